@@ -20,7 +20,7 @@ COMMANDS: dict[str, str] = {
     "robots": "list the robots, or check a URDF",
     "lessons": "list the lessons, or run every claim of them headless",
     "grade": "judge solutions of the exercises, one file or a folder of them",
-    "new": "write a template of a controller, scene, lesson or task of your own",
+    "new": "write a template of a controller, scene, lesson, task or exercise of your own",
     "bench": "control-step times of the routes and solvers, side by side",
     "reproduce": "the papers' tables and figures: our number beside the printed one",
     "sweep": "a grid of runs over settings, as a map; a stopped sweep can be continued",

@@ -180,7 +180,9 @@ LESSONS = {
         *("teaching", "recording", "scenes/run_spec", "session", "scenes", "settings", "events", "own"),
         "parallel",
     ),
-    "authoring": ("course", "exercises", "teaching", "runs", "scenes", "events", "own"),
+    "authoring": (
+        *("course", "exercises", "teaching", "scenes/run_spec", "runs", "scenes", "events", "own"),
+    ),
     "replay": ("course", "scenes/run_spec", "scenes", "settings", "events", "own"),
     "papers": ("replay", "experiments", "scenes/run_spec", "scenes", "settings", "plots"),
 }

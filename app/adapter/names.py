@@ -48,7 +48,16 @@ CHART, CHART_TITLE = ".uplot", ".u-title"
 NUMBER_BOX, SLIDER_LABEL = ".mantine-NumberInput-root", ".mantine-Slider-label"
 SHEET = 'div[style*="width: 20em"]'
 """The sheet at the bottom of a phone."""
+ROW = ".mantine-Flex-root"
+"""A control with its label."""
+ICON_BUTTON, CLOSES_NOTICE = ".mantine-ActionIcon-root", ".mantine-Notification-closeButton"
+SCROLLS = ".mantine-ScrollArea-viewport"
+STORED = "viser-user:"
+"""What viser puts before the keys of values that a browser stores."""
 OF_THE_PAGE = (
+    ("MessageHandler.tsx", f'LOCAL_STORAGE_PREFIX = "{STORED}"'),
+    ("components/common.tsx", '<Flex align="center">'),
+    ("components/common.tsx", "<label htmlFor={props.uuid}>"),
     ("App.tsx", "w.__viserMutable = mutable.current"),
     ("WebsocketInterface.tsx", "viewerMutable.sendMessage = (message)"),
     ("components/UplotComponent.css", f"{CHART} {CHART_TITLE} {{"),

@@ -6,13 +6,15 @@ import math
 from collections.abc import Mapping
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import tyro
 
+from app.commands.autograder import write_autograder
+from app.commands.handed_in import TEXTS, handed_in
 from app.commands.output import print_table, write_json
+from app.commands.own_exercise import check_exercise, print_exercise, print_hints
 from app.commands.progress import progress_bar
-from robots import InputError
 from robots.errors import unknown_name
 
 if TYPE_CHECKING:
@@ -24,14 +26,19 @@ def grade(
     exercise: tyro.conf.Positional[str | None] = None,
     hints: int = 0,
     seed: int = 0,
-    out: Path = Path("grades.csv"),
+    out: Path | None = None,
     scheduler: str | None = None,
     key: str | None = None,
     json: str | None = None,
+    format: Literal["gradescope", "github"] | None = None,
+    visibility: Literal["visible", "hidden", "after_due_date", "after_published"] = "visible",
+    check: Path | None = None,
+    autograder: str | None = None,
 ) -> int:
     """Run a solution of an exercise and grade its behaviour; without a file, list the exercises.
 
-    The name of an exercise instead of a file shows this exercise, with --hints N also its first N hints.
+    The name of an exercise instead of a file shows this exercise, with --hints N also its first N hints. For
+    an exercise of your own: himpc-lab grade EXERCISE.py SUBMISSIONS.
 
     Every file runs in a process of its own for at most a minute. A folder of submissions gives one table. If
     the command was stopped, the same command continues it. Exit code 0: all points; 1: some are missing; 2:
@@ -39,41 +46,89 @@ def grade(
 
     Args:
         file: Python file with the solution, or a folder of them; or the name of an exercise; or the text that
-            the page wrote about a learner's progress.
+            the page wrote about a learner's progress; or the file of an exercise of your own, followed by
+            the file or folder of solutions.
         exercise: name of the exercise; by default the name that the file assigns to EXERCISE.
         hints: number of hints of the exercise to show.
         seed: seed of the disturbances.
-        out: file for the table of a folder; an unfinished table is continued.
+        out: file for the table of a folder, grades.csv by default, an unfinished table is continued; with
+            --autograder the new folder, autograder by default.
         scheduler: address of a Dask scheduler, e.g. tcp://10.0.0.1:8786, for a folder, instead of this
             machine's cores.
         key: file with the key of your lab, to check whether your lab signed the progress that was handed in.
         json: write JSON to this file, or to standard output for "-".
+        format: write JSON as Gradescope or GitHub Classroom's reporter reads it, to results.json or --json;
+            for one file, or a folder with one file.
+        visibility: when Gradescope shows the checks to students.
+        check: file of an exercise of your own: show it, and test that its solution gets all points, that
+            every mistake loses some, and that every check is failed by a mistake.
+        autograder: name or file of an exercise: write the folder that Gradescope's containers need.
     """
     from lessons.exercises import EXERCISES
-    from lessons.exercises.grade import as_data
     from lessons.exercises.grade import grade as grade_file
+    from lessons.exercises.result import as_data
 
+    if check is not None:
+        return check_exercise(check, seed, hints, json)
+    if autograder is not None:
+        return write_autograder(autograder, Path("autograder") if out is None else out)
+    if file is not None and exercise is not None and _is_own(file, exercise):
+        file, exercise = Path(exercise), str(file)
     if file is None or (exercise is None and str(file) in EXERCISES and not file.exists()):
         return _list(None if file is None else str(file), hints, json)
     if not file.exists() and exercise is None and not file.suffix:
         raise unknown_name("file or exercise called", str(file), EXERCISES)
+    if format is not None:
+        return _formatted(file, exercise, seed, format, visibility, json)
     if file.is_dir():
-        return _folder(file, exercise, seed, out, scheduler, json)
-    if file.suffix in _TEXTS:
-        return _handed_in(file, key, json)
+        return _folder(file, exercise, seed, out or Path("grades.csv"), scheduler, json)
+    if file.suffix in TEXTS:
+        return handed_in(file, key, json)
     found = grade_file(str(file), exercise, seed)
     if json is not None:
         write_json(as_data(found), json)
     else:
-        _show(found, hints)
+        _show(found, exercise, hints)
+    return _code(found)
+
+
+def _code(found: Grade) -> int:
     return 2 if found.error else 0 if found.passed else 1
 
 
-def _show(found: Grade, hints: int) -> None:
-    from lessons.exercises import load_exercise
+def _is_own(first: Path, second: str) -> bool:
+    """Whether the first of two arguments is the file of an exercise and the second the solutions."""
+    from lessons.exercises import EXERCISES
+    from lessons.own.files import is_file
+
+    return is_file(first.name) and second not in EXERCISES and Path(second).exists()
+
+
+def _formatted(
+    file: Path,
+    exercise: str | None,
+    seed: int,
+    form: Literal["gradescope", "github"],
+    visibility: Literal["visible", "hidden", "after_due_date", "after_published"],
+    json: str | None,
+) -> int:
+    """The grade of one file as another system reads it. Whatever was handed in, there is a grade."""
+    from lessons.exercises.formats import formatted
+    from lessons.exercises.grade import grade_only
+
+    found = grade_only(file, exercise, seed)
+    target = json or "results.json"
+    write_json(formatted(found, form, visibility), target)
+    if target != "-":
+        print(f"{found.points} of {found.of} points: {target}")
+    return _code(found)
+
+
+def _show(found: Grade, exercise: str | None, hints: int) -> None:
+    from lessons.exercises.own import any_exercise
 
     if found.error:
-        print(f"{found.error}\n0 of 10 points")
+        print(f"{found.error}\n0 of {found.of} points")
         if found.protection:
             print(_kept(found.protection))
         return
@@ -91,7 +146,7 @@ def _show(found: Grade, hints: int) -> None:
     print_table(f"{found.file} · {found.exercise}", columns, rows)
     print(f"{found.points} of {found.of} points")
     print(_kept(found.protection))
-    _hints(load_exercise(found.exercise).hints, hints)
+    print_hints(any_exercise(exercise or found.exercise).hints, hints)
 
 
 def _kept(protection: tuple[str, ...]) -> str:
@@ -99,11 +154,6 @@ def _kept(protection: tuple[str, ...]) -> str:
     if not protection:
         return "files, network and processes were refused by Python alone, which hostile code can bypass"
     return f"files, network and processes were refused by {' and '.join(protection)}, and by Python"
-
-
-def _hints(all_hints: tuple[str, ...], count: int) -> None:
-    for number, hint in enumerate(all_hints[:count], start=1):
-        print(f"hint {number} of {len(all_hints)}: {hint}")
 
 
 def _list(exercise: str | None, hints: int, json: str | None) -> int:
@@ -129,14 +179,7 @@ def _list(exercise: str | None, hints: int, json: str | None) -> int:
         )
         return 0
     for each in chosen:
-        card = each.card
-        print(f"{each.name}: {card.title} ({card.minutes} minutes; belongs to lesson {each.lesson})")
-        print(f"  {card.question}")
-        print(f"  {each.plain}")
-        print(f"  begin: {each.commands()[0]}")
-        for check in each.checks(0):
-            print(f"    {check.points} points: {check.text} {check.condition}")
-        _hints(each.hints, hints)
+        print_exercise(each, each.commands()[0], hints)
     return 0
 
 
@@ -162,60 +205,3 @@ def _folder(
 
 def _short(row: Mapping[str, str]) -> list[str]:
     return [row["file"], row["exercise"], f"{row['points']}/{row['of']}", row["error"] or row["missed"]]
-
-
-_TEXTS = (".txt", ".text", "")
-"""Name of a file that contains the text which the page wrote."""
-
-
-def _handed_in(file: Path, key: str | None, json: str | None) -> int:
-    from app.link.exercise import parts_of
-    from lessons.course import COURSE, load_lesson
-    from lessons.replay.progress import read_handed_in, read_key
-
-    try:
-        text = file.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError):
-        raise InputError(
-            f"{file}: cannot be read as text; give the file with the text that the page wrote"
-        ) from None
-    try:
-        handed, proof = read_handed_in(text, None if key is None else read_key(key))
-    except InputError as error:
-        raise InputError(f"{file}: {error}") from None
-    progress = handed.progress
-    lessons = [
-        {
-            "lesson": name,
-            "steps": [place + 1 for place in sorted(progress.seen.get(name, ()))],
-            "of": len(parts_of(load_lesson(name))),
-            "score": progress.best.get(name),
-        }
-        for name in COURSE
-        if name in progress.seen or name in progress.best
-    ]
-    if json is not None:
-        data = {"name": handed.name, "at": handed.at, "proof": proof, "code": handed.code, "lessons": lessons}
-        write_json(data, json)
-    else:
-        rows = [
-            [str(each["lesson"]), f"{len(each['steps'])} of {each['of']}", _score(each["score"])]
-            for each in lessons
-        ]
-        print_table(f"{handed.name or 'nobody'}, {handed.at}", ("lesson", "steps run", "best score"), rows)
-        print(_SAYS[proof] if key else _NOT_JUDGED)
-        if handed.code:
-            print(f"setting on the page then: himpc-lab --state {handed.code}")
-    return 0 if key is None or proof == "signed" else 1
-
-
-def _score(points: float | None) -> str:
-    return "–" if points is None else f"{points:.0f}"
-
-
-_SAYS = {
-    "signed": "signed by a lab with your key",
-    "not signed": "not signed: anybody could have written it",
-    "signed with another key": "signed with another key, or changed",
-}
-_NOT_JUDGED = "signature not checked: give the key of your lab with --key FILE"

@@ -8,7 +8,7 @@ import tyro
 
 
 def new(
-    kind: tyro.conf.Positional[Literal["controller", "scene", "lesson", "task"]],
+    kind: tyro.conf.Positional[Literal["controller", "scene", "lesson", "task", "exercise"]],
     file: tyro.conf.Positional[str],
     start: Annotated[str | None, tyro.conf.arg(name="from", metavar="NAME")] = None,
 ) -> int:
@@ -17,21 +17,30 @@ def new(
     Args:
         kind: the kind of file.
         file: where to write it.
-        start: copy an existing one: an example controller (pd, osf, one_level_qp, himpc_one_page) or the
-            file of an exercise (himpc-lab grade lists them), a scene, a lesson, or a kind of task (com,
-            plane_distance, …).
+        start: copy an existing one: an example controller (pd, osf, one_level_qp, himpc_one_page), or what
+            students begin with in an exercise (himpc-lab grade lists them; or the path of one of your own);
+            a scene, a lesson, or a kind of task (com, plane_distance, …).
     """
     from lessons.authoring.new import write_new
-    from lessons.exercises import EXERCISES, load_exercise
+    from lessons.exercises import EXERCISES
+    from lessons.exercises.own import any_exercise
+    from lessons.own.files import is_file
 
     write_new(kind, file, start)
-    exercise = load_exercise(start) if start is not None and start in EXERCISES else None
-    if exercise is not None:
+    exercise = any_exercise(start) if start in EXERCISES or (start is not None and is_file(start)) else None
+    if exercise is not None and start is not None and exercise.start:
+        lines = (f"himpc-lab grade {start} {file}",)
+    elif exercise is not None:
         lines = (f"himpc-lab run {exercise.scene} --controller {file}", *exercise.commands(file)[1:])
     else:
         own = f"planar3-circle --controller {file}" if kind == "controller" else file
         lines = {
             "lesson": (f"himpc-lab lessons --check {file}", f"himpc-lab --lesson {file}"),
+            "exercise": (
+                f"himpc-lab grade --check {file}",
+                f"himpc-lab new controller start.py --from {file}",
+                f"himpc-lab grade {file} start.py",
+            ),
         }.get(kind, (f"himpc-lab run {own}", f"himpc-lab --scene {own}"))
     print("\n  ".join((f"{file} is written. Try it:", *lines)))
     return 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from typing import Annotated
 
@@ -27,6 +28,8 @@ def serve(
         tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="ORIGIN")
     ] = (),
     no_token: bool = False,
+    token_file: Annotated[str | None, tyro.conf.arg(metavar="FILE")] = None,
+    one_of_several: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     own_files: Annotated[str | None, tyro.conf.arg(metavar="DIR")] = None,
     no_own_files: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     key: str | None = None,
@@ -51,12 +54,17 @@ def serve(
         trusted_origin: address at which a reverse proxy serves the page, e.g. https://lab.example.org;
             docs/serving.md describes a proxy with TLS.
         no_token: let everybody use the page who can reach it; this includes every user of this machine.
+        token_file: file with a token of your own, for several servers behind one address; the environment
+            variable HIMPC_LAB_TOKEN does the same.
+        one_of_several: while all places are used, answer 503, so that the proxy in front tries the next
+            server; docs/serving.md describes one.
         own_files: folder of the Python and URDF files that you can open from the page, by default the folder
             in which himpc-lab is started. Only the page of the first printed address can open them.
         no_own_files: no page can open files of this machine.
         key: file with a key of yours, 16 characters or more, which signs the progress that learners hand in.
     """
     from app.link.choice import SceneChoice
+    from app.server.passes import given_token
     from app.server.server import FIRST
     from app.server.server import serve as serve_page
     from lessons.own.folder import Folder
@@ -90,4 +98,6 @@ def serve(
         ask_token=not no_token,
         own_files=None if no_own_files else Folder.at(own_files or "."),
         key=None if key is None else read_key(key),
+        token=given_token(token_file, os.environ),
+        refers=one_of_several,
     )

@@ -2,34 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 RGB = tuple[int, int, int]
 
-LEVELS: tuple[RGB, ...] = (
-    (240, 130, 20),  # orange: the colour that the first sentence of the page names
-    (59, 130, 246),
-    (22, 163, 104),
-    (168, 85, 247),
-    (225, 29, 116),
-    (13, 148, 150),
-)
-DAMPING: RGB = (139, 149, 161)
-JOINTS: tuple[RGB, ...] = (
-    (230, 75, 60),
-    (240, 150, 20),
-    (90, 170, 50),
-    (20, 160, 160),
-    (59, 130, 246),
-    (140, 90, 240),
-    (215, 70, 160),
-    (140, 110, 80),
-    (110, 125, 140),
-)
-BAD: RGB = (225, 45, 45)
-GOOD: RGB = (22, 163, 104)
+WHITE: RGB = (255, 255, 255)
+BLACK: RGB = (0, 0, 0)
+LIGHT_PAGE, DARK_PAGE = WHITE, (36, 36, 36)
+"""What stands behind lists and plots; the 3D view is white, or darker than the page."""
+
+BAD: RGB = (215, 38, 38)
+GOOD: RGB = (22, 158, 100)
 BOUND: RGB = (139, 149, 161)
 GHOST: RGB = (124, 92, 230)
+DAMPING: RGB = BOUND
+
+# Each pair of these and of BOUND differs by a CIEDE2000 of at least 10 for normal sight, deuteranopia and
+# protanopia, and each has a contrast of at least 3 on both pages; tests/app/test_app_palette.py computes it.
+_ORANGE: RGB = (226, 112, 0)  # the first level: texts of lessons call it orange
+_BLUE: RGB = (48, 121, 240)  # the second level: texts of lessons call it blue
+_GREEN: RGB = (37, 137, 100)
+_MAGENTA: RGB = (231, 0, 198)
+_ROSE: RGB = (255, 33, 114)
+_TEAL: RGB = (2, 125, 153)
+LEVELS: tuple[RGB, ...] = (_ORANGE, _BLUE, _GREEN, _MAGENTA, _ROSE, _TEAL)
+JOINTS: tuple[RGB, ...] = (BAD, _ORANGE, _GREEN, _TEAL, _BLUE, _MAGENTA, _ROSE)
+_DASHES: tuple[tuple[float, ...], ...] = ((), (12.0, 3.0), (12.0, 3.0, 2.0, 3.0))
+"""The pattern of the first seven joints (solid), of the next seven, and so on: joints that share a colour
+differ in the pattern."""
 
 
 def css(colour: RGB, alpha: float = 1.0) -> str:
@@ -62,3 +62,51 @@ def recoloured(names: Sequence[str], before: dict[str, RGB]) -> dict[str, RGB]:
 
 def joint_colour(index: int) -> RGB:
     return JOINTS[index % len(JOINTS)]
+
+
+def joint_dash(index: int) -> tuple[float, ...]:
+    """Lengths of dashes and gaps in px of the curve of a joint; empty for a solid curve."""
+    return _DASHES[index // len(JOINTS) % len(_DASHES)]
+
+
+def contrast(one: RGB, other: RGB) -> float:
+    """The contrast ratio of WCAG 2.1, 1 … 21."""
+    low, high = sorted((_luminance(one), _luminance(other)))
+    return (high + 0.05) / (low + 0.05)
+
+
+def on(colour: RGB) -> RGB:
+    """White or black, whichever is easier to read on the colour; its contrast is at least 4.58."""
+    return max((WHITE, BLACK), key=lambda text: contrast(text, colour))
+
+
+def button(colour: RGB) -> RGB:
+    """The colour, as dark as a button must be on which the page writes in white."""
+    return next(found for found in _mixed(colour, BLACK) if contrast(found, WHITE) >= 4.6)
+
+
+def ink(colour: RGB) -> str:
+    """The CSS colour of text in this colour, darker on a light page and lighter on a dark one."""
+    light, dark = readable_on(colour, LIGHT_PAGE), readable_on(colour, DARK_PAGE)
+    return f"light-dark({css(light)},{css(dark)})"
+
+
+def readable_on(colour: RGB, page: RGB) -> RGB:
+    """The colour, mixed with black or white until its contrast with the page is at least 7.5: enough for
+    4.5 on pale areas and in paler paragraphs."""
+    return next(found for found in _mixed(colour, on(page)) if contrast(found, page) >= _TEXT)
+
+
+def _mixed(colour: RGB, end: RGB) -> Iterator[RGB]:
+    """From the colour to `end` in steps of a twentieth."""
+    for share in range(21):
+        r, g, b = (round(own + share / 20 * (to - own)) for own, to in zip(colour, end, strict=True))
+        yield r, g, b
+
+
+_TEXT = 7.5
+
+
+def _luminance(colour: RGB) -> float:
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in (v / 255 for v in colour)]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]

@@ -11,7 +11,7 @@ from functools import lru_cache
 
 from latex2mathml.converter import convert
 
-from app.html.palette import BAD, GOOD, RGB, css
+from app.html.palette import BAD, GOOD, RGB, css, on
 
 esc = html.escape
 
@@ -47,7 +47,7 @@ def swatch(colour: RGB) -> str:
 
 def badge(text: str, colour: RGB) -> str:
     return (
-        f'<span style="background:{css(colour)};color:#fff;border-radius:4px;padding:0 0.4em;'
+        f'<span style="background:{css(colour)};color:{css(on(colour))};border-radius:4px;padding:0 0.4em;'
         f'font-weight:600;white-space:nowrap">{esc(text)}</span>'
     )
 
@@ -85,7 +85,8 @@ def bar(share: float, colour: RGB, mark: float | None = None) -> str:
 @lru_cache(maxsize=64)
 def formula(latex: str) -> str:
     """A LaTeX formula as MathML that scrolls instead of being cut off."""
-    return f'<div style="overflow-x:auto;padding:0.3em 0.75em">{convert(latex, display="block")}</div>'
+    style = "overflow-x:auto;padding:0.3em 0.75em"
+    return f'<div tabindex="0" style="{style}">{convert(latex, display="block")}</div>'
 
 
 def figure(value: float, unit: str = "") -> str:

@@ -21,6 +21,7 @@ from app.client.trouble import Trouble
 from app.html.palette import level_colours, recoloured
 from app.link.choice import SceneChoice
 from app.link.messages import Post, Ready, Status
+from app.page.comfort import Comfort
 from app.page.ui import Context, face_for
 from app.panels.lesson.course import Course
 from app.panels.run.active_constraints import BindingPanel
@@ -65,12 +66,13 @@ class Stage:
         own_files: Folder | None,
         loop: asyncio.AbstractEventLoop,
         notebook: Notebook,
+        comfort: Comfort,
         phone: bool,
     ) -> None:
         """phone: whether the page is shown on a phone, which has no panel at the left: the plots are then
         tabs of the other panel."""
         self._client, self._learner, self._ready = client, learner, ready
-        self._theme = theme
+        self._theme, self._comfort = theme, comfort
         self._colours = level_colours([task.level for task in in_order(ready)])
         self._bindings: Bindings[Any] = Bindings(self._post, loop)
         self._in_view = InView(client)
@@ -126,6 +128,7 @@ class Stage:
         with tabs.add_tab("Robot"):
             self._robot_panel = RobotPanel(gui, self._ready, scenes, choose, own_files)
         with tabs.add_tab("Help"):
+            self._comfort.add_switch(gui)
             self._help = HelpPanel(gui)
         for place, key in enumerate(_HOTKEYS):  # also for levels that may be added later
             add_command(gui, f"Level {place + 1} on or off", key, partial(self._toggle, place))
@@ -243,6 +246,7 @@ class Stage:
         now = replace(shown, status=learner.status)
         with self._client.atomic():
             self._playback.update(now)
+            self._comfort.follow(now)
             if found[1] > 0:
                 self._compare.update(now)
                 self._face.write(shown)

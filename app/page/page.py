@@ -21,6 +21,7 @@ from app.client.trouble import Trouble
 from app.html.text import block, in_trouble
 from app.link.choice import SceneChoice
 from app.link.messages import Ready
+from app.page.comfort import Comfort
 from app.page.fault import FaultNotice
 from app.panels.widgets.command import add_command
 from lessons.own.folder import Folder
@@ -51,6 +52,7 @@ class Page:
         own_files: Folder | None,
         loop: asyncio.AbstractEventLoop,
         notebook: Notebook,
+        comfort: Comfort,
         on_dark: Callable[[bool], None],
         greet: Callable[[viser.GuiApi], None],
     ) -> None:
@@ -65,7 +67,7 @@ class Page:
         self._dark = dark
         self._own_files = own_files
         self._event_loop = loop
-        self._notebook = notebook
+        self._notebook, self._comfort = notebook, comfort
         self._phone = False
         self._seen: tuple[str | None, ...] | None = None  # the scene to which the camera was turned
         self._stage: Stage | None = None
@@ -236,9 +238,11 @@ class Page:
                 self._own_files,
                 self._event_loop,
                 self._notebook,
+                self._comfort,
                 self._phone,
             )
             add_command(self._client.gui, "Camera: all of the robot", "F", self._frame)
+            self._comfort.opened(self.learner)
             run = ready.choice.run
             seen = (run.scene, run.urdf, run.tip, ready.choice.urdf_text, ready.robot.name)
             if seen != self._seen:  # after a restart the camera stays as the learner left it

@@ -9,12 +9,14 @@ from typing import ClassVar
 import numpy as np
 import viser
 
+from app.adapter.removed_handle_errors import unless_removed
 from app.client.moment import Moment
 from app.html.palette import LEVELS
 from app.link.messages import Ready, Status
 from app.page.scene_ui import Context
 from app.panels.inside.inside import InsidePanel
 from app.panels.run.joints import JointPlots
+from app.panels.run.move import MovePanel
 from app.panels.torque.controller import ControllerPanel
 from app.panels.torque.plant import add_plant
 from app.panels.torque.plots import LevelPlots
@@ -26,6 +28,7 @@ from app.view.cover import CoverView
 from app.view.drag import Hand
 from app.view.ellipsoids import EllipsoidView
 from app.view.link_picker import LinkPicker
+from app.view.movable import Movable
 from app.view.pull import Pull
 from app.view.robot import RobotView, gizmo_size
 from app.view.target import TargetFrames
@@ -54,6 +57,7 @@ class TorqueFace:
         ready, bindings, settings = context.ready, context.bindings, context.settings
         with tabs.add_tab("Start"):
             self._start = StartPanel(gui, context.post, ready, settings, context.colours, context.dark)
+            self._move = MovePanel(gui, self._movables)
         with tabs.add_tab("Tasks"):
             self._tasks = TasksPanel(
                 gui,
@@ -171,6 +175,9 @@ class TorqueFace:
     def toggle(self, place: int) -> Set | None:
         return self._tasks.toggle(place)
 
+    def _movables(self) -> list[Movable]:
+        return [*self._hand.movables(), *self._targets.movables()]
+
     def _recall(self) -> None:
         poses = self._context.poses()
         if poses is not None:
@@ -216,6 +223,7 @@ class TorqueFace:
             now.latest[fields["gauge_norm"]], now.latest[fields["gauge_radius"]] = now.status.gauge
         self._start.show_verdict(self._hand.verdict, bool(self._start.clamp.value))
         self._start.update(now, self._context.colours)
+        self._context.loop.call_soon_threadsafe(unless_removed, self._move.update)
         self._tasks.update(now)
         self._controller.update(now)
         self._inside.write(now.status, now.settings)

@@ -3,16 +3,19 @@ obstacles."""
 
 from __future__ import annotations
 
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
 import viser
 
+from app.adapter.removed_handle_errors import unless_removed
 from app.client.moment import Moment
 from app.html.text import free_name
 from app.link.messages import Ready, Status, TaskView
 from app.page.scene_ui import Context
 from app.panels.run.joints import ACCELERATION, JointPlots
+from app.panels.run.move import MovePanel
 from app.panels.velocity.controller import HtmpcPanel
 from app.panels.velocity.mission import MissionPanel, swap
 from app.panels.velocity.plant import add_servo_plant
@@ -24,6 +27,7 @@ from app.panels.widgets.snapshot import SessionSnapshot
 from app.view.coordinates import full
 from app.view.follow import FollowBase
 from app.view.goals import Goals
+from app.view.movable import Movable
 from app.view.obstacles import Obstacles
 from app.view.robot import RobotView, gizmo_size, look_at
 from app.view.surroundings import Carried, People, ReachCircle
@@ -33,6 +37,7 @@ from himpc.htmpc import base_joints
 from lessons.events import Appear, Set
 from lessons.settings.missions import ArchitectureOptions
 from lessons.settings.velocity import VelocitySettings
+from robots.collision import Ball, Box
 from robots.stretch import horizontal_reach
 
 _AHEAD, _RADIUS = 0.7, 0.2
@@ -60,6 +65,7 @@ class VelocityFace:
             self._begin = BeginPanel(
                 gui, ready.choice.run.scene, roles, colours, bool(self._base), context.dark
             )
+            self._move = MovePanel(gui, self._movables)
         with tabs.add_tab("Mission"):
             self._mission = MissionPanel(
                 gui,
@@ -146,6 +152,19 @@ class VelocityFace:
     def _put(self, name: str, centre: tuple[float, float, float]) -> None:
         self._context.post(Set(f"obstacles.{name}", centre))
 
+    def _movables(self) -> list[Movable]:
+        goals = self._goals.movables()
+        taken = {each.name for each in goals}
+        return goals + [
+            Movable(each.name, partial(np.array, each.centre), partial(self._put_at, each.name))
+            for each in self._settings().htmpc.obstacles
+            if isinstance(each, (Ball, Box)) and each.name not in taken
+        ]
+
+    def _put_at(self, name: str, place: np.ndarray) -> None:
+        x, y, z = place.tolist()
+        self._put(name, (x, y, z))
+
     def _add_obstacle(self) -> None:
         """Adds a ball in front of the hand, as seen from the base: close enough to have an effect, but not
         yet in the way."""
@@ -223,6 +242,7 @@ class VelocityFace:
 
     def write(self, now: SessionSnapshot[VelocitySettings]) -> None:
         self._begin.update(now)
+        self._context.loop.call_soon_threadsafe(unless_removed, self._move.update)
         self._mission.update(now)
         self._roles.update(now)
         self._controller.update(now)

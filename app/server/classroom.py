@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import secrets
 from collections.abc import Sequence
-from typing import cast
+from typing import ClassVar, cast
 
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
@@ -47,6 +47,8 @@ for _name in ("send", "start_ghost", "stop_ghost", "reset_all", "load", "restart
 class Classroom:
     """Replaces `Sessions` in a classroom: every visitor is admitted, and the session lasts as long as the
     server."""
+
+    turns_away: ClassVar[bool] = False
 
     def __init__(self, choice: SceneChoice) -> None:
         self.token = secrets.token_urlsafe(16)

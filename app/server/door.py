@@ -57,6 +57,10 @@ class Door:
         """Returns None if the request is admitted, else the response to send. An admitted request names this
         server as its host and, if the browser says which page sent it, that page is one of ours. who:
         identifies the sender, see `app.server.peers`."""
+        return self.refuses(request) or self._ask_token(request, request.headers["Host"], who)
+
+    def refuses(self, request: Request) -> Answer | None:
+        """As `judge`, but asks for no token."""
         headers = request.headers
         hosts, origins = headers.get_all("Host"), headers.get_all("Origin")
         if len(hosts) != 1 or len(origins) > 1:
@@ -72,7 +76,7 @@ class Door:
             return _foreign("A page of another site embeds this page.")
         if _leads_away(request):
             return _foreign("Its address would connect the page to another server.")
-        return self._ask_token(request, hosts[0], who)
+        return None
 
     def is_owner(self, request: Request, who: str = "") -> bool:
         """Whether the person who started the server sent this upgrade, which must have been admitted."""
@@ -104,15 +108,18 @@ class Door:
         role = self.passes.in_address(request.path)
         if role is not None:
             return None if is_upgrade(request) else self._keep(request, host, role, who)
+        if self.passes.in_header(request.headers):
+            return None
         if self.passes.token is None or self.passes.in_cookies(request.headers, who) is not None:
             return None
         text = _WRONG if QUERY in _query(request) else _NEEDED
         return Answer(HTTPStatus.FORBIDDEN, "A token is needed", text, _NOT_KEPT)
 
     def _keep(self, request: Request, host: str, role: Role, who: str) -> Answer:
-        """A response that removes the secret from the address and puts a proof of it into the cookie."""
+        """A response that removes the secret from the address and puts a proof of it into the cookie. The
+        browser sends the cookie to the folder of this address and below, also behind a proxy's prefix."""
         secure = "; Secure" if f"https://{host.lower()}" in self.trusted else ""
-        cookie = f"{self.passes.keep(role, who)}; HttpOnly; SameSite=Strict; Path=/{secure}"
+        cookie = f"{self.passes.keep(role, who)}; HttpOnly; SameSite=Strict{secure}"
         kept = (("Set-Cookie", cookie), *_NOT_KEPT)
         rest = urlencode({name: values for name, values in _query(request).items() if name != QUERY}, True)
         page = f"./?{rest}" if rest else "./"

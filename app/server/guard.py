@@ -20,6 +20,7 @@ from app.server import budget
 from app.server.budget import Budget
 from app.server.connection_limits import ConnectionLimits
 from app.server.door import Answer, Door, is_upgrade, secured
+from app.server.load import Load, Places, load_of, report
 from app.server.peers import ends_of
 from app.server.uploads import TRANSFER, Uploads
 from app.server.words import refusal
@@ -46,11 +47,21 @@ class ConnectionGuard:
         self.taken = 0
         """Number of messages that were passed on to viser."""
         self._door = door
-        self._open = False
+        self._open = self._refers = False
+        self._places: Places | None = None
 
-    def open(self, door: Door) -> None:
-        """Admits requests according to `door` from now on."""
-        self._door, self._open = door, True
+    def open(self, door: Door, places: Places | None = None, refers: bool = False) -> None:
+        """Admits requests according to `door` from now on.
+
+        places: the sessions, for /health and /metrics. refers: a newcomer is refused with status 503 while
+            every place is used, so that a proxy tries the next server; otherwise their page says so.
+        """
+        self._door, self._places, self._refers, self._open = door, places, refers, True
+
+    @property
+    def load(self) -> Load:
+        """How busy the server is."""
+        return load_of(self._places, len(self.crowd), self.refused, self.taken, not self._open)
 
     def close(self) -> None:
         self._open = False
@@ -60,6 +71,9 @@ class ConnectionGuard:
         files: Callable[[ServerConnection, Request], Response | None] = given["process_request"] or _nothing
 
         def request(connection: ServerConnection, request: Request) -> Response | None:
+            told = None if is_upgrade(request) else report(request.path, self.load)
+            if told is not None and self._door.refuses(request) is None:
+                return _plain(*told)
             answer = self._judge(connection, request)
             if answer is not None:
                 self.refused += answer.status >= HTTPStatus.BAD_REQUEST
@@ -87,12 +101,14 @@ class ConnectionGuard:
 
     def _judge(self, connection: ServerConnection, request: Request) -> Answer | None:
         if not self._open:
-            return Answer(HTTPStatus.SERVICE_UNAVAILABLE, "Starting", "<p>Try again in a moment.</p>")
+            return _NOT_OPEN
         answer = self._door.judge(request, _user(connection))
         if answer is None and not self.crowd.comes_from(connection, self.address(connection, request)):
             return Answer(
                 HTTPStatus.SERVICE_UNAVAILABLE, "Too many pages", "<p>Close some of them and try again.</p>"
             )
+        if answer is None and self._refers and self.load.full:
+            return _FULL
         return answer
 
     def _is_owners(self, connection: ServerConnection, request: Request) -> bool:
@@ -208,6 +224,22 @@ def _nothing_said(_: str) -> None:
 
 def _nothing(_: ServerConnection, __: Request) -> Response | None:
     return None
+
+
+_NOT_OPEN = Answer(HTTPStatus.SERVICE_UNAVAILABLE, "Starting or stopping", "<p>Try again in a moment.</p>")
+_FULL = Answer(
+    HTTPStatus.SERVICE_UNAVAILABLE,
+    "All places are taken",
+    "<p>Every robot is in use. This page tries again by itself.</p>",
+    (("Retry-After", "5"), ("Refresh", "5"), ("Cache-Control", "no-store")),
+)
+
+
+def _plain(status: HTTPStatus, kind: str, text: str) -> Response:
+    body = text.encode()
+    headers = Headers({"Content-Type": kind, "Content-Length": str(len(body)), "Cache-Control": "no-store"})
+    headers["Connection"] = "close"
+    return Response(status.value, status.phrase, headers, body)
 
 
 def _response(answer: Answer) -> Response:

@@ -4,16 +4,25 @@ from __future__ import annotations
 
 import hashlib
 import hmac
+import re
 import secrets
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Literal
 from urllib.parse import parse_qs, urlencode, urlsplit
 
 from websockets.datastructures import Headers
 
+from robots import InputError
+
 QUERY = "himpc-token"
 """The name of the parameter in the address. Jupyter, which may serve a lab, uses `token` for itself."""
+HEADER = "X-Himpc-Lab-Token"
+"""The name of the header in which a proxy may send the token of its visitors."""
+VARIABLE = "HIMPC_LAB_TOKEN"
+"""The environment variable with a token of the user's own."""
+SHORTEST = 16  # characters of a token of the user's own
 Role = Literal["guest", "owner"]
 _ROLES: tuple[Role, ...] = ("owner", "guest")
 
@@ -21,6 +30,33 @@ _ROLES: tuple[Role, ...] = ("owner", "guest")
 def new_token() -> str:
     """A random token of 128 bits, as text that can be part of an address."""
     return secrets.token_urlsafe(16)
+
+
+def given_token(file: str | None, environment: Mapping[str, str]) -> str | None:
+    """The token that the user gives, so that several servers have the same one: the first line of a file, or
+    the environment variable `VARIABLE`; None if neither is given. Raises InputError for a token that is too
+    short or not in letters, digits, - and _."""
+    text, place = environment.get(VARIABLE), VARIABLE
+    if file is not None:
+        place = f"--token-file {file}"
+        try:
+            text = Path(file).read_text(encoding="utf-8").partition("\n")[0]
+        except (OSError, UnicodeDecodeError):
+            raise InputError(f"{place}: cannot be read; give a text file with the token") from None
+    if text is None:
+        return None
+    if not re.fullmatch(rf"[A-Za-z0-9_-]{{{SHORTEST},200}}", text.strip()):
+        raise InputError(
+            f"{place}: a token has {SHORTEST} characters or more, letters, digits, - and _: make one with "
+            "python -c 'import secrets; print(secrets.token_urlsafe())'"
+        )
+    return text.strip()
+
+
+def shared(token: str, owner: str | None) -> Passes:
+    """The passes of a server whose token the user gave: the cookie of one such server opens all of them."""
+    key = hmac.new(token.encode(), b"cookie", hashlib.sha256).digest()
+    return Passes(token, owner, "himpc-lab", key)
 
 
 @dataclass(frozen=True)
@@ -51,10 +87,16 @@ class Passes:
         known = (self.owner, self.token)
         return _first(any(_same(each, right) for each in given) for right in known)
 
+    def in_header(self, headers: Headers) -> bool:
+        """Whether a proxy sent the token in its header; the owner's secret does not count there."""
+        given = headers.get_all(HEADER)
+        return len(given) == 1 and _same(given[0], self.token)
+
     def in_cookies(self, headers: Headers, who: str) -> Role | None:
         """The role whose cookie is in a request from `who`, see `app.server.peers`; None if there is none."""
         given = list(self._cookies(headers))
-        return _first(any(_same(each, self._value(role, who)) for each in given) for role in _ROLES)
+        right = {"guest": self._value("guest", who), "owner": self.owner and self._value("owner", who)}
+        return _first(any(_same(each, right[role]) for each in given) for role in _ROLES)
 
     def keep(self, role: Role, who: str) -> str:
         """The name and value of a visitor's cookie. It is only valid for `who`: browsers send it to all
@@ -62,7 +104,9 @@ class Passes:
         return f"{self.cookie}={self._value(role, who)}"
 
     def _value(self, role: Role, who: str) -> str:
-        return hmac.new(self.key, f"{role} {who}".encode(), hashlib.sha256).hexdigest()
+        # Guests may be able to derive the key from their token; the owner's secret is not known to them.
+        key = self.key + (self.owner or "").encode() if role == "owner" else self.key
+        return hmac.new(key, f"{role} {who}".encode(), hashlib.sha256).hexdigest()
 
     def _cookies(self, headers: Headers) -> Iterable[str]:
         # Parsed by hand: the library rejects the whole header if another server of this host has set an

@@ -23,7 +23,7 @@ from app.server.greeting import greeting
 from app.server.guard import ConnectionGuard
 from app.server.malloc_tuning import few_arenas, large_arrays_apart
 from app.server.opening import opened_in_a_browser
-from app.server.passes import Passes, new_token
+from app.server.passes import Passes, new_token, shared
 from app.server.sessions import GRACE, Sessions
 from app.server.visit import Visit
 from lessons.own.folder import Folder
@@ -47,6 +47,8 @@ def serve(
     ask_token: bool = True,
     own_files: Folder | None = None,
     key: bytes | None = None,
+    token: str | None = None,
+    refers: bool = False,
 ) -> int:
     """Serves the page until Ctrl-C or SIGTERM. Raises InputError for a scene, robot, host, port or origin
     that cannot be used.
@@ -54,7 +56,8 @@ def serve(
     With `classroom` all pages show one session, and pages on which the printed token was typed control it.
     The page asks for a token unless `ask_token` is False. The page whose address contains the owner's
     secret may open and run files below `own_files` by path; with None no page may. `key` signs the
-    learners' progress.
+    learners' progress. `token` replaces the random one; with `refers` a full server answers 503, so that a
+    proxy tries the next one.
     """
     server = PageServer(
         choice,
@@ -66,6 +69,8 @@ def serve(
         ask_token=ask_token,
         own_files=own_files,
         key=key,
+        token=token,
+        refers=refers,
     )
     stop = threading.Event()
     try:
@@ -115,6 +120,8 @@ class PageServer:
         ask_token: bool = True,
         own_files: Folder | None = None,
         key: bytes | None = None,
+        token: str | None = None,
+        refers: bool = False,
     ) -> None:
         """Arguments as for `serve`; grace: time, s, that a session outlives its tab."""
         if max_sessions < 1:
@@ -148,12 +155,13 @@ class PageServer:
         self._viser.gui.configure_theme(show_share_button=False, show_logo=False)
         self._viser.on_client_connect(self._connect)
         self._viser.on_client_disconnect(self._disconnect)
-        self.passes = Passes(
-            new_token() if ask_token else None,
-            None if own_files is None else new_token(),
-            f"himpc-lab-{found}",
-        )
-        self.guard.open(Door(local, trusted, self.passes, names_of_this_machine()))
+        owner = None if own_files is None else new_token()
+        if ask_token and token is not None:
+            self.passes = shared(token, owner)
+        else:
+            self.passes = Passes(new_token() if ask_token else None, owner, f"himpc-lab-{found}")
+        door = Door(local, trusted, self.passes, names_of_this_machine())
+        self.guard.open(door, self.sessions, refers)
         self._loading = threading.Thread(target=_load, args=(choice,), daemon=True)
         self._loading.start()
 

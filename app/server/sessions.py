@@ -8,6 +8,7 @@ import secrets
 import threading
 import time
 from collections.abc import Callable, Sequence
+from typing import ClassVar
 
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
@@ -27,6 +28,8 @@ _TIDY = 10.0
 
 class Sessions:
     """At most `max_sessions` learners, and one spare process as long as there is room for another learner."""
+
+    turns_away: ClassVar[bool] = True
 
     def __init__(self, choice: SceneChoice, max_sessions: int, grace: float = GRACE) -> None:
         self.max_sessions = max_sessions

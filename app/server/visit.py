@@ -14,6 +14,7 @@ from app.adapter import private
 from app.adapter.removed_handle_errors import print_exception
 from app.client.progress import Notebook
 from app.html.text import block
+from app.page.comfort import ASK_MOTION, MOTION, REDUCED, Comfort
 from app.page.inlet import Inlet
 from app.page.page import Page
 from app.panels.run.classroom import add_watching
@@ -58,6 +59,7 @@ class Visit:
         self._asking: asyncio.Future[tuple[str | None, ...]] | None = None
         self._dark = False
         self._notebook = Notebook(LearnerProgress(), lambda _: None)
+        self._comfort = Comfort(client, reduced=False)
         self._workers = Workers()
         self._steps = ThreadPoolExecutor(1, thread_name_prefix="visit")
         private.give_workers(client, self._workers)
@@ -76,14 +78,16 @@ class Visit:
 
     async def arrive(self) -> None:
         """Starts the visit, on viser's loop. A browser that does not answer is treated as a new one."""
-        keys = (_TOKENS, _DARK, _PROGRESS)
+        private.run_script(self._client, ASK_MOTION)
+        keys = (_TOKENS, _DARK, _PROGRESS, MOTION)
         self._asking = asyncio.ensure_future(private.read_storage(self._client, keys, STORAGE))
         try:
             found = await self._asking
         except asyncio.CancelledError:
             return  # the tab was closed
-        tokens, dark, progress = (text if text and len(text) <= _LONGEST else None for text in found)
+        tokens, dark, progress, motion = (text if text and len(text) <= _LONGEST else None for text in found)
         self._dark = dark == "1"
+        self._comfort = Comfort(self._client, motion == REDUCED and isinstance(self._sessions, Sessions))
         self._notebook = Notebook(
             found_progress(progress, self._key), lambda text: self._keep(_PROGRESS, text), self._key
         )
@@ -129,6 +133,7 @@ class Visit:
             None if isinstance(learner, Watcher) else self._own_files,
             self._server.get_event_loop(),
             self._notebook,
+            self._comfort,
             on_dark=self._remember_dark,
             greet=self._greet if isinstance(learner, Watcher) else _no_greeting,
         )

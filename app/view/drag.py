@@ -16,6 +16,7 @@ from app.client.pending_edit import Send
 from app.html.palette import RGB
 from app.link.messages import Ready
 from app.view.coordinates import draggable, full, of_task, raw, xyzw
+from app.view.movable import Movable, turned
 from app.view.reachability import Question, Reachability, ReachabilityWorker
 from app.view.target import TargetFrames, TargetGizmo
 from lessons.events import MoveTarget
@@ -131,6 +132,29 @@ class Hand:
     def _judged(self, verdict: Reachability) -> None:
         if self._gizmo is not None and verdict.question.number > self._forgotten:
             self.verdict = verdict
+
+    def movables(self) -> list[Movable]:
+        """The target as it can be moved without a mouse; [] if there is none."""
+        gizmo = self._gizmo
+        if gizmo is None:
+            return []
+        turn = self._turn_by if gizmo.turns else None
+        return [Movable(gizmo.position.name, lambda: gizmo.raw, partial(self._put, None), turn)]
+
+    def _put(self, rotation: np.ndarray | None, position: np.ndarray) -> None:
+        gizmo = self._gizmo
+        if gizmo is None:
+            return
+        active = ["xyz".index(axis) for axis in gizmo.position.axes]
+        place = gizmo.raw
+        place[active] = position[active]
+        gizmo.put(place, rotation)
+        self._moved(place, gizmo.rotation if gizmo.turns else None)
+
+    def _turn_by(self, by: np.ndarray) -> None:
+        gizmo = self._gizmo
+        if gizmo is not None:
+            self._put(turned(gizmo.rotation, by), gizmo.raw)
 
     def recall(self, tip: np.ndarray) -> None:
         """Moves the target to the robot's hand, whose pose is tip (7,)."""

@@ -39,7 +39,7 @@ class Goal:
         the goal cannot be dragged."""
         floor = "z" not in axes
         self._lift = np.array([0.0, 0.0, _LIFT if floor else 0.0])
-        self._touched = -float("inf")
+        self._touched, self._axes, self._moved = -float("inf"), axes, moved
         node = f"/goal/{role}"
         position = start + self._lift
         if moved is None:
@@ -65,10 +65,24 @@ class Goal:
 
         return hear
 
+    def put(self, place: np.ndarray) -> None:
+        """Moves the goal as its arrows do, along the directions that it has arrows for."""
+        if self._moved is not None:
+            active = ["xyz".index(axis) for axis in self._axes]
+            at = self.place
+            at[active] = place[active]
+            self._touched = time.monotonic()
+            self._node.position = at + self._lift
+            self._moved(at)
+
     @property
     def place(self) -> np.ndarray:
         """The position of the goal, (3,) m."""
         return np.array(self._node.position, float) - self._lift
+
+    def where(self) -> np.ndarray:
+        """As `place`."""
+        return self.place
 
     def follow(self, goal: np.ndarray | None, text: str) -> None:
         """goal (3,): the session's goal, m; None: it has none, and the dragged position stays."""

@@ -14,6 +14,7 @@ from app.html.text import free_name, quantity
 from app.link.messages import Ready, Status, TaskView
 from app.link.mission_view import MissionRow
 from app.view.goal import Goal
+from app.view.movable import Movable
 from app.view.targets import Targets
 from lessons.events import Event, InsertTask, MoveTarget
 
@@ -118,6 +119,14 @@ class Goals:
                 if away > _THERE:
                     text += f": {quantity(away, 'm')} to go"
             goal.follow(None if target is None else point(target), text)
+
+    def movables(self) -> list[Movable]:
+        """The goals as they can be moved without a mouse: positions first, then orientations."""
+        free = {name: task for name, task in self._roles.items() if task.raw is not None}
+        return [
+            *(Movable(name, goal.where, goal.put) for name, goal in self._goals.items() if name in free),
+            *self._rings.movables(),
+        ]
 
     @property
     def places(self) -> dict[str, np.ndarray]:

@@ -99,6 +99,11 @@ class TargetGizmo:
     def rotation(self) -> np.ndarray:
         return vtf.SO3(np.array(self._turn.wxyz, float)).as_matrix()
 
+    @property
+    def turns(self) -> bool:
+        """Whether the rings are shown."""
+        return self._rings
+
     def show_rings(self, on: bool) -> None:
         """Shows the rings if the user may rotate the target."""
         on = on and self.orientation is not None

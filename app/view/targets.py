@@ -13,6 +13,7 @@ from app.client.pending_edit import HOLD, Send
 from app.html.palette import BOUND, RGB
 from app.link.messages import Ready, TaskView
 from app.view.coordinates import draggable, full, of_task, xyzw
+from app.view.movable import Movable, turned
 from lessons.events import MoveTarget
 from robots import Robot
 
@@ -49,6 +50,10 @@ class Targets:
         instant is now, so that targets can be dragged."""
         for target in self._targets:
             target.follow(poses, of_task(target.task, raw), live)
+
+    def movables(self) -> list[Movable]:
+        """The targets as they can be moved without a mouse."""
+        return [target.movable() for target in self._targets]
 
     def remove(self) -> None:
         """Removes the targets from the scene."""
@@ -104,8 +109,29 @@ class _Target:
 
         @self._control.on_update
         async def _(_: viser.TransformControlsEvent) -> None:
-            self._touched = time.monotonic()
-            self._post(MoveTarget(self.name, self._value()))
+            self._moved()
+
+    def _moved(self) -> None:
+        self._touched = time.monotonic()
+        self._post(MoveTarget(self.name, self._value()))
+
+    def movable(self) -> Movable:
+        """The target as it can be moved without a mouse."""
+        if self.task.kind in _TURNING:
+            return Movable(self.name, self._at, turn=self._turn_by)
+        return Movable(self.name, self._at, move=self._put)
+
+    def _at(self) -> np.ndarray | None:
+        return np.array(self._control.position, float) if self._control.visible else None
+
+    def _put(self, position: np.ndarray) -> None:
+        self._control.position = position
+        self._moved()
+
+    def _turn_by(self, by: np.ndarray) -> None:
+        rotation = turned(vtf.SO3(np.array(self._control.wxyz, float)).as_matrix(), by)
+        self._control.wxyz = vtf.SO3.from_matrix(rotation).wxyz
+        self._moved()
 
     def _value(self) -> tuple[float, ...]:
         """The task's target at the dragged position."""

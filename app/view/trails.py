@@ -7,7 +7,7 @@ import viser
 
 from app.adapter import private
 from app.client.decimate import decimate
-from app.html.palette import RGB
+from app.html.palette import LEVELS, RGB
 
 EXAGGERATION = 100
 """Magnification of the prediction at torque level, where it covers only some milliseconds and would look like
@@ -47,9 +47,7 @@ class Trails:
                 f"/reference{name}/{index}", segments(points), curve_colour, thickness=0.003
             )
         self._trace = scene.add_line_segments(f"/trace{name}", NOTHING, colour, thickness=0.004)
-        self._prediction = scene.add_line_segments(
-            f"/prediction{name}", NOTHING, (225, 29, 116), thickness=0.008
-        )
+        self._prediction = scene.add_line_segments(f"/prediction{name}", NOTHING, LEVELS[4], thickness=0.008)
         self._label = scene.add_label(f"/prediction_label{name}", "", visible=False)
 
     def show(self, trace: bool, prediction: bool) -> None:

@@ -1,4 +1,4 @@
-"""Writes a template file for a controller, scene, task or lesson."""
+"""Writes a template file for a controller, scene, task, lesson or exercise."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pathlib import Path
 from himpc.tasks import KINDS
 from lessons.course import COURSE
 from lessons.exercises import EXERCISES, start_of
+from lessons.exercises.own import exercise_in
 from lessons.own.files import is_file
 from lessons.own.kinds import Kind
 from lessons.scenes.names import ALL_SCENES
@@ -34,12 +35,22 @@ of a pointing task is not.
 def choices(kind: Kind) -> Sequence[str]:
     """The templates of a kind of file."""
     controllers = (*EXAMPLES, *EXERCISES)
-    return {"controller": controllers, "scene": tuple(ALL_SCENES), "lesson": COURSE, "task": TASKS}[kind]
+    return {
+        "controller": controllers,
+        "scene": tuple(ALL_SCENES),
+        "lesson": COURSE,
+        "task": TASKS,
+        "exercise": (),
+    }[kind]
 
 
 def text_of(kind: Kind, start: str | None, file: str) -> str:
     """The text of a new file. Raises InputError if there is no such template."""
     known = choices(kind)
+    if kind == "controller" and start is not None and is_file(start):
+        return exercise_in(start).start
+    if kind == "exercise" and start is not None:
+        raise InputError("an exercise has one template: leave out --from")
     if start is not None and start not in known:
         raise unknown_name(f"template of a {kind}", start, known)
     if kind == "controller" and start in EXERCISES:

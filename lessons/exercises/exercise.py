@@ -62,14 +62,16 @@ class Exercise:
     """The task of an exercise and the checks that grade a solution.
 
     Attributes:
-        name: its name in `lessons.exercises.EXERCISES`.
+        name: its name in `lessons.exercises.EXERCISES`, or that of a teacher's own exercise.
         card: the docstring of its file.
         equation: LaTeX.
         plain: the equation as plain text, for a terminal.
         hints: shown one by one.
-        lesson: the lesson it belongs to.
+        lesson: the lesson it belongs to; "" if there is none.
         checks: function of a seed, which decides the disturbances.
         mistakes: frequent mistakes, which the grade names.
+        start, solution: the file with the missing lines and the right one, of a teacher's own exercise; ""
+            for the lab's.
     """
 
     name: str
@@ -80,6 +82,8 @@ class Exercise:
     lesson: str
     checks: Callable[[int], tuple[GradeCheck, ...]]
     mistakes: tuple[Mistake, ...] = ()
+    start: str = ""
+    solution: str = ""
 
     @property
     def scene(self) -> str:

@@ -6,11 +6,12 @@ import csv
 import os
 from collections.abc import Callable, Iterator
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 
-from lessons.exercises import load_exercise
-from lessons.exercises.grade import WITHIN, Grade, Submission, grade_apart
-from lessons.own.files import SUFFIX, Source, read
+from lessons.exercises.grade import WITHIN, Submission, grade_apart
+from lessons.exercises.result import Grade
+from lessons.own.files import SUFFIX, Source, fingerprint, is_file, read
 from lessons.parallel import FailedJob, Spread
 from robots import InputError
 from robots.processes.isolation import Allowance
@@ -34,7 +35,8 @@ def grade_folder(
 
     Args:
         folder: the folder of the submissions.
-        exercise: name of the exercise; None: the name that each file assigns to EXERCISE.
+        exercise: name of the exercise, or path of a teacher's own; None: the name that each file assigns to
+            EXERCISE.
         seed: seed of the disturbances, which are the same for all files.
         out: CSV file; its rows of files whose content has not changed are kept.
         spread: function that spreads the work.
@@ -44,11 +46,11 @@ def grade_folder(
     Raises:
         InputError: no such exercise, no Python file in the folder, or the table cannot be written.
     """
-    if exercise is not None:
-        load_exercise(exercise)
+    asked = exercise if exercise is None or not is_file(exercise) else fingerprint(exercise)
     files = sorted(path for path in folder.iterdir() if path.suffix == SUFFIX and path.is_file())
     if not files:
         raise InputError(f"{folder}: has no Python file; give a folder of submissions")
+    model = Submission.to(exercise, Source("", ""), seed, within)
     held = {(row["file"], row["sha256"], row["seed"], row["asked"]): row for row in _rows(out)}
     done: dict[Path, Row] = {}
     left: list[Source] = []
@@ -56,20 +58,20 @@ def grade_folder(
         try:
             source = read(str(path))
         except InputError as error:
-            done[path] = row_of(Grade(str(path), "", exercise or "", error=str(error)), seed, exercise)
+            done[path] = row_of(Grade(str(path), "", exercise or "", error=str(error)), seed, asked)
             continue
-        row = held.get((_text(path.name), source.digest, str(seed), exercise or ""))
+        row = held.get((_text(path.name), source.digest, str(seed), asked or ""))
         if row is None:
             left.append(source)
         else:
             done[path] = row
-    work = spread(grade_apart, [Submission(source, exercise, seed, within) for source in left])
+    work = spread(grade_apart, [replace(model, source=source) for source in left])
     with closing(work) as outcomes:
         for place, outcome in outcomes:
             source = left[place]
             if isinstance(outcome, FailedJob):
                 outcome = Grade(source.path, source.digest, exercise or "", error=outcome.reason)
-            done[Path(source.path)] = row_of(outcome, seed, exercise)
+            done[Path(source.path)] = row_of(outcome, seed, asked)
             _write(out, [done[each] for each in files if each in done])
             progress(len(done) / len(files))
     found = [done[path] for path in files]

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
@@ -17,7 +18,9 @@ from lessons.exercises import EXERCISES, load_exercise
 from lessons.exercises.apart import Apart, Exhausted
 from lessons.exercises.exercise import Exercise, GradeCheck
 from lessons.exercises.mistakes import Diagnosis
-from lessons.own.files import Source, read
+from lessons.exercises.own import exercise_of
+from lessons.exercises.result import CheckResult, Grade
+from lessons.own.files import SUFFIX, Source, is_file, read
 from lessons.recording.recording import Recording
 from lessons.recording.run import checked_duration, record
 from lessons.scenes.catalog import as_torque_scene, prepared
@@ -33,61 +36,6 @@ WITHIN = Allowance(60.0, 4_000_000_000, "grading it", "was ended by the program 
 
 
 @dataclass(frozen=True)
-class CheckResult:
-    """One check with the measured value.
-
-    Attributes:
-        check: the sentence of the check.
-        measured: value in `unit`; NaN if there was nothing to measure.
-        unit, wanted: e.g. "mm", "≤ 0.5 mm".
-        points, of: points given, and points possible.
-        why: one sentence with the cause if the check fails, "" if it holds.
-    """
-
-    check: str
-    measured: float
-    unit: str
-    wanted: str
-    points: int
-    of: int
-    why: str
-
-
-@dataclass(frozen=True)
-class Grade:
-    """The grade of a submission.
-
-    Attributes:
-        file: its path.
-        digest: hash of its content.
-        exercise: name of the exercise, "" if it is unknown.
-        lines: one per check; empty if the file could not be run.
-        error: one sentence if it could not be run, or was ended.
-        protection: mechanisms of the operating system that refused it files, the network and other processes;
-            () if only Python refused them.
-    """
-
-    file: str
-    digest: str
-    exercise: str
-    lines: tuple[CheckResult, ...] = ()
-    error: str = ""
-    protection: tuple[str, ...] = ()
-
-    @property
-    def points(self) -> int:
-        return sum(line.points for line in self.lines)
-
-    @property
-    def of(self) -> int:
-        return sum(line.of for line in self.lines) or 10
-
-    @property
-    def passed(self) -> bool:
-        return not self.error and self.points == self.of
-
-
-@dataclass(frozen=True)
 class Submission:
     """A file to be graded, as it is sent to another process or another machine.
 
@@ -98,6 +46,8 @@ class Submission:
         within: time and memory for grading it.
         kernel: whether the operating system refuses it files, the network and other processes; otherwise
             only Python refuses them.
+        own: the file of the exercise, if it is a teacher's own.
+        possible: points that the exercise gives.
     """
 
     source: Source
@@ -105,6 +55,27 @@ class Submission:
     seed: int = 0
     within: Allowance = WITHIN
     kernel: bool = True
+    own: Source | None = None
+    possible: int = 10
+
+    @classmethod
+    def to(
+        cls, exercise: str | None, source: Source, seed: int = 0, within: Allowance = WITHIN
+    ) -> Submission:
+        """A submission to an exercise, given by its name or by the path of a teacher's file.
+
+        Raises:
+            InputError: there is no such exercise, or the teacher's file cannot be used.
+        """
+        if exercise is None:
+            return cls(source, None, seed, within)
+        if not is_file(exercise):
+            load_exercise(exercise)
+            return cls(source, exercise, seed, within)
+        own = read(exercise)
+        found = exercise_of(own)
+        possible = sum(check.points for check in found.checks(seed))
+        return cls(source, found.name, seed, within, own=own, possible=possible)
 
 
 class Shown(Protocol):
@@ -124,11 +95,27 @@ def grade(path: str, exercise: str | None = None, seed: int = 0) -> Grade:
     """Grades a file, in a process of its own; arguments as of `Submission`.
 
     Raises:
-        InputError: there is no such exercise or no such file.
+        InputError: there is no such exercise or no such file, or the file of the exercise cannot be used.
     """
-    if exercise is not None:
-        load_exercise(exercise)
-    return grade_apart(Submission(read(path), exercise, seed))
+    return grade_apart(Submission.to(exercise, read(path), seed))
+
+
+def grade_only(path: Path, exercise: str | None = None, seed: int = 0) -> Grade:
+    """Grades a file, or the only Python file of a folder. Whatever was handed in, there is a grade: one with
+    an error if there is no such file, or more than one.
+
+    Raises:
+        InputError: there is no such exercise, or its file cannot be used.
+    """
+    model = Submission.to(exercise, Source(str(path), ""), seed)
+    files = sorted(path.glob(f"*{SUFFIX}")) if path.is_dir() else [path]
+    if len(files) != 1:
+        error = f"hand in one Python file: found {', '.join(each.name for each in files[:5]) or 'none'}"
+        return Grade(str(path), "", exercise or "", error=error, possible=model.possible)
+    try:
+        return grade_apart(replace(model, source=read(str(files[0]))))
+    except InputError as error:
+        return Grade(str(files[0]), "", exercise or "", error=str(error), possible=model.possible)
 
 
 def grade_apart(submission: Submission) -> Grade:
@@ -142,7 +129,7 @@ def grade_apart(submission: Submission) -> Grade:
         error = f"{source.path}: {fault}"
     except InputError as refusal:
         error = str(refusal)
-    return Grade(source.path, source.digest, asked or "", error=error)
+    return Grade(source.path, source.digest, asked or "", error=error, possible=submission.possible)
 
 
 def graded(submission: Submission) -> Grade:
@@ -152,17 +139,20 @@ def graded(submission: Submission) -> Grade:
         InputError: the file cannot be loaded, or the name of its exercise is missing or unknown.
     """
     source, within = submission.source, submission.within
+    own = None if submission.own is None else exercise_of(submission.own)
     with Apart(source, within.seconds, within.memory, submission.kernel) as apart:
         name = submission.exercise or apart.exercise
-        if name not in EXERCISES:
+        if own is None and name not in EXERCISES:
             raise InputError(
                 f'{source.path}: has no name of an exercise: write e.g. EXERCISE = "joint-pd" at its '
                 f"top, or name one of {', '.join(EXERCISES)}"
             )
         try:
-            lines = judged_by(load_exercise(name), apart, submission.seed)
+            lines = judged_by(own or load_exercise(name), apart, submission.seed)
         except Exhausted as end:
-            return Grade(source.path, source.digest, name, (), str(end), apart.protection)
+            return Grade(
+                source.path, source.digest, name, (), str(end), apart.protection, submission.possible
+            )
         return Grade(source.path, source.digest, name, lines, protection=apart.protection)
 
 
@@ -260,20 +250,3 @@ def beside(scene: TorqueScene, shown: Shown, diagnosis: Diagnosis, duration: flo
             raise InputError(answer.notice)
         worst = max(worst, float(np.abs(answer.tau - plan.tau).max()))
     return worst
-
-
-def as_data(found: Grade) -> dict[str, Any]:
-    """JSON-ready."""
-    return {
-        "file": found.file,
-        "sha256": found.digest,
-        "exercise": found.exercise,
-        "points": found.points,
-        "of": found.of,
-        "error": found.error,
-        "protection": list(found.protection),
-        "checks": [
-            {**vars(line), "measured": line.measured if math.isfinite(line.measured) else None}
-            for line in found.lines
-        ],
-    }

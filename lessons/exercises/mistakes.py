@@ -24,10 +24,12 @@ class Mistake:
     Attributes:
         says: one sentence about it.
         make: returns a new control law with this mistake, without memory of earlier runs.
+        text: the file of a student who makes it; "" for the lab's own, which are laws.
     """
 
     says: str
     make: Callable[[], Law]
+    text: str = ""
 
 
 @final

@@ -8,7 +8,7 @@ from typing import Any, Literal, get_args
 
 from robots import InputError
 
-Kind = Literal["controller", "scene", "task", "lesson"]
+Kind = Literal["controller", "scene", "task", "lesson", "exercise"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 
 _DEFINES: dict[Kind, str] = {
@@ -16,23 +16,26 @@ _DEFINES: dict[Kind, str] = {
     "scene": "SCENE, or a function scene() that returns one",
     "task": "TASK",
     "lesson": "LESSON",
+    "exercise": "EXERCISE = own_exercise(…)",
 }
 
 
 def kind_of(module: ModuleType) -> Kind:
-    """The kind of a file. Raises InputError if it defines none of the four kinds, or several."""
+    """The kind of a file. Raises InputError if it defines none of the kinds, or several."""
     path, names = module.__file__, vars(module)
     defined: dict[Kind, bool] = {
         "controller": "torque" in names or "Controller" in names,
         "scene": "SCENE" in names or callable(names.get("scene")),
         "task": "TASK" in names,
         "lesson": "LESSON" in names,
+        # A solution names its exercise by a text.
+        "exercise": not isinstance(names.get("EXERCISE", ""), str),
     }
     found: list[Kind] = [kind for kind in KINDS if defined[kind]]
     if not found:
         raise InputError(
-            f"{path}: defines neither a controller nor a scene, task or lesson: "
-            + "; ".join(f"a {kind} is {what}" for kind, what in _DEFINES.items())
+            f"{path}: defines neither a controller nor a scene, task, lesson or exercise: "
+            + "; ".join(f"{_a(kind)} is {what}" for kind, what in _DEFINES.items())
         )
     if len(found) > 1:
         raise InputError(f"{path}: defines a {' and a '.join(found)}: put each into a file of its own")
@@ -43,7 +46,11 @@ def expected(module: ModuleType, kind: Kind) -> None:
     """Raises InputError if a file is not of the expected kind."""
     found = kind_of(module)
     if found != kind:
-        raise InputError(f"{module.__file__}: is a {found}, and a {kind} is needed: {_DEFINES[kind]}")
+        raise InputError(f"{module.__file__}: is {_a(found)}, and {_a(kind)} is needed: {_DEFINES[kind]}")
+
+
+def _a(kind: Kind) -> str:
+    return f"{'an' if kind == 'exercise' else 'a'} {kind}"
 
 
 def law_of(module: ModuleType) -> Callable[[], Callable[[Any], Any]]:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from http import HTTPStatus
+from pathlib import Path
 
 import pytest
 from websockets.datastructures import Headers
 from websockets.http11 import Request
 
 from app.server.door import Answer, Door, as_origin
-from app.server.passes import QUERY, Passes, new_token
+from app.server.passes import QUERY, VARIABLE, Passes, given_token, new_token, shared
 from robots import InputError
 
 OURS = "127.0.0.1:8080"
@@ -126,7 +127,7 @@ def test_the_token_moves_from_the_address_into_a_cookie(secret: str) -> None:
     assert headers["Location"] == "./?fixedDpr=1" and headers["Cache-Control"] == "no-store"
     assert secret not in str(answer)
     cookie, *attributes = headers["Set-Cookie"].split("; ")
-    assert {"HttpOnly", "SameSite=Strict", "Path=/"} == set(attributes)
+    assert {"HttpOnly", "SameSite=Strict"} == set(attributes)
     assert judged(TOKENED, Cookie=f'odd={{"a": [1, "é"]}}; {cookie}') is None
     own = {"Origin": f"http://{OURS}", "Upgrade": "websocket"}
     assert judged(TOKENED, Cookie=cookie, **own) is None
@@ -194,3 +195,40 @@ def test_origins_are_written_as_browsers_do() -> None:
     for wrong in ("lab.example.org", "https://", "*", "https://lab/page", "ftp://lab", "https://a:b", "null"):
         with pytest.raises(InputError, match=r"--trusted-origin.*https://lab.example.org"):
             as_origin(wrong)
+
+
+def test_a_proxy_may_send_the_token_in_its_header() -> None:
+    """The owner's secret does not count there, and pages of other sites are refused as before."""
+    own = {"Origin": f"http://{OURS}", "Upgrade": "websocket"}
+    assert judged(TOKENED, X_Himpc_Lab_Token=TOKEN, **own) is None
+    assert judged(TOKENED, X_Himpc_Lab_Token=TOKEN) is None
+    for wrong in (OWNER, "", f"{TOKEN}x", [TOKEN, TOKEN]):
+        assert judged(TOKENED, X_Himpc_Lab_Token=wrong, **own) is not None
+    assert judged(TOKENED, X_Himpc_Lab_Token=TOKEN, Origin="https://evil.example") is not None
+    assert not TOKENED.is_owner(asked(X_Himpc_Lab_Token=OWNER))
+
+
+def test_servers_with_one_token_take_each_others_cookies_but_no_owner_is_made_of_it() -> None:
+    """Who has the token can compute the key, but the owner's cookie also needs the owner's secret."""
+    first, second = shared(TOKEN, OWNER), shared(TOKEN, new_token())
+    cookie = first.keep("guest", "")
+    assert judged(Door(passes=second), Cookie=cookie) is None
+    assert judged(Door(passes=shared(new_token(), None)), Cookie=cookie) is not None
+    assert not Door(passes=second).is_owner(asked(Cookie=first.keep("owner", "")))
+    for owner in (None, OWNER):
+        forged = Passes(TOKEN, None, first.cookie, first.key).keep("owner", "")
+        assert not Door(passes=shared(TOKEN, owner)).is_owner(asked(Cookie=forged))
+    assert Door(passes=first).is_owner(asked(Cookie=first.keep("owner", "")))
+
+
+def test_a_token_of_ones_own_comes_from_a_file_or_the_environment(tmp_path: Path) -> None:
+    file = tmp_path / "token"
+    file.write_text(f"{TOKEN}\nmore\n")
+    assert given_token(str(file), {VARIABLE: "x"}) == TOKEN
+    assert given_token(None, {VARIABLE: TOKEN}) == TOKEN
+    assert given_token(None, {}) is None
+    for wrong in ("short", "with spaces and so on", "ä" * 20):
+        with pytest.raises(InputError, match="16 characters"):
+            given_token(None, {VARIABLE: wrong})
+    with pytest.raises(InputError, match="cannot be read"):
+        given_token(str(tmp_path / "none"), {})

@@ -179,3 +179,29 @@ def test_targets_from_before_the_axes_were_changed_are_not_drawn(held: Callable[
     assert one.scene.nodes["/target"].position == pytest.approx(one.start)
     one.hand.look_back(before)
     assert one.scene.nodes["/target"].visible
+
+
+def test_keys_move_and_turn_the_target_as_a_drag_does(held: Callable[[bool], Held]) -> None:
+    """By an amount along an axis and about one."""
+    one = held(False)
+    (target,) = one.hand.movables()
+    at = target.place()
+    assert at is not None and target.move is not None and target.turn is not None
+    assert np.allclose(at, one.start)
+    target.move(at + np.array([0.0, 0.01, 0.0]))
+    assert one.take()["position"] == pytest.approx((at[0], at[1] + 0.01, at[2]))
+    assert np.allclose(one.scene.nodes["/target"].position, at + np.array([0.0, 0.01, 0.0]))
+    before = one.scene.nodes["/target/turn"].wxyz
+    target.turn(np.array([0.0, 0.0, np.radians(5.0)]))
+    x, y, z, w = one.take()["orientation"]
+    assert 2 * np.degrees(np.arccos(abs(np.dot((w, x, y, z), before)))) == pytest.approx(5.0)
+
+
+def test_keys_too_keep_the_target_within_reach(held: Callable[[bool], Held]) -> None:
+    one = held(True)
+    (target,) = one.hand.movables()
+    assert target.move is not None
+    target.move(FAR)
+    assert one.take() == {}
+    one.judge.place(one.judge.asked[-1], 0.1 * FAR)
+    assert one.take()["position"] == (0.5, 0.0, 0.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import http.client
 import os
 import re
 import shutil
@@ -14,6 +15,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from urllib.parse import urljoin
 
 import pytest
 from viser import __version__
@@ -23,7 +25,7 @@ from websockets.sync.client import connect
 from app.__main__ import main
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
-from app.server.passes import QUERY
+from app.server.passes import HEADER, QUERY
 from app.server.server import PageServer
 from browsing.wire import Wire, camera, eventually, pack
 from lessons.own.folder import Folder
@@ -214,6 +216,111 @@ def test_strangers_that_a_forgotten_proxy_lets_through_run_nothing(
                 assert page.find("Python file") is None and page.find("File") is None
     finally:
         server.close()
+
+
+_PREFIXED = """
+server {
+    listen 127.0.0.1:PORT;
+    location /user/zoe/lab/ {
+        proxy_pass URL/;
+        proxy_http_version 1.1;
+        proxy_set_header Host $http_host;
+        proxy_set_header Upgrade $http_upgrade;
+        proxy_set_header Connection "upgrade";
+    }
+}
+"""
+
+
+def test_the_page_works_below_any_path(nginx: str, tmp_path: Path) -> None:
+    """Behind a proxy that removes a prefix: the token leaves the address without leaving the prefix, the
+    cookie belongs to it, the question for the token leads back to it, and a page gets a robot."""
+    port, prefix = free_port(), "/user/zoe/lab/"
+    server = PageServer(
+        SceneChoice(RunSpec("planar3-hold")),
+        port=0,
+        max_sessions=1,
+        trusted_origins=[f"http://127.0.0.1:{port}"],
+    )
+    site = _PREFIXED.replace("PORT", str(port)).replace("URL", server.url)
+    try:
+        with nginx_with(nginx, tmp_path, site, port):
+
+            def ask(path: str, cookie: str = "") -> tuple[int, http.client.HTTPMessage, str]:
+                connection = http.client.HTTPConnection("127.0.0.1", port, timeout=LONG)
+                connection.request("GET", path, headers={"Cookie": cookie})
+                found = connection.getresponse()
+                text = found.read().decode()
+                connection.close()
+                return found.status, found.headers, text
+
+            status, _, text = ask(prefix)
+            assert status == 403
+            links = re.findall(r'(?:href|action|src)="([^"]*)"', text)
+            assert links and {urljoin(prefix, each) for each in links} == {prefix}
+            token = (server.guest_link).partition("?")[2]
+            status, headers, _ = ask(f"{prefix}?{token}")
+            assert status == 303 and urljoin(prefix, headers["Location"]) == prefix
+            cookie, *attributes = headers["Set-Cookie"].split("; ")
+            assert not any(each.startswith("Path") for each in attributes)  # a browser takes the prefix
+            status, _, page = ask(prefix, cookie)
+            assert status == 200 and not re.findall(r'(?:href|action|src)="/', page)
+            assert ask(f"{prefix}health")[0] == 200
+            with Wire(f"http://127.0.0.1:{port}{prefix}?{token}"):
+                assert eventually(lambda: len(server.sessions.learners) == 1, LONG)
+    finally:
+        server.close()
+
+
+def test_a_full_server_behind_the_printed_balancer_is_passed_over(nginx: str, tmp_path: Path) -> None:
+    """Two servers of one session each, with one token: the second learner gets the second robot, the third is
+    asked to wait, and gets the place that becomes free."""
+    port, token = free_port(), "one-token-for-all-servers"
+    origin = f"http://127.0.0.1:{port}"
+    servers = [
+        PageServer(
+            SceneChoice(RunSpec("planar3-hold")),
+            port=0,
+            max_sessions=1,
+            grace=0.5,
+            trusted_origins=[origin],
+            token=token,
+            refers=True,
+        )
+        for _ in range(2)
+    ]
+    (site,) = re.findall(r"```text\n(upstream .*?)```", PAGE.read_text(), re.DOTALL)
+    for text, here in (
+        ("lab-1.example.org:8080", servers[0].url.removeprefix("http://")),
+        ("lab-2.example.org:8080", servers[1].url.removeprefix("http://")),
+        ("listen 80;", f"listen 127.0.0.1:{port};"),
+    ):
+        assert site.count(text) == 1
+        site = site.replace(text, here)
+    link = f"{origin}/?{QUERY}={token}"
+    try:
+        with nginx_with(nginx, tmp_path, site, port):
+
+            def taken() -> int:
+                return sum(learner.attached for each in servers for learner in each.sessions.learners)
+
+            with Wire(link):
+                assert eventually(lambda: taken() == 1, LONG)
+                with Wire(link):
+                    assert eventually(lambda: taken() == 2, LONG)
+                    assert [len(each.sessions.learners) for each in servers] == [1, 1]
+                    with pytest.raises(InvalidStatus) as refused:
+                        connect(link.replace("http", "ws"), subprotocols=PROTOCOL)
+                    assert refused.value.response.status_code == 503
+                    with pytest.raises(urllib.error.HTTPError) as waiting:
+                        urllib.request.urlopen(urllib.request.Request(origin, headers={HEADER: token}))
+                    assert waiting.value.code == 503 and waiting.value.headers["Refresh"] == "5"
+                assert eventually(lambda: sum(len(each.sessions.learners) for each in servers) == 1, LONG)
+                with Wire(link):
+                    assert eventually(lambda: taken() == 2, LONG)
+    finally:
+        for each in servers:
+            each.close()
 
 
 def test_the_command_takes_what_the_page_shows(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -19,7 +19,8 @@ from himpc.controllers.answers import OwnFault
 from himpc.controllers.view import View
 from lessons.exercises import EXERCISES, load_exercise, start_of
 from lessons.exercises.folder import Row, grade_folder
-from lessons.exercises.grade import WITHIN, CheckResult, Grade, Submission, grade, grade_apart, judged_by
+from lessons.exercises.grade import WITHIN, Submission, grade, grade_apart, judged_by
+from lessons.exercises.result import CheckResult, Grade
 from lessons.own.files import Source, execute, sentence
 from lessons.own.kinds import law_of
 from lessons.parallel import on_cores, one_by_one

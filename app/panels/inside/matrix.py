@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import viser
 
-from app.html.palette import BAD, BOUND, LEVELS, css
+from app.html.palette import BAD, BOUND, LEVELS, css, ink
 from app.html.text import block, esc, figure
 from app.link.inside import Inside
 from app.panels.widgets.in_view import InView
@@ -139,6 +139,6 @@ def _legend(matrix: Matrix, names: Sequence[str]) -> str:
         + (f" (the first {matrix.shown} of {matrix.knots} knots)" if matrix.shown < matrix.knots else "")
         + f". Blue positive, orange negative; the shade is the size, six powers of ten below "
         f"{figure(matrix.largest)}. Largest over smallest eigenvalue: {figure(matrix.condition)}.<br>"
-        + (f'<b style="color:{css(BAD)}">Red: active bounds</b>{held}' if held else "No bound is active.")
+        + (f'<b style="color:{ink(BAD)}">Red: active bounds</b>{held}' if held else "No bound is active.")
         + (f"<br>… and {more} more." if more > 0 else "")
     )

@@ -9,7 +9,7 @@ import viser
 
 from app.client.moment import Moment
 from app.client.pending_edit import Send
-from app.html.palette import BAD, BOUND, GHOST, RGB, css
+from app.html.palette import BAD, BOUND, GHOST, RGB, ink
 from app.html.text import block, esc, figure, swatch
 from app.link.inside import Inside, InsideRequest
 from app.panels.inside.plane_svg import CONTOURED, SIZE, half_width, parts
@@ -122,12 +122,12 @@ class PlanePanel:
                 f"contours of its cost; the disc is its optimum; (33) leaves {left}"
             )
         lines.append(
-            f'<span style="color:{css(BAD)}">▭</span> the box of bounds; the red area violates a bound'
+            f'<span style="color:{ink(BAD)}">▭</span> the box of bounds; the red area violates a bound'
         )
-        lines.append(f'<span style="color:{css(GHOST)}">◆</span> one weighted cost of all; no priorities')
+        lines.append(f'<span style="color:{ink(GHOST)}">◆</span> one weighted cost of all; no priorities')
         if plane.osf is not None:
             outside = "outside the box" if not plane.box.inside(plane.osf) else "inside the box in this tick"
-            lines.append(f'<span style="color:{css(BAD)}">▲</span> the increment of OSF: {outside}')
+            lines.append(f'<span style="color:{ink(BAD)}">▲</span> the increment of OSF: {outside}')
         lines.append(f"Geometry and solver agree to <b>{figure(max(plane.apart, 1e-16), 'N·m')}</b>.")
         if several:
             lines.append("Later knots are held at their values in the solution.")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from app.html.palette import BAD, BOUND, GHOST, RGB, css
+from app.html.palette import BAD, BOUND, GHOST, RGB, css, ink
 from app.html.text import esc
 
 if TYPE_CHECKING:
@@ -155,7 +155,7 @@ def _sides(plane: Plane, paper: _Paper) -> str:
         turn = " rotate(-90)" if turned else ""
         parts.append(
             f'<text transform="translate({at[0]:.1f} {at[1]:.1f}){turn}" text-anchor="middle" '
-            f'fill="{css(BAD)}">{esc(kind)}</text>'
+            f'fill="{ink(BAD)}">{esc(kind)}</text>'
         )
     return "".join(parts)
 
@@ -213,9 +213,9 @@ def _line(ends: Sequence[np.ndarray] | np.ndarray, paper: _Paper) -> str:
 def _points(plane: Plane, paper: _Paper, colours: Mapping[str, RGB]) -> list[str]:
     parts = []
     if plane.osf is not None:
-        parts.append(_mark("osf", plane.osf, "OSF", css(BAD), "M0 -6L6 5H-6Z", paper, (0, -10)))
+        parts.append(_mark("osf", plane.osf, "OSF", BAD, "M0 -6L6 5H-6Z", paper, (0, -10)))
     for place, level in reversed(list(enumerate(plane.levels[:CONTOURED]))):
-        colour = css(colours.get(level.name, BOUND))
+        colour = colours.get(level.name, BOUND)
         if np.abs(level.centre - level.solved).max() > 0.02 * paper.half:
             ring = "M-4 0a4 4 0 1 0 8 0a4 4 0 1 0 -8 0"
             parts.append(
@@ -232,10 +232,10 @@ def _points(plane: Plane, paper: _Paper, colours: Mapping[str, RGB]) -> list[str
             )
     if plane.weighted is not None:
         parts.append(
-            _mark("weighted", plane.weighted, "weighted", css(GHOST), "M0 -6L6 0L0 6L-6 0Z", paper, (8, 4))
+            _mark("weighted", plane.weighted, "weighted", GHOST, "M0 -6L6 0L0 6L-6 0Z", paper, (8, 4))
         )
     for place, level in reversed(list(enumerate(plane.levels[:CONTOURED]))):
-        colour, r = css(colours.get(level.name, BOUND)), 5.5 - 1.5 * place
+        colour, r = colours.get(level.name, BOUND), 5.5 - 1.5 * place
         disc = f"M{-r} 0a{r} {r} 0 1 0 {2 * r} 0a{r} {r} 0 1 0 {-2 * r} 0"
         shift = (-11, -7) if place == 0 else (8, 14)
         parts.insert(
@@ -249,7 +249,7 @@ def _mark(
     name: str,
     w: np.ndarray,
     words: str,
-    colour: str,
+    colour: RGB,
     shape: str,
     paper: _Paper,
     shift: tuple[float, float],
@@ -272,11 +272,11 @@ def _mark(
         dx, dy = shift
         if x > _LEFT + 0.85 * _SIDE and dx >= 0:
             anchor, dx = "end", -dx
-    fill = f'fill="none" stroke="{colour}" stroke-width="1.6"' if hollow else f'fill="{colour}"'
+    fill = f'fill="none" stroke="{css(colour)}" stroke-width="1.6"' if hollow else f'fill="{css(colour)}"'
     return (
         f'<g class="{name}" data-at="{exact}" transform="translate({x:.1f} {y:.1f})">'
         f'<path d="{shape}" transform="{turn.strip()}" {fill}/>'
-        f'<text x="{dx}" y="{dy}" text-anchor="{anchor}" fill="{colour}" font-weight="600">'
+        f'<text x="{dx}" y="{dy}" text-anchor="{anchor}" fill="{ink(colour)}" font-weight="600">'
         f"{esc(words)}</text></g>"
     )
 

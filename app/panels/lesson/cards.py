@@ -10,6 +10,7 @@ import viser
 
 from app.client.progress import Notebook
 from app.html.palette import GOOD, LEVELS, css
+from app.html.palette import button as dark
 from app.html.text import badge, block, esc
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace, parts_of
@@ -72,7 +73,7 @@ def _button(
     choose: Choose,
     colour: tuple[int, int, int] | None = None,
 ) -> None:
-    button = gui.add_button(label, color=colour)
+    button = gui.add_button(label, color=None if colour is None else dark(colour))
 
     on_click(button, lambda: choose(choice))
 

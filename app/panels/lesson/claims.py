@@ -6,7 +6,7 @@ import math
 
 from app.html.glossary import STYLE
 from app.html.markdown import rendered, rendered_line
-from app.html.palette import BAD, BOUND, GOOD, LEVELS, RGB, css
+from app.html.palette import BAD, BOUND, GOOD, LEVELS, RGB, css, ink, on
 from app.html.text import badge, bar, block, esc, figure
 from app.link.exercise import Lecture, LessonPlace, SignalCurve, parts_of, signals_of
 from app.panels.lesson.drawing import Bound, chart
@@ -121,10 +121,11 @@ def _claim(claim: Claim, place: int, lecture: Lecture) -> str:
     )
     return (
         f'<div style="display:flex;gap:0.5em;margin:0.25em 0"><div style="flex:0 0 1.3em;height:1.3em;'
-        f'border-radius:50%;text-align:center;font-weight:700;color:#fff;line-height:1.3;background:{css(colour)}">'
+        f"border-radius:50%;text-align:center;font-weight:700;color:{css(on(colour))};"
+        f'line-height:1.3;background:{css(colour)}">'
         f'{sign}</div><div style="min-width:0">{esc(claim.text)}'
         f'<div style="opacity:0.8" title="{esc(claim.measure.words)}">'
-        f'<b style="color:{css(colour)}">{word}</b> {measured}</div></div></div>'
+        f'<b style="color:{ink(colour)}">{word}</b> {measured}</div></div></div>'
     )
 
 

@@ -9,12 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from app.html.palette import BOUND, GOOD, LEVELS, css
+from app.html.palette import BOUND, GOOD, LEVELS, RGB, css, ink
 from app.html.text import esc, figure
 from app.link.exercise import SignalCurve
 
 _W = 360  # units of every picture's width; it scales with the panel
-GUESS, TRUTH = css(LEVELS[0]), css(LEVELS[1])
+GUESS, TRUTH = LEVELS[0], LEVELS[1]
 
 
 def scale(low: float, high: float, guess: float | None, truth: float | None, factor: float, unit: str) -> str:
@@ -78,7 +78,7 @@ def chart(
             f'stroke-width="1.5" stroke-dasharray="2 3"><title>{esc(bound.words)}</title></line>'
         )
     if ghost is not None:
-        parts.append(frame.line(ghost, css(BOUND), "5 4"))
+        parts.append(frame.line(ghost, BOUND, "5 4"))
     return _svg(frame.height, [*parts, frame.line(curve, TRUTH)], f"{words} over time")
 
 
@@ -97,7 +97,10 @@ def sketch(
         *frame.axes(figure(low), figure(high, unit)),
         _text(frame.left, 11, "your sketch", GUESS, bold=True),
         frame.line(SignalCurve(times, values), GUESS, "6 3"),
-        *(f'<circle cx="{frame.x(t):.1f}" cy="{frame.y(v):.1f}" r="3.5" fill="{GUESS}"/>' for t, v in points),
+        *(
+            f'<circle cx="{frame.x(t):.1f}" cy="{frame.y(v):.1f}" r="3.5" fill="{css(GUESS)}"/>'
+            for t, v in points
+        ),
     ]
     if truth is not None:
         inside = truth.t <= until
@@ -139,7 +142,7 @@ class _Frame(NamedTuple):
             _text(_W - 6, self.height - 2, f"{self.until:g} s", anchor="end"),
         ]
 
-    def line(self, curve: SignalCurve, colour: str, dashes: str = "none") -> str:
+    def line(self, curve: SignalCurve, colour: RGB, dashes: str = "none") -> str:
         """A curve, with gaps where it is not finite."""
         pieces, pen = [], "M"
         for t, value in zip(curve.t.tolist(), curve.values.tolist(), strict=True):
@@ -149,7 +152,7 @@ class _Frame(NamedTuple):
             pieces.append(f"{pen}{self.x(t):.1f} {self.y(value):.1f}")
             pen = "L"
         return (
-            f'<path d="{"".join(pieces)}" stroke="{colour}" stroke-width="2" fill="none" '
+            f'<path d="{"".join(pieces)}" stroke="{css(colour)}" stroke-width="2" fill="none" '
             f'stroke-linejoin="round" stroke-dasharray="{dashes}"/>'
         )
 
@@ -174,22 +177,23 @@ def _end(axis: Axis, which: int) -> str:
     return figure(10.0 ** axis[which] if axis[2] else float(f"{axis[which]:.2g}"))
 
 
-def _pointer(x: float, tip: float, foot: float, colour: str) -> str:
+def _pointer(x: float, tip: float, foot: float, colour: RGB) -> str:
     d = 5 if foot > tip else -5
     return (
-        f'<path d="M{x:.1f} {tip}L{x - 5:.1f} {tip + 2 * d}H{x + 5:.1f}Z" fill="{colour}"/>'
-        f'<line x1="{x:.1f}" x2="{x:.1f}" y1="{tip}" y2="{foot}" stroke="{colour}" stroke-width="2"/>'
+        f'<path d="M{x:.1f} {tip}L{x - 5:.1f} {tip + 2 * d}H{x + 5:.1f}Z" fill="{css(colour)}"/>'
+        f'<line x1="{x:.1f}" x2="{x:.1f}" y1="{tip}" y2="{foot}" stroke="{css(colour)}" stroke-width="2"/>'
     )
 
 
 def _text(
-    x: float, y: float, words: str, colour: str = "currentColor", anchor: str = "start", bold: bool = False
+    x: float, y: float, words: str, colour: RGB | None = None, anchor: str = "start", bold: bool = False
 ) -> str:
     # A centred label near an edge would be cut off.
     half = 3.1 * len(words)
     x = min(max(x, half + 2), _W - half - 2) if anchor == "middle" else x
     weight = ' font-weight="600"' if bold else ""
-    return f'<text x="{x:.1f}" y="{y}" fill="{colour}" text-anchor="{anchor}"{weight}>{esc(words)}</text>'
+    fill = "currentColor" if colour is None else ink(colour)
+    return f'<text x="{x:.1f}" y="{y}" fill="{fill}" text-anchor="{anchor}"{weight}>{esc(words)}</text>'
 
 
 def _svg(height: float, parts: Sequence[str], words: str) -> str:

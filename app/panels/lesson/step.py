@@ -10,7 +10,7 @@ import viser
 
 from app.client.progress import Notebook
 from app.client.simulation_client import SimulationClient
-from app.html.palette import LEVELS
+from app.html.palette import LEVELS, button
 from app.link.choice import SceneChoice
 from app.link.exercise import Lecture, LessonPlace, parts_of
 from app.link.messages import Post, Predict, ResetAll, RunStep
@@ -85,13 +85,13 @@ class LessonPanel:
             with self._knobs_first:
                 for knob in part.knobs:
                     add_control(gui, self._bindings, knob, self._settings())
-        self._run = gui.add_button("Run this step", color=LEVELS[1], hint="Key P")
+        self._run = gui.add_button("Run this step", color=button(LEVELS[1]), hint="Key P")
         self._hurry = gui.add_checkbox(
             "As fast as possible", self._fast, hint="Instead of real time: if you have seen the run before"
         )
         self._state = gui.add_html("")
         self._after = gui.add_html("")
-        self._next = gui.add_button(self._next_label(), color=LEVELS[2], visible=False, hint="Key N")
+        self._next = gui.add_button(self._next_label(), color=button(LEVELS[2]), visible=False, hint="Key N")
         self._free = gui.add_folder("Controls of this step", visible=False)
         with self._free:
             if isinstance(part, Step):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import viser
 
-from app.html.palette import RGB
+from app.html.palette import BOUND, RGB
 from app.html.text import block, esc, swatch
 from app.panels.widgets.snapshot import SessionSnapshot
 from himpc.limits import CONSTRAINTS
@@ -33,7 +33,7 @@ class BindingPanel:
 
     def update(self, now: SessionSnapshot[SceneSettings]) -> None:
         rows = "".join(
-            f"<tr><td>{swatch(self._colours.get(row.level, (139, 149, 161)))}{esc(row.level)}</td>"
+            f"<tr><td>{swatch(self._colours.get(row.level, BOUND))}{esc(row.level)}</td>"
             f"<td>{esc(row.joint)}</td><td>{esc(row.kind)} {esc(row.side)}</td>"
             f"<td>{row.multiplier:.3g}</td><td>{row.slack:.2g}</td></tr>"
             for row in now.status.binding
@@ -57,6 +57,5 @@ class BindingPanel:
 
 def _table(titles: tuple[str, ...], rows: str) -> str:
     head = _HEAD.format("".join(f'<th style="padding-right:0.8em">{title}</th>' for title in titles))
-    return (
-        f'<div style="overflow-x:auto"><table style="border-spacing:0.3em 0.1em">{head}{rows}</table></div>'
-    )
+    table = f'<table style="border-spacing:0.3em 0.1em">{head}{rows}</table>'
+    return f'<div tabindex="0" style="overflow-x:auto">{table}</div>'

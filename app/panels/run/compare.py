@@ -9,7 +9,7 @@ import viser
 
 from app.client.run_statistics import RunFigures
 from app.client.simulation_client import SimulationClient
-from app.html.palette import BAD, BOUND, GHOST, RGB, css
+from app.html.palette import BAD, BOUND, GHOST, RGB, button, ink
 from app.html.text import badge, block, esc, quantity, swatch
 from app.link.messages import Post
 from app.panels.widgets.snapshot import SessionSnapshot
@@ -43,7 +43,7 @@ class ComparePanel:
         )
         self._folders: list[viser.GuiFolderHandle] = []
         self._settings = [self._row(gui, place) for place in range(1, _ROWS + 1)]
-        self._start = gui.add_button("Start the ghost", color="violet")
+        self._start = gui.add_button("Start the ghost", color=button(GHOST))
         self._swap = gui.add_button(
             "Swap robot and ghost", hint="Each gets the other's settings; both start again", visible=False
         )
@@ -154,7 +154,7 @@ class ComparePanel:
         ]
         head = (
             '<tr><td></td><td style="text-align:right"><b>robot</b></td>'
-            f'<td style="text-align:right;color:{css(GHOST)}"><b>ghost</b></td></tr>'
+            f'<td style="text-align:right;color:{ink(GHOST)}"><b>ghost</b></td></tr>'
         )
         return block(
             f'<table style="width:100%;border-spacing:0 0.25em">{head}{"".join(rows)}</table>'
@@ -166,7 +166,7 @@ def _legend(words: str, now: SessionSnapshot[SceneSettings]) -> str:
     slow = ""
     if now.status.capped:
         slow = (
-            f'<br><span style="color:{css(BAD)}">This computer cannot run both in real time: the clock of '
+            f'<br><span style="color:{ink(BAD)}">This computer cannot run both in real time: the clock of '
             "both is slowed down.</span>"
         )
     return block(

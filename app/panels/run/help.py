@@ -20,6 +20,10 @@ _KEYS = (
     ("?", "this help"),
     ("1 … 9", "switch the level at that place on or off"),
     ("Ctrl K", "every command, searchable"),
+    (
+        "↑ ↓ in a field",
+        "one step: Start, Move a target by keys moves and turns targets, goals and obstacles",
+    ),
     ("W A S D Q E", "the camera goes forward, left, back, right, down, up; the arrow keys turn it"),
     ("", "after you have used a field or a checkbox, click beside it first: it receives all keys until then"),
 )

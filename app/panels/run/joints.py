@@ -11,7 +11,7 @@ import numpy as np
 import viser
 
 from app.client.decimated import PlotWindow
-from app.html.palette import BAD, BOUND, GOOD, joint_colour
+from app.html.palette import BAD, BOUND, GOOD, ink, joint_colour, joint_dash
 from app.html.text import block
 from app.panels.widgets.chart import Chart, ChartLine, of_ghost
 from app.panels.widgets.in_view import InView
@@ -72,7 +72,7 @@ class JointPlots:
         gui.add_html(
             block(
                 "Shaded: inside the bounds in force (the data sheet's where a bound is off). "
-                'A <b style="color:rgb(225,45,45)">red mark</b> at the bottom: a shown joint is at its bound.'
+                f'A <b style="color:{ink(BAD)}">red mark</b> at the bottom: a shown joint is at its bound.'
             )
         )
 
@@ -161,7 +161,9 @@ class JointPlots:
 
     def _all(self, title: str, names: tuple[str, ...], last: bool, ghost: bool) -> Chart:
         n = len(names)
-        lines = [ChartLine(_short(name, k), joint_colour(k)) for k, name in enumerate(names)]
+        lines = [
+            ChartLine(_short(name, k), joint_colour(k), dash=joint_dash(k)) for k, name in enumerate(names)
+        ]
         bounds = [ChartLine("upper bound", BOUND, dashed=True), ChartLine("lower bound", BOUND, dashed=True)]
         return Chart(
             self._gui,

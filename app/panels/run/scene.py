@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 
 import viser
 
-from app.html.palette import BAD, DAMPING, GOOD, LEVELS
+from app.html.palette import BAD, DAMPING, GOOD, LEVELS, css
 from app.html.text import badge, block, esc
 from app.link.choice import SceneChoice
 from app.link.messages import Ready
@@ -163,7 +163,7 @@ class RobotPanel:
         waited, self._waits = self._waits, False
         if waited and self._answer is not None:
             self._answer.content = block(
-                f"{badge('NOT LOADED', BAD)} {esc(sentence)}", "border-left:3px solid rgb(225,45,45)"
+                f"{badge('NOT LOADED', BAD)} {esc(sentence)}", f"border-left:3px solid {css(BAD)}"
             )
         return waited
 

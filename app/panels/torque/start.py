@@ -8,7 +8,7 @@ import numpy as np
 import viser
 
 from app.client.pending_edit import Send
-from app.html.palette import BAD, GOOD, RGB
+from app.html.palette import BAD, GOOD, RGB, ink
 from app.html.text import block, esc, quantity
 from app.link.messages import Ready
 from app.panels.torque.guide import guide
@@ -121,7 +121,7 @@ class StartPanel:
         if verdict is None:
             self._where.content = block("The target is where the hand is.")
             return
-        colour = "rgb({},{},{})".format(*(GOOD if verdict.reachable else BAD))
+        colour = ink(GOOD if verdict.reachable else BAD)
         if verdict.reachable:
             text = "Target within reach."
         else:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import viser
 
-from app.html.palette import BAD, RGB
+from app.html.palette import BAD, RGB, button
 from app.html.text import block, esc
 from app.panels.widgets.mirror import Bindings
 from himpc.tasks import Task
@@ -59,4 +59,6 @@ class TaskEditor:
         self._bindings.bind(menu, read, lambda value: Set("stack.edit", {"name": name, field: str(value)}))
 
     def _button(self, label: str, event: Callable[[], Set], colour: RGB | None = None) -> None:
-        self._gui.add_button(label, color=colour).on_click(lambda _: self._bindings.post(event()))
+        self._gui.add_button(label, color=colour and button(colour)).on_click(
+            lambda _: self._bindings.post(event())
+        )

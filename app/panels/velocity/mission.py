@@ -8,7 +8,7 @@ import numpy as np
 import viser
 
 from app.client.pending_edit import Send
-from app.html.palette import GOOD, RGB, css
+from app.html.palette import GOOD, RGB, button, css
 from app.html.text import badge, block, esc, free_name, swatch
 from app.link.messages import Status, TaskView
 from app.link.mission_view import MissionRow
@@ -44,7 +44,7 @@ class MissionPanel:
         self._filled = False
         self._list = gui.add_html("")
         self._swap = gui.add_button("Swap which comes first", hint="The first two tasks change places")
-        self._release = gui.add_button("Release", visible=False, color=GOOD)
+        self._release = gui.add_button("Release", visible=False, color=button(GOOD))
         if architectures:
             with gui.add_folder("How it is carried out, from the next Reset", expand_by_default=False):
                 controls.add("architecture", "base_tolerance", "base_at_rest")

@@ -32,6 +32,7 @@ _TIMES: uplot.Axis = {
     "splits": tuple(float(second) for second in _SECONDS),
     "values": tuple(f"{second} s".replace("-", "−") if second else "now" for second in _SECONDS),
 }
+_BOUND_DASH, _GHOST_DASH = (6.0, 4.0), (3.0, 3.0)
 _PATIENCE = 12
 """Number of updates without a value after which a text explains why the chart is empty."""
 _NOTHING = block("No tick has run yet: run (Space), or take single ticks (T), to see a curve.")
@@ -39,19 +40,20 @@ _NOTHING = block("No tick has run yet: run (Space), or take single ticks (T), to
 
 @dataclass(frozen=True)
 class ChartLine:
-    """label: name in the legend; fill: opacity of the area below the curve; dashed: for bounds and, with a
-    finer pattern, for ghosts."""
+    """label: name in the legend; fill: opacity of the area below the curve; dashed: for bounds; dash: lengths
+    of dashes and gaps, px, for curves that share a colour; a ghost's curve has a finer pattern."""
 
     label: str
     colour: RGB
     dashed: bool = False
     fill: float = 0.0
     width: float = 1.6
-    dash: tuple[float, float] = (6.0, 4.0)
+    dash: tuple[float, ...] = ()
 
     def of_ghost(self) -> ChartLine:
         """The same curve of the ghost."""
-        return replace(self, label=f"{self.label}, ghost", dashed=True, width=1.3, dash=(3.0, 3.0))
+        finer = tuple(0.5 * length for length in self.dash) or _GHOST_DASH
+        return replace(self, label=f"{self.label}, ghost", width=1.3, dash=finer)
 
 
 def of_ghost(lines: Sequence[ChartLine], ghost: bool) -> list[ChartLine]:
@@ -192,8 +194,8 @@ def _series(line: ChartLine) -> uplot.Series:
         "width": line.width,
         "points": {"show": False},
     }
-    if line.dashed:
-        series["dash"] = line.dash
+    if line.dashed or line.dash:
+        series["dash"] = line.dash or _BOUND_DASH
     if line.fill:
         series["fill"], series["fillTo"] = css(line.colour, line.fill), 0.0
     return series

@@ -1,0 +1,87 @@
+"""What a page does for people who do not see it, or who do not bear motion."""
+
+from __future__ import annotations
+
+import json
+import time
+
+import viser
+
+from app.adapter import private
+from app.adapter.names import STORED
+from app.client.simulation_client import SimulationClient
+from app.link.messages import Play
+from app.page import accessible
+from app.panels.run.narration import Narration, facts_of
+from app.panels.widgets.snapshot import SessionSnapshot
+from lessons.settings.settings import SceneSettings
+
+MOTION = "himpc-lab-motion"
+REDUCED = "reduced"
+LINE = "himpc-lab-says"
+"""Identifier of the line in the browser's document."""
+
+ASK_MOTION = """try {
+  const reduced = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
+  localStorage.setItem("%s%s", reduced ? "%s" : "");
+} catch {}""" % (STORED, MOTION, REDUCED)  # noqa: UP031
+"""Stores in the browser whether its user asked for less motion."""
+
+# A screen reader says changes of a region that was there before, so the region outlives the page's scenes.
+_BEGIN = """(() => {
+  const line = document.getElementById(%(line)s) ?? document.createElement("div");
+  line.id = %(line)s;
+  line.setAttribute("role", "status");
+  line.setAttribute("aria-live", "polite");
+  line.style.cssText = "position:fixed;bottom:0.6em;left:50%%;transform:translateX(-50%%);z-index:5;" +
+    "max-width:min(36em,90vw);padding:0.2em 0.7em;border-radius:4px;pointer-events:none;font-size:0.85em;" +
+    "background:#222;color:#fff";
+  line.hidden = true;
+  document.body.append(line);
+})()"""
+_SAY = """(() => {
+  const line = document.getElementById(%s);
+  if (line) { line.textContent = %s; line.hidden = !line.textContent; }
+})()"""
+
+
+class Comfort:
+    """The line that says what just happened, and the pause in which a page begins."""
+
+    def __init__(self, client: viser.ClientHandle, reduced: bool) -> None:
+        """reduced: whether the user asked the browser for less motion."""
+        self._client, self._reduced = client, reduced
+        self.says = True
+        """Whether the line is shown."""
+        self._narration = Narration(time.monotonic)
+
+    def opened(self, learner: SimulationClient) -> None:
+        """Called when a scene was built."""
+        self._narration = Narration(time.monotonic)
+        private.run_script(self._client, _BEGIN % {"line": json.dumps(LINE)})
+        private.run_script(self._client, accessible.script())
+        if self._reduced:
+            learner.send(Play(False))
+
+    def add_switch(self, gui: viser.GuiApi) -> None:
+        """Adds the checkbox that shows or hides the line."""
+        switch = gui.add_checkbox(
+            "Say what happens",
+            self.says,
+            hint="A line below the robot, which a screen reader says: at most one sentence in two seconds",
+        )
+
+        @switch.on_update
+        async def _(event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:
+            if event.client is not None:
+                self.says = bool(switch.value)
+                self._show("")
+
+    def follow(self, now: SessionSnapshot[SceneSettings]) -> None:
+        """Says what happened since the last call."""
+        sentence = self._narration.look(facts_of(now))
+        if sentence and self.says:
+            self._show(sentence)
+
+    def _show(self, sentence: str) -> None:
+        private.run_script(self._client, _SAY % (json.dumps(LINE), json.dumps(sentence)))

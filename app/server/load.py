@@ -1,0 +1,101 @@
+"""How busy a server is, for a proxy that spreads visitors and for Prometheus."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from http import HTTPStatus
+from typing import ClassVar, Protocol
+from urllib.parse import urlsplit
+
+_JSON, _PROMETHEUS = "application/json", "text/plain; version=0.0.4; charset=utf-8"
+
+
+class Place(Protocol):
+    """A session that a browser may use."""
+
+    @property
+    def attached(self) -> bool:
+        """Whether a page uses it now."""
+        ...
+
+
+class Places(Protocol):
+    """The sessions of a server."""
+
+    max_sessions: int
+    turns_away: ClassVar[bool]
+
+    @property
+    def learners(self) -> Sequence[Place]:
+        """All sessions, also those that wait for their browser to come back."""
+        ...
+
+
+@dataclass(frozen=True)
+class Load:
+    """What a server has to do now.
+
+    Attributes:
+        sessions: simulations that run, also those whose browser may come back.
+        attached: simulations that a page uses.
+        maximum: of sessions; 0 if nobody is turned away, as in a classroom.
+        connections: open connections.
+        refused: requests refused since the start.
+        messages: messages of pages since the start.
+        stopping: whether the server is starting or stopping.
+    """
+
+    sessions: int
+    attached: int
+    maximum: int
+    connections: int
+    refused: int
+    messages: int
+    stopping: bool
+
+    @property
+    def full(self) -> bool:
+        """Whether a newcomer would have to wait, and nobody could come back to a place of theirs."""
+        return 0 < self.maximum <= self.attached
+
+    @property
+    def state(self) -> str:
+        return "stopping" if self.stopping else "full" if self.full else "open"
+
+
+def load_of(places: Places | None, connections: int, refused: int, messages: int, stopping: bool) -> Load:
+    """The load of a server; places: None before it is open."""
+    learners = () if places is None else places.learners
+    attached = sum(each.attached for each in learners)
+    most = places.max_sessions if places is not None and places.turns_away else 0
+    return Load(len(learners), attached, most, connections, refused, messages, stopping)
+
+
+def report(path: str, load: Load) -> tuple[HTTPStatus, str, str] | None:
+    """Status, type and text of the answer to a request for a path; None for every other path."""
+    match urlsplit(path).path:
+        case "/health":
+            text = {"state": load.state, "sessions": load.sessions, "maximum": load.maximum}
+            status = HTTPStatus.OK if load.state == "open" else HTTPStatus.SERVICE_UNAVAILABLE
+            return status, _JSON, json.dumps(text) + "\n"
+        case "/metrics":
+            return HTTPStatus.OK, _PROMETHEUS, "".join(_lines(load))
+        case _:
+            return None
+
+
+def _lines(load: Load) -> list[str]:
+    rows = (
+        ("himpc_lab_sessions", "gauge", "Simulations that run.", load.sessions),
+        ("himpc_lab_sessions_attached", "gauge", "Simulations that a page uses.", load.attached),
+        ("himpc_lab_sessions_maximum", "gauge", "Simulations that may run.", load.maximum),
+        ("himpc_lab_connections", "gauge", "Open connections.", load.connections),
+        ("himpc_lab_requests_refused_total", "counter", "Requests refused since the start.", load.refused),
+        ("himpc_lab_messages_total", "counter", "Messages of pages since the start.", load.messages),
+        ("himpc_lab_stopping", "gauge", "1 while the server starts or stops.", int(load.stopping)),
+    )
+    return [
+        f"# HELP {name} {words}\n# TYPE {name} {kind}\n{name} {value}\n" for name, kind, words, value in rows
+    ]

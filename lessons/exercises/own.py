@@ -1,0 +1,159 @@
+"""An exercise of a teacher's own: one Python file with the text, the hole, the checks and the solution."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Mapping
+from dataclasses import fields
+from functools import lru_cache, partial
+from inspect import cleandoc
+from textwrap import indent
+
+from lessons.exercises import load_exercise
+from lessons.exercises.exercise import Exercise, GradeCheck
+from lessons.exercises.mistakes import Law, Mistake
+from lessons.own.files import Source, execute, is_file, read
+from lessons.own.kinds import expected, law_of
+from lessons.own.load import load
+from lessons.teaching.lesson import Card
+from robots import InputError
+
+HOLE = "TODO"
+"""The one line of the start that contains this word is replaced by the missing lines."""
+
+
+def filled(start: str, lines: str) -> str:
+    """The file of a student who writes these lines instead of the line with `TODO`; they are indented as that
+    line.
+
+    Raises:
+        InputError: no line, or more than one, contains TODO.
+    """
+    holes = [line for line in start.splitlines() if HOLE in line]
+    if len(holes) != 1:
+        raise InputError(
+            f"start has {len(holes) or 'no'} lines with {HOLE}: mark the missing lines by one comment with "
+            "this word"
+        )
+    margin = holes[0][: len(holes[0]) - len(holes[0].lstrip())]
+    return start.replace(holes[0], indent(cleandoc(lines), margin))
+
+
+def own_exercise(
+    name: str,
+    card: Card,
+    start: str,
+    solution: str,
+    mistakes: Mapping[str, str],
+    checks: Callable[[int], tuple[GradeCheck, ...]],
+    plain: str = "",
+    equation: str = "",
+    hints: tuple[str, ...] = (),
+    lesson: str = "",
+) -> Exercise:
+    """An exercise whose solution and mistakes are lines of code.
+
+    Args:
+        name: for the table of grades and the names of files.
+        card: title, question, minutes and what one must know.
+        start: the file that students complete; one line contains the word TODO.
+        solution: the lines that belong there.
+        mistakes: wrong lines, by the sentence that names what is wrong with them.
+        checks: function of a seed, which decides the disturbances.
+        plain, equation: what students implement, as plain text and in LaTeX.
+        hints: shown one by one.
+        lesson: a lesson that it belongs to.
+
+    Raises:
+        InputError: start has no line with TODO, or more than one.
+    """
+    start = cleandoc(start) + "\n"
+    return Exercise(
+        name,
+        card,
+        equation,
+        plain,
+        hints,
+        lesson,
+        checks,
+        tuple(_mistake(says, filled(start, lines)) for says, lines in mistakes.items()),
+        start,
+        filled(start, solution),
+    )
+
+
+def _mistake(says: str, text: str) -> Mistake:
+    return Mistake(says, partial(_law, text), text)
+
+
+def _law(text: str) -> Law:
+    """The control law of a teacher's text, without memory of earlier runs."""
+    return law_of(execute(Source("a known mistake", text)))()
+
+
+def any_exercise(name: str) -> Exercise:
+    """The lab's exercise of a name, or the one of a teacher's file.
+
+    Raises:
+        InputError: there is none of this name, or the file cannot be used.
+    """
+    return exercise_in(name) if is_file(name) else load_exercise(name)
+
+
+def exercise_in(path: str) -> Exercise:
+    """The exercise of a teacher's file. Raises InputError if the file cannot be used."""
+    return exercise_of(read(path))
+
+
+@lru_cache(maxsize=8)
+def exercise_of(source: Source) -> Exercise:
+    """The exercise of a teacher's file, which is executed in this process.
+
+    Raises:
+        InputError: the file does not assign a call, such as `own_exercise(…)`, to EXERCISE (then nothing of
+            it is executed: it may be a student's), or it cannot be loaded or used.
+    """
+    if not _makes_one(source):
+        raise InputError(
+            f"{source.path}: is no file of an exercise: it must assign EXERCISE = own_exercise(…); begin "
+            "with himpc-lab new exercise FILE.py"
+        )
+    module = load(source)
+    expected(module, "exercise")
+    found = vars(module)["EXERCISE"]
+    if not isinstance(found, Exercise) or not found.solution:
+        raise InputError(f"{source.path}: EXERCISE must be made with own_exercise(…)")
+    _checked(source.path, found)
+    return found
+
+
+def _makes_one(source: Source) -> bool:
+    try:
+        body = ast.parse(source.text).body
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return False
+    return any(
+        isinstance(each, ast.Assign)
+        and isinstance(each.value, ast.Call)
+        and any(isinstance(to, ast.Name) and to.id == "EXERCISE" for to in each.targets)
+        for each in body
+    )
+
+
+def _checked(path: str, found: Exercise) -> None:
+    """Raises InputError if a field has the wrong type, or a check cannot be judged."""
+    texts = ("name", "equation", "plain", "lesson")
+    wrong = [each.name for each in fields(found) if each.name in texts]
+    wrong = [name for name in wrong if not isinstance(getattr(found, name), str)]
+    if wrong:
+        raise InputError(f"{path}: {wrong[0]} of the exercise must be a text")
+    if not found.name or not isinstance(found.card, Card):
+        raise InputError(f"{path}: the exercise needs a name, and a card made with card_of(__doc__)")
+    checks = found.checks(0)
+    if not checks or not all(isinstance(each, GradeCheck) for each in checks):
+        raise InputError(f"{path}: checks(seed) must return one GradeCheck or more, as a tuple")
+    for each in checks:
+        if each.measure is None and not each.beside:
+            raise InputError(f"{path}: the check '{each.text}' needs measure=…, or beside=… a controller")
+        if each.points < 1:
+            raise InputError(f"{path}: the check '{each.text}' must give one point or more")

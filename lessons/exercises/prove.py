@@ -1,0 +1,89 @@
+"""Proves that an exercise of a teacher's own can be graded: the solution gets all points, every known mistake
+loses some, and every check is failed by a mistake."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import dataclass, replace
+
+from lessons.exercises.exercise import Exercise
+from lessons.exercises.grade import Submission, grade_apart
+from lessons.exercises.own import exercise_in
+from lessons.exercises.result import Grade
+from lessons.own.files import Source, read
+from lessons.parallel import FailedJob, Spread
+
+
+@dataclass(frozen=True)
+class Proof:
+    """The grades of a teacher's own files.
+
+    Attributes:
+        exercise: the exercise.
+        solution, start: the grades of the solution and of the file with the missing lines.
+        mistakes: (what is wrong, its grade), in order.
+    """
+
+    exercise: Exercise
+    solution: Grade
+    start: Grade
+    mistakes: tuple[tuple[str, Grade], ...]
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """Sentences about what must be mended; () if the exercise can be used."""
+        found: list[str] = []
+        for name, grade in (("the solution", self.solution), ("the start", self.start)):
+            if grade.error:
+                found.append(f"{name} cannot be run: {grade.error}")
+        found += [
+            f"the solution misses the check '{line.check}': {line.why}"
+            for line in self.solution.lines
+            if line.why
+        ]
+        if self.start.passed:
+            found.append("the start already gets all points: leave something to be written")
+        for says, grade in self.mistakes:
+            if grade.error:
+                found.append(f"the mistake '{says}' cannot be run: {grade.error}")
+            elif grade.passed:
+                found.append(f"the mistake '{says}' gets all points: add a check that it fails")
+            elif not any(says in line.why for line in grade.lines):
+                found.append(f"the mistake '{says}' is not named: another mistake returns the same torques")
+        missed = {place for _, grade in self.mistakes for place, line in enumerate(grade.lines) if line.why}
+        found += [
+            f"the check '{check.text}' is passed by every mistake: add one that fails it"
+            for place, check in enumerate(self.exercise.checks(0))
+            if place not in missed
+        ]
+        return tuple(found)
+
+
+def prove(path: str, seed: int, spread: Spread, progress: Callable[[float], None]) -> Proof:
+    """Grades the solution, the start and the mistakes of a teacher's file, each in a process of its own, as
+    submissions are.
+
+    Args:
+        path: the teacher's file.
+        seed: seed of the disturbances.
+        spread: function that spreads the work.
+        progress: called with the completed share.
+
+    Raises:
+        InputError: the file cannot be used.
+    """
+    exercise = exercise_in(path)
+    model = Submission.to(path, read(path), seed)
+    texts = [("solution", exercise.solution), ("start", exercise.start)]
+    texts += [(f"mistake {k}", each.text) for k, each in enumerate(exercise.mistakes, start=1)]
+    work = [replace(model, source=Source(f"{path}, {name}", text)) for name, text in texts]
+    grades: dict[int, Grade] = {}
+    with closing(spread(grade_apart, work)) as outcomes:
+        for place, outcome in outcomes:
+            if isinstance(outcome, FailedJob):
+                outcome = Grade(work[place].source.path, "", exercise.name, error=outcome.reason)
+            grades[place] = outcome
+            progress(len(grades) / len(work))
+    mistakes = tuple((each.says, grades[k]) for k, each in enumerate(exercise.mistakes, start=2))
+    return Proof(exercise, grades[0], grades[1], mistakes)

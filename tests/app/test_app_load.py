@@ -1,0 +1,109 @@
+"""/health and /metrics, and a full server that sends newcomers to the next one."""
+
+from __future__ import annotations
+
+import json
+import re
+import urllib.error
+import urllib.request
+from http import HTTPStatus
+
+import pytest
+from viser import __version__
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+
+from app.link.choice import SceneChoice
+from app.server.load import Load, report
+from app.server.passes import HEADER
+from app.server.server import PageServer
+from browsing.wire import Wire, eventually
+from lessons.scenes.run_spec import RunSpec
+
+TOKEN = "a-token-of-ones-own-0"
+_LINE = re.compile(r"# (HELP|TYPE) [a-z_]+ .+|[a-z_]+ \d+")
+
+
+def load(attached: int = 0, maximum: int = 2, stopping: bool = False) -> Load:
+    return Load(attached, attached, maximum, 3, 5, 7, stopping)
+
+
+@pytest.mark.parametrize(
+    ("now", "state", "status"),
+    [
+        (load(1), "open", 200),
+        (load(2), "full", 503),
+        (load(0, stopping=True), "stopping", 503),
+        (load(1, maximum=0), "open", 200),  # a classroom turns nobody away
+    ],
+)
+def test_health_is_good_while_a_newcomer_gets_a_place(now: Load, state: str, status: int) -> None:
+    found = report("/health?x=1", now)
+    assert found is not None and (found[0], found[1]) == (status, "application/json")
+    assert json.loads(found[2]) == {"state": state, "sessions": now.sessions, "maximum": now.maximum}
+    assert report("/healthy", now) is None and report("/", now) is None
+
+
+def test_metrics_are_prometheus_text() -> None:
+    """Every sample has its HELP and TYPE; counters end in _total."""
+    found = report("/metrics", load(2))
+    assert found is not None and found[0] is HTTPStatus.OK and "version=0.0.4" in found[1]
+    lines = found[2].splitlines()
+    assert found[2].endswith("\n") and all(_LINE.fullmatch(line) for line in lines)
+    samples = dict(line.split() for line in lines if not line.startswith("#"))
+    assert samples["himpc_lab_sessions"] == samples["himpc_lab_sessions_maximum"] == "2"
+    kinds = dict(line.split()[2:4] for line in lines if line.startswith("# TYPE"))
+    assert kinds.keys() == samples.keys()
+    assert all((kind == "counter") == name.endswith("_total") for name, kind in kinds.items())
+
+
+def get(address: str, **headers: str) -> tuple[int, dict[str, str], str]:
+    named = {name.replace("_", "-"): value for name, value in headers.items()}
+    try:
+        with urllib.request.urlopen(urllib.request.Request(address, headers=named), timeout=30) as found:
+            return found.status, dict(found.headers), found.read().decode()
+    except urllib.error.HTTPError as error:
+        return error.code, dict(error.headers), error.read().decode()
+
+
+def test_a_full_server_sends_newcomers_away_and_takes_them_again(one_fork_server: None) -> None:
+    server = PageServer(
+        SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1, token=TOKEN, refers=True
+    )
+    token = {HEADER: TOKEN}
+    try:
+        assert get(f"{server.url}/health")[0] == 200
+        assert get(f"{server.url}/health", Host="evil.example")[0] == 403
+        assert get(server.url)[0] == 403
+        assert get(server.url, **token)[0] == 200
+        with Wire(server.link):
+            assert eventually(lambda: len(server.sessions.learners) == 1)
+            status, headers, text = get(f"{server.url}/health")
+            assert (status, json.loads(text)["state"]) == (503, "full")
+            status, headers, text = get(server.url, **token)
+            assert status == 503 and "Refresh" in headers and "All places are taken" in text
+            assert "himpc_lab_sessions_attached 1" in get(f"{server.url}/metrics")[2]
+            with pytest.raises(InvalidStatus) as refused:
+                connect(
+                    server.url.replace("http", "ws"),
+                    subprotocols=[f"viser-v{__version__}"],  # pyright: ignore[reportArgumentType]
+                    additional_headers=token,
+                )
+            assert refused.value.response.status_code == 503
+        assert eventually(lambda: get(f"{server.url}/health")[0] == 200)
+        server.guard.close()
+        assert json.loads(get(f"{server.url}/health")[2])["state"] == "stopping"
+    finally:
+        server.close()
+
+
+def test_a_server_of_its_own_shows_a_full_house_on_the_page(one_fork_server: None) -> None:
+    """Without a proxy that could try another one, a newcomer's page opens and says why it must wait."""
+    server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
+    try:
+        with Wire(server.link) as first:
+            assert eventually(lambda: bool(server.sessions.learners) and bool(first.made))
+            with Wire(server.link) as second:
+                assert eventually(lambda: second.shows("runs a robot for each of 1 pages"))
+    finally:
+        server.close()
