@@ -18,7 +18,7 @@ from himpc.compilation.compiler import compile_apart, compiles_here
 from himpc.compilation.keeping import Kept
 from himpc.compilation.loading import load
 from himpc.compilation.options import OPTIONS, Function
-from himpc.compilation.pieces import Piece, Whole
+from himpc.compilation.pieces import Open, Piece, Whole
 from himpc.compilation.sources import digest_of
 
 try:
@@ -67,6 +67,23 @@ def _compiled_now(fast: Any, arguments: tuple[Any, ...]) -> Any:
                 fast.compile(arguments)
     fast.disable_compile()
     return fast
+
+
+def intermediate(function: Function, arguments: tuple[Any, ...]) -> tuple[str, list[str]]:
+    """Returns a function and all functions that it calls as LLVM's text, which is not optimised for any processor.
+
+    Args:
+        function: a Python function whose callees are inline kernels.
+        arguments: types of its arguments.
+
+    Returns:
+        the name of the function in the text, and the modules.
+    """
+    fast: Any = njit(**_OPTIONS, no_cpython_wrapper=True, pipeline_class=Open)(function)
+    fast.compile(arguments)
+    (found,) = fast.overloads.values()
+    modules = [str(each._get_module_for_linking()) for each in (found.library, *found.library.called)]
+    return found.fndesc.llvm_func_name, modules
 
 
 @contextmanager

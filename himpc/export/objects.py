@@ -1,0 +1,110 @@
+"""Machine code of the exported controller for a target, by LLVM: an object file with a plain C interface."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from hashlib import sha256
+
+import llvmlite.binding as llvm
+
+from himpc.export.entries import EXPORTED, entries_text, kernel_text
+from himpc.export.layout import layout_number
+from robots.errors import InputError, unknown_name
+
+
+@dataclass(frozen=True)
+class Target:
+    """What code can be made for.
+
+    Attributes:
+        triple: as LLVM calls it.
+        features: of the processor, besides those that every one of its kind has.
+        bits: of a pointer.
+        ending: of the object file's name.
+        flags: what a C compiler for the target needs to link the replay.
+    """
+
+    triple: str
+    features: str = ""
+    bits: int = 64
+    ending: str = "o"
+    compiler: str = "cc"
+
+
+TARGETS: dict[str, Target] = {
+    "wasm32": Target(
+        "wasm32-unknown-unknown",
+        "+simd128,+bulk-memory,+sign-ext,+nontrapping-fptoint",
+        bits=32,
+        ending="wasm",
+    ),
+    "x86_64-linux": Target("x86_64-unknown-linux-gnu"),
+    "aarch64-linux": Target("aarch64-unknown-linux-gnu", compiler="aarch64-linux-gnu-gcc"),
+    "x86_64-macos": Target("x86_64-apple-macosx11.0.0"),
+    "aarch64-macos": Target("arm64-apple-macosx11.0.0"),
+    "x86_64-windows": Target("x86_64-pc-windows-msvc", ending="obj", compiler="clang"),
+}
+"""By the names that the command knows."""
+
+MATHEMATICS = frozenset({"sin", "cos", "tan", "atan2", "hypot", "exp", "expm1", "log", "sqrt", "pow"})
+"""Functions of libm that the code may use."""
+_MEMORY = frozenset({"memcpy", "memset", "memmove"})
+_COUNTS = re.compile(r"^define [^\n]*@(NRT_incref|NRT_decref)\(.*?^\}\n", re.MULTILINE | re.DOTALL)
+
+
+def target_named(name: str) -> Target:
+    """Returns a target. Raises InputError if the name is unknown."""
+    if name not in TARGETS:
+        raise unknown_name("target", name, TARGETS)
+    return TARGETS[name]
+
+
+def object_code(target: Target, text: tuple[str, list[str]] | None = None) -> bytes:
+    """Returns an object file for a target.
+
+    text: as of `kernel_text`, if it is known already; it takes half a minute.
+
+    Raises:
+        InputError: this build of LLVM cannot make code for the target.
+    """
+    name, parts = text or kernel_text()
+    llvm.initialize_all_targets()
+    llvm.initialize_all_asmprinters()
+    try:
+        found = llvm.Target.from_triple(target.triple)
+    except RuntimeError:
+        raise InputError(f"the LLVM of this llvmlite makes no code for {target.triple}") from None
+    reloc = "static" if target.bits == 32 else "pic"
+    machine = found.create_target_machine(features=target.features, opt=3, reloc=reloc)
+    head = f'target datalayout = "{machine.target_data}"\ntarget triple = "{target.triple}"\n'
+    whole = llvm.parse_assembly(head + entries_text(name, layout_number(), target.bits))
+    for part in parts:
+        whole.link_in(llvm.parse_assembly(_retargeted(part, head)))
+    for each in (*whole.functions, *whole.global_variables):
+        if not each.is_declaration and each.name not in EXPORTED:
+            each.linkage = "internal"
+    whole.verify()
+    builder = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(speed_level=2))
+    builder.getModulePassManager().run(whole, builder)
+    foreign = {each.name for each in whole.functions if each.is_declaration}
+    foreign = {each for each in foreign if not each.startswith("llvm.")} - MATHEMATICS - _MEMORY
+    if foreign:
+        raise RuntimeError(f"the exported code would need {', '.join(sorted(foreign))}")
+    return machine.emit_object(whole)
+
+
+def digest(code: bytes) -> str:
+    """Returns the first digits of a digest."""
+    return sha256(code).hexdigest()[:16]
+
+
+def _retargeted(text: str, head: str) -> str:
+    """A module of Numba for another target, without reference counts: nothing that a tick uses is allocated."""
+    text = _COUNTS.sub(r"define linkonce_odr void @\1(ptr %p) {\n  ret void\n}\n", text)
+    for name in re.findall(r"^define linkonce_odr void @(\w+)\(ptr %p\)", text, re.MULTILINE):
+        text = re.sub(rf"^declare .*@{name}\(.*\n", "", text, flags=re.MULTILINE)
+    text = re.sub(r'^target (datalayout|triple) = ".*"\n', "", text, flags=re.MULTILINE)
+    text = re.sub(r"^declare .*@llvm\.x86\..*\n", "", text, flags=re.MULTILINE)
+    text = re.sub(r'"(?:target-cpu|target-features|tune-cpu)"="[^"]*" ?', "", text)
+    return head + text
