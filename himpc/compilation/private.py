@@ -79,7 +79,7 @@ def intermediate(function: Function, arguments: tuple[Any, ...]) -> tuple[str, l
     Returns:
         the name of the function in the text, and the modules.
     """
-    fast: Any = njit(**_OPTIONS, no_cpython_wrapper=True, pipeline_class=Open)(function)
+    fast: Any = njit(**_OPTIONS, no_cpython_wrapper=True, _nrt=False, pipeline_class=Open)(function)
     fast.compile(arguments)
     (found,) = fast.overloads.values()
     modules = [str(each._get_module_for_linking()) for each in (found.library, *found.library.called)]

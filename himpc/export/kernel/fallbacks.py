@@ -145,10 +145,11 @@ def on_the_way(t: TickArrays, p: LoopArrays, i: int, fallback: int) -> int:
             p.trial[j, a] = U[j, a] + share * p.wanted[j, a]
             p.wanted[j, a] *= share
     if i > 0 and not t.level[i, ALONE]:
-        for j in range(N):
-            for row in range(t.level[i - 1, LAST]):
-                if abs(dot(t.B[j, row], p.wanted[j], n)) > LEAK:
-                    return fallback
+        for above in range(i):
+            for j in range(N):
+                for row in range(t.level[above, FIRST], t.level[above, LAST]):
+                    if abs(dot(t.B[j, row], p.wanted[j], n)) > LEAK:
+                        return fallback
     if not cost(t, p, i, p.trial) < cost(t, p, i, U):
         return fallback
     copy_rows(p.trial, U)
