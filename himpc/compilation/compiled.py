@@ -35,3 +35,6 @@ compiled."""
 intermediate = chain.intermediate
 """(function, argument types): the function and all that it calls as LLVM's text, for targets other than this
 processor."""
+kept = chain.kept
+"""(function, key, make): bytes that depend on the function's sources, from disk if they have been made
+before."""

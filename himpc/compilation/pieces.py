@@ -96,6 +96,7 @@ class Piece(_Compiling):
 
 
 class Open(_Compiling):
-    """Compiles a function for other targets than this processor: nothing is optimised or becomes machine code."""
+    """Compiles a function for other targets than this processor: nothing is optimised or becomes machine
+    code."""
 
     library = _Loose

@@ -70,7 +70,8 @@ def _compiled_now(fast: Any, arguments: tuple[Any, ...]) -> Any:
 
 
 def intermediate(function: Function, arguments: tuple[Any, ...]) -> tuple[str, list[str]]:
-    """Returns a function and all functions that it calls as LLVM's text, which is not optimised for any processor.
+    """Returns a function and all functions that it calls as LLVM's text, which is not optimised for any
+    processor.
 
     Args:
         function: a Python function whose callees are inline kernels.
@@ -84,6 +85,25 @@ def intermediate(function: Function, arguments: tuple[Any, ...]) -> tuple[str, l
     (found,) = fast.overloads.values()
     modules = [str(each._get_module_for_linking()) for each in (found.library, *found.library.called)]
     return found.fndesc.llvm_func_name, modules
+
+
+def kept(function: Function, key: str, make: Callable[[], bytes]) -> bytes:
+    """Returns bytes that depend on the sources of a function: from disk, or made and then kept there.
+
+    Args:
+        function: a Python function.
+        key: what the bytes are; part of a file's name.
+        make: makes them.
+    """
+    store = Kept(Path(function.__code__.co_filename), function.__qualname__, digest_of(function))
+    found = store.load_bytes(key)
+    if found is None:
+        with _one_at_a_time(store.cache_path, key):
+            found = store.load_bytes(key)  # another process may have made them meanwhile
+            if found is None:
+                found = make()
+                store.save_bytes(key, found)
+    return found
 
 
 @contextmanager

@@ -75,3 +75,8 @@ def intermediate(function: Function, arguments: tuple[Any, ...]) -> tuple[str, l
         InputError: always.
     """
     raise InputError(f"export needs the usual tool chain: unset {SWITCH}")
+
+
+def kept(function: Function, key: str, make: Callable[[], bytes]) -> bytes:
+    """See `compiled`; this tool chain keeps nothing."""
+    return make()

@@ -1,30 +1,41 @@
-"""The C interface of an exported controller, in LLVM's text: it finds the arrays in a controller's memory and calls
-`control`."""
+"""The C interface of an exported controller, in LLVM's text: it finds the arrays in a controller's memory and
+calls `control`."""
 
 from __future__ import annotations
 
 import struct
+import zlib
 
-from himpc.compilation.compiled import INDICES, VECTOR, WHOLE, intermediate
+from himpc.compilation.compiled import INDICES, VECTOR, WHOLE, intermediate, kept
 from himpc.export.kernel.whole_tick import RESET, TICK, control
 
 ARRAYS = ("data", "where", "whole", "whole_where", "loop", "loop_where")
 """The arrays of a controller, in the order of the arguments of `control`."""
 MAGIC, LAYOUT, SIZE, JOINTS, FIRST = range(5)
-"""What the words at the beginning of a controller's memory hold: a sign, which kernel it is for, the number of bytes
-and of joints, and from FIRST on, for each of ARRAYS, where it begins (bytes) and how many numbers it has."""
+"""What the words at the beginning of a controller's memory hold: a sign, which kernel it is for, the number
+of bytes and of joints, and from FIRST on, for each of ARRAYS, where it begins (bytes) and how many numbers it
+has."""
 WORDS = 32
 """Number of these words, 8 bytes each."""
 SIGN = struct.unpack("<q", b"himpclab")[0]
 EXPORTED = ("himpc_tick", "himpc_reset", "himpc_set", "himpc_check")
 """The functions of the object."""
 _TYPES = (VECTOR, INDICES, INDICES, INDICES, VECTOR, INDICES, WHOLE, WHOLE, VECTOR, VECTOR, VECTOR, VECTOR)
+_BETWEEN = "\n; ----\n"
 _ARRAY = "ptr, ptr, i64, i64, ptr, i64, i64"
 
 
 def kernel_text() -> tuple[str, list[str]]:
     """Returns the name of the compiled `control` and the modules of its text."""
-    return intermediate(control.py_func, _TYPES)
+    made = kept(
+        control.py_func, "text", lambda: zlib.compress(_joined(*intermediate(control.py_func, _TYPES)), 1)
+    )
+    name, *modules = zlib.decompress(made).decode().split(_BETWEEN)
+    return name, modules
+
+
+def _joined(name: str, modules: list[str]) -> bytes:
+    return _BETWEEN.join((name, *modules)).encode()
 
 
 def entries_text(control_name: str, layout: int, bits: int) -> str:
@@ -37,7 +48,8 @@ def entries_text(control_name: str, layout: int, bits: int) -> str:
     """
     size_t = f"i{bits}"
     return (
-        f"declare i32 @{control_name}(ptr, ptr, {', '.join([_ARRAY] * 6)}, i64, i64, {', '.join([_ARRAY] * 4)})\n"
+        f"declare i32 @{control_name}(ptr, ptr, "
+        f"{', '.join([_ARRAY] * 6)}, i64, i64, {', '.join([_ARRAY] * 4)})\n"
         + _entry(
             "himpc_tick",
             "ptr %q, ptr %v, ptr %tau_applied, ptr %tau",
@@ -69,7 +81,8 @@ define i32 @himpc_check(ptr %c, {size_t} %size) {{
   %enough = icmp uge {size_t} %size, {8 * WORDS}
   br i1 %enough, label %look, label %no
 look:
-{_word(MAGIC, "magic")}{_word(LAYOUT, "layout")}{_word(SIZE, "bytes")}  %given = {"zext" if bits == 32 else "bitcast"} {size_t} %size to i64
+{_word(MAGIC, "magic")}{_word(LAYOUT, "layout")}{_word(SIZE, "bytes")}
+  %given = {"zext" if bits == 32 else "bitcast"} {size_t} %size to i64
   %a = icmp eq i64 %magic, {SIGN}
   %b = icmp eq i64 %layout, {layout}
   %d = icmp ule i64 %bytes, %given
@@ -85,9 +98,8 @@ no:
 
 
 def _word(place: int, name: str) -> str:
-    return (
-        f"  %{name}.at = getelementptr i8, ptr %c, i64 {8 * place}\n  %{name} = load i64, ptr %{name}.at, align 8\n"
-    )
+    where = f"  %{name}.at = getelementptr i8, ptr %c, i64 {8 * place}\n"
+    return where + f"  %{name} = load i64, ptr %{name}.at, align 8\n"
 
 
 def _entry(

@@ -91,7 +91,7 @@ def image_of(controller: Controller, robot: Robot, references: Mapping[str, Refe
         *(budget_of(arena), strict),
     )
     f["goal"][:], f["tau_limit"][:], f["weight"][:] = arena.f["limits"], robot.tau_limit, 1.0
-    for place, (level, table) in enumerate(zip(form.levels, tables, strict=True)):
+    for place, level in enumerate(form.levels):
         calmed = DAMPING_SHARE if level.name == DAMPING_LEVEL.name and not strict else 1.0
         f["Q"][level.rows] = calmed * level.root_Q**2
         R = level.R * np.array(settings.M_bar) ** 2 if settings.R_on == "acceleration" else level.R
@@ -128,7 +128,9 @@ def _levels(robot: Robot, settings: Settings, strict: bool) -> tuple[StackForm, 
     if strict:
         levels = (*settings.stack, DAMPING_LEVEL) if settings.damping else settings.stack
         if len(levels) > _MOST_LEVELS:
-            raise InputError(f"the stack has {len(settings.stack)} levels: export takes at most {_MOST_LEVELS}")
+            raise InputError(
+                f"the stack has {len(settings.stack)} levels: export takes at most {_MOST_LEVELS}"
+            )
         if not levels:
             raise InputError("the stack is empty and damping is off: export needs at least one level")
         form = stack_form(robot, levels, settings)
@@ -140,7 +142,8 @@ def _levels(robot: Robot, settings: Settings, strict: bool) -> tuple[StackForm, 
 
 
 def _damped(robot: Robot, settings: Settings) -> list[float]:
-    """Whether the damping level is added, for every choice of levels that are on; bit k stands for level k."""
+    """Whether the damping level is added, for every choice of levels that are on; bit k stands for level
+    k."""
     found = []
     for choice in range(1 << len(settings.stack)):
         stack = tuple(
@@ -156,7 +159,13 @@ def _write_reference(
     """Writes the reference of a task; returns the task's entry in the manifest."""
     place, task, span = where
     rows = span.stop - span.start
-    told: dict[str, Any] = {"name": task.name, "index": place, "rows": rows, "unit": task.unit, "target": "none"}
+    told: dict[str, Any] = {
+        "name": task.name,
+        "index": place,
+        "rows": rows,
+        "unit": task.unit,
+        "target": "none",
+    }
     reference = references.get(task.name)
     if isinstance(task, Damping) or reference is None:
         return told
@@ -176,8 +185,8 @@ def _write_reference(
         return told | {"target": kind}
     if not write_curve(arena, place, span, reference):
         raise InputError(
-            f"task '{task.name}' follows a {type(reference).__name__}, which export does not have: choose a scene "
-            "whose references are circles, swings, constants or dragged targets"
+            f"task '{task.name}' follows a {type(reference).__name__}, which export does not have: choose a "
+            "scene whose references are circles, swings, constants or dragged targets"
         )
     return told | {"target": "fixed"}
 
@@ -196,7 +205,9 @@ def _joined(arena: Arena, loop: Array, loop_where: Array, n: int) -> tuple[bytes
     return words.astype("<i8").tobytes() + b"".join(pieces), offsets
 
 
-def _listed(arena: Arena, f: dict[str, Array], loop_where: Array, offsets: dict[str, int]) -> list[dict[str, Any]]:
+def _listed(
+    arena: Arena, f: dict[str, Array], loop_where: Array, offsets: dict[str, int]
+) -> list[dict[str, Any]]:
     """Every array: name, type, shape, unit and at which byte it begins."""
     tick = get_type_hints(TickArrays, include_extras=True)
     own = get_type_hints(LoopArrays, include_extras=True)

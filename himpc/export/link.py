@@ -30,7 +30,15 @@ def linked(code: bytes) -> bytes:
         given.write_bytes(code)
         subprocess.run(
             [
-                *(*_linker(), str(given), "-o", str(made), "--no-entry", "--allow-undefined", "--gc-sections"),
+                *(
+                    *_linker(),
+                    str(given),
+                    "-o",
+                    str(made),
+                    "--no-entry",
+                    "--allow-undefined",
+                    "--gc-sections",
+                ),
                 *("--strip-all", "--export=__heap_base", "-z", f"stack-size={_STACK}", "--stack-first"),
                 *(f"--export={name}" for name in EXPORTED),
             ],

@@ -5,10 +5,13 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from hashlib import sha256
+from pathlib import Path
 
 import llvmlite.binding as llvm
 
+from himpc.compilation.compiled import kept
 from himpc.export.entries import EXPORTED, entries_text, kernel_text
+from himpc.export.kernel.whole_tick import control
 from himpc.export.layout import layout_number
 from robots.errors import InputError, unknown_name
 
@@ -22,7 +25,7 @@ class Target:
         features: of the processor, besides those that every one of its kind has.
         bits: of a pointer.
         ending: of the object file's name.
-        flags: what a C compiler for the target needs to link the replay.
+        compiler: a C compiler that links the replay for the target.
     """
 
     triple: str
@@ -60,15 +63,18 @@ def target_named(name: str) -> Target:
     return TARGETS[name]
 
 
-def object_code(target: Target, text: tuple[str, list[str]] | None = None) -> bytes:
-    """Returns an object file for a target.
-
-    text: as of `kernel_text`, if it is known already; it takes half a minute.
+def object_code(target: Target) -> bytes:
+    """Returns an object file for a target; it is kept on disk.
 
     Raises:
         InputError: this build of LLVM cannot make code for the target.
     """
-    name, parts = text or kernel_text()
+    own = b"".join(Path(__file__).with_name(name).read_bytes() for name in ("objects.py", "entries.py"))
+    return kept(control.py_func, f"{target.triple}-{sha256(own).hexdigest()[:8]}", lambda: _made(target))
+
+
+def _made(target: Target) -> bytes:
+    name, parts = kernel_text()
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
     try:
@@ -94,13 +100,9 @@ def object_code(target: Target, text: tuple[str, list[str]] | None = None) -> by
     return machine.emit_object(whole)
 
 
-def digest(code: bytes) -> str:
-    """Returns the first digits of a digest."""
-    return sha256(code).hexdigest()[:16]
-
-
 def _retargeted(text: str, head: str) -> str:
-    """A module of Numba for another target, without reference counts: nothing that a tick uses is allocated."""
+    """A module of Numba for another target, without reference counts: nothing that a tick uses is
+    allocated."""
     text = _COUNTS.sub(r"define linkonce_odr void @\1(ptr %p) {\n  ret void\n}\n", text)
     for name in re.findall(r"^define linkonce_odr void @(\w+)\(ptr %p\)", text, re.MULTILINE):
         text = re.sub(rf"^declare .*@{name}\(.*\n", "", text, flags=re.MULTILINE)

@@ -18,13 +18,15 @@ def check(controller: Controller, settings: Settings) -> None:
     """Raises InputError if an exported controller cannot do what this one does."""
     if type(controller) not in (HIMPC, HIQP, NHIMPC, Weighted):
         raise InputError(
-            f"the controller {type(controller).__name__} is not compiled: export takes himpc, hiqp, nhimpc and "
-            "weighted"
+            f"the controller {type(controller).__name__} is not compiled: export takes himpc, hiqp, nhimpc "
+            "and weighted"
         )
     if settings.route != "compiled":
         raise InputError("route=explicit is not compiled: export takes route=compiled")
     if settings.M_bar_adapt:
-        raise InputError("M_bar_adapt needs the robot's dynamic model, which is not exported: set it to false")
+        raise InputError(
+            "M_bar_adapt needs the robot's dynamic model, which is not exported: set it to false"
+        )
     given = given_of(imposed(settings.limits))
     if given:
         raise InputError(
@@ -34,6 +36,6 @@ def check(controller: Controller, settings: Settings) -> None:
         for task in level.tasks:
             if not is_built_in(task):
                 raise InputError(
-                    f"task '{task.name}' is a {type(task).__name__}, which Python computes: export takes positions "
-                    "and orientations of frames, joints and postures"
+                    f"task '{task.name}' is a {type(task).__name__}, which Python computes: export takes "
+                    "positions and orientations of frames, joints and postures"
                 )

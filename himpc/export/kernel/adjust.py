@@ -25,19 +25,21 @@ _MODE = 9
 
 @inline_kernel
 def adjust(t: TickArrays, p: LoopArrays, what: int, index: int, values: Array, count: int) -> int:
-    """Changes a setting; returns 0, or FIXED, MISFIT, NOT_USABLE or NO_HIERARCHY, and then nothing has changed.
+    """Changes a setting; returns 0, or FIXED, MISFIT, NOT_USABLE or NO_HIERARCHY, and then nothing has
+    changed.
 
     Args:
         what: TARGET … ENABLED.
         index: of the task (TARGET, GAINS) or of the level (WEIGHT_Q, WEIGHT_R, ENABLED).
-        values, count: TARGET see `drag`; M̄ (n) kg·m²; K_p (m) 1/s², then K_v (m) 1/s; Q (m); R (n); the limits of
+        values, count: TARGET see `drag`; M̄ (n) kg·m²; K_p (m) 1/s², then K_v (m) 1/s; Q (m); R (n); the
+        limits of
             torque (n) N·m, velocity (n) rad/s, lower and upper position (n) rad each; 0 or 1.
     """
     n, r = t.q.size, int(p.setup[LEVELS])
     if not dot(values, values, count) < 1e18 and what != LIMITS:
         return NOT_USABLE
-    of_task = what == TARGET or what == GAINS
-    if index < 0 or index >= (len(t.task) if of_task else r):
+    of_task = what in (TARGET, GAINS)
+    if what < 0 or what > ENABLED or index < 0 or index >= (len(t.task) if of_task else r):
         return MISFIT
     if what == TARGET:
         return drag(t, p, index, values, count)
@@ -47,7 +49,7 @@ def adjust(t: TickArrays, p: LoopArrays, what: int, index: int, values: Array, c
     if what == GAINS:
         first, last = t.task[index, 2], t.task[index, 2] + t.task[index, 3]
     size = last - first
-    wanted = n if what == M_BAR or what == WEIGHT_R else 2 * size if what == GAINS else size
+    wanted = n if what in (M_BAR, WEIGHT_R) else 2 * size if what == GAINS else size
     if what == ENABLED:
         wanted = 1
     if count != wanted:
@@ -56,7 +58,7 @@ def adjust(t: TickArrays, p: LoopArrays, what: int, index: int, values: Array, c
         for k in range(count):
             if not (values[k] > 0.0 or (what == GAINS and values[k] == 0.0)):
                 return NOT_USABLE
-    tied = what == WEIGHT_R or what == ENABLED or (what == M_BAR and p.setup[ON_ACCELERATION] != 0.0)
+    tied = what in (WEIGHT_R, ENABLED) or (what == M_BAR and p.setup[ON_ACCELERATION] != 0.0)
     if tied and p.setup[SIMPLE] == 0.0:
         return NO_HIERARCHY
     if what == GAINS:
@@ -89,8 +91,8 @@ def set_limits(p: LoopArrays, values: Array, n: int) -> int:
 
 @inline_kernel
 def write_rows(t: TickArrays, p: LoopArrays, first: int, last: int) -> None:
-    """Writes √Q, its effect coefficients and the coefficients of the free motion of some rows, from their gains,
-    their Q and how far they have faded in; see `himpc.prediction.task.residual_model`."""
+    """Writes √Q, its effect coefficients and the coefficients of the free motion of some rows, from their
+    gains, their Q and how far they have faded in; see `himpc.prediction.task.residual_model`."""
     N, T_s = len(t.fixed), t.scalars[T_S]
     for i in range(first, last):
         K, K_p, K_v = t.row_knots[i], t.K_p[i], t.K_v[i]
@@ -145,8 +147,8 @@ def switch(t: TickArrays, p: LoopArrays, index: int, on: bool) -> None:
 
 @inline_kernel
 def arrange(t: TickArrays, p: LoopArrays) -> None:
-    """Writes the tables of the levels that are on, see `himpc.tick.tables.write_levels`. Without a strict hierarchy
-    they stay as they are."""
+    """Writes the tables of the levels that are on, see `himpc.tick.tables.write_levels`. Without a strict
+    hierarchy they stay as they are."""
     if p.setup[SIMPLE] == 0.0:
         return
     n, r, choice, count = t.q.size, int(p.setup[LEVELS]), 0, 0

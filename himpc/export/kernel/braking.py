@@ -1,4 +1,5 @@
-"""Bounds that give way, and increments that bring the joints to rest, joint by joint: `himpc.limits.braking`."""
+"""Bounds that give way, and increments that bring the joints to rest, joint by joint:
+`himpc.limits.braking`."""
 
 from __future__ import annotations
 
@@ -24,15 +25,18 @@ def clamp(x: float, low: float, high: float) -> float:
 
 @inline_kernel
 def braking(t: TickArrays, p: LoopArrays, U: Array) -> None:
-    """Increments (N, n) that meet the torque rows always, and torque and velocity rows whenever any do; of position
-    rows they see the next one only. The rows are `lower` and `upper` of the tick."""
+    """Increments (N, n) that meet the torque rows always, and torque and velocity rows whenever any do; of
+    position rows they see the next one only. The rows are `lower` and `upper` of the tick."""
     N, n = U.shape
     T_s, kinds = t.scalars[T_S], len(t.L) // N
     for a in range(n):
         for j in range(N):
             p.low[j, a], p.high[j, a] = t.lower[N + j, a], t.upper[N + j, a]
         for j in range(N - 2, -1, -1):
-            behind_low, behind_high = p.low[j + 1, a] - t.upper[j + 1, a], p.high[j + 1, a] - t.lower[j + 1, a]
+            behind_low, behind_high = (
+                p.low[j + 1, a] - t.upper[j + 1, a],
+                p.high[j + 1, a] - t.lower[j + 1, a],
+            )
             low, high = p.low[j, a], p.high[j, a]
             p.low[j, a], p.high[j, a] = clamp(behind_low, low, high), clamp(behind_high, low, high)
         q_dd = (t.v[a] - t.v_was[a]) / t.scalars[PERIOD]
@@ -57,7 +61,8 @@ def braking(t: TickArrays, p: LoopArrays, U: Array) -> None:
 
 @inline_kernel
 def missed(t: TickArrays, p: LoopArrays, U: Array) -> float:
-    """The violation of each row by increments into `size`, (b, n) ≥ 0 N·m, 0 up to rounding; returns the largest."""
+    """The violation of each row by increments into `size`, (b, n) ≥ 0 N·m, 0 up to rounding; returns the
+    largest."""
     N, n = U.shape
     for j in range(N):
         for a in range(n):

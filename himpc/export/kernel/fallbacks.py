@@ -1,5 +1,5 @@
-"""What acts when a level has no optimum within its budget: `himpc.tick.fallbacks` without the routes that need a
-general QP solver."""
+"""What acts when a level has no optimum within its budget: `himpc.tick.fallbacks` without the routes that
+need a general QP solver."""
 
 from __future__ import annotations
 
@@ -119,8 +119,8 @@ def settled(U: Array) -> bool:
 
 @inline_kernel
 def on_the_way(t: TickArrays, p: LoopArrays, i: int, fallback: int) -> int:
-    """Moves U_i, which meets the rows, towards `wanted` as far as the rows allow, if that improves the cost and
-    changes nothing at the level above; returns the fallback, FEASIBLE after a move."""
+    """Moves U_i, which meets the rows, towards `wanted` as far as the rows allow, if that improves the cost
+    and changes nothing at the level above; returns the fallback, FEASIBLE after a move."""
     U, N = t.U[i], len(p.trial)
     t.kkt[i], t.active_count[i] = 0.0, 0
     if not settled(p.wanted):
@@ -136,7 +136,11 @@ def on_the_way(t: TickArrays, p: LoopArrays, i: int, fallback: int) -> int:
         for a in range(n):
             change = p.size[row, a]
             if change != 0.0:
-                room = t.upper[row, a] - t.reached[row, a] if change > 0.0 else t.reached[row, a] - t.lower[row, a]
+                room = (
+                    t.upper[row, a] - t.reached[row, a]
+                    if change > 0.0
+                    else t.reached[row, a] - t.lower[row, a]
+                )
                 share = min(share, room / abs(change))
     if not share > 0.0:
         return fallback

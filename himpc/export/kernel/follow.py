@@ -72,8 +72,8 @@ def rest_at_targets(t: TickArrays, p: LoopArrays) -> None:
 
 @inline_kernel
 def drag(t: TickArrays, p: LoopArrays, task: int, values: Array, count: int) -> int:
-    """Moves a raw target: a position by its three coordinates (m), an orientation by its quaternion x y z w, joints
-    by their coordinates (rad). Returns 0, or what is wrong, see `adjust`."""
+    """Moves a raw target: a position by its three coordinates (m), an orientation by its quaternion x y z w,
+    joints by their coordinates (rad). Returns 0, or what is wrong, see `adjust`."""
     if p.target[task, DRAGGABLE] == 0.0:
         return FIXED
     m, width = int(p.target[task, ROWS]), int(p.target[task, WIDTH])
@@ -115,5 +115,5 @@ def to_rotation(quaternion: Array, R: Array) -> bool:
 
 
 FIXED, MISFIT, NOT_USABLE, NO_HIERARCHY = -1, -2, -3, -4
-"""What is wrong with a setting: the task follows a fixed motion; no such index, or a wrong number of values; a value
-is not finite or out of range; the controller has no strict hierarchy."""
+"""What is wrong with a setting: the task follows a fixed motion; no such index, or a wrong number of values;
+a value is not finite or out of range; the controller has no strict hierarchy."""

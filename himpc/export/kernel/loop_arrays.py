@@ -10,16 +10,18 @@ from himpc.tick.kernel.arrays import Array, TickArrays, Whole
 
 
 class LoopArrays(NamedTuple):
-    """Settings that can change while the robot moves, targets, and scratch of the fallbacks; each annotation says
-    the shape, the unit and what the array is.
+    """Settings that can change while the robot moves, targets, and scratch of the fallbacks; each annotation
+    says the shape, the unit and what the array is.
 
-    Sizes: as for `TickArrays`, where r counts all levels, also those that are off; D = 2ʳ choices of levels; V
-    numbers of a target's value, W of a sample, K of its caps, see `himpc.tick.kernel.target.roll`.
+    Sizes: as for `TickArrays`, where r counts all levels, also those that are off; D = 2ʳ choices of levels;
+    V numbers of a target's value, W of a sample, K of its caps, see `himpc.tick.kernel.target.roll`.
     """
 
     setup: Annotated[Array, "8", "1", "constants of the export, see MOST and the names after it"]
     state: Annotated[Array, "4", "1", "what is remembered, see STARTED and the names after it"]
-    goal: Annotated[Array, "8 n", "N·m, rad/s, rad, rad/s²", "the limits that are wanted, rows as in `limits`"]
+    goal: Annotated[
+        Array, "8 n", "N·m, rad/s, rad, rad/s²", "the limits that are wanted, rows as in `limits`"
+    ]
     tau_limit: Annotated[Array, "n", "N·m", "largest torque of each joint; no reading is larger"]
     Q: Annotated[Array, "M", "s⁴/m²", "weight of each row's residual"]
     R: Annotated[Array, "r n", "1/(N·m)²", "weight of the increments of each level"]
@@ -50,12 +52,12 @@ SHAPES: dict[str, str] = {
 """Every array and its shape, in the order in which they stand."""
 
 MOST, TOLERANCE, ON_ACCELERATION, LEVELS, DAMPS, BUDGET, SIMPLE = range(7)
-"""What `setup` holds: largest number of iterations and where they end (N·m), see `NHIMPC`; whether R weighs M̄⁻¹Δτ;
-number of levels and whether the last one is the damping level; multiplications that a tick may use; whether levels
-form a strict hierarchy, so that they can be switched."""
+"""What `setup` holds: largest number of iterations and where they end (N·m), see `NHIMPC`; whether R weighs
+M̄⁻¹Δτ; number of levels and whether the last one is the damping level; multiplications that a tick may use;
+whether levels form a strict hierarchy, so that they can be switched."""
 STARTED, TICKS, FADING = range(3)
-"""What `state` holds: whether the tick before is remembered, number of ticks since the reset, and whether rows fade
-in."""
+"""What `state` holds: whether the tick before is remembered, number of ticks since the reset, and whether
+rows fade in."""
 DRAGGABLE, ROWS, WIDTH, KNOWN = range(4)
 """Columns of `target`. KNOWN is 0 for a target at rest."""
 
@@ -64,8 +66,17 @@ def sizes_of(n: int, N: int, M: int, r: int, T: int, b: int) -> dict[str, int]:
     """Returns what the letters of the shapes stand for."""
     widest = max(n, 3)
     return {
-        **{"n": n, "N": N, "N1": N + 1, "M": M, "r": r, "T": T, "b": b, "D": 2**r},
-        **{"V": max(9, widest), "W": max(19, 4 * widest + 1), "K": 3 + 3 * widest},
+        "n": n,
+        "N": N,
+        "N1": N + 1,
+        "M": M,
+        "r": r,
+        "T": T,
+        "b": b,
+        "D": 2**r,
+        "V": max(9, widest),
+        "W": max(19, 4 * widest + 1),
+        "K": 3 + 3 * widest,
     }
 
 

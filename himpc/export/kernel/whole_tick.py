@@ -1,4 +1,5 @@
-"""The entry of an exported controller: a whole control period, a reset, or a setting; see `himpc.export.entries`."""
+"""The entry of an exported controller: a whole control period, a reset, or a setting; see
+`himpc.export.entries`."""
 
 from __future__ import annotations
 
@@ -124,11 +125,9 @@ def whole_tick(
 
 
 @inline_kernel
-def iterate(
-    t: TickArrays, p: LoopArrays, data: Array, where: Whole, whole: Whole, whole_where: Whole
-) -> int:
-    """Solves all levels, once or, for NHIMPC, until no increment changes any more; returns the last of the fallbacks
-    that acted, HOLD if there is no torque."""
+def iterate(t: TickArrays, p: LoopArrays, data: Array, where: Whole, whole: Whole, whole_where: Whole) -> int:
+    """Solves all levels, once or, for NHIMPC, until no increment changes any more; returns the last of the
+    fallbacks that acted, HOLD if there is no torque."""
     t.budget[0] = p.setup[BUDGET]
     most, change, count, fallback = int(p.setup[MOST]), math.inf, 0, SOLVE
     while count == 0 or (change > p.setup[TOLERANCE] and count < most):
@@ -159,8 +158,8 @@ def iterate(
 
 @inline_kernel
 def take_torque(t: TickArrays, p: LoopArrays, tau: Array) -> None:
-    """Takes the torque that acts now. It cannot exceed a joint's limit: a larger reading is wrong and must not be the
-    start of a bound."""
+    """Takes the torque that acts now. It cannot exceed a joint's limit: a larger reading is wrong and must
+    not be the start of a bound."""
     for a in range(t.q.size):
         reach = max(p.tau_limit[a], p.goal[1, a])
         t.tau_0[a] = min(max(tau[a], -reach), reach)
@@ -184,7 +183,8 @@ def forget(t: TickArrays, p: LoopArrays) -> int:
 
 @inline_kernel
 def begin(t: TickArrays) -> None:
-    """The memory of a robot that has moved with constant velocity so far; `himpc.tick.tick.CompiledTick.recall`."""
+    """The memory of a robot that has moved with constant velocity so far;
+    `himpc.tick.tick.CompiledTick.recall`."""
     T_s = t.scalars[T_S]
     copy(t.q, t.q_was, t.q.size)
     copy(t.v, t.v_was, t.q.size)
