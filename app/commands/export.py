@@ -50,6 +50,7 @@ def export(
     from lessons.scenes.catalog import as_torque_scene
     from lessons.scenes.run_spec import RunSpec
     from lessons.session.torque import TorqueSession
+    from robots.mechanics.saving import saved
 
     wanted = target_named(target)
     if not 1 <= ticks <= 100_000:
@@ -72,7 +73,9 @@ def export(
     ]
     folder = _made(out)
     print("compiling the controller: up to a minute …", flush=True)
-    files = files_of(image, wanted, torques, recorded(loaded, ticks, seed), target)
+    settings = loaded.settings
+    plant = saved(loaded.robot, settings.plant, loaded.world, settings.T_s)
+    files = files_of(image, wanted, torques, recorded(loaded, ticks, seed), target, plant)
     for name, content in files.items():
         _write(folder / name, content)
     for name, content in files.items():

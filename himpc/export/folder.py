@@ -20,6 +20,13 @@ MOVE = 8
 """Largest number of values of a move in a recorded run."""
 
 
+_LOOP = """\
+| `loop.cpp` | a loop in step with the clock, with MuJoCo's C library as the robot. To build it, MUJOCO being \
+the folder of the Python package mujoco: \
+`g++ -O2 -I$MUJOCO/include loop.cpp himpc.o $MUJOCO/libmujoco.so.* -Wl,-rpath,$MUJOCO -o loop` |
+"""
+
+
 class Move(NamedTuple):
     """A target that is dragged before a period: the period, the index of the task, and the values."""
 
@@ -36,7 +43,7 @@ class Recorded(NamedTuple):
 
 
 def files_of(
-    image: Image, target: Target, torques: Sequence[float], recorded: Recorded, name: str
+    image: Image, target: Target, torques: Sequence[float], recorded: Recorded, name: str, plant: bytes
 ) -> Mapping[str, bytes]:
     """Returns the files of a controller for a target by their names.
 
@@ -46,11 +53,12 @@ def files_of(
         torques: N·m, the largest torque of each joint.
         recorded: a run to replay.
         name: the target's.
+        plant: the simulated robot, for MuJoCo's C library.
     """
     code = object_code(target)
     wasm = target.ending == "wasm"
     object_name = f"himpc.{target.ending}"
-    own = ("himpc.mjs", "replay.mjs") if wasm else ("replay.c",)
+    own = ("himpc.mjs", "replay.mjs") if wasm else ("replay.c", "loop.cpp")
     manifest = {"target": name, "object": object_name, **image.manifest}
     return {
         object_name: linked(code) if wasm else code,
@@ -59,6 +67,7 @@ def files_of(
         "himpc.h": header(image.manifest, torques).encode(),
         **{each: (FILES / each).read_bytes() for each in own},
         "vector.bin": vector_of(recorded),
+        "plant.mjb": plant,
         "README.md": _readme(image, target, object_name, len(recorded.rows)).encode(),
     }
 
@@ -79,7 +88,7 @@ def _readme(image: Image, target: Target, object_name: str, ticks: int) -> str:
         extra = "| `himpc.mjs` | the JavaScript interface |\n| `replay.mjs` | replays `vector.bin` |\n"
     else:
         commands = f"    {target.compiler} -O2 replay.c {object_name} -lm -o replay\n    ./replay"
-        needs, extra = "libm", "| `replay.c` | replays `vector.bin` |\n"
+        needs, extra = "libm", "| `replay.c` | replays `vector.bin` |\n" + _LOOP
     return (
         (FILES / "README.md")
         .read_text()

