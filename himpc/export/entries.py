@@ -4,9 +4,8 @@ calls `control`."""
 from __future__ import annotations
 
 import struct
-import zlib
 
-from himpc.compilation.compiled import INDICES, VECTOR, WHOLE, intermediate, kept
+from himpc.compilation.compiled import INDICES, VECTOR, WHOLE, intermediate
 from himpc.export.kernel.whole_tick import RESET, TICK, control
 
 ARRAYS = ("data", "where", "whole", "whole_where", "loop", "loop_where")
@@ -21,32 +20,21 @@ SIGN = struct.unpack("<q", b"himpclab")[0]
 EXPORTED = ("himpc_tick", "himpc_reset", "himpc_set", "himpc_check")
 """The functions of the object."""
 _TYPES = (VECTOR, INDICES, INDICES, INDICES, VECTOR, INDICES, WHOLE, WHOLE, VECTOR, VECTOR, VECTOR, VECTOR)
-_BETWEEN = "\n; ----\n"
 _ARRAY = "ptr, ptr, i64, i64, ptr, i64, i64"
 
 
 def kernel_text() -> tuple[str, list[str]]:
     """Returns the name of the compiled `control` and the modules of its text."""
-    made = kept(
-        control.py_func, "text", lambda: zlib.compress(_joined(*intermediate(control.py_func, _TYPES)), 1)
-    )
-    name, *modules = zlib.decompress(made).decode().split(_BETWEEN)
-    return name, modules
+    return intermediate(control.py_func, _TYPES)
 
 
-def _joined(name: str, modules: list[str]) -> bytes:
-    return _BETWEEN.join((name, *modules)).encode()
-
-
-def entries_text(control_name: str, layout: int, bits: int) -> str:
+def entries_text(control_name: str, layout: int) -> str:
     """Returns the functions in EXPORTED.
 
     Args:
         control_name: as of `kernel_text`.
         layout: the number that a controller's memory must have for this kernel.
-        bits: of a size_t.
     """
-    size_t = f"i{bits}"
     return (
         f"declare i32 @{control_name}(ptr, ptr, "
         f"{', '.join([_ARRAY] * 6)}, i64, i64, {', '.join([_ARRAY] * 4)})\n"
@@ -77,12 +65,12 @@ def entries_text(control_name: str, layout: int, bits: int) -> str:
             [("%values", "%k")] * 4,
         )
         + f"""
-define i32 @himpc_check(ptr %c, {size_t} %size) {{
-  %enough = icmp uge {size_t} %size, {8 * WORDS}
+define i32 @himpc_check(ptr %c, i32 %size) {{
+  %enough = icmp uge i32 %size, {8 * WORDS}
   br i1 %enough, label %look, label %no
 look:
 {_word(MAGIC, "magic")}{_word(LAYOUT, "layout")}{_word(SIZE, "bytes")}
-  %given = {"zext" if bits == 32 else "bitcast"} {size_t} %size to i64
+  %given = zext i32 %size to i64
   %a = icmp eq i64 %magic, {SIGN}
   %b = icmp eq i64 %layout, {layout}
   %d = icmp ule i64 %bytes, %given

@@ -21,8 +21,8 @@ MOVE = 8
 
 
 _LOOP = """\
-| `loop.cpp` | a loop in step with the clock, with MuJoCo's C library as the robot. To build it, MUJOCO being \
-the folder of the Python package mujoco: \
+| `loop.cpp` | a loop in step with the clock, with MuJoCo's C library as the robot. To build it, \
+MUJOCO being the folder of the Python package mujoco: \
 `g++ -O2 -I$MUJOCO/include loop.cpp himpc.o $MUJOCO/libmujoco.so.* -Wl,-rpath,$MUJOCO -o loop` |
 """
 

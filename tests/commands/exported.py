@@ -64,7 +64,7 @@ class Exported:
         self._c.himpc_tick.argtypes = [ctypes.c_void_p, N_P, N_P, ctypes.c_void_p, N_P]
         self._c.himpc_set.argtypes = [ctypes.c_void_p, ctypes.c_int, ctypes.c_int, N_P, ctypes.c_int]
         self._c.himpc_reset.argtypes = [ctypes.c_void_p, ctypes.c_void_p]
-        self._c.himpc_check.argtypes = [ctypes.c_void_p, ctypes.c_size_t]
+        self._c.himpc_check.argtypes = [ctypes.c_void_p, ctypes.c_uint]
         self.manifest: dict[str, Any] = json.loads((folder / "controller.json").read_text())
         self.n = len(self.manifest["joints"])
         image = (folder / "controller.bin").read_bytes()

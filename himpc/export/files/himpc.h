@@ -49,7 +49,7 @@ int himpc_reset(himpc_controller *c, const double *tau);
 /* Changes a setting; himpc_set_... below are easier to use. */
 int himpc_set(himpc_controller *c, int what, int index, const double *values, int count);
 /* 0 if this memory is a controller that this kernel can run. */
-int himpc_check(const void *memory, size_t size);
+int himpc_check(const void *memory, unsigned size);
 
 enum { HIMPC_TARGET, HIMPC_M_BAR, HIMPC_GAINS, HIMPC_WEIGHT_Q, HIMPC_WEIGHT_R, HIMPC_LIMITS, HIMPC_ENABLED };
 
@@ -67,7 +67,7 @@ static const double HIMPC_LARGEST_TORQUE[HIMPC_N] = { @torques@ };
 /* A controller in `memory` of HIMPC_BYTES bytes, from the content of controller.bin; NULL if it does not fit. */
 static inline himpc_controller *himpc_create(void *memory, size_t size, const void *image, size_t image_size) {
     if (image_size < HIMPC_BYTES || size < HIMPC_BYTES || (size_t)memory % HIMPC_ALIGNMENT) return NULL;
-    if (himpc_check(image, image_size)) return NULL;
+    if (himpc_check(image, HIMPC_BYTES)) return NULL;
     memcpy(memory, image, HIMPC_BYTES);
     himpc_reset((himpc_controller *)memory, NULL);
     return (himpc_controller *)memory;

@@ -42,9 +42,9 @@ static int hostile(himpc_controller *c, const double *q, const double *v) {
     const double wild[] = {NAN, INFINITY, -INFINITY, 1e300, -1e300, 1e8, 1e4, 100.0, -100.0, 10.0, -10.0, 3.0, 0.0};
     const int count = (int)(sizeof wild / sizeof *wild);
     double x[HIMPC_N], y[HIMPC_N], z[HIMPC_N], tau[HIMPC_N];
-    int bad = 0, seen[8] = {0};
+    int bad = 0, seen[HIMPC_HOLD + 1] = {0};
     uint32_t seed = 1;
-    for (int k = 0; k < 4000; k++) {
+    for (int k = 0; k < 500; k++) {
         for (int a = 0; a < HIMPC_N; a++) {
             uint32_t dice[3];
             for (int i = 0; i < 3; i++) dice[i] = (seed = seed * 1664525u + 1013904223u) >> 8;
