@@ -28,6 +28,8 @@ except ImportError:  # on a system without fcntl, two processes may compile the 
 
 _OPTIONS: dict[str, Any] = {**OPTIONS, "no_cfunc_wrapper": True}
 _PIECE = {**_OPTIONS, "no_cpython_wrapper": True, "pipeline_class": Piece}
+_OPEN = {**_OPTIONS, "no_cpython_wrapper": True, "_nrt": False, "pipeline_class": Open}
+"""Without reference counts: nothing is allocated."""
 inline_kernel = njit(**_PIECE)
 always_inline_kernel = njit(**_PIECE, forceinline=True)
 """See `compiled`."""
@@ -80,7 +82,7 @@ def intermediate(function: Function, arguments: tuple[Any, ...]) -> tuple[str, l
     Returns:
         the name of the function in the text, and the modules.
     """
-    fast: Any = njit(**_OPTIONS, no_cpython_wrapper=True, _nrt=False, pipeline_class=Open)(function)
+    fast: Any = njit(**_OPEN)(function)
     fast.compile(arguments)
     (found,) = fast.overloads.values()
     modules = [str(each._get_module_for_linking()) for each in (found.library, *found.library.called)]

@@ -250,7 +250,7 @@ def _node_of_the_type_checker() -> str:
 
 
 def test_a_loop_in_c_with_mujoco_moves_as_python_does(folders: dict[str, Path]) -> None:
-    """The C++ program closes the loop with MuJoCo's C library; every torque stays that of Python's closed loop."""
+    """The C++ program closes the loop with MuJoCo's C library; every torque stays that of Python's loop."""
     import mujoco
 
     needed("g++")
