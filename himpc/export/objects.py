@@ -94,7 +94,7 @@ def _portable() -> str:
 
     Numba's text is for pointers of eight bytes. Here all calls that pass structures with pointers are
     inlined and the structures taken apart: what is left is the same on a target with other pointers. Loops
-    stay as they are, because each target has its own vectors.
+    stay as they are; each target has its own vectors.
     """
 
     def make() -> bytes:

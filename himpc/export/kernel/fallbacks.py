@@ -91,7 +91,7 @@ def kept_rows(t: TickArrays, p: LoopArrays, keep: bool) -> None:
 
 @inline_kernel
 def contain(t: TickArrays, U: Array) -> None:
-    """Widens the rows until U meets them, so that lower levels start from a feasible point."""
+    """Widens the rows until U meets them: the point from which lower levels start is feasible."""
     constraint_values(U, bounds_of(t, t.reached))
     for row in range(len(t.L)):
         for a in range(U.shape[1]):

@@ -54,7 +54,7 @@ SHAPES: dict[str, str] = {
 MOST, TOLERANCE, ON_ACCELERATION, LEVELS, DAMPS, BUDGET, SIMPLE = range(7)
 """What `setup` holds: largest number of iterations and where they end (N·m), see `NHIMPC`; whether R weighs
 M̄⁻¹Δτ; number of levels and whether the last one is the damping level; multiplications that a tick may use;
-whether levels form a strict hierarchy, so that they can be switched."""
+whether levels form a strict hierarchy, and can be switched."""
 STARTED, TICKS, FADING = range(3)
 """What `state` holds: whether the tick before is remembered, number of ticks since the reset, and whether
 rows fade in."""
