@@ -24,6 +24,7 @@ COMMANDS: dict[str, str] = {
     "bench": "control-step times of the routes and solvers, side by side",
     "reproduce": "the papers' tables and figures: our number beside the printed one",
     "sweep": "a grid of runs over settings, as a map; a stopped sweep can be continued",
+    "export": "a controller as C or WebAssembly, with its numbers and a recorded run to replay",
     "tune": "find M̄ step by step, as Remark 4 of the HIMPC paper says",
 }
 """One line per command; the function `NAME(…) -> exit code` is in `app/commands/NAME.py`."""

@@ -22,6 +22,7 @@ DOORS = {
     "daqp": ("himpc/qp.py",),
     "proxsuite": ("himpc/qp.py",),
     "numba": ("himpc/compilation/",),
+    "llvmlite": ("himpc/export/objects.py",),
     "casadi": ("himpc/qp.py",),
     "viser": ("app/",),
     "tyro": ("app/",),
@@ -261,6 +262,11 @@ COMPILED = {
     "controllers": (
         *("tick", "plan", "formulation", "cascade", "limits", "prediction", "stack", "tasks"),
         *("kinematics", "references", "qp", "catalog"),
+    ),
+    "export/kernel": ("tick/kernel", "tick", "controllers", "limits", "cascade", "compilation", "qp"),
+    "export": (
+        *("export/kernel", "tick", "tick/kernel", "compilation", "controllers", "formulation", "cascade"),
+        *("limits", "references", "tasks", "stack"),
     ),
     "htmpc": (
         *("htmpc/kernel", "tick/kernel", "plan", "stack", "tasks", "kinematics", "references"),

@@ -11,14 +11,14 @@ from himpc.limits.rows import Rows
 
 Array = NDArray[np.float64]
 
-_ROOM = 1e-7
+ROOM = 1e-7
 """N·m added to the least slack, so that the widened rows have an interior to rounding."""
 
 
 def softened(rows: Rows) -> Rows | None:
     """Returns the rows widened by the least slack that makes them feasible; None if they need no slack."""
     slack = least_slack(rows)
-    return rows.widened(np.where(slack > 0, slack + _ROOM, 0.0)) if slack.any() else None
+    return rows.widened(np.where(slack > 0, slack + ROOM, 0.0)) if slack.any() else None
 
 
 def last_resort(rows: Rows, before: Array | None) -> tuple[Fallback, Array]:

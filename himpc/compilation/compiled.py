@@ -32,3 +32,9 @@ imported, for arguments of these types only."""
 on_compiled = chain.on_compiled
 """(tell): a context; while it is open, `tell` is called with the dotted name of each function that is
 compiled."""
+intermediate = chain.intermediate
+"""(function, argument types): the function and all that it calls as LLVM's text, for targets other than this
+processor."""
+kept = chain.kept
+"""(function, key, make): bytes that depend on the function's sources, from disk if they have been made
+before."""

@@ -75,6 +75,29 @@ class Kept:
             if _written(folder / name, sha256(body).digest() + body):
                 return
 
+    def load_bytes(self, key: str) -> bytes | None:
+        """Returns what `save_bytes` wrote under this key for the same sources; None if it is not there."""
+        name, made_for = self._named(key)
+        for folder in self._folders(make=False):
+            body = _read(folder / name)
+            if body is not None and body.startswith(made_for):
+                return body[len(made_for) :]
+        return None
+
+    def save_bytes(self, key: str, content: bytes) -> None:
+        """Writes bytes that depend on the function's sources to the first folder that accepts them, if any
+        does."""
+        name, made_for = self._named(key)
+        body = made_for + content
+        for folder in self._folders(make=True):
+            if _written(folder / name, sha256(body).digest() + body):
+                return
+
+    def _named(self, key: str) -> tuple[str, bytes]:
+        """Returns the name of the file for a key, and its first bytes."""
+        version = f"{numba.__version__} {sys.version}".encode()
+        return f"{self._source.stem}.{self._name}-{key}.code", sha256(self._digest + version).digest()
+
     def enable(self) -> None:
         """Does nothing: the cache is always enabled."""
 

@@ -93,3 +93,10 @@ class Piece(_Compiling):
         if not len(self.state.typingctx.callstack):
             raise TypeError(f"{func.__qualname__} is a piece of compiled functions: nobody else can call it")
         return super().compile_extra(func)
+
+
+class Open(_Compiling):
+    """Compiles a function for other targets than this processor: nothing is optimised or becomes machine
+    code."""
+
+    library = _Loose

@@ -18,7 +18,7 @@ from himpc.compilation.compiler import compile_apart, compiles_here
 from himpc.compilation.keeping import Kept
 from himpc.compilation.loading import load
 from himpc.compilation.options import OPTIONS, Function
-from himpc.compilation.pieces import Piece, Whole
+from himpc.compilation.pieces import Open, Piece, Whole
 from himpc.compilation.sources import digest_of
 
 try:
@@ -28,6 +28,8 @@ except ImportError:  # on a system without fcntl, two processes may compile the 
 
 _OPTIONS: dict[str, Any] = {**OPTIONS, "no_cfunc_wrapper": True}
 _PIECE = {**_OPTIONS, "no_cpython_wrapper": True, "pipeline_class": Piece}
+_OPEN = {**_OPTIONS, "no_cpython_wrapper": True, "_nrt": False, "pipeline_class": Open}
+"""Without reference counts: nothing is allocated."""
 inline_kernel = njit(**_PIECE)
 always_inline_kernel = njit(**_PIECE, forceinline=True)
 """See `compiled`."""
@@ -67,6 +69,43 @@ def _compiled_now(fast: Any, arguments: tuple[Any, ...]) -> Any:
                 fast.compile(arguments)
     fast.disable_compile()
     return fast
+
+
+def intermediate(function: Function, arguments: tuple[Any, ...]) -> tuple[str, list[str]]:
+    """Returns a function and all functions that it calls as LLVM's text, which is not optimised for any
+    processor.
+
+    Args:
+        function: a Python function whose callees are inline kernels.
+        arguments: types of its arguments.
+
+    Returns:
+        the name of the function in the text, and the modules.
+    """
+    fast: Any = njit(**_OPEN)(function)
+    fast.compile(arguments)
+    (found,) = fast.overloads.values()
+    modules = [str(each._get_module_for_linking()) for each in (found.library, *found.library.called)]
+    return found.fndesc.llvm_func_name, modules
+
+
+def kept(function: Function, key: str, make: Callable[[], bytes]) -> bytes:
+    """Returns bytes that depend on the sources of a function: from disk, or made and then kept there.
+
+    Args:
+        function: a Python function.
+        key: what the bytes are; part of a file's name.
+        make: makes them.
+    """
+    store = Kept(Path(function.__code__.co_filename), function.__qualname__, digest_of(function))
+    found = store.load_bytes(key)
+    if found is None:
+        with _one_at_a_time(store.cache_path, key):
+            found = store.load_bytes(key)  # another process may have made them meanwhile
+            if found is None:
+                found = make()
+                store.save_bytes(key, found)
+    return found
 
 
 @contextmanager

@@ -10,8 +10,10 @@ from typing import Any
 import numba
 from numba import njit
 
+from himpc.compilation import SWITCH
 from himpc.compilation.options import OPTIONS, Function
 from himpc.compilation.sources import digest_of
+from robots.errors import InputError
 
 config: Any = numba.config  # pyright: ignore[reportPrivateImportUsage]
 inline_kernel = njit(**OPTIONS)
@@ -64,3 +66,17 @@ def matrices(data: Any, start: int, count: int, rows: int, columns: int) -> Any:
 def borrowed(array: Any) -> Any:
     """See `views`."""
     return array
+
+
+def intermediate(function: Function, arguments: tuple[Any, ...]) -> tuple[str, list[str]]:
+    """See `compiled`; this tool chain has no such text.
+
+    Raises:
+        InputError: always.
+    """
+    raise InputError(f"export needs the usual tool chain: unset {SWITCH}")
+
+
+def kept(function: Function, key: str, make: Callable[[], bytes]) -> bytes:
+    """See `compiled`; this tool chain keeps nothing."""
+    return make()

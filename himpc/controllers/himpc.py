@@ -32,7 +32,7 @@ from himpc.tick.tick import CompiledTick
 Array = NDArray[np.float64]
 
 ENABLE_SECONDS = 0.5
-_FAINTEST = 1e-8
+FAINTEST = 1e-8
 """A task that is switched on starts with this share of its Q, which then grows exponentially to 1."""
 
 
@@ -267,7 +267,7 @@ class HIMPC(TorqueController):
         if weight >= 1.0:
             return 1.0
         self._weight[name] = min(1.0, weight + self._settings.T_s / ENABLE_SECONDS)
-        return math.sqrt(_FAINTEST ** (1.0 - weight))
+        return math.sqrt(FAINTEST ** (1.0 - weight))
 
     def _hold(self, q: Array, started: int) -> Plan:
         """Returns the plan for a tick without a usable state: the torque is held and the memory is

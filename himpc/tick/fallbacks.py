@@ -29,7 +29,7 @@ _ITERATIONS = 100
 _TOLERATED = 1e-6
 """N·m: rows that are wider than this have no solution for the printed route either."""
 
-_LEAK = 1e-7
+LEAK = 1e-7
 """m/s²: largest change that a point may cause at the levels above."""
 
 
@@ -130,7 +130,7 @@ def _on_the_way(
     on_the_way = towards(rows, U, wanted)
     if on_the_way is not None and place and not arena.i["level"][place, ALONE]:
         above = slice(0, int(arena.i["level"][place - 1, LAST]))
-        if np.abs(f["B"][:, above] @ (on_the_way - U)[:, :, None]).max(initial=0.0) > _LEAK:
+        if np.abs(f["B"][:, above] @ (on_the_way - U)[:, :, None]).max(initial=0.0) > LEAK:
             on_the_way = None
     if on_the_way is not None:
         problem = printed_problem(arena, place)

@@ -22,7 +22,7 @@ BUDGET = 42e6
 twenty on a slower core. The limit is a count and not a time, so that the same seed gives the same run."""
 _ROUNDS = 12_000
 """Largest number of changes of active rows in a tick; the longest run takes some milliseconds."""
-_ACCURACY = 1e-8
+ACCURACY = 1e-8
 """N·m: largest distance of a point from the optimum, since H ≥ ρ."""
 
 
@@ -76,7 +76,7 @@ def write_levels(arena: Arena, levels: Sequence[LevelTable]) -> None:
         rho = float(level.R.min())
         metric = np.sqrt(rho / level.R)
         f["rho"][place], f["metric"][place], f["R"][place] = rho, metric, level.own_R
-        f["accuracy"][place] = min(_ACCURACY * rho, KKT_TOLERANCE)
+        f["accuracy"][place] = min(ACCURACY * rho, KKT_TOLERANCE)
         arena.i["level"][place] = (
             level.rows.start,
             level.rows.stop,

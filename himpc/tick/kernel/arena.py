@@ -26,8 +26,8 @@ class Arena:
 
     def __init__(self, **sizes: int) -> None:
         """sizes: by the letters of the shapes."""
-        self.data, self.where, self.f = _laid_out(NUMBERS, sizes, np.float64)
-        self.whole, self.whole_where, self.i = _laid_out(WHOLES, sizes, np.intp)
+        self.data, self.where, self.f = laid_out(NUMBERS, sizes, np.float64)
+        self.whole, self.whole_where, self.i = laid_out(WHOLES, sizes, np.intp)
         self.arguments = (self.data, self.where, self.whole, self.whole_where)
         begin, end = self.where[[AT.tau, AT.placed]].tolist()
         whole_begin, whole_end = self.whole_where[[WHOLE_AT.active_row, WHOLE_AT.end]].tolist()
@@ -59,7 +59,14 @@ class Snapshot(NamedTuple):
         return self.arena.read(self, name)
 
 
-def _laid_out(shapes: dict[str, str], sizes: dict[str, int], kind: type) -> tuple:
+def laid_out(shapes: dict[str, str], sizes: dict[str, int], kind: type) -> tuple:
+    """Returns the numbers of arrays, where each of them begins, and the arrays by name.
+
+    Args:
+        shapes: by name.
+        sizes: by the letters of the shapes.
+        kind: of a number.
+    """
     where, views, end = np.zeros(len(shapes), np.intp), {}, 0
     sized = {
         name: tuple(sizes[s] if s in sizes else int(s) for s in shape.split())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from himpc.compilation.compiled import GIVEN_MATRICES, MATRIX, NUMBER, VECTOR, WHOLE, inline_kernel, kernel
+from himpc.compilation.views import matrix
 from himpc.constants import APPROACH_RATE, STILL, VELOCITY_RATE
 from himpc.tick.kernel.arrays import Array
 from himpc.tick.kernel.kinematics import turned_away
@@ -83,7 +84,7 @@ def following(now: Array, then: Array, raw: Array, caps: Array, T_s: float, m: i
     for a in range(m):
         away[a] = 0.0 if rests or width > m else raw[a] - now[a]
     if width > m and not rests:
-        turned_away(raw.reshape(3, 3), now[:9].reshape(3, 3), away)
+        turned_away(matrix(raw, 0, 3, 3), matrix(now, 0, 3, 3), away)
     distance, speed = math.sqrt(dot(away, away, m)), math.sqrt(dot(velocity, velocity, m))
     if rests or (distance < STILL and speed < 10.0 * STILL):
         copy(raw, then, width)

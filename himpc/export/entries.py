@@ -1,0 +1,124 @@
+"""The C interface of an exported controller, in LLVM's text: it finds the arrays in a controller's memory and
+calls `control`."""
+
+from __future__ import annotations
+
+import struct
+
+from himpc.compilation.compiled import INDICES, VECTOR, WHOLE, intermediate
+from himpc.export.kernel.whole_tick import RESET, TICK, control
+
+ARRAYS = ("data", "where", "whole", "whole_where", "loop", "loop_where")
+"""The arrays of a controller, in the order of the arguments of `control`."""
+MAGIC, LAYOUT, SIZE, JOINTS, FIRST = range(5)
+"""What the words at the beginning of a controller's memory hold: a sign, which kernel it is for, the number
+of bytes and of joints, and from FIRST on, for each of ARRAYS, where it begins (bytes) and how many numbers it
+has."""
+WORDS = 32
+"""Number of these words, 8 bytes each."""
+SIGN = struct.unpack("<q", b"himpclab")[0]
+EXPORTED = ("himpc_tick", "himpc_reset", "himpc_set", "himpc_check")
+"""The functions of the object."""
+_TYPES = (VECTOR, INDICES, INDICES, INDICES, VECTOR, INDICES, WHOLE, WHOLE, VECTOR, VECTOR, VECTOR, VECTOR)
+_ARRAY = "ptr, ptr, i64, i64, ptr, i64, i64"
+
+
+def kernel_text() -> tuple[str, list[str]]:
+    """Returns the name of the compiled `control` and the modules of its text."""
+    return intermediate(control.py_func, _TYPES)
+
+
+def entries_text(control_name: str, layout: int) -> str:
+    """Returns the functions in EXPORTED.
+
+    Args:
+        control_name: as of `kernel_text`.
+        layout: the number that a controller's memory must have for this kernel.
+    """
+    return (
+        f"declare i32 @{control_name}(ptr, ptr, "
+        f"{', '.join([_ARRAY] * 6)}, i64, i64, {', '.join([_ARRAY] * 4)})\n"
+        + _entry(
+            "himpc_tick",
+            "ptr %q, ptr %v, ptr %tau_applied, ptr %tau",
+            "  %given = icmp ne ptr %tau_applied, null\n  %index = zext i1 %given to i64\n"
+            "  %z = select i1 %given, ptr %tau_applied, ptr %q\n",
+            control_name,
+            (f"i64 {TICK}", "i64 %index"),
+            [("%q", "%n"), ("%v", "%n"), ("%z", "%n"), ("%tau", "%n")],
+        )
+        + _entry(
+            "himpc_reset",
+            "ptr %tau",
+            "  %given = icmp ne ptr %tau, null\n  %index = zext i1 %given to i64\n"
+            "  %x = select i1 %given, ptr %tau, ptr %c\n",
+            control_name,
+            (f"i64 {RESET}", "i64 %index"),
+            [("%x", "%n")] * 4,
+        )
+        + _entry(
+            "himpc_set",
+            "i32 %what, i32 %index, ptr %values, i32 %count",
+            "  %w = zext i32 %what to i64\n  %i = sext i32 %index to i64\n  %k = sext i32 %count to i64\n",
+            control_name,
+            ("i64 %w", "i64 %i"),
+            [("%values", "%k")] * 4,
+        )
+        + f"""
+define i32 @himpc_check(ptr %c, i32 %size) {{
+  %enough = icmp uge i32 %size, {8 * WORDS}
+  br i1 %enough, label %look, label %no
+look:
+{_word(MAGIC, "magic")}{_word(LAYOUT, "layout")}{_word(SIZE, "bytes")}
+  %given = zext i32 %size to i64
+  %a = icmp eq i64 %magic, {SIGN}
+  %b = icmp eq i64 %layout, {layout}
+  %d = icmp ule i64 %bytes, %given
+  %ab = and i1 %a, %b
+  %abd = and i1 %ab, %d
+  %r = select i1 %abd, i32 0, i32 -1
+  ret i32 %r
+no:
+  ret i32 -1
+}}
+"""
+    )
+
+
+def _word(place: int, name: str) -> str:
+    where = f"  %{name}.at = getelementptr i8, ptr %c, i64 {8 * place}\n"
+    return where + f"  %{name} = load i64, ptr %{name}.at, align 8\n"
+
+
+def _entry(
+    name: str,
+    arguments: str,
+    before: str,
+    control_name: str,
+    what: tuple[str, str],
+    given: list[tuple[str, str]],
+) -> str:
+    """A function that calls `control`; 6, the sign of a held torque, if that ends with a fault."""
+    body, passed = _word(JOINTS, "n"), []
+    for place, array in enumerate(ARRAYS):
+        body += _word(FIRST + 2 * place, f"{array}.offset") + _word(FIRST + 2 * place + 1, f"{array}.count")
+        body += f"  %{array} = getelementptr i8, ptr %c, i64 %{array}.offset\n"
+        passed.append(_array(f"%{array}", f"%{array}.count"))
+    passed += [*what, *(_array(*each) for each in given)]
+    return f"""
+define i32 @{name}(ptr %c, {arguments}) {{
+{before}{body}  %result = alloca i64
+  %fault = alloca ptr
+  store i64 0, ptr %result
+  %status = call i32 @{control_name}(ptr %result, ptr %fault, {", ".join(passed)})
+  %found = load i64, ptr %result
+  %short = trunc i64 %found to i32
+  %fine = icmp eq i32 %status, 0
+  %r = select i1 %fine, i32 %short, i32 6
+  ret i32 %r
+}}
+"""
+
+
+def _array(pointer: str, count: str) -> str:
+    return f"ptr null, ptr null, i64 {count}, i64 8, ptr {pointer}, i64 {count}, i64 8"

@@ -1,0 +1,105 @@
+"""The files of an exported controller."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from himpc.export.header import header
+from himpc.export.image import Image
+from himpc.export.link import linked
+from himpc.export.objects import Target, object_code
+from himpc.tick.kernel.arrays import Array
+
+FILES = Path(__file__).parent / "files"
+MOVE = 8
+"""Largest number of values of a move in a recorded run."""
+
+
+_LOOP = """\
+| `loop.cpp` | a loop in step with the clock, with MuJoCo's C library as the robot. To build it, \
+MUJOCO being the folder of the Python package mujoco: \
+`g++ -O2 -I$MUJOCO/include loop.cpp himpc.o $MUJOCO/libmujoco.so.* -Wl,-rpath,$MUJOCO -o loop` |
+"""
+
+
+class Move(NamedTuple):
+    """A target that is dragged before a period: the period, the index of the task, and the values."""
+
+    tick: int
+    task: int
+    values: Sequence[float]
+
+
+class Recorded(NamedTuple):
+    """A recorded run: moves of targets; and q, v, τ applied and τ of every period, (ticks, 4, n)."""
+
+    moves: Sequence[Move]
+    rows: Array
+
+
+def files_of(
+    image: Image, target: Target, torques: Sequence[float], recorded: Recorded, name: str, plant: bytes
+) -> Mapping[str, bytes]:
+    """Returns the files of a controller for a target by their names.
+
+    Args:
+        image: the controller.
+        target: what its code is for.
+        torques: N·m, the largest torque of each joint.
+        recorded: a run to replay.
+        name: the target's.
+        plant: the simulated robot, for MuJoCo's C library.
+    """
+    code = object_code(target)
+    wasm = target.ending == "wasm"
+    object_name = f"himpc.{target.ending}"
+    own = ("himpc.mjs", "replay.mjs") if wasm else ("replay.c", "loop.cpp")
+    manifest = {"target": name, "object": object_name, **image.manifest}
+    return {
+        object_name: linked(code) if wasm else code,
+        "controller.bin": image.memory,
+        "controller.json": (json.dumps(manifest, indent=1, allow_nan=False) + "\n").encode(),
+        "himpc.h": header(image.manifest, torques).encode(),
+        **{each: (FILES / each).read_bytes() for each in own},
+        "vector.bin": vector_of(recorded),
+        "plant.mjb": plant,
+        "README.md": _readme(image, target, object_name, len(recorded.rows)).encode(),
+    }
+
+
+def vector_of(recorded: Recorded) -> bytes:
+    """Returns a recorded run as bytes: how many periods and moves (int64), the moves, then the rows."""
+    moves = np.zeros((len(recorded.moves), 3 + MOVE))
+    for row, move in zip(moves, recorded.moves, strict=True):
+        row[:3], row[3 : 3 + len(move.values)] = (move.tick, move.task, len(move.values)), move.values
+    counts = np.array([len(recorded.rows), len(moves)], "<i8")
+    return counts.tobytes() + moves.astype("<f8").tobytes() + recorded.rows.astype("<f8").tobytes()
+
+
+def _readme(image: Image, target: Target, object_name: str, ticks: int) -> str:
+    wasm = target.ending == "wasm"
+    if wasm:
+        commands, needs = "    node replay.mjs", "`sin`, `cos` and the like, which JavaScript has"
+        extra = "| `himpc.mjs` | the JavaScript interface |\n| `replay.mjs` | replays `vector.bin` |\n"
+    else:
+        commands = f"    {target.compiler} -O2 replay.c {object_name} -lm -o replay\n    ./replay"
+        needs, extra = "libm", "| `replay.c` | replays `vector.bin` |\n" + _LOOP
+    return (
+        (FILES / "README.md")
+        .read_text()
+        .format(
+            controller=image.manifest["controller"],
+            robot=image.manifest["robot"],
+            period=image.manifest["period_s"],
+            object=f"`{object_name}`",
+            ticks=ticks,
+            commands=commands,
+            needs=needs,
+            extra=extra,
+        )
+    )

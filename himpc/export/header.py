@@ -1,0 +1,63 @@
+"""The C header of an exported controller."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from himpc.cascade.level import FALLBACKS
+
+
+def header(manifest: dict[str, Any], torques: Sequence[float]) -> str:
+    """Returns the header of a controller.
+
+    Args:
+        manifest: of its `Image`.
+        torques: N·m, the largest torque of each joint.
+    """
+    tasks, levels = manifest["tasks"], manifest["levels"]
+    names = {
+        "controller": manifest["controller"],
+        "robot": _plain(manifest["robot"]),
+        "joints": ", ".join(map(_plain, manifest["joints"])),
+        "n": len(manifest["joints"]),
+        "horizon": manifest["horizon"],
+        "bytes": manifest["bytes"],
+        "period": repr(float(manifest["period_s"])),
+        "fallbacks": ", ".join(f"HIMPC_{name.upper()}" for name in FALLBACKS),
+        "fallback_names": _strings(FALLBACKS),
+        "tasks": "; ".join(
+            f"{_plain(each['name'])} ({each['rows']} rows, {each['target']} target)" for each in tasks
+        ),
+        "task_count": len(tasks),
+        "task_names": _strings([each["name"] for each in tasks]),
+        "task_rows": ", ".join(str(each["rows"]) for each in tasks),
+        "levels": "; ".join(_plain(each["name"]) for each in levels),
+        "level_count": len(levels),
+        "level_names": _strings([each["name"] for each in levels]),
+        "level_rows": ", ".join(str(each["rows"]) for each in levels),
+        "torques": ", ".join(repr(float(each)) if each < 1e300 else "HUGE_VAL" for each in torques),
+        "most_rows": max([len(manifest["joints"]), *(each["rows"] for each in (*tasks, *levels))]),
+    }
+    text = (Path(__file__).parent / "files" / "himpc.h").read_text()
+    return re.sub(r"@(\w+)@", lambda found: str(names[found[1]]), text)
+
+
+def _plain(name: str) -> str:
+    """A name inside a comment, which it must not end."""
+    return "".join(each if each.isalnum() or each in "_-. +" else "?" for each in name)
+
+
+def _strings(names: Sequence[str]) -> str:
+    """Names as string literals of C."""
+    return ", ".join(f'"{"".join(map(_letter, name.encode()))}"' for name in names)
+
+
+def _letter(byte: int) -> str:
+    return (
+        chr(byte)
+        if chr(byte).isascii() and (chr(byte).isalnum() or chr(byte) in "_-. +")
+        else f"\\{byte:03o}"
+    )

@@ -1,0 +1,233 @@
+"""The memory of an exported controller: all its numbers, and what they mean."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, get_type_hints
+
+import numpy as np
+
+from himpc.controllers.controller import Controller
+from himpc.controllers.nhimpc import NHIMPC
+from himpc.controllers.weighted import DAMPING_SHARE, Weighted, accumulated
+from himpc.export.entries import ARRAYS, FIRST, JOINTS, LAYOUT, MAGIC, SIGN, SIZE, WORDS
+from himpc.export.kernel.loop_arrays import (
+    BUDGET,
+    DAMPS,
+    DRAGGABLE,
+    LEVELS,
+    MOST,
+    ON_ACCELERATION,
+    ROWS,
+    SHAPES,
+    SIMPLE,
+    TOLERANCE,
+    WIDTH,
+    LoopArrays,
+    sizes_of,
+)
+from himpc.export.layout import layout_number
+from himpc.export.refusals import check
+from himpc.formulation.forms import StackForm, prepare, stack_form
+from himpc.formulation.settings import Settings
+from himpc.limits import in_force
+from himpc.references import Reference, Target
+from himpc.stack import DAMPING_LEVEL, freedom_left
+from himpc.tasks import Damping, Task
+from himpc.tick.configure import Span, arena_for, write_curve, write_limits
+from himpc.tick.kernel.arena import Arena, laid_out
+from himpc.tick.kernel.arrays import NUMBERS, WHOLES, Array, TickArrays
+from himpc.tick.tables import LevelTable, budget_of
+from robots import InputError, Robot
+
+_LINE = 64
+"""Arrays begin at multiples of so many bytes."""
+_MOST_LEVELS = 10
+"""Every choice of levels that are on has an entry in a table."""
+
+
+@dataclass(frozen=True, eq=False)
+class Image:
+    """An exported controller.
+
+    Attributes:
+        memory: the bytes that a program copies to have a controller.
+        manifest: what they mean, as JSON.
+    """
+
+    memory: bytes
+    manifest: dict[str, Any]
+
+
+def image_of(controller: Controller, robot: Robot, references: Mapping[str, Reference]) -> Image:
+    """Returns the memory of a controller before its first period.
+
+    Args:
+        controller: HIMPC, HIQP, NHIMPC or Weighted on the compiled route.
+        robot: whose it is.
+        references: of every task by its name, before the first period.
+
+    Raises:
+        InputError: it uses something that exported controllers do not have.
+    """
+    settings = controller.settings
+    check(controller, settings)
+    strict = not isinstance(controller, Weighted)
+    form, off, tables = _levels(robot, settings, strict)
+    arena, spans = arena_for(robot, settings, form, off, tables)
+    force = in_force(robot, settings.limits)
+    write_limits(arena, force, settings.limits.position == "paper")
+    arena.f["direction"][:] = np.eye(robot.n)
+    sizes = sizes_of(
+        robot.n, settings.horizon, len(arena.f["K_p"]), len(tables), len(spans), len(arena.f["L"])
+    )
+    loop, loop_where, f = laid_out(SHAPES, sizes, np.float64)
+    f["setup"][[MOST, TOLERANCE]] = (
+        (controller.max_iterations, controller.tolerance) if isinstance(controller, NHIMPC) else (1, np.inf)
+    )
+    f["setup"][[ON_ACCELERATION, LEVELS, DAMPS, BUDGET, SIMPLE]] = (
+        *(settings.R_on == "acceleration", len(tables), strict and settings.damping),
+        *(budget_of(arena), strict),
+    )
+    f["goal"][:], f["tau_limit"][:], f["weight"][:] = arena.f["limits"], robot.tau_limit, 1.0
+    for place, level in enumerate(form.levels):
+        calmed = DAMPING_SHARE if level.name == DAMPING_LEVEL.name and not strict else 1.0
+        f["Q"][level.rows] = calmed * level.root_Q**2
+        R = level.R * np.array(settings.M_bar) ** 2 if settings.R_on == "acceleration" else level.R
+        f["R"][place], f["enabled"][place] = R, level.level.enabled
+        f["table"][place] = arena.i["level"][place]
+    if strict:
+        f["damped"][: 1 << len(settings.stack)] = _damped(robot, settings)
+    tasks = [_write_reference(arena, f, span, references) for span in spans]
+    memory, offsets = _joined(arena, loop, loop_where, robot.n)
+    levels = [
+        {"name": level.name, "index": place, "rows": level.rows.stop - level.rows.start}
+        | {"tasks": [task.name for task in level.level.tasks], "enabled": level.level.enabled}
+        for place, level in enumerate(form.levels)
+    ]
+    return Image(
+        memory,
+        {
+            "controller": type(controller).__name__,
+            "robot": robot.name,
+            "joints": list(robot.joint_names),
+            "period_s": settings.T_s,
+            "horizon": settings.horizon,
+            "bytes": len(memory),
+            "layout": layout_number(),
+            "tasks": tasks,
+            "levels": levels,
+            "arrays": _listed(arena, f, loop_where, offsets),
+        },
+    )
+
+
+def _levels(robot: Robot, settings: Settings, strict: bool) -> tuple[StackForm, list[Task], list[LevelTable]]:
+    """The levels, also those that are off, if there is a strict hierarchy; else those that are on."""
+    if strict:
+        levels = (*settings.stack, DAMPING_LEVEL) if settings.damping else settings.stack
+        if len(levels) > _MOST_LEVELS:
+            raise InputError(
+                f"the stack has {len(settings.stack)} levels: export takes at most {_MOST_LEVELS}"
+            )
+        if not levels:
+            raise InputError("the stack is empty and damping is off: export needs at least one level")
+        form = stack_form(robot, levels, settings)
+        return form, [], [LevelTable.of(level) for level in form.levels]
+    form, idle, off = prepare(robot, settings)
+    if idle:
+        raise InputError("no level is enabled and damping is off: switch one level on to export it")
+    return form, off, list(accumulated(form.levels))
+
+
+def _damped(robot: Robot, settings: Settings) -> list[float]:
+    """Whether the damping level is added, for every choice of levels that are on; bit k stands for level
+    k."""
+    found = []
+    for choice in range(1 << len(settings.stack)):
+        stack = tuple(
+            replace(level, enabled=bool(choice >> place & 1)) for place, level in enumerate(settings.stack)
+        )
+        found.append(float(settings.damping and freedom_left(robot, stack) > 0))
+    return found
+
+
+def _write_reference(
+    arena: Arena, f: dict[str, Array], where: Span, references: Mapping[str, Reference]
+) -> dict[str, Any]:
+    """Writes the reference of a task; returns the task's entry in the manifest."""
+    place, task, span = where
+    rows = span.stop - span.start
+    told: dict[str, Any] = {
+        "name": task.name,
+        "index": place,
+        "rows": rows,
+        "unit": task.unit,
+        "target": "none",
+    }
+    reference = references.get(task.name)
+    if isinstance(task, Damping) or reference is None:
+        return told
+    if isinstance(reference, Target):
+        value, rotates = reference.raw, reference.raw.ndim == 2
+        if rotates and rows < 3:
+            # The motion of such a reference depends on the robot's configuration.
+            arena.f["R_d"][place] = value
+            return told | {"target": "fixed"}
+        m = 3 if rotates else rows
+        f["target"][place, [DRAGGABLE, ROWS, WIDTH]] = 1.0, m, value.size
+        f["raw"][place, : value.size] = value.ravel()
+        caps = reference.caps
+        f["caps"][place, :3] = caps.speed, caps.acceleration, caps.jerk
+        f["samples"][place, 0, : value.size], f["samples"][place, 0, value.size + 3 * m] = value.ravel(), 1.0
+        kind = "orientation" if rotates else "position" if task.unit == "m" else "joints"
+        return told | {"target": kind}
+    if not write_curve(arena, place, span, reference):
+        raise InputError(
+            f"task '{task.name}' follows a {type(reference).__name__}, which export does not have: choose a "
+            "scene whose references are circles, swings, constants or dragged targets"
+        )
+    return told | {"target": "fixed"}
+
+
+def _joined(arena: Arena, loop: Array, loop_where: Array, n: int) -> tuple[bytes, dict[str, int]]:
+    """All arrays one after another behind the words that say where they are."""
+    given = (*arena.arguments, loop, loop_where)
+    words, offsets, end = np.zeros(WORDS, np.int64), {}, 8 * WORDS
+    pieces = []
+    for place, (name, array) in enumerate(zip(ARRAYS, given, strict=True)):
+        start = -(-end // _LINE) * _LINE
+        pieces += [bytes(start - end), array.astype(array.dtype.newbyteorder("<")).tobytes()]
+        offsets[name], end = start, start + array.nbytes
+        words[FIRST + 2 * place : FIRST + 2 * place + 2] = start, array.size
+    words[[MAGIC, LAYOUT, SIZE, JOINTS]] = SIGN, layout_number(), end, n
+    return words.astype("<i8").tobytes() + b"".join(pieces), offsets
+
+
+def _listed(
+    arena: Arena, f: dict[str, Array], loop_where: Array, offsets: dict[str, int]
+) -> list[dict[str, Any]]:
+    """Every array: name, type, shape, unit and at which byte it begins."""
+    tick = get_type_hints(TickArrays, include_extras=True)
+    own = get_type_hints(LoopArrays, include_extras=True)
+    found = []
+    kinds: Sequence[tuple[str, Any, Any, Any]] = (
+        ("data", NUMBERS, arena.f, arena.where),
+        ("whole", WHOLES, arena.i, arena.whole_where),
+        ("loop", SHAPES, f, loop_where),
+    )
+    for part, names, arrays, where in kinds:
+        for place, name in enumerate(names):
+            hint = own[name] if part == "loop" else tick[name]
+            found.append(
+                {
+                    "name": name,
+                    "part": part,
+                    "type": "int64" if part == "whole" else "float64",
+                    "shape": list(arrays[name].shape),
+                    "unit": hint.__metadata__[1],
+                    "offset": offsets[part] + 8 * int(where[place]),
+                }
+            )
+    return found

@@ -1,0 +1,102 @@
+"""Bounds that give way, and increments that bring the joints to rest, joint by joint:
+`himpc.limits.braking`."""
+
+from __future__ import annotations
+
+import math
+
+from himpc.cascade.last_resort import ROOM
+from himpc.compilation.compiled import inline_kernel
+from himpc.export.kernel.loop_arrays import LoopArrays
+from himpc.limits.rows import BRAKING
+from himpc.limits.yielding import MET
+from himpc.tick.kernel.arrays import PERIOD, T_S, Array, TickArrays
+from himpc.tick.kernel.bounds import LevelBounds, constraint_values
+
+_ROUNDING = 1e-14
+"""A row that is missed by less than this share of what adds up to it is met."""
+
+
+@inline_kernel
+def clamp(x: float, low: float, high: float) -> float:
+    """x within the bounds; of contradicting bounds the upper one holds."""
+    return min(max(x, low), high)
+
+
+@inline_kernel
+def braking(t: TickArrays, p: LoopArrays, U: Array) -> None:
+    """Increments (N, n) that meet the torque rows always, and torque and velocity rows whenever any do; of
+    position rows they see the next one only. The rows are `lower` and `upper` of the tick."""
+    N, n = U.shape
+    T_s, kinds = t.scalars[T_S], len(t.L) // N
+    for a in range(n):
+        for j in range(N):
+            p.low[j, a], p.high[j, a] = t.lower[N + j, a], t.upper[N + j, a]
+        for j in range(N - 2, -1, -1):
+            behind_low, behind_high = (
+                p.low[j + 1, a] - t.upper[j + 1, a],
+                p.high[j + 1, a] - t.lower[j + 1, a],
+            )
+            low, high = p.low[j, a], p.high[j, a]
+            p.low[j, a], p.high[j, a] = clamp(behind_low, low, high), clamp(behind_high, low, high)
+        q_dd = (t.v[a] - t.v_was[a]) / t.scalars[PERIOD]
+        before = position = 0.0
+        for j in range(N):
+            time = T_s * (j + 1.0)
+            rest = (math.expm1(-BRAKING * time) * t.v[a] - time * q_dd) * (t.M_bar[a] / T_s)
+            wanted = clamp(rest, p.low[j, a], p.high[j, a])
+            if kinds == 3 and j + 1 < N:
+                row = 2 * N + j + 1
+                wanted = clamp(wanted, t.lower[row, a] - position, t.upper[row, a] - position)
+            before = clamp(wanted, before + t.lower[j, a], before + t.upper[j, a])
+            p.w[j, a] = before
+            position += before
+        gained = 0.0
+        for j in range(N):
+            # The steps of the steps of w.
+            step = p.w[j, a] - (p.w[j - 1, a] if j else 0.0)
+            U[j, a] = step - gained
+            gained = step
+
+
+@inline_kernel
+def missed(t: TickArrays, p: LoopArrays, U: Array) -> float:
+    """The violation of each row by increments into `size`, (b, n) ≥ 0 N·m, 0 up to rounding; returns the
+    largest."""
+    N, n = U.shape
+    for j in range(N):
+        for a in range(n):
+            p.wanted[j, a] = abs(U[j, a])
+    constraint_values(p.wanted, bounds_of(t, p.size))
+    constraint_values(U, bounds_of(t, t.reached))
+    worst = 0.0
+    for row in range(len(t.L)):
+        for a in range(n):
+            excess = max(t.reached[row, a] - t.upper[row, a], t.lower[row, a] - t.reached[row, a], 0.0)
+            p.size[row, a] = excess if excess > _ROUNDING * len(t.L) * p.size[row, a] else 0.0
+            worst = max(worst, p.size[row, a])
+    return worst
+
+
+@inline_kernel
+def bounds_of(t: TickArrays, value: Array) -> LevelBounds:
+    """The rows of this tick, all of which bound single joints; their values go to `value`."""
+    return LevelBounds(t.L, t.lower, t.upper, value, t.length, t.direction, len(t.L))
+
+
+@inline_kernel
+def soften(t: TickArrays, p: LoopArrays) -> bool:
+    """Widens the state's rows by the least slack that makes them feasible; False if they need none."""
+    N, n = p.trial.shape
+    braking(t, p, p.trial)
+    missed(t, p, p.trial)
+    enough = MET if len(t.L) >= 3 * N else 0.0
+    widened = False
+    for row in range(N, len(t.L)):
+        for a in range(n):
+            slack = p.size[row, a]
+            if slack > enough:
+                t.lower[row, a] -= slack + ROOM
+                t.upper[row, a] += slack + ROOM
+                widened = True
+    return widened

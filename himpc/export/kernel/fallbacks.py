@@ -1,0 +1,174 @@
+"""What acts when a level has no optimum within its budget: `himpc.tick.fallbacks` without the routes that
+need a general QP solver."""
+
+from __future__ import annotations
+
+import math
+
+from himpc.compilation.compiled import inline_kernel
+from himpc.export.kernel.braking import bounds_of, braking, missed, soften
+from himpc.export.kernel.loop_arrays import LoopArrays
+from himpc.tick.fallbacks import LEAK
+from himpc.tick.kernel.arrays import Array, TickArrays, Whole
+from himpc.tick.kernel.bounds import constraint_values
+from himpc.tick.kernel.cascade import ALONE, FIRST, KNOTS, LAST, SOFTENED
+from himpc.tick.kernel.evidence import cost_of
+from himpc.tick.kernel.goldfarb_idnani import TOLERANCE
+from himpc.tick.kernel.linear import copy_rows, dot
+from himpc.tick.kernel.residual import add_effects, effects
+from himpc.tick.kernel.solve_level import solve_level
+
+SOLVE, SOFTEN, FEASIBLE, PREVIOUS, INHERIT, BRAKE, HOLD = range(7)
+"""Which fallback gave a level's increments, in the order of `himpc.cascade.level.FALLBACKS`."""
+
+solve = inline_kernel(solve_level.py_func)
+
+
+@inline_kernel
+def solve_levels(
+    t: TickArrays, p: LoopArrays, data: Array, where: Whole, whole: Whole, whole_where: Whole
+) -> int:
+    """Solves all levels; returns the last of the fallbacks that acted, SOLVE if none was needed."""
+    worst = SOLVE
+    for i in range(t.sizes[4]):
+        # If the solver fails at once, the point of an earlier tick must not be used as a direction.
+        t.U[i, 0, 0] = math.nan
+        found = SOLVE
+        if not solve(data, where, whole, whole_where, i, 0.0):
+            found = climb_down(t, p, data, where, whole, whole_where, i)
+        t.rung[i] = float(found)
+        worst = max(worst, found)
+    return worst
+
+
+@inline_kernel
+def climb_down(
+    t: TickArrays, p: LoopArrays, data: Array, where: Whole, whole: Whole, whole_where: Whole, i: int
+) -> int:
+    """Finds increments of level i that meet all rows whenever any do; returns the fallback that gave them."""
+    if i > 0 and not t.level[i, ALONE]:
+        # If U_{i−1} is almost the only feasible point, a small slack separates the rows.
+        if solve(data, where, whole, whole_where, i, TOLERANCE):
+            return SOLVE
+        copy_rows(t.U[i], p.wanted)
+        copy_rows(t.U[i - 1], t.U[i])
+        kept_rows(t, p, True)
+        contain(t, t.U[i])
+        found = on_the_way(t, p, i, INHERIT)
+        kept_rows(t, p, False)
+        return found
+    kept_rows(t, p, True)
+    widened = soften(t, p)
+    if widened and solve(data, where, whole, whole_where, i, 0.0):
+        if i > 0:
+            kept_rows(t, p, False)
+        return SOFTEN
+    copy_rows(t.U[i], p.trial)  # `missed` uses `wanted`
+    found = BRAKE
+    if t.known[1] and t.rung[i] <= SOFTENED:
+        shifted(t.U_was[i], t.U[i])
+        found = PREVIOUS if settled(t.U[i]) and missed(t, p, t.U[i]) == 0.0 else BRAKE
+    if found == BRAKE:
+        braking(t, p, t.U[i])
+    copy_rows(p.trial, p.wanted)
+    found = on_the_way(t, p, i, found)
+    kept_rows(t, p, False)
+    if i == 0:
+        contain(t, t.U[0])
+    return found
+
+
+@inline_kernel
+def kept_rows(t: TickArrays, p: LoopArrays, keep: bool) -> None:
+    """Keeps the bounds of this tick, or writes back those that were kept."""
+    if keep:
+        copy_rows(t.lower, p.lowest)
+        copy_rows(t.upper, p.highest)
+    else:
+        copy_rows(p.lowest, t.lower)
+        copy_rows(p.highest, t.upper)
+
+
+@inline_kernel
+def contain(t: TickArrays, U: Array) -> None:
+    """Widens the rows until U meets them: the point from which lower levels start is feasible."""
+    constraint_values(U, bounds_of(t, t.reached))
+    for row in range(len(t.L)):
+        for a in range(U.shape[1]):
+            t.lower[row, a] = min(t.lower[row, a], t.reached[row, a])
+            t.upper[row, a] = max(t.upper[row, a], t.reached[row, a])
+
+
+@inline_kernel
+def shifted(U: Array, out: Array) -> None:
+    """The plan of the tick before, one knot later; the torque then stays."""
+    N = len(U)
+    for j in range(N):
+        for a in range(U.shape[1]):
+            out[j, a] = U[j + 1, a] if j + 1 < N else 0.0
+
+
+@inline_kernel
+def settled(U: Array) -> bool:
+    """Whether all increments are finite."""
+    total = 0.0
+    for j in range(len(U)):
+        total += dot(U[j], U[j], U.shape[1])
+    return math.isfinite(total)
+
+
+@inline_kernel
+def on_the_way(t: TickArrays, p: LoopArrays, i: int, fallback: int) -> int:
+    """Moves U_i, which meets the rows, towards `wanted` as far as the rows allow, if that improves the cost
+    and changes nothing at the level above; returns the fallback, FEASIBLE after a move."""
+    U, N = t.U[i], len(p.trial)
+    t.kkt[i], t.active_count[i] = 0.0, 0
+    if not settled(p.wanted):
+        return fallback
+    n = U.shape[1]
+    for j in range(N):
+        for a in range(n):
+            p.wanted[j, a] -= U[j, a]
+    constraint_values(U, bounds_of(t, t.reached))
+    constraint_values(p.wanted, bounds_of(t, p.size))
+    share = 1.0
+    for row in range(len(t.L)):
+        for a in range(n):
+            change = p.size[row, a]
+            if change != 0.0:
+                room = (
+                    t.upper[row, a] - t.reached[row, a]
+                    if change > 0.0
+                    else t.reached[row, a] - t.lower[row, a]
+                )
+                share = min(share, room / abs(change))
+    if not share > 0.0:
+        return fallback
+    for j in range(N):
+        for a in range(n):
+            p.trial[j, a] = U[j, a] + share * p.wanted[j, a]
+            p.wanted[j, a] *= share
+    if i > 0 and not t.level[i, ALONE]:
+        for above in range(i):
+            for j in range(N):
+                for row in range(t.level[above, FIRST], t.level[above, LAST]):
+                    if abs(dot(t.B[j, row], p.wanted[j], n)) > LEAK:
+                        return fallback
+    if not cost(t, p, i, p.trial) < cost(t, p, i, U):
+        return fallback
+    copy_rows(p.trial, U)
+    return FEASIBLE
+
+
+@inline_kernel
+def cost(t: TickArrays, p: LoopArrays, i: int, U: Array) -> float:
+    """(32a) or (34a) of level i."""
+    first, last = t.level[i, FIRST], t.level[i, LAST]
+    effects(t.B, U, first, last, t.pushed)
+    for j in range(len(U)):
+        for row in range(first, last):
+            t.e_1[j, row] = t.root_Q[row] * t.free[j, row]
+    add_effects(t.C, t.pushed, first, last, t.row_knots, t.e_1)
+    for a in range(U.shape[1]):
+        p.weights[a] = t.rho[i] / (t.metric[i, a] * t.metric[i, a])
+    return cost_of(t.e_1, U, p.weights, first, last, t.row_knots, t.level[i, KNOTS])

@@ -1,0 +1,222 @@
+"""The entry of an exported controller: a whole control period, a reset, or a setting; see
+`himpc.export.entries`."""
+
+from __future__ import annotations
+
+import math
+
+from himpc.compilation.compiled import inline_kernel
+from himpc.export.kernel.adjust import adjust, arrange, fade, ramp, write_rows
+from himpc.export.kernel.fallbacks import HOLD, SOLVE, solve_levels
+from himpc.export.kernel.follow import follow, rest_at_targets
+from himpc.export.kernel.loop_arrays import (
+    BUDGET,
+    FADING,
+    MOST,
+    STARTED,
+    TICKS,
+    TOLERANCE,
+    LoopArrays,
+    loop_arrays_of,
+)
+from himpc.tick.kernel.arrays import NOW, PERIOD, T_S, Array, TickArrays, Whole
+from himpc.tick.kernel.arrays_of import arrays_of
+from himpc.tick.kernel.cascade import finite
+from himpc.tick.kernel.finish_tick import finish_tick
+from himpc.tick.kernel.linear import copy, copy_rows
+from himpc.tick.kernel.linearize import linearize
+
+_linearize, _finish = inline_kernel(linearize.py_func), inline_kernel(finish_tick.py_func)
+"""The very functions that Python runs, as parts of these entries."""
+
+
+TICK, RESET = -2, -1
+"""What is asked of `control`; else a setting, see `adjust`."""
+
+
+@inline_kernel
+def control(
+    data: Array,
+    where: Whole,
+    whole: Whole,
+    whole_where: Whole,
+    loop: Array,
+    loop_where: Whole,
+    what: int,
+    index: int,
+    x: Array,
+    v: Array,
+    tau_applied: Array,
+    tau: Array,
+) -> int:
+    """Does what is asked of a controller.
+
+    Args:
+        data, where, whole, whole_where: of the arena of a tick.
+        loop, loop_where: see `loop_arrays_of`.
+        what: TICK, RESET or a setting.
+        index: TICK and RESET: whether a torque is given; else see `adjust`.
+        x: TICK: q, (n,) rad; RESET: the torque that acts now, (n,) N·m; else the values of the setting.
+        v, tau_applied, tau: only for TICK.
+
+    Returns:
+        TICK: SOLVE or the last of the fallbacks that acted; else 0 or what is wrong, see `adjust`.
+    """
+    t = arrays_of(data, where, whole, whole_where)
+    p = loop_arrays_of(loop, loop_where, t)
+    if what == TICK:
+        return whole_tick(t, p, data, where, whole, whole_where, x, v, tau_applied, index, tau)
+    if what == RESET:
+        return restart(t, p, x, index)
+    return adjust(t, p, what, index, x, x.size)
+
+
+@inline_kernel
+def whole_tick(
+    t: TickArrays,
+    p: LoopArrays,
+    data: Array,
+    where: Whole,
+    whole: Whole,
+    whole_where: Whole,
+    q: Array,
+    v: Array,
+    tau_applied: Array,
+    measured: int,
+    tau: Array,
+) -> int:
+    """One control period: the torque from the measured state; `himpc.controllers.himpc.HIMPC.step`.
+
+    Args:
+        t, p: the arrays.
+        data, where, whole, whole_where: the arena of a tick.
+        q, v: measured state, (n,) rad and rad/s.
+        tau_applied: the torque that acted during the last period, (n,) N·m.
+        measured: whether there is one; else it was the torque of the last call.
+        tau: the torque to apply from now on, (n,) N·m; finite and within the limits in force for every state.
+
+    Returns:
+        SOLVE, or the last of the fallbacks that acted.
+    """
+    if measured and finite(tau_applied):
+        take_torque(t, p, tau_applied)
+    hold(t, p)  # whatever happens further on, this torque is one that may be applied
+    copy(t.tau, tau, tau.size)
+    p.state[TICKS] += 1.0
+    if not (finite(q) and finite(v)):
+        return forget(t, p)
+    copy(q, t.q, q.size)
+    copy(v, t.v, v.size)
+    ramp(t, p)
+    fade(t, p)
+    if p.state[STARTED] == 0.0:
+        begin(t)
+    t.scalars[NOW] = (p.state[TICKS] - 1.0) * t.scalars[T_S]
+    follow(t, p, p.state[TICKS] > 1.0)
+    fallback = iterate(t, p, data, where, whole, whole_where)
+    if fallback == HOLD:
+        hold(t, p)
+        copy(t.tau, tau, tau.size)
+        return forget(t, p)
+    p.state[STARTED] = 1.0
+    copy(t.tau, tau, tau.size)
+    copy(t.tau, t.tau_0, tau.size)
+    return fallback
+
+
+@inline_kernel
+def iterate(t: TickArrays, p: LoopArrays, data: Array, where: Whole, whole: Whole, whole_where: Whole) -> int:
+    """Solves all levels, once or, for NHIMPC, until no increment changes any more; returns the last of the
+    fallbacks that acted, HOLD if there is no torque."""
+    t.budget[0] = p.setup[BUDGET]
+    most, change, count, fallback = int(p.setup[MOST]), math.inf, 0, SOLVE
+    while count == 0 or (change > p.setup[TOLERANCE] and count < most):
+        if count:
+            # J_i(q_{k+j|k}): the knots of this tick's own prediction replace those of the last tick's.
+            for j in range(1, len(t.path)):
+                copy(t.predicted[j - 1], t.path[j], t.q.size)
+            for i in range(t.sizes[4]):
+                copy_rows(t.U[i], p.before[i])
+        if not _linearize(data, where, whole, whole_where):
+            return HOLD
+        fallback = solve_levels(t, p, data, where, whole, whole_where)
+        if not _finish(data, where, whole, whole_where, most == 1):
+            return HOLD
+        if count:
+            change = 0.0
+            for i in range(t.sizes[4]):
+                for j in range(len(t.fixed)):
+                    for a in range(t.q.size):
+                        change = max(change, abs(t.U[i, j, a] - p.before[i, j, a]))
+        count += 1
+        if fallback != SOLVE:
+            break  # another iteration needs optima at all levels
+    if most > 1:
+        _finish(data, where, whole, whole_where, True)
+    return fallback
+
+
+@inline_kernel
+def take_torque(t: TickArrays, p: LoopArrays, tau: Array) -> None:
+    """Takes the torque that acts now. It cannot exceed a joint's limit: a larger reading is wrong and must
+    not be the start of a bound."""
+    for a in range(t.q.size):
+        reach = max(p.tau_limit[a], p.goal[1, a])
+        t.tau_0[a] = min(max(tau[a], -reach), reach)
+
+
+@inline_kernel
+def hold(t: TickArrays, p: LoopArrays) -> None:
+    """The torque that acts now, within the limits in force."""
+    for a in range(t.q.size):
+        reach = max(p.tau_limit[a], p.goal[1, a])
+        t.tau[a] = min(max(t.tau_0[a], max(t.limits[0, a], -reach)), min(t.limits[1, a], reach))
+
+
+@inline_kernel
+def forget(t: TickArrays, p: LoopArrays) -> int:
+    """Ends a period without a usable state: its torque acts from now on, and nothing is remembered."""
+    copy(t.tau, t.tau_0, t.q.size)
+    p.state[STARTED] = 0.0
+    return HOLD
+
+
+@inline_kernel
+def begin(t: TickArrays) -> None:
+    """The memory of a robot that has moved with constant velocity so far;
+    `himpc.tick.tick.CompiledTick.recall`."""
+    T_s = t.scalars[T_S]
+    copy(t.q, t.q_was, t.q.size)
+    copy(t.v, t.v_was, t.q.size)
+    t.scalars[PERIOD] = T_s
+    t.known[0], t.known[1] = 0, 0
+    for i in range(len(t.warm_count)):
+        t.warm_count[i] = 0
+        for j in range(len(t.fixed)):
+            for a in range(t.q.size):
+                t.U_was[i, j, a] = 0.0
+    for j in range(1, len(t.path)):
+        for a in range(t.q.size):
+            t.path[j, a] = t.q[a] + T_s * (j - 1.0) * t.v[a]
+
+
+@inline_kernel
+def restart(t: TickArrays, p: LoopArrays, tau: Array, known: int) -> int:
+    """Forgets everything but the settings; targets rest where they were dragged to.
+
+    tau: the torque that acts now, (n,) N·m, if it is `known`, else zero.
+    """
+    for a in range(t.q.size):
+        t.tau_0[a] = 0.0
+    if known and finite(tau):
+        take_torque(t, p, tau)
+    for a in range(t.q.size):
+        t.limits[0, a], t.limits[1, a], t.limits[2, a] = -math.inf, math.inf, math.inf
+        t.limits[6, a], t.limits[7, a] = -math.inf, math.inf
+    for i in range(len(p.weight)):
+        p.weight[i] = 1.0
+    p.state[STARTED], p.state[TICKS], p.state[FADING] = 0.0, 0.0, 0.0
+    arrange(t, p)
+    write_rows(t, p, 0, t.sizes[3])
+    rest_at_targets(t, p)
+    return 0

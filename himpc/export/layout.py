@@ -1,0 +1,19 @@
+"""Which kernel a controller's memory is for."""
+
+from __future__ import annotations
+
+from functools import cache
+from hashlib import sha256
+
+from himpc.compilation.sources import digest_of
+from himpc.export.kernel.loop_arrays import SHAPES
+from himpc.export.kernel.whole_tick import control
+from himpc.tick.kernel.arrays import NUMBERS, WHOLES
+
+
+@cache
+def layout_number() -> int:
+    """Returns a number that changes with every source of the kernel: memory that another kernel laid out is
+    refused."""
+    tables = repr((NUMBERS, WHOLES, SHAPES)).encode()
+    return int.from_bytes(sha256(tables + digest_of(control.py_func)).digest()[:7], "little")

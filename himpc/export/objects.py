@@ -1,0 +1,153 @@
+"""Machine code of the exported controller for a target, by LLVM: an object file with a plain C interface."""
+
+from __future__ import annotations
+
+import re
+import zlib
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+
+import llvmlite.binding as llvm
+
+from himpc.compilation.compiled import kept
+from himpc.export.entries import EXPORTED, entries_text, kernel_text
+from himpc.export.kernel.whole_tick import control
+from himpc.export.layout import layout_number
+from robots.errors import InputError, unknown_name
+
+
+@dataclass(frozen=True)
+class Target:
+    """What code can be made for.
+
+    Attributes:
+        triple: as LLVM calls it.
+        features: of the processor, besides those that every one of its kind has.
+        bits: of a pointer.
+        ending: of the object file's name.
+        compiler: a C compiler that links the replay for the target.
+    """
+
+    triple: str
+    features: str = ""
+    bits: int = 64
+    ending: str = "o"
+    compiler: str = "cc"
+
+
+TARGETS: dict[str, Target] = {
+    "wasm32": Target(
+        "wasm32-unknown-unknown",
+        "+simd128,+bulk-memory,+sign-ext,+nontrapping-fptoint",
+        bits=32,
+        ending="wasm",
+    ),
+    "x86_64-linux": Target("x86_64-unknown-linux-gnu"),
+    "aarch64-linux": Target("aarch64-unknown-linux-gnu", compiler="aarch64-linux-gnu-gcc"),
+    "x86_64-macos": Target("x86_64-apple-macosx11.0.0"),
+    "aarch64-macos": Target("arm64-apple-macosx11.0.0"),
+    "x86_64-windows": Target("x86_64-pc-windows-msvc", ending="obj", compiler="clang"),
+}
+"""By the names that the command knows."""
+
+MATHEMATICS = frozenset({"sin", "cos", "tan", "atan2", "hypot", "exp", "expm1", "log", "sqrt", "pow"})
+"""Functions of libm that the code may use."""
+_MEMORY = frozenset({"memcpy", "memset", "memmove"})
+_COUNTS = re.compile(r"^define [^\n]*@(NRT_incref|NRT_decref)\(.*?^\}\n", re.MULTILINE | re.DOTALL)
+
+
+_STRUCTURES = re.compile(r"= alloca (?!i\d+,|ptr,|double,)|getelementptr [\w ]*[{%]")
+"""Local variables that are not numbers, and places inside a structure."""
+
+
+def target_named(name: str) -> Target:
+    """Returns a target. Raises InputError if the name is unknown."""
+    if name not in TARGETS:
+        raise unknown_name("target", name, TARGETS)
+    return TARGETS[name]
+
+
+def object_code(target: Target) -> bytes:
+    """Returns an object file for a target; it is kept on disk.
+
+    Raises:
+        InputError: this build of LLVM cannot make code for the target.
+    """
+    return kept(control.py_func, f"{target.triple}-{_own_digest()}", lambda: _made(target))
+
+
+def _made(target: Target) -> bytes:
+    machine, head = _machine(target)
+    whole = llvm.parse_assembly(_retargeted(_portable(), head))
+    whole.verify()
+    _optimise(whole, machine, llvm.create_pipeline_tuning_options(speed_level=2))
+    foreign = {each.name for each in whole.functions if each.is_declaration}
+    foreign = {each for each in foreign if not each.startswith("llvm.")} - MATHEMATICS - _MEMORY
+    if foreign:
+        raise RuntimeError(f"the exported code would need {', '.join(sorted(foreign))}")
+    return machine.emit_object(whole)
+
+
+def _portable() -> str:
+    """Returns the text of all functions for all targets; it is kept on disk.
+
+    Numba's text is for pointers of eight bytes. Here all calls that pass structures with pointers are
+    inlined and the structures taken apart: what is left is the same on a target with other pointers. Loops
+    stay as they are; each target has its own vectors.
+    """
+
+    def make() -> bytes:
+        name, parts = kernel_text()
+        machine, head = _machine(Target("x86_64-unknown-linux-gnu"))
+        whole = llvm.parse_assembly(head + entries_text(name, layout_number()))
+        for part in parts:
+            whole.link_in(llvm.parse_assembly(_retargeted(part, head)))
+        for each in (*whole.functions, *whole.global_variables):
+            if not each.is_declaration and each.name not in EXPORTED:
+                each.linkage = "internal"
+        tuning = llvm.create_pipeline_tuning_options(speed_level=2)
+        tuning.loop_vectorization = tuning.slp_vectorization = tuning.loop_unrolling = False
+        _optimise(whole, machine, tuning)
+        text = str(whole)
+        if _STRUCTURES.search(text):
+            raise RuntimeError("structures are left, in which places depend on the size of a pointer")
+        return zlib.compress(text.encode())
+
+    return zlib.decompress(kept(control.py_func, f"portable-{_own_digest()}", make)).decode()
+
+
+def _own_digest() -> str:
+    """A digest of the files that make code of Numba's text."""
+    own = b"".join(Path(__file__).with_name(name).read_bytes() for name in ("objects.py", "entries.py"))
+    return sha256(own).hexdigest()[:8]
+
+
+def _machine(target: Target) -> tuple[llvm.TargetMachine, str]:
+    """LLVM's generator for a target, and the first lines of a text for it. Raises InputError if LLVM has no
+    such target."""
+    llvm.initialize_all_targets()
+    llvm.initialize_all_asmprinters()
+    try:
+        found = llvm.Target.from_triple(target.triple)
+    except RuntimeError:
+        raise InputError(f"the LLVM of this llvmlite makes no code for {target.triple}") from None
+    reloc = "static" if target.bits == 32 else "pic"
+    machine = found.create_target_machine(features=target.features, opt=3, reloc=reloc)
+    return machine, f'target datalayout = "{machine.target_data}"\ntarget triple = "{target.triple}"\n'
+
+
+def _optimise(whole: llvm.ModuleRef, machine: llvm.TargetMachine, tuning: llvm.PipelineTuningOptions) -> None:
+    builder = llvm.create_pass_builder(machine, tuning)
+    builder.getModulePassManager().run(whole, builder)
+
+
+def _retargeted(text: str, head: str) -> str:
+    """A module for another target, without reference counts: nothing that a tick uses is allocated."""
+    text = _COUNTS.sub(r"define linkonce_odr void @\1(ptr %p) {\n  ret void\n}\n", text)
+    for name in re.findall(r"^define linkonce_odr void @(\w+)\(ptr %p\)", text, re.MULTILINE):
+        text = re.sub(rf"^declare .*@{name}\(.*\n", "", text, flags=re.MULTILINE)
+    text = re.sub(r'^target (datalayout|triple) = ".*"\n', "", text, flags=re.MULTILINE)
+    text = re.sub(r"^declare .*@llvm\.x86\..*\n", "", text, flags=re.MULTILINE)
+    text = re.sub(r'"(?:target-cpu|target-features|tune-cpu)"="[^"]*" ?', "", text)
+    return head + text

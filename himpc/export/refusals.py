@@ -1,0 +1,41 @@
+"""What cannot be exported, each told in a sentence."""
+
+from __future__ import annotations
+
+from himpc.controllers.controller import Controller
+from himpc.controllers.himpc import HIMPC
+from himpc.controllers.hiqp import HIQP
+from himpc.controllers.nhimpc import NHIMPC
+from himpc.controllers.weighted import Weighted
+from himpc.formulation.settings import Settings
+from himpc.limits.constraints import imposed
+from himpc.tick.configure import is_built_in
+from himpc.tick.tables import given_of
+from robots import InputError
+
+
+def check(controller: Controller, settings: Settings) -> None:
+    """Raises InputError if an exported controller cannot do what this one does."""
+    if type(controller) not in (HIMPC, HIQP, NHIMPC, Weighted):
+        raise InputError(
+            f"the controller {type(controller).__name__} is not compiled: export takes himpc, hiqp, nhimpc "
+            "and weighted"
+        )
+    if settings.route != "compiled":
+        raise InputError("route=explicit is not compiled: export takes route=compiled")
+    if settings.M_bar_adapt:
+        raise InputError(
+            "M_bar_adapt needs the robot's dynamic model, which is not exported: set it to false"
+        )
+    given = given_of(imposed(settings.limits))
+    if given:
+        raise InputError(
+            f"the limit '{given[0].label}' is computed in Python, which is not exported: switch it off"
+        )
+    for level in settings.stack:
+        for task in level.tasks:
+            if not is_built_in(task):
+                raise InputError(
+                    f"task '{task.name}' is a {type(task).__name__}, which Python computes: export takes "
+                    "positions and orientations of frames, joints and postures"
+                )

