@@ -37,7 +37,7 @@ def file(tmp_path: Path):
     return write
 
 
-@pytest.mark.parametrize("kind", ["controller", "scene", "task", "lesson"])
+@pytest.mark.parametrize("kind", ["controller", "scene", "task", "lesson", "exercise"])
 def test_own_file_is_what_it_defines(kind, file) -> None:
     assert kind_of(execute(read(file(text_of(kind, None, "mine.py"))))) == kind
 
