@@ -42,14 +42,13 @@ OVERLAP = Step(
     """,
     do="Could the ghost keep up with a higher speed of the paths? What does its base do at each stop?",
     why=r"""
-    The robot needs less than two thirds of the ghost's time, and of the way. While the hand holds the
-    ball out, the base sets out for the next person as far as the arm allows: that alone would save 9 of
-    the ghost's 31 seconds. While the base drives, the hand already reaches: that alone would save 7.
-    (No setting shows one of the two alone. We measured them with a second task that was taken away at
-    times.) Both together save 11, less than the sum: once the base has driven its way, no driving is
-    left during which the hand could reach. The way is shorter because the base stays behind its hand:
-    the ghost's only task is the hand, so the base goes along with it up to every person and has to come
-    back.
+    The robot needs less than two thirds of the ghost's time, and of the way. While the hand holds the ball
+    out, the base sets out for the next person as far as the arm allows: that alone would save 9 of the
+    ghost's 31 seconds. While the base drives, the hand already reaches: that alone would save 7. (No
+    setting shows either alone. We measured them with a second task that was taken away at times.) Both
+    together save 11, less than the sum: once the base has driven its way, no driving is left during which
+    the hand could reach. The way is shorter because the base stays behind its hand: the ghost's only task
+    is the hand, so the base goes along with it up to every person and has to come back.
     """,
     prediction=Choice(
         "The same places, the same speed of the paths. Two tasks at a time take …",
