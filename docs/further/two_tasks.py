@@ -6,7 +6,7 @@ import numpy as np
 
 from docs.further.kit import Further, Line, Question, null_space
 
-SHARE = 50**2 / (200**2 + 50**2)
+SHARE = 50 / (200 + 50)
 
 
 def _problem(rng: np.random.Generator) -> tuple[np.ndarray, ...]:
@@ -27,10 +27,16 @@ def _stationary(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _between(rng: np.random.Generator) -> tuple[float, float]:
-    Q, K, z = rng.uniform(1, 9, 2), rng.uniform(1, 9, 2), rng.normal(size=2)
-    grid = np.linspace(-9, 9, 2_000_001)
-    cost = sum(Q[i] * (K[i] * (grid - z[i])) ** 2 for i in range(2))
-    return float(grid[np.argmin(cost)]), float((Q * K**2) @ z / (Q @ K**2))
+    """Returns where a coordinate comes to rest whose acceleration is changed every millisecond by the optimum
+    of the sum, and the formula."""
+    Q, K, z = rng.uniform(1, 9, 2), rng.uniform(50, 200, 2), rng.normal(size=2)
+    at, speed, acceleration = 0.0, 0.0, 0.0
+    for _ in range(4000):
+        e = acceleration + 2 * np.sqrt(K) * speed + K * (at - z)
+        acceleration -= float(Q @ e / Q.sum())
+        speed += 1e-3 * acceleration
+        at += 1e-3 * speed
+    return at, float((Q * K) @ z / (Q @ K))
 
 
 def _kept(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
@@ -58,10 +64,11 @@ FURTHER = Further(
         ),
         Line(
             r"Every task pulls at every other. Suppose both want the same coordinate, at $z_1$ and at "
-            r"$z_2$. At rest $e_i = K_{P,i}(z - z_i)$, and the sum settles between them",
-            r"z = \frac{Q_1 K_{P,1}^2 z_1 + Q_2 K_{P,2}^2 z_2}{Q_1 K_{P,1}^2 + Q_2 K_{P,2}^2}",
+            r"$z_2$. At rest $\Delta\tau = 0$ and $e_i = K_{P,i}(z - z_i)$. Take $c_0 = 1$ for both. Then "
+            r"the gradient vanishes at",
+            r"z = \frac{Q_1 K_{P,1} z_1 + Q_2 K_{P,2} z_2}{Q_1 K_{P,1} + Q_2 K_{P,2}}",
             _between,
-            1e-4,
+            1e-6,
         ),
         Line(
             r"with the gains as prices, too. A strict second level asks differently. Let the columns of "
@@ -82,18 +89,17 @@ FURTHER = Further(
         Question(
             "Two wishes about one coordinate: at 0 with $K_P = 200$, at 1 with $K_P = 50$, and equal $Q$. "
             "Where does a weighted controller come to rest?",
-            r"At $z = 50^2/(200^2 + 50^2) = ⟨z⟩$: what counts is the square of the gain, 16 to 1, though "
-            r"both were "
-            "said to be equally important.",
-            {"z": (SHARE, ".3f")},
+            r"At $z = 50/(200 + 50) = ⟨z⟩$: what counts is the gain, 4 to 1, though both were said to be "
+            r"equally important. With $Q_2$ four times as large it is ⟨half⟩.",
+            {"z": (SHARE, ".1f"), "half": (4 * 50 / (200 + 4 * 50), ".1f")},
         ),
         Question(
             "How many times larger than $Q_2$ must $Q_1$ be there for $z$ to stay below 0.001, and below "
             r"$10^{-6}$? What speaks against just taking it so?",
-            r"From $z = 50^2 Q_2/(200^2 Q_1 + 50^2 Q_2)$ it is $Q_1/Q_2 > ⟨much⟩$, and ⟨more⟩ for a "
+            r"From $z = 50\, Q_2/(200\, Q_1 + 50\, Q_2)$ it is $Q_1/Q_2 > ⟨much⟩$, and ⟨more⟩ for a "
             r"millionth. Level 2 then weighs little beside $R$, so it is followed less well even where it "
             r"could be: the last step of the lesson shows it.",
-            {"much": ((1 / 0.001 - 1) / 16, ".0f"), "more": ((1 / 1e-6 - 1) / 16, ",.0f")},
+            {"much": ((1 / 0.001 - 1) / 4, ".0f"), "more": ((1 / 1e-6 - 1) / 4, ",.0f")},
         ),
         Question(
             "Three joints; level 1 has two coordinates, level 2 one. How many numbers does level 2 "

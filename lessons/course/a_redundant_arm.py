@@ -133,9 +133,10 @@ COUNT = Step(
     """,
     do="Switch levels on and off and feel how stiff the elbow becomes.",
     why=r"""
-    Joint 3 gets further, and the hand pays with a tilt nobody objects to. It is still where it was:
-    every level takes away at most as many free motions as it has coordinates (fewer where levels
-    above have taken them already, or in a singular pose), and the next one has to do with the rest.
+    Joint 3 gets further, and the hand pays with a tilt nobody objects to. The hand is still where it
+    was. Every level takes away at most as many free motions as it has coordinates. It takes away fewer
+    if levels above have taken some already, or in a singular pose. The next level has to do with the
+    rest.
     """,
     prediction=Value(
         "Without the orientation level: by how many degrees does the hand tilt?",

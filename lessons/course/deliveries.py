@@ -42,13 +42,13 @@ OVERLAP = Step(
     """,
     do="Could the ghost keep up with a higher speed of the paths? What does its base do at each stop?",
     why=r"""
-    Less than two thirds of the time, and of the way. While the hand holds the ball out, the base
-    sets out for the next person as far as the arm allows: that alone would save 9 of the ghost's
-    31 seconds. While the base drives, the hand already reaches: that alone would save 7. (No setting
-    shows one half alone. We measured them with a second task that was taken away at times.) Both
-    together save 11, less than the sum: once the base has driven its way, no driving is left during
-    which the hand could reach. The way is shorter because the base stays behind its hand: the ghost's
-    only task is the hand, so the base goes along with it up to every person and has to come back.
+    The robot needs less than two thirds of the ghost's time, and of the way. While the hand holds the ball
+    out, the base sets out for the next person as far as the arm allows: that alone would save 9 of the
+    ghost's 31 seconds. While the base drives, the hand already reaches: that alone would save 7. (No
+    setting shows either alone. We measured them with a second task that was taken away at times.) Both
+    together save 11, less than the sum: once the base has driven its way, no driving is left during which
+    the hand could reach. The way is shorter because the base stays behind its hand: the ghost's only task
+    is the hand, so the base goes along with it up to every person and has to come back.
     """,
     prediction=Choice(
         "The same places, the same speed of the paths. Two tasks at a time take …",
@@ -102,15 +102,15 @@ THERE = Step(
     """,
     do="Set the distance to 5, 25 and 50 cm, without the rest. What becomes of the factor?",
     why=r"""
-    The strict rule costs the ghost 11 seconds and the other one 14. The robot with two tasks could
-    pass 80 cm beside the place, and it loses more because it now has to go all the way to it: its base
+    The strict rule costs the ghost 11 seconds and the other one 14. The robot with two tasks could pass
+    80 cm beside the place, and it loses more because it now has to go all the way to it: its base
     drives half as far again. The ghost's base drives only a tenth farther, because it went up to the
-    people anyhow. Standing still there costs either of them less than 3 seconds. So the
-    factor between the two ways of working depends on the rule: it was 1.6 before and is 1.2 now. The
-    factor says something only where the rule is the same. Two tasks at a time under the first rule are
-    2.1 times as fast as one at a time under this one, but more than half of the time saved is due to
-    the rule. The paper measured a factor of 2.3 over four rounds, against a robot whose base and arm
-    take turns. It does not say when a base counts as there.
+    people anyhow. Standing still there costs either of them less than 3 seconds. So the factor between
+    the two ways of working depends on the rule: it was 1.6 before and is 1.2 now. A factor compares the
+    two ways only if the rule is the same. Two tasks at a time under the first rule are 2.1 times as
+    fast as one task at a time under the strict rule, but more than half of the time saved is due to the
+    rule. The paper measured a factor of 2.3 over four rounds, against a robot whose base and arm take
+    turns. It does not say when a base counts as there.
     """,
     prediction=Choice(
         "Both have to stop at every place. Two tasks at a time now take …",
@@ -137,7 +137,7 @@ THERE = Step(
             "at least",
             0.75,
             fails_with=PASSES,
-            because="then only the ghost has to stop: no comparison of one task with two",
+            because="then only the ghost has to stop, and the two robots keep different rules",
         ),
     ),
     set=(*ROUND, "base_tolerance=0.05", "base_at_rest=true"),

@@ -33,11 +33,11 @@ FURTHER = Step(
     why=r"""
     Nothing happens. With $Q = 200$, $R = 10$ and this small an $\bar M$, the very first $\Delta\tau$
     already removes nearly all of $e$: the controller is deadbeat, and there is nothing left to plan.
-    The paper's Table VI prints a gain of 17 % in x from $N = 5$ to $N = 30$. Over the whole 4 s we
-    find a third of that gain, because a longer horizon sees the ends of the joints' ranges sooner:
-    with the position limits off the gain is gone. In the 1.2 s of this step no joint comes near an
-    end. $N = 1$ errs less in x than $N = 30$ even over the 4 s, but 1600 of its QPs have no solution.
-    Twice the $\bar M$ halves the error; no horizon does that.
+    The paper's Table VI prints a gain of 17 % in x from $N = 5$ to $N = 30$. Over the whole 4 s we find
+    a third of that gain, because a longer horizon sees the ends of the joints' ranges sooner. Without
+    position limits there is no gain. In the 1.2 s of this step no joint comes near an end. Over the 4 s
+    the error in x is smaller with $N = 1$ than with $N = 30$, but with $N = 1$ 1600 QPs have no
+    solution. Twice the $\bar M$ halves the error; no horizon does that.
     """,
     prediction=Choice(
         "N = 20 instead of N = 1: the RMS error of the hand becomes …",
@@ -84,11 +84,12 @@ REASON = Step(
     do="Compare N = 1 with N = 20 for both meanings of R. Then set N = 1 and make R smaller, down to 0.1.",
     why=r"""
     Twenty steps make about half the error of one step, with smoother torques, which is the paper's
-    trend. But the price of torque has changed, not foresight. A change of torque stays in force at
-    all later knots. With $N = 20$ it is paid for once and counted twenty times, so $R$ weighs less.
-    A smaller $R$ does the same: with a hundredth of it, $R = 0.1$, one step ahead errs less than
-    twenty steps with $R = 10$, and its torque is as smooth. At $R = 0.1$ the two horizons err alike.
-    Even here the longer horizon gives nothing that another weight does not give.
+    trend. But what the longer horizon changes is the price of torque. A change of torque stays in force
+    at all later knots. With $N = 20$ it is paid for once and counts at twenty knots, so $R$ weighs
+    less: $R = 10$ acts like 1.7 with $N = 1$. A smaller $R$ does the same: with a hundredth of it, $R =
+    0.1$, one step ahead errs less than twenty steps with $R = 10$, and its torque is as smooth. At $R =
+    0.1$ the two horizons err alike. Even here the longer horizon gives nothing that another weight does
+    not give.
     """,
     prediction=Value(
         "R on accelerations: the RMS error with N = 20 is how many times that with N = 1?",

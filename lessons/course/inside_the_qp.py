@@ -140,8 +140,8 @@ BOUND = Step(
     why=r"""
     Level 1 moves along its valley, where other points are as good, and loses nothing: its error is
     no larger than with all the torque. Level 2 slides along the line until the frame stops it, short
-    of the point where its ellipse would touch. Such a bound is *active*. A little more room would
-    lower this level's cost (31) by twice the bound's multiplier, per N·m. With a tenth of the torque
+    of the point where its ellipse would touch. Such a bound is *active*. With a little more room this
+    level's cost (31) would fall by twice the bound's multiplier, per N·m. With a tenth of the torque
     the whole valley is outside for a while: then level 1 pays as well.
 
     A projection splits torques by priority; that a torque must also be *possible* is no part of it:

@@ -37,10 +37,11 @@ LOAD = Step(
     """,
     do="Hang on more weight, and take it off again.",
     why=r"""
-    The hand dips by a few millimetres and comes back, to a hundredth of a millimetre: whatever the
-    load does to the acceleration is measured, and in the next millisecond it is part of $H_q$. The
-    ghost's model is exact but for the kilogram; its springs hold that, so it sags by centimetres
-    and stays there.
+    The hand dips by a few millimetres and comes back, to a hundredth of a millimetre. Whatever the load
+    does to the acceleration is measured, and in the next millisecond it is part of $H_q$. That ends the
+    sag. The spring of (4) then brings the hand back. Without a spring, $K_P = 0$, the hand stays 3.3 mm
+    too low. The ghost's model is exact but for the kilogram; its springs hold that, so it sags by
+    centimetres and stays there.
     """,
     prediction=Choice(
         "One kilogram that the controller does not know of: where is the hand 1.5 s later?",
@@ -90,10 +91,10 @@ SMALL = Step(
     do="Go down to 0.1, then up to 2, and watch the gauge.",
     why=r"""
     The torque is right in the end, but it comes late: every millisecond only a part of the error in
-    $\ddot q$ is removed. The gauge is the spectral radius of $I - M^{-1}\bar M$: of the slowest
-    component of that error this share is left after each step. Close to 1 it says *slow* here: the
-    eigenvalue behind it is near +1. An eigenvalue near −1 would give the same radius and mean *almost
-    unstable*; the radius alone does not tell which.
+    $\ddot q$ is removed. The gauge is the spectral radius of $I - M^{-1}\bar M$. It is the share of the
+    slowest component of that error that is left after each step. Here a gauge close to 1 means *slow*:
+    the eigenvalue behind it is near +1. An eigenvalue near −1 would give the same radius and mean
+    *almost unstable*; the radius alone does not tell which.
     """,
     prediction=Value(
         "With 0.3 M̄ instead of M̄: how many times larger is the largest error?",

@@ -36,10 +36,10 @@ SPRING = Step(
     """,
     do="Push the arm yourself, wherever you like.",
     why=r"""
-    The push throws the hand off twice. It does so when it begins. It does so again, to the other side,
-    when it ends, because by then the torques had changed so as to push back. Half a second later the
-    hand is back on its target, and it has not swung:
-    with $K_V = 2\sqrt{K_P}$ the wish is critically damped. There is no spring in
+    The push moves the hand off its target when it begins. When the push ends, the hand moves off to the
+    other side, because by then the torques had changed so as to push back. Half a second later the
+    hand is back on its target, and it has not swung: with $K_V = 2\sqrt{K_P}$ the wish is critically
+    damped. There is no spring in
     the arm. The controller looks for torques that make (4) true.
     """,
     prediction=Sketch(
@@ -163,9 +163,9 @@ FREE = Step(
     Nothing asks that direction to stop, so the elbow still moves when the hand has long been home.
     Which way it moves is decided by a bound. The push drives joint 2 to its speed limit, and the
     torques change to hold it there. When the push ends, the part of the torques along the free motion
-    stays as it is, and it turns joint 2 round: 0.2 s later it does 80°/s the other way. Without speed
-    limits joint 2 goes on the way it was pushed, with more than 300°/s. A last level that wants $\ddot
-    q + K_V \dot q = 0$ brings it to rest; the hand hardly notices.
+    stays as it is, and it turns joint 2 round. 0.2 s later joint 2 does 80°/s the other way. Without
+    speed limits joint 2 goes on the way it was pushed, with more than 300°/s. A last level that wants
+    $\ddot q + K_V \dot q = 0$ brings it to rest; the hand hardly notices.
     """,
     prediction=Choice(
         "The hand is held. What does the elbow do after the push?",

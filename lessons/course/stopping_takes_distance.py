@@ -46,12 +46,13 @@ PRINTED = Step(
     do="Watch the torque of joint 2 at the moment it gets there.",
     why=r"""
     To stop from 57°/s within 0.3° takes a deceleration of about 100 rad/s². With all its torque the
-    motor gets 35 to 38 rad/s². So the problem has no solution, a fallback takes over, the torque hits
-    its limit and the joint overruns its range by 0.6°. The rows on speed keep the joint from
-    braking for the first three ticks only: without them it still overruns by 0.57°. With three times
-    the torque, in the bounds and in the motors, 0.2° is left. Then the rows on speed matter: with the
-    rows on speed off as well only 0.1° is left. The row on the position is correct, but it comes too
-    late.
+    motor gets 35 to 38 rad/s², and the joint overruns its range by 0.6°. Many of the QPs have no
+    solution, and a fallback takes over. The lack of torque explains most of the overrun, but not that
+    QPs have no solution: at 15°/s, where 26 rad/s² are enough, QPs have no solution either, but the
+    joint overruns by 0.03° only. The rows on speed delay the braking, but only for three ticks: without
+    them it still overruns by 0.57°. With three times the torque, in the bounds and in the motors, 0.2°
+    is left. At that torque the rows on speed count: with the rows on speed off as well only 0.1° is
+    left. The row on the position is correct, but it comes too late.
     """,
     prediction=Choice(
         "The joint comes at 57°/s and the controller looks 5 ms ahead. How hard does it brake?",
@@ -131,20 +132,20 @@ VIABLE = Step(
 
     $$\dot q \le a\left(-t + \sqrt{t^2 + 2\,(q_s - q)/a}\right)$$
 
-    From that speed, after a time $t$ in which nothing happens, $a = 20$ rad/s² stops the joint at
+    A joint at that speed that goes on for a time $t$ and then brakes with $a = 20$ rad/s² stops at
     $q_s$. Such a state is called viable: there is a future that keeps the limit. For an exact model $t
     = T_s$ and $q_s = q_{\max}$ would do. Our model is estimated, and the joint brakes tens of steps
-    late. Besides, the rows on speed allow a change of speed of at most 15 1/s times the distance
-    between the speed and its bound. So $t = T_s + 5/15$ s $= 0.33$ s, and $q_s$ lies 0.4° before the
+    late. The rows on speed delay it, too: in a second the speed may change by at most 15 times its
+    distance from its bound. So $t = T_s + 5/15$ s $= 0.33$ s, and $q_s$ lies 0.4° before the
     limit; beyond $q_s$ the joint must come back at 5 1/s times the excess. Again $N = 5$.
     """,
     do="Let it close in faster, at 60 and 200 1/s. What is won, and what does the torque say?",
     why=r"""
-    Now the very next step already knows the whole braking distance. 5° before the limit $t = T_s$ would
-    allow 106°/s, $t = 0.33$ s only 13.5°/s; the arm does 18, a little late behind the falling bound. At
-    no moment would an even stop before the limit take more than 1.5 of the 20 rad/s², and no QP is
-    without a solution. The price is time: the last degrees are crept. What a short horizon cannot see
-    must be put into its bounds. It is this lab's default and a deliberate departure from (32d).
+    Now the very next step already knows the whole braking distance. At 5° before the limit $t = T_s$
+    would allow 106°/s, $t = 0.33$ s only 13.5°/s; the arm does 18 and follows the falling bound a
+    little late. An even stop before the limit would never take more than 1.5 of the 20 rad/s², and
+    every QP has a solution. The price is time: the last degrees are crept. What a short horizon cannot
+    see must be put into its bounds. It is this lab's default and a deliberate departure from (32d).
     """,
     prediction=Choice(
         "A horizon of 5 ms again, but with the bound on speed. The largest torque is …",

@@ -28,12 +28,12 @@ INVERSE = Step(
     """,
     do="Start gently. Then try OSF with a damped inverse, TDEOSF, HQP and HIMPC.",
     why=r"""
-    Sideways almost no torque would be enough. But a circle also bends: in the first instant this one
+    Sideways almost no torque would be enough. But a circle also bends: right after the start this one
     asks for 0.06 m/s² along the arm, where no joint can move the hand, and the inverse magnifies that
     many million times. Started gently, the circle asks for nothing along the arm at first, and for a
     tenth of a second the demand is small. Then, at 0.13 s, it passes a thousand times the limit all the
-    same, for a tick or two. A damped inverse, `osf_damped`, asks for a fifth of the limit. Motors cannot
-    follow such demands: they clip them.
+    same, for a tick or two. A damped inverse, `osf_damped`, asks for a fifth of the limit. Motors
+    cannot follow such demands: they clip them.
     """,
     prediction=Choice(
         "The hand should only move sideways. How much torque does OSF ask for, at most?",
@@ -52,7 +52,7 @@ INVERSE = Step(
             "at least",
             1e5,
             fails_with=("controller=himpc",),
-            because="HIMPC inverts nothing: even without bounds it demands no more than half of the limit",
+            because="HIMPC with R = 10 demands no more than half of the limit, even without bounds",
         ),
     ),
     set=("controller=osf",),
@@ -62,7 +62,7 @@ INVERSE = Step(
 )
 
 REGULAR = Step(
-    title="No inverse, no singularity",
+    title="A softer question",
     text=r"""
     HIMPC asks a softer question: which $\Delta\tau$ makes $Q \lVert e \rVert^2 + R \lVert
     \Delta\tau \rVert^2$ small? Where $J$ loses a direction, the first term does not care and the
@@ -71,11 +71,12 @@ REGULAR = Step(
     """,
     do="Make R smaller by a factor of a million. Is it still calm?",
     why=r"""
-    The torque never leaves its bounds, and after a few tenths of a second the hand is on its
-    circle, with no case distinction for singular poses. $R$ is a damping factor, too. But it damps
-    the *change* of torque: at rest it costs nothing, so it need not be small to be accurate. The
-    ghost, with a hundred times the $R$, does as well; with a million times the hand swings by
-    centimetres and more.
+    The torque never leaves its bounds, and after a few tenths of a second the hand is on its circle,
+    with no case distinction for singular poses. With its bounds HIMPC demands 67 % of the limit even
+    with $R = 10^{-12}$. Without bounds $R$ keeps it calm: with $R = 10^{-5}$ it then demands more than
+    a hundred times the limit. $R$ is a damping factor, too. But it damps the *change* of torque: at
+    rest it costs nothing, so it need not be small to be accurate. The ghost, with a hundred times the
+    $R$, does as well; with a million times the hand swings by centimetres and more.
     """,
     claims=(
         Claim(

@@ -120,9 +120,10 @@ BACK = Step(
     """,
     do="Swap levels as fast as you can click. Try to make the arm jump.",
     why=r"""
-    The controller computes a change $\Delta\tau$ of the torque that acts anyway (12), whatever the order.
-    The torque may still jump: by 4.7 N·m in the first millisecond. It is not the bounds that keep the
-    motion orderly: without any of them the run is nearly the same.
+    The controller computes a change $\Delta\tau$ of the torque that acts anyway (12), whatever the
+    order. The torque may still jump: by 4.7 N·m in the first millisecond. It is not the bounds that
+    keep the motion orderly: without any of them the run is nearly the same. What keeps it orderly we
+    have not tested.
     """,
     claims=(
         Claim(

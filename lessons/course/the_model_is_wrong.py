@@ -115,13 +115,14 @@ HEAVIER = Step(
     do="Go down to half the mass: which way do error and gauge go? Then back, M̄ up, and friction off.",
     why=r"""
     The error grows a little. Heavier links make $M^{-1}\bar M$ smaller, so corrections are slower. The
-    part of the error that comes of inertia grows by half, as the mass does: you see it alone if you
+    part of the error that comes of inertia grows by half, as the mass does. To see this part alone,
     take the friction away. But three quarters of the error are friction's, which does not grow with the
     mass. A larger $\bar M$ makes the whole error as small as before. Lighter links make corrections
-    faster and the error smaller. They do not lead to the cliff, since the inertia of the motors is left:
-    with links of a twentieth the gauge reads 0.47. It passes 1 only if the motors are lighter, too, 0.01
-    kg·m² each. As long as $\lVert I - M^{-1}\bar M \rVert$ is below 1 errors stay bounded (Remark 4).
-    That is sufficient, not necessary: in the long run the spectral radius decides, the gauge.
+    faster and the error smaller. They do not lead to the cliff, since the inertia of the motors is
+    left: with links of a twentieth the gauge reads 0.47. It passes 1 only if the motors are lighter,
+    too, 0.01 kg·m² each. As long as $\lVert I - M^{-1}\bar M \rVert$ is below 1 errors stay bounded
+    (Remark 4). That is sufficient, not necessary: in the long run the spectral radius decides, the
+    gauge.
     """,
     prediction=Choice(
         "Links 50 % heavier, not told. HIMPC's largest error grows …",

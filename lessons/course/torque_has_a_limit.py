@@ -34,8 +34,8 @@ ENOUGH = Step(
     do="Lower the limit until something changes. What is it that changes first?",
     why=r"""
     The run needs nine tenths of the 0.24 N·m, and most of that is friction: without any friction the
-    same motion needs a third of the 0.24 N·m, and half of it without the dry one alone. A bound that is
-    not met does nothing: with all the torque the errors are the same.
+    same motion needs a third of the 0.24 N·m, and without dry friction alone it needs half of it. A
+    bound that is not met does nothing: with all the torque the errors are the same.
     """,
     prediction=Value(
         "Which share of the reduced limit does the motion need at most?",
@@ -142,11 +142,11 @@ LESS = Step(
     why=r"""
     The hand leaves its circle: bounds rank above level 1. Without dry friction the circle by itself
     would need 0.07 N·m, and the hand would stay on it. But the hand leaves its circle no further than
-    without any level 2. The order is not the reason, for with joint 1 first the hand is off as far:
-    whichever task comes first, joint 1's motor is at its limit. Nor can an order promise that the hand
-    stays as near as without a level 2. An order is kept in every single tick, not over the run: with a
-    swing of −30° the hand gets further off than the ghost, 16 mm instead of 10, since level 2 has moved
-    joint 1 meanwhile.
+    without any level 2. The order is not the reason, for with joint 1 first the hand is off as far. In
+    both orders joint 1's motor is at the same limit nearly all the time. An order is kept in every
+    single tick, not over the run. It cannot promise that the hand stays as near as without a level 2:
+    with a swing of −30° the hand gets further off than the ghost, 16 mm instead of 10. With joint 1
+    first it is off by 9 mm there.
     """,
     prediction=Choice(
         "Compared with the ghost, which has no second task: how much larger is the hand's error?",

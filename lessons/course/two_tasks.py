@@ -80,9 +80,9 @@ WEIGHTED = Step(
     """,
     do="Make Q of level 2 smaller until the hand is where you want it. What does it cost?",
     why=r"""
-    A sum is a trade. What is weighed is $e$, and at rest $e = K_P \tilde x$: 200 m/s² for a metre of
-    the hand, 50 rad/s² for a radian of joint 1. So the gains are prices, too. Both lose, and the
-    hand leaves its circle by a quarter of a metre. No unit tells you the right weights.
+    A sum is a trade. It weighs $e$, and at rest $e = K_P \tilde x$. A metre of the hand counts 200
+    m/s², and a radian of joint 1 counts 50 rad/s². So the gains are prices, too. Both tasks lose, and
+    the hand leaves its circle by a quarter of a metre. No unit tells you the right weights.
     """,
     prediction=Choice(
         "Equal weights for hand and joint 1: how far from its circle does the hand get?",
@@ -104,7 +104,7 @@ WEIGHTED = Step(
             because="then the hand has the higher priority",
         ),
         Claim(
-            "It is off by more than 20 cm: a radian of joint 1 is worth a quarter of a metre of the hand.",
+            "It is off by more than 20 cm.",
             Measure(HAND),
             "at least",
             200.0,

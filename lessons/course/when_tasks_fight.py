@@ -28,9 +28,9 @@ PROJECTION = Step(
     P_1$, and compute the force it takes there. That needs the inverse of $J_{2|1} M^{-1}
     J_{2|1}^\top$. Here the hand follows its circle and joint 1 swings to −120°, beyond what the
     circle allows. From 1.3 s on links 2 and 3 come into line. When they are, they can no longer make
-    up for joint 1, so any motion of joint 1 moves the hand: $J_{2|1}$ vanishes. Its controller (OSF)
-    has a model that is 20 % light. The torque limit of the motors is only
-    measured here, not enforced.
+    up for joint 1, so any motion of joint 1 moves the hand: $J_{2|1}$ vanishes. The controller is OSF,
+    with a model that is 20 % too light. The torque limit of the motors is only measured here, not
+    enforced.
     """,
     do="Switch to HIMPC in good time, and back, while the arm moves.",
     why=r"""
@@ -71,7 +71,7 @@ PROJECTION = Step(
             "at most",
             100.0,
             fails_with=("q1_amplitude_deg=-170",),
-            because="swinging further, joint 1 gets there sooner",
+            because="with a larger swing links 2 and 3 come into line sooner",
         ),
     ),
     set=("controller=osf",),
@@ -89,9 +89,10 @@ BETTER_MODEL = Step(
     do="Let joint 1 swing by 20° only and compare OSF with TDEOSF.",
     why=r"""
     It knows the arm better and fails at the same place, and so does OSF with an exact model. The model
-    is not the trouble. The inverse asks for more than the arm can do and knows no bound. Damped, the
-    inverse comes through. A controller without any inverse is lost as well if nothing bounds it: HIMPC
-    is, with all its bounds off.
+    is not the trouble. The inverse asks for more than the arm can do and knows no bound. With a damped
+    inverse TDEOSF comes through, with less than four times the speed limit. With a damped inverse OSF
+    does not: a joint passes six times its limit. A controller without any inverse is lost as well if
+    nothing bounds it: HIMPC is, with all its bounds off.
     """,
     prediction=Choice(
         "Estimated dynamics instead of a wrong model. At the conflict the arm …",
@@ -139,13 +140,13 @@ EQUALITY = Step(
     Level 2 wants something it cannot have. It goes to the edge of what level 1 leaves, where links 2
     and 3 are in line, and does not come to rest there: from 2 s on joint 3 swings about the edge, to
     and fro with 94°/s, a little more than once a second, until joint 1 is called back. A strict order
-    does not make the arm calm. Nor is the strict order what makes it swing: in a weighted sum with $Q_2
-    = 0.01$ joint 3 swings as well, with up to 73°/s, and with $R_2 = 10^5$ the strict one slows down to
-    58°/s. Time-delay estimation is not what keeps it swinging: with twice the $\bar M$ it swings as
-    before. With our weights the horizon keeps it swinging: with $N = 1$ the swing dies away to a tremble
-    of 12°/s. Where level 2 weighs little, a single step is enough: with $N = 1$ and $R_2 = 10^5$ joint 3
-    goes on swinging with 62°/s. But torque and speed stay within their bounds, and the hand
-    stays on its circle. The equality (34g) does not do that alone, the bounds are needed as well:
+    does not make the arm calm. The strict order does not make it swing either: in a weighted sum with
+    $Q_2 = 0.01$ joint 3 swings as well, with up to 73°/s. With the strict order and $R_2 = 10^5$ it
+    slows down to 58°/s. Time-delay estimation is not what keeps it swinging: with twice the $\bar M$ it
+    swings as before. With our weights the horizon keeps it swinging: with $N = 1$ the swing dies away
+    to a tremble of 12°/s. With another weight it swings without a horizon, too: with $N = 1$ and $R_2 =
+    10^5$ joint 3 goes on swinging with 62°/s. But torque and speed stay within their bounds, and the
+    hand stays on its circle. The equality (34g) does not do that alone, the bounds are needed as well:
     without those on speed and position every motor comes to its limit and the hand is off by 11 mm, and
     without any bound the arm is lost as with a projection.
     """,

@@ -3,7 +3,8 @@
 Each row quotes a sentence, names a run that shows the effect, the assignments that take the cause away, and
 the measured values with and without it. `interventions_all` has all of them: the course's are in
 `interventions_tasks`, `interventions_limits` and `interventions_mobile`, the documents' in
-`interventions_documents`, and those that replace refuted sentences in `interventions_reader`.
+`interventions_documents`, and those that replace refuted sentences in
+`interventions_reader` and `interventions_fourth_reader`.
 """
 
 from __future__ import annotations

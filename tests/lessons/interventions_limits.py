@@ -36,10 +36,7 @@ LIMIT_ROWS = (
         "torque-has-a-limit/2", "for with joint 1 first the hand is off as far",
         HAND, (8, 12), ("order=q1,position",), (8, 12), stays=True,
     ),
-    Intervention(
-        "torque-has-a-limit/2", "16 mm instead of 10, since level 2 has moved joint 1 meanwhile",
-        HAND, (15.5, 17), ("levels.q1.enabled=false",), (9.5, 11), of=("q1_amplitude_deg=-30",),
-    ),
+
     Intervention(
         "torque-has-a-limit/0", "that is too little for level 1 alone",
         HAND, (0.5, 30), ("levels.q1.enabled=false",), (0.5, 30), of=("limits.torque_scale=0.03",),

@@ -31,11 +31,7 @@ MOBILE_ROWS = (
         "how-strict-is-strict/0", "and the line search accepts no step",
         of("way of the base", "m"), (0, 0.01), ("delta_m=0.001",), (1.0, 3.0),
     ),
-    Intervention(
-        "how-strict-is-strict/1",
-        "the errors that the old plan allowed at its later knots never happen",
-        EE, (0.4, 1.4), ("rate_hz=2",), (2.0, 8.0),
-    ),
+
     Intervention(
         "how-strict-is-strict/2", "its gradient says little about which way is harmful",
         of("step/base", "", "mean"), (0.015, 0.03), ("formulation=paper",), (0.045, 0.2),
@@ -112,10 +108,7 @@ MOBILE_ROWS = (
         "seeing-ahead/3", "the base is as quick as before",
         of("error/base", "m", "mean", 8.0), (0.18, 0.21), ("gains=[20,2]",), (0.18, 0.21), stays=True,
     ),
-    Intervention(
-        "seeing-ahead/3", "without any the hand is off by more", EE, (15, 25), NO_LIMITS, (26, 50),
-        seconds=4.0,
-    ),
+
     # ---------------------------------------- your-robot
     Intervention(
         "your-robot/0", "the orientation as far as five joints can",

@@ -43,12 +43,7 @@ READER_ROWS = (
         HAND_LAST, (90, 105), ("levels.posture.enabled=false",), (0, 1),
         of=("controller=weighted", "levels.orientation.enabled=false"),
     ),
-    # ---------------------------------------- deadlines
-    Intervention(
-        "deadlines/1", "it divides by 1 ms and keeps the noise of the full rate",
-        ROUGH, (0.25, 0.5), ("T_s=0.002", "deadline_ms=2"), (0.05, 0.2),
-        of=("T_s=0.001", "deadline_ms=1", "plant.encoder_resolution_deg=0.0005"),
-    ),
+
     # ---------------------------------------- inside-the-qp
     Intervention(
         "inside-the-qp/0", "With equal weights it pays 12 degrees",
@@ -91,8 +86,8 @@ READER_ROWS = (
         SWING, (72, 73.4), ("q1_amplitude_deg=20",), (0, 50), of=("controller=weighted", "levels.q1.Q=0.01"),
     ),
     Intervention(
-        "when-tasks-fight/2", "the strict one slows down to 58°/s", SWING, (93, 95), ("levels.q1.R=1e5",),
-        (57, 58.4),
+        "when-tasks-fight/2", "With the strict order and $R_2 = 10^5$ it slows down to 58°/s",
+        SWING, (93, 95), ("levels.q1.R=1e5",), (57, 58.4),
     ),
     # ---------------------------------------- stretched-out
     Intervention(
@@ -106,7 +101,7 @@ READER_ROWS = (
         TORQUE, (85, 92), NO_FRICTION, (32, 36),
     ),
     Intervention(
-        "torque-has-a-limit/0", "and half of it without the dry one alone",
+        "torque-has-a-limit/0", "without dry friction alone it needs half of it",
         TORQUE, (85, 92), ("plant.friction=0",), (48, 54),
     ),
     Intervention(
@@ -137,16 +132,16 @@ READER_ROWS = (
     ),
     # ---------------------------------------- how-far-ahead
     Intervention(
-        "how-far-ahead/0", "$N = 1$ errs less in x than $N = 30$ even over the 4 s",
+        "how-far-ahead/0", "Over the 4 s the error in x is smaller with $N = 1$ than with $N = 30$",
         X, (0.528, 0.538), ("horizon=1",), (0.47, 0.476), of=LONG, on="iiwa14-circle-paper", seconds=4.0,
     ),
     Intervention(
-        "how-far-ahead/0", "1600 of its QPs have no solution",
+        "how-far-ahead/0", "with $N = 1$ 1600 QPs have no solution",
         of("unsolved", "", "sum"), (0, 50), ("horizon=1",), (1550, 1700), of=LONG, on="iiwa14-circle-paper",
         seconds=4.0,
     ),
     Intervention(
-        "how-far-ahead/1", "it is paid for once and counted twenty times, so $R$ weighs less",
+        "how-far-ahead/1", "it is paid for once and counts at twenty knots, so $R$ weighs less",
         HAND_RMS, (1.35, 1.6), ("horizon=1",), (2.4, 3.0),
     ),
     Intervention(
@@ -172,14 +167,7 @@ READER_ROWS = (
         HAND, (0.041, 0.047), NO_FRICTION, (0.0105, 0.0114), of=OLD_LINKS,
     ),
     # ---------------------------------------- how-strict-is-strict
-    Intervention(
-        "how-strict-is-strict/1", "with a new plan only every 0.2 s the hand is off by 2.2 mm",
-        EE, (0.4, 1.0), ("rate_hz=5",), (2.15, 2.3),
-    ),
-    Intervention(
-        "how-strict-is-strict/1", "with a new plan only every 0.4 s it is off by 1.9 mm, still a fifth of",
-        EE, (0.4, 1.0), ("rate_hz=2.5",), (1.8, 2.0),
-    ),
+
     Intervention(
         "how-strict-is-strict/2",
         "so the gradient is larger, and the accepted steps are about three times as long",

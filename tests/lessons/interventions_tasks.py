@@ -50,7 +50,7 @@ TASK_ROWS = (
         "one-task/2", "with $\\bar M^{-1} = 30$ here", HAND, (3.6, 4.2), ("R_on=acceleration",), (10, 40),
     ),
     Intervention(
-        "one-task/3", "0.2 s later it does 80°/s the other way",
+        "one-task/3", "0.2 s later joint 2 does 80°/s the other way",
         of("v", "deg/s", "mean", 0.495, 0.505, column=1), (78, 82), ("limits.velocity=false",), (-500, -200),
         seconds=0.6,
     ),
@@ -136,10 +136,7 @@ TASK_ROWS = (
         "when-tasks-fight/0", "The singularity is made by the algorithm",
         of("torque share", "%"), (1e5, INF), ("controller=osf_damped",), (0, 2000),
     ),
-    Intervention(
-        "when-tasks-fight/1", "Damped, the inverse comes through.",
-        of("torque share", "%"), (1e5, INF), ("controller=tdeosf_damped",), (0, 2000),
-    ),
+
     Intervention(
         "when-tasks-fight/1", "It knows the arm better and fails at the same place",
         of("torque share", "%"), (1e5, INF), ("plant.friction=0", *EXACT), (1e5, INF), of=("controller=osf",),
@@ -183,7 +180,7 @@ TASK_ROWS = (
     ),
     # ---------------------------------------- stretched-out
     Intervention(
-        "stretched-out/0", "even without bounds it demands no more than half of the limit",
+        "stretched-out/0", "demands no more than half of the limit, even without bounds",
         of("tau_demand", "N·m", column=1), (1, 2), NO_BOUNDS, (1, 2), of=("controller=himpc",), stays=True,
     ),
     Intervention(

@@ -216,7 +216,11 @@ QUOTED = (
     Quoted("seeing-ahead/2", "the plan keeps the hand within a millimetre", _of(EE), 0.1, 1.0, None),
     Quoted("seeing-ahead/3", "the hand pays with 2 cm", _of(EE), 15, 25),
     Quoted(
-        "deliveries/0", "Less than two thirds of the time", _ratio(Signal("time at work", "s")), 0.55, 0.667
+        "deliveries/0",
+        "less than two thirds of the ghost's time",
+        _ratio(Signal("time at work", "s")),
+        0.55,
+        0.667,
     ),
     Quoted("deliveries/0", "and of the way", _ratio(WAY), 0.55, 0.667),
     Quoted(

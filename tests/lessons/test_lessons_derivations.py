@@ -6,6 +6,7 @@ The predictions (14), (15), (18), (28) with c_l are compared with the printed ma
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from dataclasses import replace
@@ -21,12 +22,15 @@ from himpc.limits.velocity import REACTION
 from himpc.limits.viability import viability_bounds
 from himpc.prediction.task import residual_model
 from lessons.course import load_lesson
+from lessons.events import MoveTarget
 from lessons.recording.run import run
 from lessons.scenes.catalog import torque_scene
+from lessons.scenes.run_spec import RunSpec
 from lessons.scenes.torque_scene import TorqueScene
 from robots import Plant, convergence_gauge, load_robot
 
 Array = NDArray[np.float64]
+OFF = ("limits.position=off", "limits.velocity=false", "limits.torque=false")
 
 
 @pytest.fixture(scope="module")
@@ -132,6 +136,25 @@ def test_at_rest_the_residual_is_K_P_times_the_error() -> None:
     still = np.zeros((5, 2))
     e = model.free(np.ones(2), np.zeros(2), np.zeros(2), still, still, still)
     np.testing.assert_allclose(e, np.tile([200.0, 50.0], (5, 1)))
+
+
+@pytest.mark.parametrize(("K_p", "Q", "share"), [(50.0, 200.0, 0.2), (50.0, 800.0, 0.5), (12.5, 200.0, 0.06)])
+def test_two_wishes_about_one_coordinate_count_with_their_gains(K_p: float, Q: float, share: float) -> None:
+    """*Two tasks, one arm*, derivation: joint 1 comes to rest between two targets in proportion to Q K_P, not
+    to Q K_P²."""
+    wishes = [("a", 200.0, 28.0, 200.0), ("b", K_p, 2.0 * math.sqrt(K_p), Q)]
+    stack = [
+        {"task": "joints", "name": name, "joints": ["joint_1"], "K_p": p, "K_v": v, "Q": weight, "R": 10.0}
+        for name, p, v, weight in wishes
+    ]
+    spec = RunSpec("planar3-hold", controller="weighted", duration=2.0).but(
+        f"stack={json.dumps(stack)}", "horizon=1", "M_bar_scale=2", *OFF
+    )
+    start = float(spec.prepared().q_0[0])
+    spec = replace(spec, events=((0.0, MoveTarget("b", (start + 0.5,))),))
+    gone = (float(run(spec.prepared())["q"][-1, 0]) - start) / 0.5
+    assert gone == pytest.approx(share, abs=0.01)
+    assert share == pytest.approx(K_p * Q / (200.0 * 200.0 + K_p * Q), abs=0.002)
 
 
 def test_with_links_2_and_3_in_line_any_motion_of_joint_1_moves_the_hand() -> None:
