@@ -166,7 +166,8 @@ def test_the_folder_of_an_autograder_grades_a_submission(
         assert set(compared.left_only) <= {"__pycache__"}
         shutil.rmtree(source / name)
     submission, results = tmp_path / "submission", tmp_path / "results"
-    submission.mkdir(), results.mkdir()
+    submission.mkdir()
+    results.mkdir()
     (submission / "work.py").write_text(start_of("joint-pd"))
     environment = {**os.environ, "AUTOGRADER": str(tmp_path), "PYTHON": sys.executable}
     environment.pop("PYTHONPATH", None)
