@@ -145,7 +145,8 @@ class HIMPC(TorqueController):
             return self._hold(q, started)
         solutions, predicted_q = found.solutions, found.predicted_q
         first = solutions[-1].U[0] if solutions else 0.0
-        self._guard.errors = self._form.lengths(errors)
+        if self._distances is not None:
+            self._guard.errors = self._form.lengths(errors)
         tau = np.minimum(np.maximum(self._tau_0 + first, limits.tau_lower), limits.tau_upper)
         if not usable(tau):
             return self._hold(q, started)
