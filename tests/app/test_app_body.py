@@ -154,8 +154,8 @@ def test_history_keeps_spikes_and_counts_bounds(body: SimulationRunner) -> None:
     history.pull()
     window = history.window()
     assert np.nanmax(window.columns(layout.fields["step_us"])) == 7.0
-    assert history.bound_ticks[2].tolist() == [1, 0, 1, 1] and history.bound_ticks.sum() == 4
-    assert history.bound_ticks[3].tolist() == [0, 1, 0, 0]
+    assert history.bound_ticks[2].tolist() == [1, 0, 1, 1, 0] and history.bound_ticks.sum() == 4
+    assert history.bound_ticks[3].tolist() == [0, 1, 0, 0, 0]
     assert window.at_bound(0)[:, 2].sum() == 2  # one bucket, two points
     assert len(window.ages()) == 2 * BUCKETS
     history.forget()
