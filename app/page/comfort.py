@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+from typing import TYPE_CHECKING
 
 import viser
 
@@ -13,8 +14,10 @@ from app.client.simulation_client import SimulationClient
 from app.link.messages import Play
 from app.page import accessible
 from app.panels.run.narration import Narration, facts_of
-from app.panels.widgets.snapshot import SessionSnapshot
-from lessons.settings.settings import SceneSettings
+
+if TYPE_CHECKING:  # the server listens before anything that computes is loaded
+    from app.panels.widgets.snapshot import SessionSnapshot
+    from lessons.settings.settings import SceneSettings
 
 MOTION = "himpc-lab-motion"
 REDUCED = "reduced"

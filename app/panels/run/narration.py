@@ -5,10 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from app.html.text import quantity
-from app.panels.widgets.snapshot import SessionSnapshot
-from lessons.settings.settings import SceneSettings
+
+if TYPE_CHECKING:  # the server listens before anything that computes is loaded
+    from app.panels.widgets.snapshot import SessionSnapshot
+    from lessons.settings.settings import SceneSettings
 
 AT_MOST_EVERY = 2.0
 """Time, s, between two sentences."""
