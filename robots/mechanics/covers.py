@@ -46,8 +46,7 @@ def made_cover(robot: Robot, meshes: bool = True, tries: int = 1) -> Cover:
     Args:
         robot: it has its collision geometry.
         meshes: whether mesh files are read.
-        tries: with 2, the bodies of pairs that are left out only because of their capsules get more of the
-            capsules, if fewer pairs are left out then.
+        tries: with 2, bodies whose capsules alone touch get more capsules, if fewer pairs are left out then.
     """
     surfaces = list(patches(robot, meshes))
     supports = robot.model.supports
