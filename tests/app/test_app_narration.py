@@ -99,6 +99,11 @@ class Reader(Wire):
         return str(found[-1])
 
 
+def says(page: Reader, word: str) -> bool:
+    """Whether the line has said a word."""
+    return any("textContent =" in each and word in each.lower() for each in page.scripts)
+
+
 def test_a_page_without_a_mouse(one_fork_server: None) -> None:
     """It begins paused, because its browser asks for less motion; a field moves the target by a centimetre, a
     button turns it by 5°; and a sentence says that the simulation runs, unless that is switched off."""
@@ -118,8 +123,9 @@ def test_a_page_without_a_mouse(one_fork_server: None) -> None:
                 lambda: page.controls[x]["value"] == pytest.approx(start["position"][0], abs=1e-3)
             )
             assert page.controls[y]["props"]["step"] == 0.01
+            assert eventually(lambda: says(page, "paused"))
             page.press_key("space")
-            assert eventually(lambda: any("Running" in each for each in page.scripts))
+            assert eventually(lambda: says(page, "running"))
             page.write(y, value=round(float(start["position"][1]) + 0.01, 3))
             assert eventually(lambda: targets()["position"][1] - start["position"][1] > 0.008)
             assert np.abs(targets()["position"] - start["position"]).max() < 0.012

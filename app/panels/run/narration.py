@@ -78,6 +78,7 @@ class Narration:
         before, self._before = self._before, now
         if before is None:
             self._told = {name: error for name, (error, _) in now.errors.items() if math.isfinite(error)}
+            self._waiting += [] if now.running else ["paused"]
         else:
             for sentence in (*_switched(before, now), *self._reached(now), *self._arrived(before, now)):
                 if sentence not in self._waiting:
