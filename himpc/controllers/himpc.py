@@ -57,7 +57,7 @@ class HIMPC(TorqueController):
         """Clears plan and memory; τ₀ (n,) N·m is the torque acting now, and q̈ and ẍ start at zero."""
         super().reset(tau_0)
         self._memory: Memory | None = None
-        self._guard = StallGuard(self._form.tasks, self._settings.T_s)
+        self._guard = StallGuard(len(self._form.tasks), self._settings.T_s)
         self._asked: list[LevelProblem] = []
         if self.kernel is not None:
             self.kernel.forget()
@@ -92,7 +92,7 @@ class HIMPC(TorqueController):
         # A joint's torque cannot exceed its limit. A larger reading is wrong and must not be the start of a
         # bound.
         self._reach = np.maximum(self.robot.tau_limit, self._goal.tau_upper)
-        self._settings, self._guard = settings, StallGuard(self._form.tasks, settings.T_s)
+        self._settings, self._guard = settings, StallGuard(len(self._form.tasks), settings.T_s)
         self._load = LoadModel(self.robot, settings.nominal) if settings.M_bar_adapt else None
         avoidance = settings.limits.avoidance
         explicit = settings.route == "explicit"
@@ -186,7 +186,10 @@ class HIMPC(TorqueController):
     def _slowed(self, previews: Mapping[str, Preview]) -> LimitsInForce:
         """The limits in force, with lower velocities while a robot that keeps distances is stalled."""
         distances = self._distances if self.kernel is None else self.kernel.distances
-        return self._limits if distances is None else self._guard.limits(self._limits, previews, distances)
+        if distances is None:
+            return self._limits
+        fastest = self._form.fastest(previews) if self.kernel is None else self.kernel.fastest_reference
+        return self._guard.limits(self._limits, fastest, distances)
 
     def _adapt(self, q: Array) -> None:
         """Adapts M̄ to the torque that acted."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from typing import final
 
 import numpy as np
@@ -10,8 +9,6 @@ from numpy.typing import NDArray
 
 from himpc.limits import LimitsInForce
 from himpc.limits.stall import PROGRESS, going, slowed, stalled
-from himpc.references import Preview
-from himpc.tasks import Damping, Task
 from himpc.tick.distances import Distances
 
 Array = NDArray[np.float64]
@@ -26,20 +23,17 @@ class StallGuard:
         stall: how far it is stalled.
     """
 
-    def __init__(self, tasks: Sequence[Task], T_s: float) -> None:
-        self._tasks, self._T_s = tasks, T_s
+    def __init__(self, tasks: int, T_s: float) -> None:
+        self._T_s = T_s
         self.errors: Array | None = None
-        self.stall = going(len(tasks))
+        self.stall = going(tasks)
 
-    def limits(
-        self, limits: LimitsInForce, previews: Mapping[str, Preview], distances: Distances
-    ) -> LimitsInForce:
-        """The limits in force at this tick, with lower velocities while the robot is stalled."""
+    def limits(self, limits: LimitsInForce, fastest: float, distances: Distances) -> LimitsInForce:
+        """The limits in force at this tick, with lower velocities while the robot is stalled.
+
+        fastest: the largest velocity of a row of a reference, m/s or rad/s.
+        """
         if self.errors is not None:
-            moves = distances.moves or any(
-                float(np.abs(previews[task.name].velocity[0]).max()) > PROGRESS
-                for task in self._tasks
-                if not isinstance(task, Damping)
-            )
+            moves = distances.moves or fastest > PROGRESS
             self.stall = stalled(self.stall, self.errors, moves, distances.room, self._T_s)
         return slowed(limits, self.stall)

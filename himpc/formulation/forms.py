@@ -133,6 +133,11 @@ class StackForm:
         """The length of each task's error, m or rad."""
         return np.array([float(np.linalg.norm(errors[task.name])) for task in self.tasks])
 
+    def fastest(self, previews: Mapping[str, Preview]) -> float:
+        """The largest velocity of a row of a reference, m/s or rad/s."""
+        led = (task for task in self.tasks if not isinstance(task, Damping))
+        return max((float(np.abs(previews[task.name].velocity[0]).max()) for task in led), default=0.0)
+
     def pulling(self, error: Array, pull: float) -> Array:
         """x̃ on which the tasks act, (m,): errors that are longer than they pull are shortened, see
         `Avoidance.pull`."""

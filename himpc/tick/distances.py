@@ -167,16 +167,16 @@ class Distances:
         pairs = self._pairs
         pairs.find(placed, z, WITHIN)
         count = nearest(pairs.count, pairs.distance, self._chosen, self._taken)
+        chosen = self._chosen[:count]
+        distance, shape, sphere = pairs.distance[chosen], pairs.shape[chosen], pairs.sphere[chosen]
+        self._share[:count] = self._shares[shape, sphere]
+        self.room = float((distance - self._avoidance.d_safe * self._share[:count]).min(initial=math.inf))
         velocity = self._observed.velocity
-        self.room = math.inf
-        for c, pair in enumerate(self._chosen[:count].tolist()):
-            shape = int(pairs.shape[pair])
-            self._share[c] = share = self._shares[shape, pairs.sphere[pair]]
-            self.room = min(self.room, float(pairs.distance[pair] - share * self._avoidance.d_safe))
-            self._moving[c] = 0.0
-            if velocity is not None and shape < len(velocity):
-                self._moving[c] = pairs.normal[pair] @ velocity[shape]
-        self._moving[count:] = 0.0
+        self._moving[:] = 0.0
+        if velocity is not None:
+            objects = shape < len(velocity)
+            normal = pairs.normal[chosen[objects]]
+            self._moving[:count][objects] = np.sum(normal * velocity[shape[objects]], axis=1)
         return count
 
     def _named(self, count: int) -> tuple[str, ...]:

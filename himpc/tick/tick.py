@@ -122,6 +122,11 @@ class CompiledTick:
         """The pairs whose distances are kept; None if none are."""
         return self._given_bounds.distances
 
+    @property
+    def fastest_reference(self) -> float:
+        """The largest velocity of a row of a reference at the last tick, m/s or rad/s."""
+        return float(np.abs(self.arena.f["motion"][1, 0]).max(initial=0.0))
+
     def error_lengths(self, tasks: Sequence[Task]) -> Array:
         """The length of the last error of each of the first tasks, m or rad."""
         error = self.arena.f["error"]

@@ -43,7 +43,7 @@ class TickArrays(NamedTuple):
     x_d: Annotated[Array, "M", "m, rad", "configure kinematics linearize preview_writer → gather"]
     R_d: Annotated[Array, "T 3 3", "1", "configure kinematics preview_writer → finish_tick linearize"]
     # x_d(k+j) − x_d(k), ẋ_d and ẍ_d
-    motion: Annotated[Array, "3 N1 M", "m, m/s, m/s²", "configure linearize preview_writer → gather"]
+    motion: Annotated[Array, "3 N1 M", "m, m/s, m/s²", "configure linearize preview_writer → gather tick"]
     given: Annotated[Array, "N1 G n", "m, 1", "given → linearize"]
     curve: Annotated[Array, "M 4", "m, rad", "configure → linearize"]
     pace: Annotated[Array, "T 2", "rad/s, rad", "configure → linearize"]
