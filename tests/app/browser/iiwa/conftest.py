@@ -42,6 +42,7 @@ def page(shared_page: Page, server: PageServer) -> Page:
     """The page in its initial state, independent of the tests before, and the only page on the server."""
     assert eventually(shared_page, lambda: len(server.sessions.learners) == 1)
     show_scene(shared_page, server.sessions.learners[0], CHOICE)
+    tab(shared_page, "Errors")
     tab(shared_page, "Start")
     press(shared_page, "Reset all")
     expect(shared_page.get_by_text("RUNNING", exact=True).first).to_be_visible()
