@@ -17,7 +17,7 @@ from himpc.tick.kernel.arrays import Array
 if TYPE_CHECKING:
     from himpc.formulation.forms import LevelForm
 
-BUDGET = 42e6
+BUDGET = 50e6
 """Largest number of multiplications for changes of active rows in one tick: about ten milliseconds, less than
 twenty on a slower core. The limit is a count and not a time, so that the same seed gives the same run."""
 _ROUNDS = 12_000
