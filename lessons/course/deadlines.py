@@ -93,7 +93,7 @@ SLOWER = Step(
     better than a loop of half the rate. With coarse sensors it follows worse. With encoders of 0.005°
     the late hand is off by 47 mm, that of half the rate by 3.2 mm. Two things are needed for so large
     an error. One is the division by 1 ms: if the late controller divides by 2 ms, it is still off by
-    6.6 mm. The other is the limits: without any bound on torque, speed and position the late hand is
+    6.6 mm. The other is the torque limit: without it, in the bounds and in the motors, the late hand is
     off by 3.4 mm. The error grows with the period (Remark 6): that is why the paper wants 1 ms, and why
     it calls its own 8 ms per step on seven joints, at $N = 5$, too long.
     """,

@@ -209,7 +209,7 @@ LARGE = Step(
             "at least",
             1.0,
             fails_with=("M_bar_scale=4",),
-            because="there every eigenvalue of the error's map is below 1",
+            because="there every eigenvalue of the error's map lies between −1 and 1",
         ),
         Claim(
             "From × 6 to × 8 the gauge goes up by more than half.",

@@ -131,14 +131,14 @@ NO_PLAN = Step(
     """,
     do="Compare the two speeds: who is the faster right after a jump, who shortly before the goal?",
     why=r"""
-    Both are surprised at 8 s, and still it is far behind, 16 cm from home at the end where the ghost
-    has long arrived. A velocity in proportion to the error is slow at the end, and with 0.3 1/s it is
-    slow for long: without any limit on speed and acceleration it is hardly nearer home, with a gain of
-    2 1/s it arrives. A planner has weights instead of a gain. With our $Q = 10$ it is nearly as quick
-    as the limits let it be: it comes home later with half the speed or a third of the acceleration,
-    where HTIDKC comes home as late as before. With $Q = 1$ and the scene's own limits it is still 22 cm
-    away at the time when $Q = 10$ has brought it home. The paper, which tuned both to do equally well
-    in Part 1, counts 42 % less error in Part 2 for HTMPC.
+    Both are surprised at 8 s, yet HTIDKC is far behind, 16 cm from home at the end where the ghost has
+    long arrived. A velocity in proportion to the error is slow at the end, and with 0.3 1/s it is slow
+    for long: without any limit on speed and acceleration it is hardly nearer home, with a gain of 2 1/s
+    it arrives. A planner has weights instead of a gain. With our $Q = 10$ it is nearly as quick as the
+    limits let it be: it comes home later with half the speed or a third of the acceleration, where
+    HTIDKC comes home as late as before. With $Q = 1$ and the scene's own limits it is still 22 cm away
+    at the time when $Q = 10$ has brought it home. The paper, which tuned both to do equally well in
+    Part 1, counts 42 % less error in Part 2 for HTMPC.
     """,
     prediction=Value(
         "Part 2, mean error of the base: that of HTIDKC is how many times the ghost's?",

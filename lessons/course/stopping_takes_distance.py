@@ -47,12 +47,13 @@ PRINTED = Step(
     why=r"""
     To stop from 57°/s within 0.3° takes a deceleration of about 100 rad/s². With all its torque the
     motor gets 35 to 38 rad/s², and the joint overruns its range by 0.6°. Many of the QPs have no
-    solution, and a fallback takes over. The lack of torque explains most of the overrun, but not that
-    QPs have no solution: at 15°/s, where 26 rad/s² are enough, QPs have no solution either, but the
-    joint overruns by 0.03° only. The rows on speed delay the braking, but only for three ticks: without
-    them it still overruns by 0.57°. With three times the torque, in the bounds and in the motors, 0.2°
-    is left. At that torque the rows on speed count: with the rows on speed off as well only 0.1° is
-    left. The row on the position is correct, but it comes too late.
+    solution, and a fallback takes over. The lack of torque explains most of the overrun: at 15°/s,
+    where 26 rad/s² are enough, the joint overruns by 0.03° only. But QPs have no solution there either,
+    because the rows on the position contradict those on how fast a speed may change: without the latter
+    (`limits.velocity_approach=0`) only seven are left. The rows on speed delay the braking, but only
+    for three ticks: without them it still overruns by 0.57°. With three times the torque, in the bounds
+    and in the motors, 0.2° is left. At that torque the rows on speed count: with the rows on speed off
+    as well only 0.1° is left. The row on the position is correct, but it comes too late.
     """,
     prediction=Choice(
         "The joint comes at 57°/s and the controller looks 5 ms ahead. How hard does it brake?",
@@ -136,8 +137,9 @@ VIABLE = Step(
     $q_s$. Such a state is called viable: there is a future that keeps the limit. For an exact model $t
     = T_s$ and $q_s = q_{\max}$ would do. Our model is estimated, and the joint brakes tens of steps
     late. The rows on speed delay it, too: in a second the speed may change by at most 15 times its
-    distance from its bound. So $t = T_s + 5/15$ s $= 0.33$ s, and $q_s$ lies 0.4° before the
-    limit; beyond $q_s$ the joint must come back at 5 1/s times the excess. Again $N = 5$.
+    distance from its bound. So $t = T_s + 5/15$ s $= 0.33$ s, and $q_s$ lies 0.4° before the limit;
+    beyond $q_s$ the joint must come back, at a speed of five times the excess per second. Again $N =
+    5$.
     """,
     do="Let it close in faster, at 60 and 200 1/s. What is won, and what does the torque say?",
     why=r"""

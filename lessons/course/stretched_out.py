@@ -119,7 +119,8 @@ BLAME = Step(
     """,
     do="Look at 8 s: straight again, and the circles change there.",
     why=r"""
-    Nearly all of it was the jump: an arm cannot change its velocity in no time. In a singular pose
+    Nearly all of it was the jump. How far the hand gets off then is mostly the wish's doing: (4) comes
+    back softly. With four times the $K_P$ and twice the $K_V$ the jump costs 1.7 mm. In a singular pose
     HIMPC follows what can be followed. Where an experiment has two possible causes at once, it does not
     show which one acts; so take one of them away.
     """,

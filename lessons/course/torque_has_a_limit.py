@@ -81,8 +81,8 @@ SHORT = Step(
     the order's doing. With joint 1 first it is the hand that goes without, by 1.6 mm, and joint 1 does
     not notice. An order helps where both need what is scarce. If joint 1 swings to the other side, by
     60°, only the motor of joint 1 is short of torque. The hand does not need it, so the order makes no
-    difference. The torque is scarce because of the dry friction: without it both wishes together need
-    77 % of what there is, and joint 1 does not fall behind.
+    difference. The torque is scarce because of friction, dry and viscous together: without the dry one
+    both wishes together need 77 % of what there is, and without either joint 1 does not fall behind.
     """,
     prediction=Choice(
         "Both tasks together need more torque than there is. The hand's largest error …",
@@ -141,12 +141,11 @@ LESS = Step(
     do="Find the least torque with which the hand is still served. How much is enough without friction?",
     why=r"""
     The hand leaves its circle: bounds rank above level 1. Without dry friction the circle by itself
-    would need 0.07 N·m, and the hand would stay on it. But the hand leaves its circle no further than
-    without any level 2. The order is not the reason, for with joint 1 first the hand is off as far. In
-    both orders joint 1's motor is at the same limit nearly all the time. An order is kept in every
-    single tick, not over the run. It cannot promise that the hand stays as near as without a level 2:
-    with a swing of −30° the hand gets further off than the ghost, 16 mm instead of 10. With joint 1
-    first it is off by 9 mm there.
+    would need 0.07 N·m, and the hand would stay on it. Level 2 does not make it worse, in either order:
+    with joint 1 first the hand is off as far. In both orders joint 1's motor is at the same limit
+    nearly all the time. An order is kept in every single tick, not over the run. It cannot promise that
+    the hand stays as near as without a level 2: with a swing of −30° the hand gets further off than the
+    ghost, 16 mm instead of 10. With joint 1 first it is off by 9 mm there.
     """,
     prediction=Choice(
         "Compared with the ghost, which has no second task: how much larger is the hand's error?",

@@ -51,7 +51,7 @@ BOTH = Step(
             "at most",
             1.0,
             fails_with=("q1_amplitude_deg=-120",),
-            because="swinging that far, joint 1 would have to leave the circle",
+            because="with joint 1 that far round, the links cannot reach the circle",
         ),
         Claim(
             "With priorities the hand errs as much as with equal weights, within 5 %.",
@@ -131,10 +131,11 @@ STRICT = Step(
     """,
     do="Set Q of level 2 to 1000. Does the hand notice? And with the weighted controller?",
     why=r"""
-    Joint 1 pays: it goes no further than the circle lets it. The hand keeps its circle to a
-    millimetre, and no weight of level 2 can change that. Without level 2 the hand errs by 0.2 mm only.
-    With it joint 3 swings with up to 100°/s, and time-delay estimation has to correct what that motion
-    changes.
+    Joint 1 pays: it goes no further than the circle lets it. The hand keeps its circle to a millimetre,
+    and with $Q_2 = 1000$ it does so as well: a heavy level 2 takes nothing from it. Without level 2 the
+    hand errs by 0.2 mm only. With it joint 3 swings with up to 100°/s, and time-delay estimation has to
+    correct what that motion changes. The weight changes that motion, too: with $Q_2 = 0.01$ the hand
+    errs by 1.8 mm.
     """,
     prediction=Choice(
         "With strict priorities: who pays for the conflict?",

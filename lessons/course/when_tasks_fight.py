@@ -55,7 +55,7 @@ PROJECTION = Step(
             "at least",
             10000.0,
             fails_with=("controller=himpc",),
-            because="nothing is inverted there, and bounds are part of the problem",
+            because="bounds are part of the problem; without them it also demands a hundred times more",
         ),
         Claim(
             "A joint turns at more than twenty times its speed limit: control is lost.",
@@ -118,7 +118,7 @@ BETTER_MODEL = Step(
             "at least",
             2000.0,
             fails_with=("controller=himpc",),
-            because="no inverse of a projection, and bounds are part of the problem",
+            because="bounds are part of the problem",
         ),
     ),
     set=("controller=tdeosf",),
@@ -146,9 +146,9 @@ EQUALITY = Step(
     swings as before. With our weights the horizon keeps it swinging: with $N = 1$ the swing dies away
     to a tremble of 12°/s. With another weight it swings without a horizon, too: with $N = 1$ and $R_2 =
     10^5$ joint 3 goes on swinging with 62°/s. But torque and speed stay within their bounds, and the
-    hand stays on its circle. The equality (34g) does not do that alone, the bounds are needed as well:
-    without those on speed and position every motor comes to its limit and the hand is off by 11 mm, and
-    without any bound the arm is lost as with a projection.
+    hand stays on its circle. The equality (34g) alone is not enough for that. The bounds are needed,
+    too: without those on speed and position every motor comes to its limit and the hand is off by 11
+    mm, and without any bound the arm is lost as with a projection.
     """,
     claims=(
         Claim(

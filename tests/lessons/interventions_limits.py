@@ -33,7 +33,7 @@ LIMIT_ROWS = (
         Q1, (2, 3), ("order=q1,position",), (2, 3), of=("q1_amplitude_deg=60",), seconds=1.5, stays=True,
     ),
     Intervention(
-        "torque-has-a-limit/2", "for with joint 1 first the hand is off as far",
+        "torque-has-a-limit/2", "with joint 1 first the hand is off as far",
         HAND, (8, 12), ("order=q1,position",), (8, 12), stays=True,
     ),
 

@@ -33,10 +33,6 @@ MOBILE_ROWS = (
     ),
 
     Intervention(
-        "how-strict-is-strict/2", "its gradient says little about which way is harmful",
-        of("step/base", "", "mean"), (0.015, 0.03), ("formulation=paper",), (0.045, 0.2),
-    ),
-    Intervention(
         "how-strict-is-strict/3", "its own best plan lets the hand slip a little",
         EE, (12, 20), ("velocity_effort=0.001",), (2, 9),
     ),

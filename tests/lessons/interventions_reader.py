@@ -109,11 +109,11 @@ READER_ROWS = (
         HAND, (0.5, 30), ("plant.friction=0",), (0, 0.1), of=("limits.torque_scale=0.03",),
     ),
     Intervention(
-        "torque-has-a-limit/1", "The torque is scarce because of the dry friction",
+        "torque-has-a-limit/1", "The torque is scarce because of friction, dry and viscous together",
         of("error/q1", "deg"), (0.45, 0.65), ("plant.friction=0",), (0, 0.05),
     ),
     Intervention(
-        "torque-has-a-limit/1", "without it both wishes together need 77 % of what there is",
+        "torque-has-a-limit/1", "without the dry one both wishes together need 77 % of what there is",
         TORQUE, (99, 101), ("plant.friction=0",), (76, 77.4),
     ),
     Intervention(
@@ -165,18 +165,6 @@ READER_ROWS = (
         "the-model-is-wrong/2",
         "three quarters of the error are friction's, which does not grow with the mass",
         HAND, (0.041, 0.047), NO_FRICTION, (0.0105, 0.0114), of=OLD_LINKS,
-    ),
-    # ---------------------------------------- how-strict-is-strict
-
-    Intervention(
-        "how-strict-is-strict/2",
-        "so the gradient is larger, and the accepted steps are about three times as long",
-        STEP, (0.02, 0.025), ("formulation=paper",), (0.06, 0.08),
-    ),
-    Intervention(
-        "how-strict-is-strict/2", "They are still far shorter than with (12)",
-        STEP, (0.06, 0.08), ("lexicographic=per_coordinate", "formulation=proximal"), (0.3, 0.5),
-        of=("formulation=paper",),
     ),
     # ---------------------------------------- seeing-ahead
     Intervention(

@@ -99,7 +99,7 @@ TASK_ROWS = (
         HAND, (200, 300), ("tasks.q1.K_p=5", "tasks.q1.K_v=1.6"), (5, 150),
     ),
     Intervention(
-        "two-tasks/2", "no weight of level 2 can change that",
+        "two-tasks/2", "with $Q_2 = 1000$ it does so as well",
         HAND, (0.5, 1.2), ("levels.q1.Q=1000",), (0.5, 1.2), stays=True,
     ),
     Intervention(

@@ -192,7 +192,7 @@ QUOTED = (
         1.625,
         1.635,
     ),
-    Quoted("how-strict-is-strict/1", "Less than a tenth of it is used", _of(EE), 0.1, 1.0),
+    Quoted("how-strict-is-strict/1", "The hand uses less than a tenth of $\\delta$", _of(EE), 0.1, 1.0),
     Quoted(
         "how-strict-is-strict/1",
         "with (11) in its place it is off by 3 mm",

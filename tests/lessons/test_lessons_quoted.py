@@ -81,7 +81,7 @@ GIVEN: dict[str, tuple[str, ...]] = {
     "stretched-out/0": ("0.06", "million"),
     "torque-has-a-limit/1": ("60",),  # settings
     "torque-has-a-limit/2": ("−30",),
-    "stopping-takes-distance/0": ("57", "0.3", "100", "35", "38"),
+    "stopping-takes-distance/0": ("57", "0.3", "100", "35", "38", "0"),
     "stopping-takes-distance/1": ("50",),
     "stopping-takes-distance/2": ("5", "106", "13.5", "20"),
     "inside-the-qp/3": ("10", "14", "half"),  # numbers of the first step
