@@ -8,6 +8,7 @@ from operator import is_
 import numpy as np
 from numpy.typing import NDArray
 
+from himpc.limits.apart import kept_apart
 from himpc.limits.position import POSITION
 from himpc.limits.rows import Rows
 from himpc.limits.sequences import clamped, steps, viable
@@ -36,8 +37,11 @@ def braking(rows: Rows) -> Array:
     """
     N, n = rows.L.shape[1], rows.lower.shape[1]
     rest = np.zeros((N, n)) if rows.rest is None else rows.rest
-    if not _joint_by_joint(rows):
-        return closest_to_rest(rows, rest)
+    own = _own(rows)
+    if own < len(rows.constraints):
+        if not all(each.yields_first for each in rows.constraints[own:]):
+            return closest_to_rest(rows, rest)
+        return kept_apart(rows, own * N, braking(_first(rows, own)))
     w = _walk(rows, rest)
     U = steps(steps(w))
     if len(rows.constraints) == 3:
@@ -49,9 +53,22 @@ def braking(rows: Rows) -> Array:
     return U
 
 
-def _joint_by_joint(rows: Rows) -> bool:
-    """Whether all rows are of torque, velocity and position, in this order."""
-    return 2 <= len(rows.constraints) <= 3 and all(map(is_, rows.constraints, (TORQUE, VELOCITY, POSITION)))
+def _own(rows: Rows) -> int:
+    """The number of constraints, from the first on, whose rows couple no two joints and are known here."""
+    known = list(map(is_, rows.constraints, (TORQUE, VELOCITY, POSITION)))
+    return next((place for place, each in enumerate(known) if not each), len(known))
+
+
+def _first(rows: Rows, count: int) -> Rows:
+    """The rows of the first constraints alone."""
+    end = count * rows.L.shape[1]
+    return rows._replace(
+        L=rows.L[:end],
+        lower=rows.lower[:end],
+        upper=rows.upper[:end],
+        constraints=rows.constraints[:count],
+        directions=(),
+    )
 
 
 def missed(rows: Rows, U: Array) -> Array:
@@ -71,7 +88,7 @@ def least_slack(rows: Rows) -> Array:
     """
     slack = missed(rows, braking(rows))
     slack[: rows.L.shape[1]] = 0.0
-    if len(rows.constraints) >= 3 or not _joint_by_joint(rows):
+    if len(rows.constraints) >= 3 or _own(rows) < 2:
         slack[slack <= MET] = 0.0
     return slack
 
