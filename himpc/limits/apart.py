@@ -20,8 +20,9 @@ def kept_apart(rows: Rows, joints: int, U: Array) -> Array:
     """Returns increments (N, n), N·m: U with another torque of the first knot, which brings the rows behind
     those of joints closest to being met, by least squares, and keeps what U meets of the joints' own rows.
 
-    A step of torque moves a row in proportion to L[:, 0]. With one number x per joint, the joints' own rows are
-    bounds on x, which 0 meets, and rows of a direction D_c are one bound on D_c·x: the tightest of all knots.
+    A step of torque moves a row in proportion to L[:, 0]. With one number x per joint, the joints' own rows
+    are bounds on x, which 0 meets, and rows of a direction D_c are one bound on D_c·x: the tightest of all
+    knots.
 
     Args:
         rows: all rows.
@@ -45,10 +46,10 @@ def kept_apart(rows: Rows, joints: int, U: Array) -> Array:
         lower.append(low[block].max(axis=0))
         upper.append(high[block].min(axis=0))
     normals, lower, upper = np.vstack(D), np.concatenate(lower), np.concatenate(upper)
-    kept = (lower > 0.0) | (upper < 0.0) | (np.isfinite(lower) | np.isfinite(upper))
-    normals, lower, upper = normals[kept], lower[kept], upper[kept]
     if not ((lower > 0.0) | (upper < 0.0)).any():
         return U
+    bounded = np.isfinite(lower) | np.isfinite(upper)
+    normals, lower, upper = normals[bounded], lower[bounded], upper[bounded]
     c = len(normals)
     H = np.diag(np.r_[np.full(n, _FAINT), np.ones(c)])
     A = np.block([[np.eye(n), np.zeros((n, c))], [normals, np.eye(c)]])

@@ -24,8 +24,8 @@ _ITERATIONS = 300
 
 
 def braking(rows: Rows) -> Array:
-    """Returns increments (N, n), N·m, that satisfy the torque rows always, and all rows whenever this is
-    possible.
+    """Returns increments (N, n), N·m, that satisfy the torque rows always, and all rows but those that yield
+    first whenever this is possible.
 
     Rows of torque, velocity and position couple no two joints. With w_j = Σ_{i≤j} τ_i, what a velocity row
     of a joint bounds, and τ_i the torque gained up to knot i, torque rows say how far w_j may be from w_{j−1}
@@ -33,7 +33,8 @@ def braking(rows: Rows) -> Array:
     still be met are an interval; going forward, each w_j is put as close to `rows.rest` as these intervals
     allow. Where there is nothing between the bounds, a velocity row of an earlier knot counts more than later
     ones. Position rows bound sums of w_j: with them the sequence closest to `rows.rest` is a QP with N
-    unknowns for every joint. Rows of other constraints: see `closest_to_rest`.
+    unknowns for every joint. Rows that yield first follow these, see `kept_apart`: they are met if one
+    step of torque suffices. With rows of other constraints: see `closest_to_rest`.
     """
     N, n = rows.L.shape[1], rows.lower.shape[1]
     rest = np.zeros((N, n)) if rows.rest is None else rows.rest

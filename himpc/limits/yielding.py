@@ -54,11 +54,10 @@ def closest_to_rest(rows: Rows, rest: Array) -> Array:
     meet all rows.
 
     Joints that share a direction are a group; each group is a strictly convex QP. If no increments meet all
-    rows, those that are not hard give way by least squares, and first those that yield first. If no increments
-    meet the others, those do, and if none meet the hard rows, those give
-    way by least squares that do not bound the torque. Beyond _WORK the torque changes at some knots only, the
-    first among them, evenly spaced; beyond _ROWS there is no QP. Whatever the QP finds within its iterations,
-    rows of torque and of its rate hold if any increments meet them, see `_within`.
+    rows, those that yield first give way by least squares. If none meet the others, those that are not hard
+    do, and if none meet the hard rows, those that do not bound the torque. Beyond _WORK the torque changes at
+    some knots only, the first among them, evenly spaced; beyond _ROWS there is no QP. Whatever the QP finds
+    within its iterations, rows of torque and of its rate hold if any increments meet them, see `_within`.
     """
     U = steps(steps(rest))
     for group in groups(rows, rest.shape[1]):
