@@ -1,15 +1,17 @@
 """Random drags into what is around a robot and into itself, with distances kept and without.
 
-    python -m benchmarks.avoidance [--chains 25] [--robots iiwa14 panda baxter generated] [--off] [--seed 1]
-                                   [--controller himpc] [--set PATH=VALUE …]
+    python -m benchmarks.avoidance [--chains 25] [--robots iiwa14 panda baxter generated] [--off] [--balls]
+                                   [--seed 1] [--controller himpc] [--set PATH=VALUE …]
 
 Every chain drags the hands of a robot four times, once a second, in position alone or in pose, from where the
 targets are 0.1 to 0.6 m in a random direction, so many targets end in the floor, in the robot or out of
-reach. Then the robot has three seconds to come to rest. Prints a line of a Markdown table for each robot:
-drags, the deepest penetration between links whose distance is kept, by MuJoCo's geometry, the chains in which
-it exceeds 1 mm, the largest share of the velocity limits, lost runs, unsolved QPs, the chains whose joints
-are slower than 0.05 rad/s at the end, and the median and the longest processor time of a step. Exit code 1 if
-a penetration exceeds 1 mm, a run is lost, or more than 5 % of the chains do not come to rest.
+reach. Then the robot has three seconds to come to rest. `--balls` drags a ball through the arm four times
+instead, from 0.6 m before a moving link to as far behind it, with 0.15 to 0.5 m/s, and not through its
+first three joints, which cannot make way. Any controller can run. Prints a line of a Markdown table for each
+robot: drags, the deepest penetration between bodies whose distance is kept, by MuJoCo's geometry, the chains
+in which it exceeds 1 mm, the largest share of the velocity limits, lost runs, unsolved QPs, the chains whose
+joints are slower than 0.05 rad/s at the end, and the median and the longest processor time of a step. Exit
+code 1 if a penetration exceeds 1 mm, a run is lost, or more than 5 % of the chains do not come to rest.
 """
 
 from __future__ import annotations
@@ -18,10 +20,15 @@ import argparse
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from time import thread_time_ns
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
+from himpc.controllers.controller import Controller
+from himpc.plan import Plan
 from lessons.events import MoveTarget
 from lessons.scenes.catalog import torque_scene
 from lessons.scenes.hold import hold
@@ -31,11 +38,20 @@ from lessons.session.torque import TorqueSession
 from lessons.settings.assignments import with_assignments
 from robots import Robot
 from robots.cover import cover_of
+from robots.world import Ball, Thing
+
+Array = NDArray[np.float64]
 
 DRAGS, APART_S, REST_S = 4, 1.0, 3.0
 FAR_M, TURN_RAD = (0.1, 0.6), 1.0
 """How far a drag goes, at least and at most, and how far it turns at most."""
 DEEP_M, AT_REST = 1e-3, 0.05
+BALL_M, BESIDE_M, BALL_SPEED = 0.08, 0.6, (0.15, 0.5)
+"""Radius of a dragged ball, how far it goes before and behind a link, and its speed, m/s."""
+PAST_M, CLEAR_M = 0.25, 0.35
+"""How far from the first three joints of an arm it passes, and from all of the arm it begins, at least."""
+AWAY = np.array([0.0, 0.0, 10.0])
+"""m, where the ball waits."""
 SCENES = {"iiwa14": "iiwa14-hold", "panda": "panda-hold", "baxter": "baxter-hold"}
 ROBOTS = (*SCENES, "generated")
 
@@ -103,13 +119,57 @@ def drags(session: TorqueSession, rng: np.random.Generator) -> list[MoveTarget]:
     return found
 
 
+class Crossing(NamedTuple):
+    """A ball that is dragged through an arm: where it is at the start, m, its velocity, m/s, and until when,
+    s."""
+
+    start: Array
+    velocity: Array
+    seconds: float
+
+
+def crossing(session: TorqueSession, rng: np.random.Generator) -> Crossing:
+    """A path through the origin of a random joint that moves, and past the first three of its arm."""
+    robot, data = session.robot, session.robot.model.createData()
+    pin.forwardKinematics(robot.model, data, session.plant.q)
+    origins = np.array([each.translation for each in data.oMi])
+    depth = np.array([len(each) - 1 for each in robot.model.supports])
+    points = np.vstack([origins, 0.5 * (origins[1:] + origins[robot.model.parents.tolist()[1:]])])
+    while True:
+        away = rng.normal(size=3)
+        away[2] *= 0.3
+        away /= np.linalg.norm(away)
+        middle, speed = origins[int(rng.choice(np.flatnonzero(depth > 3)))], rng.uniform(*BALL_SPEED)
+        first = origins[depth <= 3] - middle
+        along = np.clip(first @ away, -BESIDE_M, BESIDE_M)
+        past = np.linalg.norm(first - along[:, None] * away, axis=1).min() > PAST_M
+        if past and np.linalg.norm(points - middle - BESIDE_M * away, axis=1).min() > CLEAR_M:
+            return Crossing(middle + BESIDE_M * away, -speed * away, 2.0 * BESIDE_M / speed)
+
+
+class Timed:
+    """A controller whose steps are timed: `times` are ms of processor time."""
+
+    def __init__(self, controller: Controller, times: list[float]) -> None:
+        self._controller, self.times = controller, times
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._controller, name)
+
+    def step(self, *given: Any) -> Plan:
+        started = thread_time_ns()
+        plan = self._controller.step(*given)
+        self.times.append(1e-6 * (thread_time_ns() - started))
+        return plan
+
+
 def covered_depth(session: TorqueSession, left_out: set[tuple[int, int]]) -> tuple[float, str]:
     """The deepest penetration between bodies whose distance is kept, m, and its name."""
     robot, found = session.robot, (0.0, "")
     for each in session.plant.contacts:
         joints = [joint_of(robot, name) for name in each.between]
         pair = (min(joints), max(joints))
-        if pair not in left_out and each.depth > found[0]:
+        if pair[1] > 0 and pair not in left_out and each.depth > found[0]:
             found = each.depth, " – ".join(each.between)
     return found
 
@@ -120,25 +180,39 @@ def joint_of(robot: Robot, name: str) -> int:
 
 
 def run(
-    robot: str, chains: int, seed: int, changes: Sequence[str], controller: str
+    robot: str, chains: int, seed: int, changes: Sequence[str], controller: str, balls: bool = False
 ) -> tuple[Total, list[float]]:
-    """Runs all chains of a robot."""
+    """Runs all chains of a robot: of dragged targets or, with `balls`, of a ball dragged through the arm."""
     rng, total, times = np.random.default_rng(seed), Total(), []
     scene = scene_of(robot, seed)
-    settings = replace(scene.settings, controller=controller)
-    settings = with_assignments(settings, changes)
+    settings = with_assignments(replace(scene.settings, controller=controller), changes)
+    world = (
+        (*scene.world, Thing(Ball("ball", tuple(AWAY.tolist()), BALL_M), mass_kg=1.0))
+        if balls
+        else scene.world
+    )
     left_out = {(each.first, each.second) for each in cover_of(scene.robot).excluded}
     for _ in range(chains):
-        session, deepest, fastest = TorqueSession(replace(scene, settings=settings)), 0.0, 0.0
+        session = TorqueSession(replace(scene, settings=settings, world=world))
+        session.controller = cast(Controller, Timed(session.controller, times))
+        deepest = fastest = 0.0
         total.chains += 1
         for drag in range(DRAGS):
             total.drags += 1
-            for event in drags(session, rng):
+            path = crossing(session, rng) if balls else None
+            for event in () if balls else drags(session, rng):
                 session.post(event)
-            for _ in range(round((APART_S if drag < DRAGS - 1 else REST_S) / session.step_s)):
+            crossed, rest = path.seconds if path else APART_S, REST_S if drag == DRAGS - 1 else 0.0
+            seconds = max(crossed, rest) if path is None else crossed + rest
+            for tick in range(round(seconds / session.step_s)):
+                if path is not None:
+                    t = tick * session.step_s
+                    there = (
+                        (path.start + t * path.velocity, path.velocity) if t < crossed else (AWAY, 0.0 * AWAY)
+                    )
+                    session.plant.carry(0, *there)
                 session.tick()
                 assert session.plan is not None
-                times.append(1e-3 * session.plan.step_us)
                 total.unsolved += session.plan.unsolved
                 fastest = max(fastest, float(np.abs(session.plant.v / session.robot.v_limit).max()))
                 if session.plant.touch.depth > DEEP_M:
@@ -158,6 +232,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--chains", type=int, default=25)
     parser.add_argument("--robots", nargs="*", default=list(ROBOTS), choices=ROBOTS)
     parser.add_argument("--off", action="store_true")
+    parser.add_argument("--balls", action="store_true")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--controller", default="himpc")
     parser.add_argument("--set", nargs="*", default=[], dest="changes")
@@ -169,7 +244,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     print("|---|---|---|---|---|---|---|---|---|")
     worst = 0
     for robot in given.robots:
-        total, times = run(robot, given.chains, given.seed, changes, given.controller)
+        total, times = run(robot, given.chains, given.seed, changes, given.controller, given.balls)
         print(
             f"| {robot} | {total.drags} | {1e3 * total.deepest:.2f} {total.where} | {total.deep} | "
             f"{total.speed:.2f} | {total.lost} | {total.unsolved} | {total.resting} of {total.chains} | "

@@ -69,8 +69,6 @@ class Plant:
         self._tau_lower, self._tau_upper = -limit, limit
         self._lag, self._delay = 1e-3 * settings.torque_lag_ms, 1e-3 * settings.delay_ms
 
-    # ---------------------------------------------------------------- state
-
     @property
     def n(self) -> int:
         """Number of joints."""
@@ -136,8 +134,6 @@ class Plant:
         q, v = self._encoders.read(period, self._resolution)
         return PlantState(self.t, q, np.where(self._resolution > 0.0, v, self.v))
 
-    # ---------------------------------------------------------------- motion
-
     def step(self, tau: np.ndarray, period: float) -> np.ndarray:
         """Holds the command tau (n,), N·m, for `period` (s), in equal internal steps no longer than the
         timestep; returns the torque (n,) acting at the end. Raises ValueError for a command that is not n
@@ -195,8 +191,6 @@ class Plant:
         if body is not None:
             self._data.xfrc_applied[self.robot.moving_body(body)] = wrench
 
-    # ---------------------------------------------------------------- queries
-
     def mass_matrix(self) -> np.ndarray:
         """(n, n) kg·m², M(q) with payload and armature."""
         return self._inertia(self._look())[: self.n, : self.n].copy()
@@ -241,6 +235,12 @@ class Plant:
     def object_velocities(self) -> np.ndarray:
         """(k, 3) m/s: the velocities of the middles of the free objects, world axes, in their order."""
         return self._data.qvel[self.n :].reshape(-1, 6)[:, :3].copy()
+
+    def carry(self, place: int, position: np.ndarray, velocity: np.ndarray) -> None:
+        """Puts the free object of a place in `objects` at a position, (3,) m, with a velocity, (3,) m/s, as
+        if a hand carried it; it needs `contacts`."""
+        q, v = self._data.qpos[self.n :].reshape(-1, 7), self._data.qvel[self.n :].reshape(-1, 6)
+        q[place, :3], v[place, :3], self._fresh = position, velocity, False
 
     def _advance(self, h: float) -> None:
         data, before = self._data, self._data.qpos.copy()

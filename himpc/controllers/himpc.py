@@ -189,7 +189,7 @@ class HIMPC(TorqueController):
         if distances is None:
             return self._limits
         fastest = self._form.fastest(previews) if self.kernel is None else self.kernel.fastest_reference
-        return self._guard.limits(self._limits, fastest, distances)
+        return self._guard.limits(self._limits, self._tau_0, fastest, distances)
 
     def _adapt(self, q: Array) -> None:
         """Adapts M̄ to the torque that acted."""

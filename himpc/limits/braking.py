@@ -8,6 +8,7 @@ from operator import is_
 import numpy as np
 from numpy.typing import NDArray
 
+from himpc.limits.apart import kept_apart
 from himpc.limits.position import POSITION
 from himpc.limits.rows import Rows
 from himpc.limits.sequences import clamped, steps, viable
@@ -23,8 +24,8 @@ _ITERATIONS = 300
 
 
 def braking(rows: Rows) -> Array:
-    """Returns increments (N, n), N·m, that satisfy the torque rows always, and all rows whenever this is
-    possible.
+    """Returns increments (N, n), N·m, that satisfy the torque rows always, and all rows but those that yield
+    first whenever this is possible.
 
     Rows of torque, velocity and position couple no two joints. With w_j = Σ_{i≤j} τ_i, what a velocity row
     of a joint bounds, and τ_i the torque gained up to knot i, torque rows say how far w_j may be from w_{j−1}
@@ -32,12 +33,16 @@ def braking(rows: Rows) -> Array:
     still be met are an interval; going forward, each w_j is put as close to `rows.rest` as these intervals
     allow. Where there is nothing between the bounds, a velocity row of an earlier knot counts more than later
     ones. Position rows bound sums of w_j: with them the sequence closest to `rows.rest` is a QP with N
-    unknowns for every joint. Rows of other constraints: see `closest_to_rest`.
+    unknowns for every joint. Rows that yield first follow these, see `kept_apart`: they are met if one
+    step of torque suffices. With rows of other constraints: see `closest_to_rest`.
     """
     N, n = rows.L.shape[1], rows.lower.shape[1]
     rest = np.zeros((N, n)) if rows.rest is None else rows.rest
-    if not _joint_by_joint(rows):
-        return closest_to_rest(rows, rest)
+    own = _own(rows)
+    if own < len(rows.constraints):
+        if not all(each.yields_first for each in rows.constraints[own:]):
+            return closest_to_rest(rows, rest)
+        return kept_apart(rows, own * N, braking(_first(rows, own)))
     w = _walk(rows, rest)
     U = steps(steps(w))
     if len(rows.constraints) == 3:
@@ -49,9 +54,22 @@ def braking(rows: Rows) -> Array:
     return U
 
 
-def _joint_by_joint(rows: Rows) -> bool:
-    """Whether all rows are of torque, velocity and position, in this order."""
-    return 2 <= len(rows.constraints) <= 3 and all(map(is_, rows.constraints, (TORQUE, VELOCITY, POSITION)))
+def _own(rows: Rows) -> int:
+    """The number of constraints, from the first on, whose rows couple no two joints and are known here."""
+    known = list(map(is_, rows.constraints, (TORQUE, VELOCITY, POSITION)))
+    return next((place for place, each in enumerate(known) if not each), len(known))
+
+
+def _first(rows: Rows, count: int) -> Rows:
+    """The rows of the first constraints alone."""
+    end = count * rows.L.shape[1]
+    return rows._replace(
+        L=rows.L[:end],
+        lower=rows.lower[:end],
+        upper=rows.upper[:end],
+        constraints=rows.constraints[:count],
+        directions=(),
+    )
 
 
 def missed(rows: Rows, U: Array) -> Array:
@@ -71,7 +89,7 @@ def least_slack(rows: Rows) -> Array:
     """
     slack = missed(rows, braking(rows))
     slack[: rows.L.shape[1]] = 0.0
-    if len(rows.constraints) >= 3 or not _joint_by_joint(rows):
+    if len(rows.constraints) >= 3 or _own(rows) < 2:
         slack[slack <= MET] = 0.0
     return slack
 

@@ -81,6 +81,7 @@ class Constraint:
         hard: whether it holds always. The others give way where they cannot be met.
         is_on: whether settings impose it.
         bounds: its bounds at a moment.
+        yields_first: whether it gives way before the others that are not hard.
     """
 
     label: str
@@ -89,6 +90,7 @@ class Constraint:
     hard: bool
     is_on: Callable[[Limits], bool]
     bounds: Callable[[Moment], Block]
+    yields_first: bool = False
 
 
 def lags(N: int) -> Array:

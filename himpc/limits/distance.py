@@ -79,4 +79,5 @@ DISTANCE = Constraint(
     hard=False,
     is_on=lambda limits: limits.avoidance.on,
     bounds=_bounds,
+    yields_first=True,
 )

@@ -19,12 +19,17 @@ INSIDE = -0.008
 """m: a robot that is farther inside must come out, and is not slowed down."""
 PROGRESS = 0.05
 """m/s, rad/s: the least decrease of an error that counts as progress; a reference that is faster moves."""
+SHARE = 0.25
+"""1/s: the least decrease as a share of the error; tasks that nothing blocks are an order faster."""
 CLOSE_ENOUGH = 0.01
 """m, rad: a task with a smaller error has reached its target."""
 SLOWING, RECOVERY = 0.1, 0.05
 """s: time constants with which the joints become slow, and fast again."""
 DISTURBED = 0.03
 """m, rad: a first task whose error grows by more was pushed away, and may come back."""
+STALLED, REST = 0.5, 0.02
+"""Shares below which a robot is stalled until something changes, and below which it has come to rest: errors
+that change while it brakes are neither progress nor a disturbance."""
 SLOWEST = 0.02
 """rad/s: no joint becomes slower."""
 
@@ -53,7 +58,8 @@ def stalled(before: Stall, errors: Array, moves: bool, room: float, T_s: float) 
 
     Without this, an arm that is dragged into the floor stops above it and goes on moving its joints near
     their limits without end. The joints become slower while something is near, no reference moves, and no
-    task that is away from its target comes closer.
+    task that is away from its target comes closer. A robot that has become slow stays so until a reference
+    moves, nothing is near any more, or its first task is disturbed.
 
     Args:
         before: one period ago.
@@ -64,11 +70,14 @@ def stalled(before: Stall, errors: Array, moves: bool, room: float, T_s: float) 
     """
     far, first = errors > CLOSE_ENOUGH, float(errors[0])
     free = moves or not INSIDE <= room <= BLOCKED or not far.any()
-    if free or first > before.least + DISTURBED:
+    brakes, rests = REST < before.share < STALLED, before.share <= REST
+    if free or (first > before.least + DISTURBED and not brakes):
         due, least, slows = errors, first, False
     else:
-        due, least = np.minimum(errors, before.due - PROGRESS * T_s), min(first, before.least)
-        slows = not bool((far & (errors <= due + CLOSE_ENOUGH)).any())
+        decrease = (PROGRESS + SHARE * errors) * T_s
+        due = np.minimum(errors, before.due - decrease)
+        least = first if brakes else min(first, before.least)
+        slows = brakes or rests or not bool((far & (errors <= due + CLOSE_ENOUGH)).any())
     goal, seconds = (0.0, SLOWING) if slows else (1.0, RECOVERY)
     return Stall(before.share + min(1.0, T_s / seconds) * (goal - before.share), due, least)
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from himpc.limits.constraint import Constraint
 from himpc.limits.rows import Rows
 from himpc.limits.sequences import clamped, steps, viable
 from himpc.limits.torque import TORQUE
@@ -37,7 +38,7 @@ class _Part(NamedTuple):
         lower, upper: (k,) N·m.
         T: (N, p).
         G: (N, p), the values of velocity rows are G x.
-        ranks: (k,) 0 for torque rows, 1 for other hard rows, 2 for rows that give way first.
+        ranks: (k,) 0 for torque rows, 1 for other hard rows, 2 for soft rows, 3 for rows that give way first.
     """
 
     A: Array
@@ -53,10 +54,10 @@ def closest_to_rest(rows: Rows, rest: Array) -> Array:
     meet all rows.
 
     Joints that share a direction are a group; each group is a strictly convex QP. If no increments meet all
-    rows, those that are not hard give way by least squares. If no increments meet the hard rows, those give
-    way by least squares that do not bound the torque. Beyond _WORK the torque changes at some knots only, the
-    first among them, evenly spaced; beyond _ROWS there is no QP. Whatever the QP finds within its iterations,
-    rows of torque and of its rate hold if any increments meet them, see `_within`.
+    rows, those that yield first give way by least squares. If none meet the others, those that are not hard
+    do, and if none meet the hard rows, those that do not bound the torque. Beyond _WORK the torque changes at
+    some knots only, the first among them, evenly spaced; beyond _ROWS there is no QP. Whatever the QP finds
+    within its iterations, rows of torque and of its rate hold if any increments meet them, see `_within`.
     """
     U = steps(steps(rest))
     for group in groups(rows, rest.shape[1]):
@@ -65,9 +66,10 @@ def closest_to_rest(rows: Rows, rest: Array) -> Array:
             continue
         x = _closest(part, rest[:, group])
         if x is None:
-            if _closest(_up_to(part, 1), rest[:, group]) is None:
-                part = _given_way(part, 1)
-            part = _given_way(part, 2)
+            last = int(part.ranks.max())
+            for rank in range(1, last + 1):
+                if rank == last or _closest(_up_to(part, rank), rest[:, group]) is None:
+                    part = _given_way(part, rank)
             x = _closest(part, rest[:, group])
         if x is not None:
             U[:, group] = part.T @ x.reshape(-1, len(group))
@@ -112,8 +114,13 @@ def _part(rows: Rows, group: list[int]) -> _Part:
         A.append(own[kept])
         lower.append(low[kept])
         upper.append(high[kept])
-        ranks.append(np.full(kept.sum(), 0 if constraint is TORQUE else 1 if constraint.hard else 2))
+        ranks.append(np.full(kept.sum(), _rank(constraint)))
     return _Part(np.vstack(A), np.concatenate(lower), np.concatenate(upper), T, G, np.concatenate(ranks))
+
+
+def _rank(constraint: Constraint) -> int:
+    """See `_Part.ranks`."""
+    return 0 if constraint is TORQUE else 1 if constraint.hard else 3 if constraint.yields_first else 2
 
 
 def _closest(part: _Part, rest: Array) -> Array | None:

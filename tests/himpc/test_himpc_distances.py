@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from himpc.limits import Limits, in_force
 from himpc.limits.avoidance import Avoidance
 from himpc.limits.distance import Near, least_rates
+from himpc.limits.load import loaded, spared
 from himpc.limits.stall import SLOWEST, going, slowed, stalled
 from himpc.references.observed import Observed
 from himpc.tick.distances import Distances
@@ -145,6 +146,20 @@ def test_from_the_least_rate_a_stop_is_possible() -> None:
     assert least_rates(pairs(0.025), kept) == [0.0]
 
 
+def test_a_joint_with_little_torque_left_becomes_slow(robot: Robot) -> None:
+    """Only the joint whose mean torque is close to its limit, and not for the torque of a moment."""
+    limits = in_force(robot, Limits())
+    tau, load = 0.5 * limits.tau_upper, np.zeros(robot.n)
+    for tick in range(1000):
+        tau[1] = -0.95 * limits.tau_upper[1]
+        tau[2] = limits.tau_upper[2] if tick == 990 else 0.0
+        load = loaded(load, tau, limits, 1e-3)
+    share = spared(limits, load).v_limit / limits.v_limit
+    assert share[1] == pytest.approx(0.05 / 0.3, rel=1e-3)
+    assert np.delete(share, 1) == pytest.approx(1.0)
+    assert spared(limits, np.zeros(robot.n)) is limits
+
+
 def test_a_robot_without_progress_becomes_slow(robot: Robot) -> None:
     """Only while something is near, nothing moves, a task is away from its target, and none comes closer."""
     cases = {
@@ -163,12 +178,16 @@ def test_a_robot_without_progress_becomes_slow(robot: Robot) -> None:
     assert set(shares.values()) == {1.0}
     stall, error = going(1), 0.5
     for _ in range(2000):
-        error -= 1e-4
+        error -= 2e-4
         stall = stalled(stall, np.array([error]), False, 0.01, 1e-3)
     assert stall.share == 1.0
     stall = going(1)
     for error in [*[0.3] * 1000, 0.35]:
         stall = stalled(stall, np.array([error]), False, 0.01, 1e-3)
     assert stall.due == [0.35]  # it was pushed away, and may come back
+    stall = going(1)
+    for error in [*[0.3] * 300, *np.linspace(0.3, 0.2, 100), *[0.2] * 1000]:
+        stall = stalled(stall, np.array([error]), False, 0.01, 1e-3)
+    assert stall.share < 0.01  # what changes while it brakes does not set it going again
     slow = slowed(in_force(robot, Limits()), stall._replace(share=0.0))
     assert slow.v_limit == pytest.approx(SLOWEST)

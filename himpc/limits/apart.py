@@ -1,0 +1,60 @@
+"""What rows of distances can still get where they cannot be met: the nearest to it, by least squares."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.limits.rows import Rows
+from himpc.qp import solve_qp
+
+Array = NDArray[np.float64]
+
+_ITERATIONS = 100
+"""Largest number of iterations of the QP, which has one unknown for each joint and each direction."""
+_FAINT = 1e-5
+"""Weight of the torque that is used for it."""
+
+
+def kept_apart(rows: Rows, joints: int, U: Array) -> Array:
+    """Returns increments (N, n), N·m: U with another torque of the first knot, which brings the rows behind
+    those of joints closest to being met, by least squares, and keeps what U meets of the joints' own rows.
+
+    A step of torque moves a row in proportion to L[:, 0]. With one number x per joint, the joints' own rows
+    are bounds on x, which 0 meets, and rows of a direction D_c are one bound on D_c·x: the tightest of all
+    knots.
+
+    Args:
+        rows: all rows.
+        joints: number of rows, the first ones, whose columns are the joints.
+        U: the increments to begin with.
+    """
+    N, n = U.shape
+    profile, value = rows.L[:, :1], rows.values(U)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        low = np.where(profile > 0.0, (rows.lower - value) / profile, -np.inf)
+        high = np.where(profile > 0.0, (rows.upper - value) / profile, np.inf)
+    least = np.minimum(low[:joints].max(axis=0), 0.0)
+    most = np.maximum(high[:joints].min(axis=0), 0.0)
+    D, lower, upper = [], [], []
+    for place in range(joints // N, len(rows.constraints)):
+        directions, block = (
+            rows.directions[place] if rows.directions else None,
+            slice(place * N, (place + 1) * N),
+        )
+        D.append(np.eye(n) if directions is None else directions.D)
+        lower.append(low[block].max(axis=0))
+        upper.append(high[block].min(axis=0))
+    normals, lower, upper = np.vstack(D), np.concatenate(lower), np.concatenate(upper)
+    if not ((lower > 0.0) | (upper < 0.0)).any():
+        return U
+    bounded = np.isfinite(lower) | np.isfinite(upper)
+    normals, lower, upper = normals[bounded], lower[bounded], upper[bounded]
+    c = len(normals)
+    H = np.diag(np.r_[np.full(n, _FAINT), np.ones(c)])
+    A = np.block([[np.eye(n), np.zeros((n, c))], [normals, np.eye(c)]])
+    found = solve_qp(H, np.zeros(n + c), A, np.r_[least, lower], np.r_[most, upper], "daqp", _ITERATIONS)
+    moved = U.copy()
+    if np.isfinite(found.x).all():
+        moved[0] += np.minimum(np.maximum(found.x[:n], least), most)
+    return moved
