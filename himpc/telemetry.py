@@ -82,8 +82,8 @@ class Layout:
     `q` and `v` are the plant's, `q_measured` and `v_measured` the values that the controller received;
     `tau_0` is the torque that acted until then. `contact_depth` (m) and `contact_force` (N) are the deepest
     penetration and the largest force of the tick that begins with the row, 0 without a contact. `distance`
-    and `distance_kept` (m) are those of the nearest pair of links or of a link and an object, and what is
-    kept of it, NaN where no distance is measured. Per task
+    and `distance_kept` (m) are those of the nearest pair of links, or of a link and an object, and d_safe
+    with its margin, which is kept; NaN where none is measured or kept. Per task
     `x/<task>` and `x_d/<task>` (coordinates, or a quaternion x y z w), `error/<task>`, `v_d/<task>`,
     `a_d/<task>` (m each; three if the target is a point to look at); per level the fields cost, kkt, rung
     (index into FALLBACKS), time_us, leak and active (number of binding constraints), NaN for a level that was

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.cascade.level import ActiveRows
+from himpc.cascade.level import NO_ROWS, ActiveRows
 from himpc.formulation.settings import Settings
 from himpc.limits import TORQUE, LimitsInForce, Rows
 from himpc.limits.constraint import Moment
@@ -99,12 +99,11 @@ class DistanceFilter:
         )
         bounded = np.flatnonzero(np.isfinite(block.lower[0]))
         asked = np.clip(wanted, force.tau_lower, force.tau_upper)
-        nothing = ActiveRows(*np.empty((2, 0), np.intp), *np.empty((2, 0)))
         # With a = M̄⁻¹(τ − τ_nom) the cost is ‖a‖², and the rows are ∇d·a and M̄ a.
-        A, n = D[bounded] * M_bar, len(q)
+        A = D[bounded] * M_bar
         lower = block.lower[0, bounded] - D[bounded] @ (asked - tau_0)
-        if not len(bounded) or not np.isfinite(lower).all() or (lower <= 0.0).all():
-            return Filtered(asked, rows, nothing, True)
+        if (lower <= 0.0).all() or not np.isfinite(lower).all():
+            return Filtered(asked, rows, NO_ROWS, bool(np.isfinite(lower).all()))
         box = force.tau_lower - asked, force.tau_upper - asked
         found, slack = _closest(A, lower, np.diag(M_bar), box), np.zeros(len(bounded))
         met = found is not None
@@ -112,7 +111,7 @@ class DistanceFilter:
             slack = _given_way(D[bounded], lower, box)
             found = _closest(A, lower - slack, np.diag(M_bar), box)
         if found is None:
-            return Filtered(asked, rows, nothing, False)
+            return Filtered(asked, rows, NO_ROWS, False)
         a, multiplier = found
         tau = np.clip(asked + M_bar * a, force.tau_lower, force.tau_upper)
         binding = np.flatnonzero(np.abs(multiplier) > _MET)
@@ -124,7 +123,6 @@ class DistanceFilter:
             multiplier[binding],
             np.where(of_torque, 0.0, slack[np.minimum(binding, len(bounded) - 1)]),
         )
-        assert len(tau) == n
         return Filtered(tau, rows, active, met)
 
 

@@ -21,11 +21,11 @@ EVERY = 5
 
 
 class Nearest(NamedTuple):
-    """The nearest pair: what counts is by how much it is farther apart than what it has to keep.
+    """The nearest pair: what counts is by how much it is farther apart than what is kept of it.
 
     Attributes:
         distance: m, negative inside; NaN if no pair is near.
-        kept: m, the distance that it has to keep while distances are kept.
+        kept: m, d_safe with its margin, from which on it may come no closer; NaN unless distances are kept.
         pair: its names.
     """
 
@@ -66,6 +66,7 @@ class Clearance:
         near = self._measures[1].at(q, objects_of(self._plant))
         if not len(near.distance):
             return NOTHING
-        kept = near.share * avoidance.d_safe
+        kept = near.share * (avoidance.d_safe + avoidance.margin)
         first = int(np.argmin(near.distance - kept))
-        return Nearest(float(near.distance[first]), float(kept[first]), near.names[first])
+        bound = float(kept[first]) if avoidance.on else math.nan
+        return Nearest(float(near.distance[first]), bound, near.names[first])

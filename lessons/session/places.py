@@ -9,7 +9,7 @@ from himpc.telemetry import Layout
 
 class Places(NamedTuple):
     """The indices of the fields that a session writes into a row; values that need the plant's M are
-    adjacent; so are depth and force of a contact, and a distance with what is kept of it."""
+    adjacent, as are depth and force of a contact, and a distance and what is kept of it."""
 
     t: int
     late: int
