@@ -40,7 +40,7 @@ class BindingPanel:
         )
         nearest = f"<p>Nearest pair: {esc(readable(now.status.nearest))}.</p>" if now.status.nearest else ""
         self._now.content = block(
-            nearest + _table(("level", "joint", "bound", "multiplier", "slack"), rows)
+            nearest + _table(("level", "joint or pair", "bound", "multiplier", "slack"), rows)
             if rows
             else f"No bound is binding: every level is limited only by the levels above it.{nearest}"
         )
