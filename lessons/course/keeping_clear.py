@@ -179,12 +179,12 @@ INSIDE = Step(
 BEHIND = Step(
     title="Behind all levels",
     text=r"""
-    Many robots get a safety filter instead: the controller knows no distance, and behind it a QP
-    changes its torque as little as possible until the rows hold,
+    Many robots get a safety filter instead: the controller knows no distance. Behind it a QP changes its
+    torque as little as possible,
 
-    $$\min_\tau \lVert \bar M^{-1} (\tau - \tau_{\mathrm{nom}}) \rVert^2 \quad \text{s.t. the same rows
-    at the next step, and } \tau_{\min} \le \tau \le \tau_{\max}.$$
+    $$\min_\tau \lVert \bar M^{-1} (\tau - \tau_{\mathrm{nom}}) \rVert^2,$$
 
+    within the bounds of the torque and under the same rows, at the next step alone.
     The ghost has its rows inside the hierarchy.
     """,
     do="Switch off the orientation and the posture. How near does the hand come now?",
