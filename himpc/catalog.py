@@ -15,6 +15,7 @@ CONTROLLERS: dict[str, str] = {
     "osf_damped": "OSF with damped least squares near singularities; what the paper's OSF leaves out",
     "tdeosf_damped": "TDEOSF with damped least squares near singularities",
     "hqp": "one-step hierarchical QP on the nominal model, within the torque bounds",
+    "himpc_filtered": "HIMPC whose levels know no distance; a QP behind them changes the torque to keep it",
 }
 """Torque-level controllers: name and description."""
 
@@ -39,6 +40,6 @@ def qp_method(controller: str, route: Route, solver: str) -> str | None:
     addition."""
     if controller == "hqp":
         return solver
-    if controller not in ("himpc", "hiqp", "nhimpc", "weighted"):
+    if controller not in ("himpc", "hiqp", "nhimpc", "weighted", "himpc_filtered"):
         return None
     return solver if route == "explicit" else OWN_METHOD

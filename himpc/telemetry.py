@@ -42,6 +42,8 @@ _SCALARS = (
     "late",
     "contact_depth",
     "contact_force",
+    "distance",
+    "distance_kept",
 )
 _PER_JOINT = (
     "q",
@@ -79,7 +81,9 @@ class Layout:
 
     `q` and `v` are the plant's, `q_measured` and `v_measured` the values that the controller received;
     `tau_0` is the torque that acted until then. `contact_depth` (m) and `contact_force` (N) are the deepest
-    penetration and the largest force of the tick that begins with the row, 0 without a contact. Per task
+    penetration and the largest force of the tick that begins with the row, 0 without a contact. `distance`
+    and `distance_kept` (m) are those of the nearest pair of links, or of a link and an object, and d_safe
+    with its margin, which is kept; NaN where none is measured or kept. Per task
     `x/<task>` and `x_d/<task>` (coordinates, or a quaternion x y z w), `error/<task>`, `v_d/<task>`,
     `a_d/<task>` (m each; three if the target is a point to look at); per level the fields cost, kkt, rung
     (index into FALLBACKS), time_us, leak and active (number of binding constraints), NaN for a level that was

@@ -192,7 +192,8 @@ class Status:
     lecture: of a lesson, when it has changed; inside: while the page requests it; own: of a controller from a
         file;
     ranks: per level the number of directions that it gets, and the number of its rows; contacts: the points
-    of contact after the last tick; objects: (k, 7), the poses of the free objects of the world.
+    of contact after the last tick; objects: (k, 7), the poses of the free objects of the world; nearest: the
+    names of the nearest pair, "" if none is measured.
     """
 
     t: float
@@ -217,6 +218,7 @@ class Status:
     ranks: dict[str, tuple[int, int]] = field(default_factory=dict)
     contacts: tuple[ContactPoint, ...] = ()
     objects: np.ndarray = field(default_factory=lambda: np.zeros((0, 7)))
+    nearest: str = ""
 
 
 @dataclass(frozen=True)

@@ -86,7 +86,9 @@ class TorqueFace:
     def add_plots(self, gui: viser.GuiApi, plots: viser.PanelHandle | viser.GuiTabGroupHandle) -> None:
         context = self._context
         with plots.add_tab("Errors"):
-            self._level_plots = LevelPlots(gui, context.in_view, context.ready, context.colours)
+            self._level_plots = LevelPlots(
+                gui, context.in_view, context.ready, context.settings, context.colours
+            )
         with plots.add_tab("Joints"):
             self._joint_plots = JointPlots(gui, context.in_view, context.ready.robot)
         with self._inside_tab or plots.add_tab("Inside"):
@@ -209,7 +211,7 @@ class TorqueFace:
         tips = moment.way[:, -1, :3] if len(moment.way) else np.zeros((0, 3))
         self._trails.draw(tips, moment.status.path, T_s)
         beside = None if moment.ghost is None else moment.ghost.window
-        self._level_plots.draw(moment.window, beside, T_s, context.settings.plant.contacts)
+        self._level_plots.draw(moment.window, beside, context.settings)
         self._joint_plots.draw(moment.window, beside)
         self._inside.draw(moment)
         q = moment.latest[context.ready.layout.fields["q"]]

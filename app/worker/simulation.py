@@ -289,6 +289,7 @@ class SimulationRunner:
             ranks=run.ranks(),
             contacts=run.contacts(),
             objects=run.objects(),
+            nearest=run.nearest(),
         )
 
     def close(self) -> None:

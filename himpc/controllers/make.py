@@ -8,6 +8,7 @@ from functools import partial
 from himpc.catalog import CONTROLLERS
 from himpc.controllers.controller import Controller
 from himpc.controllers.himpc import HIMPC
+from himpc.controllers.himpc_filtered import FilteredHIMPC
 from himpc.controllers.hiqp import HIQP
 from himpc.controllers.hqp import HQP
 from himpc.controllers.nhimpc import NHIMPC
@@ -29,6 +30,7 @@ _MAKERS: dict[str, Callable[[Robot, Settings], Controller]] = {
     "osf_damped": partial(OSF, damping=DAMPED),
     "tdeosf_damped": partial(TDEOSF, damping=DAMPED),
     "hqp": HQP,
+    "himpc_filtered": FilteredHIMPC,
 }
 
 

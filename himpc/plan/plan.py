@@ -51,6 +51,18 @@ class AtOnce(NamedTuple):
     jacobians: list[Array]
 
 
+class Behind(NamedTuple):
+    """What a filter behind the levels did to their torque.
+
+    Attributes:
+        solution: its step from τ₀, the bounds at which it stops, and its leak into the levels.
+        rows: the rows that the solution's indices refer to.
+    """
+
+    solution: LevelSolution
+    rows: Rows
+
+
 @dataclass(frozen=True, eq=False)
 class Plan:
     """The first input, the prediction, and the solution of every level.
@@ -74,6 +86,7 @@ class Plan:
             False if it cannot. None: fields are written one by one.
         at_once: increments of the levels at this tick without further computation; None: see `levels`.
         M_bar: diagonal of the M̄ of this plan, (n,) kg·m²; None: the M̄ of the settings.
+        behind: what a filter behind the levels did; None if there is none.
     """
 
     tau: Array
@@ -87,6 +100,7 @@ class Plan:
     fill: Callable[[Array, Layout], bool] | None = None
     at_once: Callable[[], AtOnce] | None = None
     M_bar: Array | None = None
+    behind: Behind | None = None
 
     def freeze(self) -> Plan:
         """Returns a copy of the plan whose data stay valid."""
@@ -125,8 +139,11 @@ class Plan:
 
     @property
     def leak(self) -> float | None:
-        """The largest leak between levels; None with fewer than two levels."""
-        return max(level.leak for level in self.levels) if len(self.levels) > 1 else None
+        """The largest leak between levels, and of a filter into them; None with fewer than two levels."""
+        if len(self.levels) < 2:
+            return None
+        between = max(level.leak for level in self.levels)
+        return between if self.behind is None else max(between, self.behind.solution.leak)
 
     @property
     def kkt_residual(self) -> float:
@@ -134,7 +151,9 @@ class Plan:
         return max((level.kkt_residual for level in self.levels), default=0.0)
 
     def binding(self, joint_names: tuple[str, ...]) -> list[Binding]:
-        """Returns every active constraint, level by level, with names instead of indices."""
+        """Returns every active constraint, level by level and of a filter behind them, with names instead of
+        indices."""
+        found = [(level, self.rows) for level in self.levels]
         return [
             Binding(
                 level.name,
@@ -145,6 +164,6 @@ class Plan:
                 abs(multiplier),
                 slack,
             )
-            for level in self.levels
-            for label, knot, direction, multiplier, slack in level.active.labelled(self.rows, joint_names)
+            for level, rows in (found if self.behind is None else [*found, self.behind])
+            for label, knot, direction, multiplier, slack in level.active.labelled(rows, joint_names)
         ]

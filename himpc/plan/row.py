@@ -28,9 +28,24 @@ def write_plan(row: Array, layout: Layout, plan: Plan, ahead: Mapping[str, Previ
         row.fill(math.nan)
         _write_by_field(row, layout, plan)
         _write_references(row, layout, ahead)
+    elif plan.behind is not None:
+        _write_behind(row, layout, plan)
     row[fields["step_us"].start] = plan.step_us
     row[fields["unsolved"].start] = plan.unsolved
     row[fields["iterations"].start] = plan.iterations
+
+
+def _write_behind(row: Array, layout: Layout, plan: Plan) -> None:
+    """Writes what a filter behind the levels changes in a row of the levels."""
+    fields, behind = layout.fields, plan.behind
+    assert behind is not None
+    row[fields["tau_demand"]], row[fields["delta_tau"]] = plan.tau, plan.tau - plan.tau_0
+    leak = row[fields["priority_leak"].start]
+    if not math.isnan(leak):
+        row[fields["priority_leak"]] = max(leak, behind.solution.leak)
+    marks = [0 if math.isnan(mark) else int(mark) for mark in row[fields["at_bound"]].tolist()]
+    _mark_bounds(marks, behind.solution.active, behind.rows)
+    row[fields["at_bound"]] = marks
 
 
 def _write_references(row: Array, layout: Layout, ahead: Mapping[str, Preview]) -> None:
@@ -85,6 +100,8 @@ def _write_by_field(row: Array, layout: Layout, plan: Plan) -> None:
         if level.active.row.size:
             _mark_bounds(marks, level.active, plan.rows)
     row[base : base + len(evidence)] = evidence
+    if plan.behind is not None:
+        _mark_bounds(marks, plan.behind.solution.active, plan.behind.rows)
     row[fields["at_bound"]] = marks
 
 

@@ -23,6 +23,8 @@ COURSE: tuple[str, ...] = (
     "stretched-out",
     "torque-has-a-limit",
     "stopping-takes-distance",
+    "a-blind-arm",
+    "keeping-clear",
     "how-far-ahead",
     "deadlines",
     "sensors-are-coarse",

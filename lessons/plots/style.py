@@ -12,6 +12,7 @@ CONTROLLER_COLOURS: dict[str, str] = {
     "tdeosf": "#009E73",
     "hqp": "#E07A00",
     "weighted": "#C2185B",
+    "himpc_filtered": "#444444",
     "htmpc": "#0057B8",
     "htmpc_wpt": "#56B4E9",
     "stmpc": "#E07A00",
@@ -28,6 +29,7 @@ NAMES: dict[str, str] = {
     "tdeosf": "TDEOSF",
     "hqp": "HQP",
     "weighted": "weighted",
+    "himpc_filtered": "HIMPC, filtered",
 }
 """Controllers as the paper writes them."""
 

@@ -10,6 +10,7 @@ from himpc.catalog import CONTROLLERS, VELOCITY_CONTROLLERS
 from himpc.tasks import Task
 from lessons.own.files import is_file
 from lessons.scenes.circle import iiwa14_circle, iiwa14_circle_paper
+from lessons.scenes.furnished import iiwa14_table, panda_post
 from lessons.scenes.hold import hold, hold_of
 from lessons.scenes.missions import velocity_scene
 from lessons.scenes.mobile_hold import ridgeback_hold
@@ -34,6 +35,8 @@ _MAKERS: dict[str, Callable[[], TorqueScene]] = {
     "panda-hold": lambda: hold_of("panda"),
     "planar3-hold": lambda: hold_of("planar3"),
     "ridgeback-ur10-hold": ridgeback_hold,
+    "iiwa14-table": iiwa14_table,
+    "panda-post": panda_post,
     "planar3-plane": planar3_plane,
     "baxter-hold": baxter_hold,
     "baxter-tray": baxter_tray,

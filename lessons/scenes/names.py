@@ -7,6 +7,8 @@ SCENES: dict[str, str] = {
     "panda-hold": "Franka Panda: the same three levels",
     "planar3-hold": "planar 3-joint arm: the same three levels, in its plane",
     "ridgeback-ur10-hold": "Ridgeback and UR10 at torque level: drag hand and base; the hand comes first",
+    "iiwa14-table": "KUKA iiwa 14 at a table with a ball, beside a post: press on them, or keep clear",
+    "panda-post": "Franka Panda beside a post",
     "baxter-hold": "Baxter, two arms: drag both hands; their positions come before their orientations",
     "baxter-tray": "Baxter's hands move along a square as if they carried a tray; the grip is level 1",
     "baxter-conflict": "Baxter's hands keep their relative pose, but have targets at two different places",

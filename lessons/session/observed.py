@@ -14,10 +14,12 @@ from robots.world import Post, Thing
 
 
 def observed(plant: Plant, avoidance: Avoidance) -> Observed:
-    """The objects of a plant's world where they are now, if distances are kept. A free box or post counts as
-    upright."""
-    if not avoidance.on:
-        return NOTHING
+    """The objects of a plant's world where they are now, if distances are kept."""
+    return objects_of(plant) if avoidance.on else NOTHING
+
+
+def objects_of(plant: Plant) -> Observed:
+    """The objects of a plant's world where they are now. A free box or post counts as upright."""
     shapes, moving = [thing.shape for thing in plant.world], plant.object_velocities()
     if not len(moving):
         return Observed(tuple(shapes))

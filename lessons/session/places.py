@@ -9,12 +9,13 @@ from himpc.telemetry import Layout
 
 class Places(NamedTuple):
     """The indices of the fields that a session writes into a row; values that need the plant's M are
-    adjacent; depth and force of a contact are adjacent, too."""
+    adjacent, as are depth and force of a contact, and a distance and what is kept of it."""
 
     t: int
     late: int
     truth: slice
     touch: slice
+    near: slice
     q: slice
     v: slice
     tau: slice
@@ -26,6 +27,7 @@ class Places(NamedTuple):
         """The indices in a layout."""
         fields = layout.fields
         start, felt = fields["dynamic_leak"].start, fields["contact_depth"].start
-        joints = (fields[name] for name in cls._fields[4:])
-        truth, touch = slice(start, start + 3), slice(felt, felt + 2)
-        return cls(fields["t"].start, fields["late"].start, truth, touch, *joints)
+        joints = (fields[name] for name in cls._fields[5:])
+        near = fields["distance"].start
+        truth, touch, apart = slice(start, start + 3), slice(felt, felt + 2), slice(near, near + 2)
+        return cls(fields["t"].start, fields["late"].start, truth, touch, apart, *joints)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import NamedTuple, final
+from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +19,10 @@ from himpc.telemetry import layout_of
 from lessons.events import Event, MoveTarget, Push
 from lessons.scenes.torque_scene import TorqueScene
 from lessons.session.bumpless import Handover, settled
+from lessons.session.clearance import Clearance
 from lessons.session.controllers import controller_of
 from lessons.session.deadline import DelayedTorque
+from lessons.session.given import Given
 from lessons.session.leak import at_once, dynamic_leak
 from lessons.session.observed import observed
 from lessons.session.places import Places
@@ -40,14 +42,6 @@ LOST_POSITION = 0.5
 """m: a level-1 position error above this counts as divergence."""
 
 
-class Given(NamedTuple):
-    """The inputs of a controller at a tick: the measured state, (n,) each, and the references' previews."""
-
-    q: Array
-    v: Array
-    previews: Mapping[str, Preview]
-
-
 @final
 class TorqueSession(Session):
     """A run whose controller gives torques: every step is a control tick.
@@ -55,6 +49,7 @@ class TorqueSession(Session):
     Attributes:
         plan: the last plan, None before the first tick.
         given: the inputs from which the controller computed it.
+        clearance: measures the nearest pair.
     """
 
     scene: TorqueScene
@@ -74,6 +69,7 @@ class TorqueSession(Session):
         self.controller = self._controller_of(scene.settings, scene.robot)
         self.layout = layout_of(scene.robot, scene.settings.levels)
         self._data = scene.robot.model.createData()
+        self.clearance = Clearance(self.plant)
         self._row, self._at = np.full(self.layout.size, np.nan), Places.of(self.layout)
         self.reset()
 
@@ -98,6 +94,7 @@ class TorqueSession(Session):
         scene = self.scene
         self.plant.reset(scene.q_0, scene.v_0, scene.tau_0)
         self.controller.reset(self.plant.tau)
+        self.clearance.reset()
         self.references = self._fresh_references()
         self.plan: Plan | None = None
         self.given: Given | None = None
@@ -223,6 +220,7 @@ class TorqueSession(Session):
         row[at.late] = late
         row[at.tau] = plant.step(self._outbox.applied(plan.tau, late, plant.tau), T_s)
         row[at.touch] = plant.touch
+        row[at.near] = self.clearance.measure(q, settings.limits.avoidance)
         self._ticks += 1
         if self.diverged_at is None:
             wild = self._is_wild(q, v)

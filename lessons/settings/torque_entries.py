@@ -48,7 +48,7 @@ TORQUE_ENTRIES = (
           "N·m/s", 0.0, 2000.0, 10.0, name="torque rate limit"),
     Entry("avoidance.on", "Keep distances",
           "Distances between links, and between links and objects, are kept above all levels by himpc, "
-              "hiqp, nhimpc and weighted",
+              "hiqp, nhimpc and weighted, and behind all levels by himpc_filtered",
           tries=("true", "false"), name="distances kept"),
     Entry("avoidance.d_safe", "d_safe", "The distance that is kept", "m", 0.0, 100.0, 1.0, shown="mm",
           factor=1e3, name="safe distance"),

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from himpc.telemetry import AT_POSITION, AT_TORQUE, AT_VELOCITY
 
 Array = NDArray[np.float64]
-Statistic = Literal["largest", "rms", "mean", "range", "last", "sum"]
+Statistic = Literal["largest", "smallest", "rms", "mean", "range", "last", "sum"]
 
 UNITS: dict[str, float] = {
     "": 1.0,
@@ -27,6 +27,7 @@ UNITS: dict[str, float] = {
     "rad/s": 1.0,
     "rad/s²": 1.0,
     "N·m": 1.0,
+    "N": 1.0,
     "m/s²": 1.0,
     "%": 100.0,
     "µs": 1.0,
@@ -94,8 +95,8 @@ class Measure:
 
     Attributes:
         signal: the signal.
-        statistic: "largest" absolute value, "rms", "mean", "range" (greatest minus least), "last" (mean over
-            the last 50 ticks) or "sum".
+        statistic: "largest" absolute value, "smallest" value, "rms", "mean", "range" (greatest minus least),
+            "last" (mean over the last 50 ticks) or "sum".
         after, until: the window, s.
         over_ghost: whether it is divided by the same number of the ghost's run; its unit is then "×".
     """
@@ -237,6 +238,7 @@ def _last(values: Array) -> float:
 
 _WORDS: Mapping[Statistic, str] = {
     "largest": "largest",
+    "smallest": "smallest",
     "rms": "RMS",
     "mean": "mean",
     "range": "range of",
@@ -246,6 +248,7 @@ _WORDS: Mapping[Statistic, str] = {
 
 _STATISTICS: Mapping[Statistic, Callable[[Array], float]] = {
     "largest": lambda values: np.abs(values).max(),
+    "smallest": lambda values: values.min(),
     "rms": lambda values: np.sqrt((values**2).mean()),
     "mean": lambda values: values.mean(),
     "range": lambda values: values.max() - values.min(),

@@ -11,6 +11,9 @@ RADIUS = of("gauge_radius")
 X = of("error/position", "mm", "rms", column=0)
 NO_FRICTION = ("plant.friction=0", "plant.damping=0")
 JOINT_2 = of("q", "deg", column=1)
+FORCE = of("contact_force", "N", "last")
+AT_THE_END = of("error/position", "mm", "last")
+TILT_AT_THE_END = of("error/orientation", "deg", "last")
 
 # fmt: off
 LIMIT_ROWS = (
@@ -66,6 +69,59 @@ LIMIT_ROWS = (
         "stopping-takes-distance/2", "The price is time: the last degrees are crept",
         of("q", "deg", "mean", 1.6, 1.7, column=1), (147.5, 148.7), ("limits.velocity_approach=0",),
         (149.5, 149.7),
+    ),
+    # ---------------------------------------- a-blind-arm
+    Intervention(
+        "a-blind-arm/0", "so its push is made up for",
+        FORCE, (360, 390), ("controller=osf",), (3, 5),
+    ),
+    Intervention(
+        "a-blind-arm/0", "so MPC is not to blame",
+        FORCE, (360, 390), ("controller=tdeosf",), (360, 400), stays=True,
+    ),
+    Intervention(
+        "a-blind-arm/0", "Half of $\\bar M$ presses half as hard",
+        FORCE, (360, 390), ("M_bar_scale=0.5",), (180, 205),
+    ),
+    Intervention(
+        "a-blind-arm/1",
+        "Stiffness does not limit it: with half of $K_p$ the bound is reached almost a second later",
+        FORCE, (205, 225), ("levels.position.K_p=28.1",), (205, 225), seconds=2.6, stays=True,
+    ),
+    Intervention(
+        "a-blind-arm/1", "With all its torque the arm comes to almost 700 N",
+        FORCE, (205, 225), ("limits.torque_scale=1",), (650, 700), seconds=4.5,
+    ),
+    # ---------------------------------------- keeping-clear
+    Intervention(
+        "keeping-clear/0", "The position fixes the hand's height, so nothing is left for the distance",
+        FORCE, (280, 300), ("order=distance,position,orientation,posture",), (0, 0),
+    ),
+    Intervention(
+        "keeping-clear/0", "as if there were no task of a distance",
+        FORCE, (280, 300), ("levels.distance.enabled=false",), (280, 300), stays=True,
+    ),
+    Intervention(
+        "keeping-clear/1", "a task takes away the whole direction",
+        AT_THE_END, (145, 150), ("levels.distance.enabled=false",), (0, 1),
+    ),
+    Intervention(
+        "keeping-clear/2", "the order decides who pays for it",
+        TILT_AT_THE_END, (28.5, 29.5), ("order=orientation,position,posture",), (0, 0.5),
+    ),
+    Intervention(
+        "keeping-clear/2", "then the hand stays 6 cm away",
+        AT_THE_END, (0, 2), ("order=orientation,position,posture",), (55, 65),
+    ),
+    Intervention(
+        "keeping-clear/3",
+        "That is the lower levels' doing: with both of them switched off the hand is 5 cm away by then",
+        AT_THE_END, (265, 275), ("levels.orientation.enabled=false", "levels.posture.enabled=false"),
+        (45, 58),
+    ),
+    Intervention(
+        "keeping-clear/3", "Without the posture alone 23 cm are left",
+        AT_THE_END, (265, 275), ("levels.posture.enabled=false",), (225, 235),
     ),
     # ---------------------------------------- how-far-ahead
     Intervention(

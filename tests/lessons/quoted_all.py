@@ -17,6 +17,7 @@ TORQUE = Signal("torque share", "%")
 RADIUS, NORM = Signal("gauge_radius"), Signal("gauge_norm")
 ROUGH = Signal("delta_tau", "N·m")
 Q1 = Signal("error/q1", "deg")
+FORCE = Signal("contact_force", "N")
 SPEED_3 = Signal("v", "deg/s", column=2)
 
 
@@ -290,4 +291,10 @@ QUOTED = (
         1.3,
         ("M_bar_scale=3",),
     ),
+    Quoted("a-blind-arm/0", "grows by more than 200 N per second", _of(FORCE, "range", 1.7), 100, 130),
+    Quoted("a-blind-arm/0", "one centimetre asks for 4 N", _of(FORCE, "last"), 3.5, 4.5, None),
+    Quoted("a-blind-arm/2", "its motors have nothing to push against", _of(TORQUE), 10, 20),
+    Quoted("keeping-clear/1", "15 cm above a target", _of(HAND, "last"), 145, 155),
+    Quoted("keeping-clear/2", "orientation gives way by 29°", _of(TILT, "last"), 28.5, 29.5),
+    Quoted("keeping-clear/3", "it stops 27 cm before its target", _of(HAND, "last"), 265, 275),
 )

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from himpc.controllers import stall_guard
+from himpc.limits import CONSTRAINTS
 from himpc.limits.distance import DISTANCE
 from lessons.events import MoveTarget
 from lessons.recording.run import run
@@ -77,6 +78,46 @@ def test_both_routes_keep_the_same_distances() -> None:
     assert pytest.approx(second.D) == first.D
     assert one.unsolved == other.unsolved == 0
     assert one.tau == pytest.approx(other.tau, abs=1e-6)
+
+
+def test_a_filter_behind_the_levels_is_listed_and_recorded() -> None:
+    """Where it acts, its pair has a name, its leak into the levels and the bits of its bounds are in the
+    row, and the recorded distance is the nearest one of that pair; both routes write the same row."""
+    for route in ("compiled", "explicit"):
+        session = TorqueSession(
+            replace(
+                scene("iiwa14-table", "avoidance.on=true", "controller=himpc_filtered", f"route={route}"),
+                events=((0.0, MoveTarget("position", (0.4, -0.4, 0.4))),),
+            )
+        )
+        row = session.tick()
+        fields = session.layout.fields
+        assert np.isfinite(row[fields["distance"]]) and session.clearance.found.pair
+        while not (found := [each for each in session.binding() if each.level == "filter"]):
+            row = session.tick()
+            assert session.t < 1.5
+        assert [each.joint for each in found if each.kind == "distance"] == ["link_5 – post"]
+        plan = session.plan
+        assert plan is not None and plan.behind is not None
+        bits = row[fields["at_bound"]].astype(int)
+        assert (bits & 1 << CONSTRAINTS.index(DISTANCE)).any()
+        assert row[fields["priority_leak"].start] == pytest.approx(plan.behind.solution.leak) != 0.0
+        assert row[fields["tau_demand"]] == pytest.approx(plan.tau)
+        assert row[fields["delta_tau"]] == pytest.approx(plan.tau - plan.tau_0)
+        near = session.clearance.found
+        assert near.kept == pytest.approx(0.02)
+        assert near.kept < near.distance < 0.25
+
+
+def test_distances_are_measured_where_there_is_something_to_measure() -> None:
+    """Not in a scene with a floor alone, unless distances are kept; among objects always, but the bound is
+    NaN where none is kept."""
+    rows = [TorqueSession(each).tick().copy() for each in (
+        scene("iiwa14-hold"), scene("iiwa14-hold", "avoidance.on=true"), scene("iiwa14-table"),
+    )]  # fmt: skip
+    fields = TorqueSession(scene("iiwa14-hold")).layout.fields
+    known = [[np.isfinite(row[fields[name].start]) for name in ("distance", "distance_kept")] for row in rows]
+    assert known == [[False, False], [True, True], [True, False]]
 
 
 def test_a_scene_without_rows_of_distances_is_as_before() -> None:

@@ -34,14 +34,15 @@ class BindingPanel:
     def update(self, now: SessionSnapshot[SceneSettings]) -> None:
         rows = "".join(
             f"<tr><td>{swatch(self._colours.get(row.level, BOUND))}{esc(row.level)}</td>"
-            f"<td>{esc(row.joint)}</td><td>{esc(row.kind)} {esc(row.side)}</td>"
+            f"<td>{esc(readable(row.joint))}</td><td>{esc(row.kind)} {esc(row.side)}</td>"
             f"<td>{row.multiplier:.3g}</td><td>{row.slack:.2g}</td></tr>"
             for row in now.status.binding
         )
+        nearest = f"<p>Nearest pair: {esc(readable(now.status.nearest))}.</p>" if now.status.nearest else ""
         self._now.content = block(
-            _table(("level", "joint", "bound", "multiplier", "slack"), rows)
+            nearest + _table(("level", "joint or pair", "bound", "multiplier", "slack"), rows)
             if rows
-            else "No bound is binding: every level is limited only by the levels above it."
+            else f"No bound is binding: every level is limited only by the levels above it.{nearest}"
         )
         robot = now.ready.robot
         shown = [place for place in range(now.bound_seconds.shape[1])
@@ -53,6 +54,11 @@ class BindingPanel:
         )
         titles = ("joint", *(CONSTRAINTS[place].label for place in shown))
         self._times.content = block(_table(titles, spent) if spent else "None so far.")
+
+
+def readable(pair: str) -> str:
+    """The names of a pair as words, "link 5 – table" for "link_5 – table"; a joint's name as it is."""
+    return pair.replace("_", " ") if " – " in pair else pair
 
 
 def _table(titles: tuple[str, ...], rows: str) -> str:

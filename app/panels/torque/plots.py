@@ -1,4 +1,5 @@
-"""Plots about the whole controller: error per level, solve time, and leaks between levels."""
+"""Plots about the whole controller: error per level, the nearest distance, solve time, and leaks between
+levels."""
 
 from __future__ import annotations
 
@@ -10,10 +11,13 @@ from app.html.palette import BAD, BOUND, GOOD, LEVELS, RGB
 from app.link.messages import Ready
 from app.panels.widgets.chart import Chart, ChartLine, of_ghost
 from app.panels.widgets.in_view import InView
+from lessons.settings.torque import TorqueSettings
+from robots.collision import Floor
 
 _ERROR = (1e-3, 1e3)  # mm or degrees
 _TIME = (1e-2, 1e2)  # ms
 _LEAK = (1e-12, 1e2)  # m/s² or rad/s²
+_DISTANCE = (0.0, 250.0)  # mm
 
 
 class LevelPlots:
@@ -21,56 +25,80 @@ class LevelPlots:
     a level without control. The curves of a ghost are dashed; the page's loop rebuilds the charts when a
     ghost starts or ends."""
 
-    def __init__(self, gui: viser.GuiApi, in_view: InView, ready: Ready, colours: dict[str, RGB]) -> None:
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        in_view: InView,
+        ready: Ready,
+        settings: TorqueSettings,
+        colours: dict[str, RGB],
+    ) -> None:
         self._gui, self._in_view = gui, in_view
         self._tasks, self._colours = ready.tasks, colours
         self._place = gui.add_folder(None)
         self._charts: list[Chart] = []
-        self._build(ghost=False, contacts=ready.settings.plant.contacts)
+        self._furnished = any(not isinstance(thing.shape, Floor) for thing in ready.world)
+        self._settings = settings
+        self._build(ghost=False)
 
     def rebuild(self, ready: Ready) -> None:
         """Rebuilds the charts for other tasks."""
         self._tasks = ready.tasks
-        self._build(self._with_ghost, self._with_contacts)
+        self._build(self._shown[0])
 
-    def _build(self, ghost: bool, contacts: bool) -> None:
+    def _wanted(self, ghost: bool) -> tuple[bool, bool, bool]:
+        """Whether there is a ghost, whether contacts are marked, and whether distances are drawn."""
+        kept = self._settings.limits.avoidance.on
+        return ghost, self._settings.plant.contacts, kept or self._furnished
+
+    def _build(self, ghost: bool) -> None:
         for chart in self._charts:
             chart.remove()
-        self._with_ghost, self._with_contacts = ghost, contacts
+        self._shown = self._wanted(ghost)
+        _, contacts, distances = self._shown
         errors = [
             ChartLine(f"{t.name} [{'mm' if t.unit == 'm' else '°'}]", self._colours.get(t.level, BOUND))
             for t in self._tasks
         ]
         step = [ChartLine("whole step", LEVELS[1], width=2.0)]
         leaks = [ChartLine("priority (own model)", LEVELS[2]), ChartLine("dynamic (true plant)", BAD)]
-        errors, step, leaks = ([*lines, *of_ghost(lines, ghost)] for lines in (errors, step, leaks))
+        near = [ChartLine("nearest pair", LEVELS[0], width=2.0)]
+        errors, step, leaks, near = (
+            [*lines, *of_ghost(lines, ghost)] for lines in (errors, step, leaks, near)
+        )
+        kept = ChartLine("bound: no closer", BAD, dashed=True, fill=0.12)
         # An area over the whole height: the time in which the robot touches something.
         errors += [ChartLine("contact", BAD, fill=0.12, width=0.0)] if contacts else []
         budget = ChartLine("budget", GOOD, dashed=True, fill=0.12)
         with self._place:
             self._charts = [
-                Chart(self._gui, self._in_view, title, lines, span, height=height, log=True)
+                Chart(self._gui, self._in_view, title, lines, span, height=height, log=span is not _DISTANCE)
                 for title, lines, span, height in (
                     ("Error per task, mm or °", errors, _ERROR, 200),
+                    ("Distance of the nearest pair, mm", [*near, kept], _DISTANCE, 170),
                     ("Control step, ms", [*step, budget], _TIME, 170),
                     ("Leak into higher levels, m/s² or rad/s²", leaks, _LEAK, 170),
                 )
+                if distances or span is not _DISTANCE
             ]
 
-    def draw(self, window: PlotWindow, ghost: PlotWindow | None, T_s: float, contacts: bool) -> None:
-        """ghost: the ghost's data over the same interval; contacts: whether the plant has contacts, which
-        the plot of errors marks."""
-        if (ghost is not None, contacts) != (self._with_ghost, self._with_contacts):
-            self._build(ghost is not None, contacts)
-        windows = [window] if ghost is None else [window, ghost]
-        error, step, leak = self._charts
+    def draw(self, window: PlotWindow, ghost: PlotWindow | None, settings: TorqueSettings) -> None:
+        """ghost: the ghost's data over the same interval; settings: say whether the plant has contacts, which
+        the plot of errors marks, and whether distances are kept."""
+        self._settings = settings
+        if self._wanted(ghost is not None) != self._shown:
+            self._build(ghost is not None)
+        windows, T_s = [window] if ghost is None else [window, ghost], settings.T_s
+        error, *distance, step, leak = self._charts
         error.show(window, lambda: self._errors_and_contacts(window, windows))
         step.show(window, lambda: [*(_times(each) for each in windows), np.full(2 * BUCKETS, 1e3 * T_s)])
         leak.show(window, lambda: [curve for each in windows for curve in _leaks(each)])
+        for near in distance:
+            near.show(window, lambda: _distances(window, windows))
 
     def _errors_and_contacts(self, window: PlotWindow, windows: list[PlotWindow]) -> list[np.ndarray]:
         curves = [curve for each in windows for curve in self._errors(each)]
-        return [*curves, touching(window)] if self._with_contacts else curves
+        return [*curves, touching(window)] if self._shown[1] else curves
 
     def _errors(self, window: PlotWindow) -> list[np.ndarray]:
         fields = window.layout.fields
@@ -95,6 +123,11 @@ def _leaks(window: PlotWindow) -> list[np.ndarray]:
         np.where(known, np.nan_to_num(window.columns(fields[name])[:, 0], nan=0.0), np.nan)
         for name in ("priority_leak", "dynamic_leak")
     ]
+
+
+def _distances(window: PlotWindow, windows: list[PlotWindow]) -> list[np.ndarray]:
+    drawn = [*((each, "distance") for each in windows), (window, "distance_kept")]
+    return [1e3 * each.columns(each.layout.fields[field])[:, 0] for each, field in drawn]
 
 
 def touching(window: PlotWindow) -> np.ndarray:

@@ -78,6 +78,10 @@ class SessionReport(ABC):
         """(k, 7) position, m, and quaternion (w, x, y, z) of the free objects of the world."""
         return np.zeros((0, 7))
 
+    def nearest(self) -> str:
+        """The names of the nearest pair of links, or of a link and an object; "" if none is measured."""
+        return ""
+
     def mission(self) -> MissionView | None:
         """The state of the mission, if there is one."""
         return None

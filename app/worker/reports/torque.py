@@ -75,6 +75,9 @@ class TorqueRun(SessionReport):
     def objects(self) -> np.ndarray:
         return self.session.plant.objects()
 
+    def nearest(self) -> str:
+        return self.session.clearance.found.pair
+
     def gauge(self) -> tuple[float, float] | None:
         found = self._mechanics()
         return None if found is None else convergence_gauge(*found)

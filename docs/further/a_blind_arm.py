@@ -1,0 +1,102 @@
+"""A blind arm: what time-delay estimation takes a table for, and how the force grows."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from docs.further.kit import Further, Line, Question, inertia, measured
+
+T_S = 1e-3
+K_P = 56.2
+ASKED = K_P * 0.01
+"""K_p of the hand times one centimetre, m/s²."""
+GROWTH = measured("a-blind-arm", "In the last half second") / 0.5
+SPRING = measured("a-blind-arm", "At the end the arm presses", there=True)
+
+
+def _estimate(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    M, M_bar, J = inertia(rng, 5), np.diag(rng.uniform(0.1, 1.0, 5)), rng.normal(size=(3, 5))
+    a, n, f = rng.normal(size=5), rng.normal(size=5), rng.normal(size=3)
+    tau = M @ a + n + J.T @ f
+    return tau - M_bar @ a, (M - M_bar) @ a + n + J.T @ f
+
+
+def _increment(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    M_bar, J, wanted = np.diag(rng.uniform(0.1, 1.0, 5)), rng.normal(size=(3, 5)), rng.normal(size=3)
+    apparent = np.linalg.inv(J @ np.linalg.inv(M_bar) @ J.T)
+    return J @ np.linalg.inv(M_bar) @ (J.T @ apparent @ wanted), wanted
+
+
+def _growth(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    M_bar, J, wanted = np.diag(rng.uniform(0.1, 1.0, 5)), rng.normal(size=(3, 5)), rng.normal(size=3)
+    apparent = np.linalg.inv(J @ np.linalg.inv(M_bar) @ J.T)
+    g, f, ticks = rng.normal(size=5), rng.normal(size=3), 20
+    tau = g + J.T @ f
+    for _ in range(ticks):
+        tau = tau + J.T @ apparent @ wanted
+    force = np.linalg.lstsq(J.T, tau - g, rcond=None)[0]
+    return force, f + ticks * apparent @ wanted
+
+
+def _spring(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    M, J, wanted, g = inertia(rng, 5), rng.normal(size=(3, 5)), rng.normal(size=3), rng.normal(size=5)
+    apparent = np.linalg.inv(J @ np.linalg.inv(M) @ J.T)
+    tau = g + J.T @ apparent @ wanted
+    return np.linalg.lstsq(J.T, tau - g, rcond=None)[0], apparent @ wanted
+
+
+FURTHER = Further(
+    derivation=(
+        Line(
+            "The arm moves by $M \\ddot q + n = \\tau - J^\\top f$, where $f$ is the force with which the "
+            "hand presses. What time-delay estimation takes for the arm's own dynamics is",
+            r"\tau_0 - \bar M \ddot q_0 = (M - \bar M)\, \ddot q_0 + n + J^\top f",
+            _estimate,
+        ),
+        Line(
+            "At rest on the table nothing moves, and the wish is $\\ddot x = -K_p \\tilde x$. An increment "
+            "that would fulfil it, with $\\bar\\Lambda = (J \\bar M^{-1} J^\\top)^{-1}$, is "
+            "$\\Delta\\tau = J^\\top \\bar\\Lambda \\ddot x$:",
+            r"J \bar M^{-1} (J^\top \bar\Lambda\, \ddot x) = \ddot x",
+            _increment,
+        ),
+        Line(
+            "But the table does not move. The increment goes into the force, and at the next tick the wish "
+            "is the same. After $k$ ticks",
+            r"f_k = f_0 + k\, \bar\Lambda\, \ddot x",
+            _growth,
+        ),
+        Line(
+            "OSF computes its torque anew from the model, with $\\Lambda = (J M^{-1} J^\\top)^{-1}$. At rest "
+            "it presses with",
+            r"f = \Lambda\, \ddot x = -\Lambda K_p \tilde x",
+            _spring,
+        ),
+    ),
+    questions=(
+        Question(
+            "The hand's $K_p$ is 56.2 1/s². Which mass does the force's growth in the last half second "
+            "belong to?",
+            r"One centimetre asks for ⟨asked⟩ m/s². The force grows by ⟨rate⟩ N per second, "
+            r"⟨tick⟩ N per millisecond. With "
+            r"$\bar\Lambda\, \ddot x$ that is a mass of ⟨mass⟩ kg: $\bar M$ is small, and still the force "
+            r"grows without end.",
+            {
+                "asked": (ASKED, ".2f"),
+                "rate": (GROWTH, ".0f"),
+                "tick": (GROWTH * T_S, ".2f"),
+                "mass": (GROWTH * T_S / ASKED, ".2f"),
+            },
+        ),
+        Question(
+            "The ghost presses with a constant force. How heavy is the hand for it?",
+            r"$f = \Lambda\, \ddot x$ with ⟨asked⟩ m/s² and ⟨force⟩ N: ⟨mass⟩ kg.",
+            {"asked": (ASKED, ".2f"), "force": (SPRING, ".1f"), "mass": (SPRING / ASKED, ".1f")},
+        ),
+        Question(
+            "Which $K_p$ would make the ghost press with 50 N at one centimetre?",
+            r"$K_p = f / (\Lambda\, |\tilde x|) = ⟨K_p⟩$ 1/s², more than thirteen times its own.",
+            {"K_p": (50.0 / (SPRING / ASKED * 0.01), ".0f")},
+        ),
+    ),
+)

@@ -1,0 +1,109 @@
+"""HIMPC with a safety filter behind it, for comparison with distances inside the hierarchy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from time import perf_counter_ns
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.cascade.level import Fallback, LevelSolution
+from himpc.controllers.distance_filter import DistanceFilter, Filtered
+from himpc.controllers.himpc import HIMPC
+from himpc.formulation.forms import usable
+from himpc.formulation.settings import Settings
+from himpc.plan import AtOnce, Behind, Plan
+from himpc.references import Preview
+from himpc.references.outlook import observed_by
+
+Array = NDArray[np.float64]
+
+FILTER = "filter"
+"""What the filter is called where levels are listed."""
+
+
+@final
+class FilteredHIMPC(HIMPC):
+    """HIMPC whose levels know of no distance, and a `DistanceFilter` that changes their torque, as
+    control-barrier filters do (for example OSCBF, arXiv 2503.06736).
+
+    With `avoidance.on` false it is HIMPC. The levels see the torque that acted: they start from what the
+    filter left of their last plan.
+    """
+
+    def reset(self, tau_0: Array) -> None:
+        super().reset(tau_0)
+        if self._filter is not None:
+            self._filter.forget()
+
+    def _apply(self, settings: Settings) -> None:
+        limits = settings.limits
+        avoidance = replace(limits.avoidance, on=False)
+        super()._apply(replace(settings, limits=replace(limits, avoidance=avoidance)))
+        self._filter = DistanceFilter(self.robot, settings) if limits.avoidance.on else None
+
+    def step(
+        self, q: Array, v: Array, previews: Mapping[str, Preview], tau_applied: Array | None = None
+    ) -> Plan:
+        """Computes one control period, see `HIMPC.step`; a plan's `behind` is what the filter did."""
+        plan = super().step(q, v, previews, tau_applied)
+        if self._filter is None:
+            return plan
+        if not usable(q) or not usable(v):
+            self._filter.forget()
+            return plan
+        started = perf_counter_ns()
+        found = self._filter(q, v, plan.tau_0, plan.tau, self._M_bar, plan.limits, observed_by(previews))
+        self._tau_0 = found.tau
+        done = self._done(plan)
+        time_us = (perf_counter_ns() - started) / 1e3
+        return replace(
+            plan,
+            tau=found.tau,
+            step_us=plan.step_us + time_us,
+            unsolved=plan.unsolved + (not found.met),
+            at_once=None if done is None else lambda: _with_filter(done, found.tau - plan.tau_0),
+            behind=Behind(self._evidence(found, plan, done, time_us), found.rows),
+        )
+
+    def _done(self, plan: Plan) -> AtOnce | None:
+        """The increments of the levels at this tick; None if none was solved."""
+        if plan.at_once is not None:
+            return plan.at_once()
+        levels, problems = plan.levels, self._asked
+        if not levels or len(problems) != len(levels):
+            return None
+        increments = np.array([level.U[0] for level in levels])
+        return AtOnce(increments, [problem.B[0] * self._M_bar for problem in problems[:-1]])
+
+    def _evidence(self, found: Filtered, plan: Plan, done: AtOnce | None, time_us: float) -> LevelSolution:
+        increment, leak = found.tau - plan.tau_0, 0.0
+        if done is not None and len(done.increments):
+            accelerations = (increment - done.increments) / self._M_bar
+            pairs = zip(done.jacobians, accelerations, strict=False)
+            leak = max((float(np.abs(J @ a).max()) for J, a in pairs if len(J)), default=0.0)
+        change = (found.tau - plan.tau) / self._M_bar
+        fallback: Fallback = "solve" if found.met else "soften"
+        status = "optimal" if found.met else "rows give way"
+        return LevelSolution(
+            FILTER,
+            increment[None],
+            float(change @ change),
+            found.active,
+            0.0,
+            status,
+            fallback,
+            time_us,
+            time_us,
+            leak,
+        )
+
+
+def _with_filter(done: AtOnce, increment: Array) -> AtOnce:
+    """The increments of the levels, the last of which is what was applied."""
+    if not len(done.increments):
+        return done
+    return AtOnce(np.vstack([done.increments[:-1], increment]), done.jacobians)

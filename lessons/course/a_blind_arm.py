@@ -1,0 +1,198 @@
+"""A blind arm
+
+An arm that feels only its joints is sent into a table: how hard does it press?
+
+Minutes: 8
+You need: lesson "no-model-needed"; lesson "torque-has-a-limit"
+"""
+
+from __future__ import annotations
+
+from lessons.events import MoveTarget
+from lessons.teaching.challenge import Challenge, Score
+from lessons.teaching.claim import Claim
+from lessons.teaching.control import Control
+from lessons.teaching.lesson import Ghost, Lesson, Step, card_of
+from lessons.teaching.measure import Measure, Signal
+from lessons.teaching.prediction import Choice, Option, Value
+
+HAND = Signal("error/position", "mm")
+FORCE = Signal("contact_force", "N")
+DISTANCE = Signal("distance", "mm")
+TORQUE = Signal("torque share", "%")
+INTO = ((0.1, MoveTarget("position", (0.556, 0.0, 0.19))),)
+SCALE = Control("limits.torque_scale", "Torque limit, factor", 0.12, 1.0, log=True)
+CONTROLLER = Control("controller", "Controller", choices=("himpc", "tdeosf", "osf"))
+STIFFNESS = Control("levels.position.K_p", "K_P of the hand, 1/s²", 10.0, 100.0, log=True)
+
+UNSEEN = Step(
+    title="A table one centimetre too high",
+    text=r"""
+    The hand is sent straight down, to a place 1 cm below the surface of a table. The controller knows
+    nothing of the table. It estimates whatever acts on the arm from the last torque,
+
+    $$\tau_0 - \bar M \ddot q_0,$$
+
+    and adds what is missing to the motion it wants. The ghost is OSF, which computes its torque
+    from a model of the arm.
+    """,
+    do="Switch to OSF with time-delay estimation (tdeosf). Halve M̄. What makes the force grow?",
+    why=r"""
+    The force grows by more than 200 N per second. The table is part of the estimate, so its push is made
+    up for, as the weight was that nobody had told of. On top of that, every millisecond the torque grows
+    by what the last centimetre still asks for. OSF without a horizon, but with time-delay estimation,
+    presses as hard, so MPC is not to blame. Half of $\bar M$ presses half as hard. The ghost acts like a
+    spring: one centimetre asks for 4 N, and no more.
+    """,
+    prediction=Choice(
+        "The target lies 1 cm inside the table. Two seconds after the drag the arm presses with …",
+        (
+            Option("a few newtons, as a soft spring would", high=20.0),
+            Option("less than a hundred newtons", 20.0, 100.0),
+            Option("several hundred newtons", low=300.0),
+        ),
+        Measure(FORCE, "last"),
+        tempting=0,
+    ),
+    claims=(
+        Claim(
+            "At the end the arm presses with more than 300 N.",
+            Measure(FORCE, "last"),
+            "at least",
+            300.0,
+            fails_with=("controller=osf",),
+            because="without time-delay estimation the arm is a spring",
+        ),
+        Claim(
+            "In the last half second the force grows by more than 80 N.",
+            Measure(FORCE, "range", after=1.7),
+            "at least",
+            80.0,
+            fails_with=("M_bar_scale=0.5",),
+            because="with half of M̄ it grows half as fast",
+        ),
+    ),
+    events=INTO,
+    duration=2.2,
+    ghost=Ghost("osf, on the model", ("controller=osf",)),
+    controls=(CONTROLLER, Control("M_bar_scale", "M̄, factor", 0.25, 1.0), STIFFNESS),
+    plots=(FORCE, HAND, TORQUE),
+)
+
+BOUND = Step(
+    title="Who limits the force?",
+    text=r"""
+    The same again, but the bound of the torque (32f) is a quarter of what the motors can give:
+
+    $$\tau_{\min} \le \tau_0 + \sum_{s=0}^{j} \Delta\tau_{k+s} \le \tau_{\max}$$
+    """,
+    do="Halve K_P, and let it run on. Does the arm press less, or only later?",
+    why=r"""
+    The torque grows until joints 2 and 4 are at their bounds, and so does the force. Stiffness does not
+    limit it: with half of $K_p$ the bound is reached almost a second later, at the same force. With all its
+    torque the arm comes to almost 700 N. A bound of the torque is no cheap bound of a force: it also
+    limits what the arm may carry, and how fast it may stop.
+    """,
+    prediction=Value(
+        "With a quarter of the torque: how hard does the arm press at the end, in N?",
+        Measure(FORCE, "last"),
+        low=10.0,
+        high=1000.0,
+        factor=1.4,
+    ),
+    claims=(
+        Claim(
+            "The arm presses with less than 230 N.",
+            Measure(FORCE, "last"),
+            "at most",
+            230.0,
+            fails_with=("limits.torque_scale=1",),
+            because="then the torque grows on",
+        ),
+        Claim(
+            "A joint is at its bound.",
+            Measure(TORQUE),
+            "at least",
+            99.9,
+            fails_with=("limits.torque_scale=1",),
+            because="two seconds are too short for that",
+        ),
+    ),
+    set=("limits.torque_scale=0.25",),
+    events=INTO,
+    duration=2.2,
+    controls=(SCALE, STIFFNESS),
+    plots=(FORCE, TORQUE, HAND),
+)
+
+SEEN = Step(
+    title="Seen, not felt",
+    text=r"""
+    Now the controller is told where the table is. It bounds the speed with which any link may come
+    closer to it, and to everything else. The next lesson shows how.
+    """,
+    do="Lower d_safe to 0 mm. Can the arm be made to touch the table lightly?",
+    why=r"""
+    The arm stops above the table and its motors have nothing to push against. What is kept is a distance,
+    and no force: this arm cannot press at all, also where it should. An arm that must wipe a table needs
+    to feel it.
+    """,
+    claims=(
+        Claim(
+            "Nothing is touched.",
+            Measure(FORCE),
+            "at most",
+            0.0,
+            fails_with=("avoidance.on=false",),
+            because="the arm does not know of the table",
+        ),
+        Claim(
+            "The nearest pair stays more than 10 mm apart.",
+            Measure(DISTANCE, "smallest"),
+            "at least",
+            10.0,
+            fails_with=("avoidance.on=false",),
+            because="the hand reaches the table",
+        ),
+        Claim(
+            "It needs less than 30 % of its torque.",
+            Measure(TORQUE),
+            "at most",
+            30.0,
+            fails_with=("avoidance.on=false",),
+            because="the force on the table takes the rest",
+        ),
+    ),
+    set=("avoidance.on=true",),
+    events=INTO,
+    duration=2.2,
+    controls=(
+        Control("avoidance.on", "Distances are kept", choices=(False, True)),
+        Control("avoidance.d_safe", "d_safe, m", 0.0, 0.05),
+    ),
+    plots=(DISTANCE, FORCE, TORQUE),
+)
+
+CHALLENGE = Challenge(
+    text=r"""
+    Without being told of the table: press on it with 100 N at least at the end, and at no time with more
+    than 250 N.
+    """,
+    goals=(
+        Claim("At the end it presses with 100 N.", Measure(FORCE, "last"), "at least", 100.0),
+        Claim("It never presses with more than 250 N.", Measure(FORCE), "at most", 250.0),
+    ),
+    knobs=(SCALE, STIFFNESS),
+    score=Score(Measure(FORCE), worst=250.0, best=180.0),
+    solutions=(("limits.torque_scale=0.18",), ("limits.torque_scale=0.2",)),
+    events=INTO,
+    duration=2.2,
+)
+
+LESSON = Lesson(
+    name="a-blind-arm",
+    card=card_of(__doc__),
+    scene="iiwa14-table",
+    steps=(UNSEEN, BOUND, SEEN),
+    challenge=CHALLENGE,
+)

@@ -1,0 +1,252 @@
+"""Keeping clear
+
+An arm must not touch a table and a post: is that a task, a bound, or a filter?
+
+Minutes: 10
+You need: lesson "stopping-takes-distance"; lesson "a-blind-arm"
+"""
+
+from __future__ import annotations
+
+from lessons.events import MoveTarget
+from lessons.teaching.claim import Claim
+from lessons.teaching.control import Control
+from lessons.teaching.lesson import Ghost, Lesson, Step, card_of
+from lessons.teaching.measure import Measure, Signal
+from lessons.teaching.prediction import Choice, Option
+
+HAND = Signal("error/position", "mm")
+TILT = Signal("error/orientation", "deg")
+HEIGHT = Signal("error/distance", "mm")
+FORCE = Signal("contact_force", "N")
+DISTANCE = Signal("distance", "mm")
+LEAK = Signal("priority_leak", "m/s²")
+INTO = ((0.1, MoveTarget("position", (0.556, 0.0, 0.19))),)
+ABOVE = ((0.1, MoveTarget("position", (0.556, 0.0, 0.25))),)
+PAST_THE_POST = ((0.1, MoveTarget("position", (0.4, -0.4, 0.4))),)
+WITH_A_TASK = (
+    'stack=[{"task":"position"},{"task":"plane_distance","name":"distance","offset":0.2},'
+    '{"task":"orientation"},{"task":"posture"}]',
+)
+FIRST = "order=distance,position,orientation,posture"
+ORDER = Control(
+    "order",
+    "Order",
+    choices=("position,distance,orientation,posture", "distance,position,orientation,posture"),
+)
+ON = Control("avoidance.on", "Distances are kept", choices=(False, True))
+CONTROLLER = Control("controller", "Controller", choices=("himpc", "himpc_filtered"))
+
+BELOW = Step(
+    title="A task below",
+    text=r"""
+    The hand is sent 1 cm into the table again. Level 2 is a task that keeps the hand's distance from
+    the table's surface, $x = n^\top p - d$. Level 1 is the hand's position.
+    """,
+    do="Before you read on: put the distance first. Who goes without now?",
+    why=r"""
+    Level 2 goes without. The position fixes the hand's height, so nothing is left for the distance,
+    and the table is pressed as if there were no task of a distance. A wish that ranks below another one
+    protects nobody.
+    """,
+    prediction=Choice(
+        "The distance is the task right below the hand's position. At the end the table is pressed with …",
+        (
+            Option("nothing: the hand stops above it", high=1.0),
+            Option("less than without that task", 1.0, 200.0),
+            Option("more than 200 N, as without that task", low=200.0),
+        ),
+        Measure(FORCE, "last"),
+        tempting=1,
+    ),
+    claims=(
+        Claim(
+            "At the end the table is pressed with more than 200 N.",
+            Measure(FORCE, "last"),
+            "at least",
+            200.0,
+            fails_with=(FIRST,),
+            because="then the hand is not sent down at all",
+        ),
+    ),
+    set=WITH_A_TASK,
+    events=INTO,
+    duration=1.8,
+    controls=(ORDER,),
+    plots=(FORCE, HAND, HEIGHT),
+)
+
+FIRST_TASK = Step(
+    title="A task on top",
+    text=r"""
+    Now the distance is level 1, and the hand's target is moved to 5 cm above the table: a place where
+    nothing is touched. A task asks for equality, $x = x_d$, and this one holds the 20 cm of the start.
+    """,
+    do="Drag the target sideways, then up. What may the hand still do?",
+    why=r"""
+    The hand stays where it is, 15 cm above a target that is perfectly safe. What was meant is an
+    inequality, at least so far; a task takes away the whole direction, also where there is room. It
+    takes only one frame's distance from one plane as well: the elbow and the post are no part of it.
+    """,
+    claims=(
+        Claim(
+            "The hand stays more than 140 mm away from a target that is safe.",
+            Measure(HAND, "last"),
+            "at least",
+            140.0,
+            fails_with=("order=position,distance,orientation,posture",),
+            because="then the hand goes there, and touches nothing",
+        ),
+        Claim(
+            "The distance is kept to 1 mm.",
+            Measure(HEIGHT),
+            "at most",
+            1.0,
+            fails_with=("order=position,distance,orientation,posture",),
+            because="then the position comes first",
+        ),
+    ),
+    set=(*WITH_A_TASK, FIRST),
+    events=ABOVE,
+    duration=1.5,
+    controls=(ORDER,),
+    plots=(HAND, HEIGHT, DISTANCE),
+)
+
+INSIDE = Step(
+    title="Above all levels",
+    text=r"""
+    A distance $d$ between any two links, or a link and an object, becomes a row beside those of torque
+    and speed. It bounds how fast $d$ may shrink,
+
+    $$\nabla d^\top \dot q_{k+j} \ge -a\left(-t + \sqrt{t^2 + 2\,(d - d_s)/a}\right),$$
+
+    the speed from which one can still stop. The seven nearest pairs have rows, and each level is solved
+    under them. The hand is sent to the other side of the post, and the elbow has to pass it.
+    """,
+    do="Open the list of active bounds: which links meet what? Then put the orientation first.",
+    why=r"""
+    The bound is shared by all levels, and the order decides who pays for it. The hand comes first: its
+    target is reached, and the hand's orientation gives way by 29°. With the orientation first it is the
+    other way round: then the hand stays 6 cm away. Where there is room, nobody pays anything.
+    """,
+    prediction=Choice(
+        "The straight way is blocked by the post. At the end the hand …",
+        (
+            Option("waits far before its target", low=50.0),
+            Option("has come near its target", 5.0, 50.0),
+            Option("is at its target", high=5.0),
+        ),
+        Measure(HAND, "last"),
+        tempting=0,
+    ),
+    claims=(
+        Claim(
+            "Nothing is touched.",
+            Measure(FORCE),
+            "at most",
+            0.0,
+            fails_with=("avoidance.on=false",),
+            because="the arm hits the post",
+        ),
+        Claim(
+            "The hand gets to within 5 mm of its target.",
+            Measure(HAND, "last"),
+            "at most",
+            5.0,
+            fails_with=("controller=himpc_filtered",),
+            because="a filter behind the levels does not know that the hand comes first",
+        ),
+        Claim(
+            "The orientation gives way by more than 20°.",
+            Measure(TILT, "last"),
+            "at least",
+            20.0,
+            fails_with=("order=orientation,position,posture",),
+            because="then the position gives way",
+        ),
+    ),
+    set=("avoidance.on=true",),
+    events=PAST_THE_POST,
+    duration=2.4,
+    controls=(
+        ON,
+        Control("order", "Order", choices=("position,orientation,posture", "orientation,position,posture")),
+    ),
+    plots=(DISTANCE, HAND, TILT),
+)
+
+BEHIND = Step(
+    title="Behind all levels",
+    text=r"""
+    Many robots get a safety filter instead: the controller knows no distance. Behind it a QP changes its
+    torque as little as possible,
+
+    $$\min_\tau \lVert \bar M^{-1} (\tau - \tau_{\mathrm{nom}}) \rVert^2,$$
+
+    within the bounds of the torque and under the same rows, at the next step alone.
+    The ghost has its rows inside the hierarchy.
+    """,
+    do="Switch off the orientation and the posture. How near does the hand come now?",
+    why=r"""
+    The filter is as safe: nothing is touched. But it does not know who comes first. Orientation and
+    posture pull the elbow towards the post, the filter takes the sum of all pulls and changes it as
+    little as it can, and the hand goes without: it stops 27 cm before its target. That is the lower
+    levels' doing: with both of them switched off the hand is 5 cm away by then, and comes closer. Without
+    the posture alone 23 cm are left. An order that is decided before the bounds are known does not hold.
+    """,
+    prediction=Choice(
+        "The same rows, but behind the levels. At the end the hand …",
+        (
+            Option("is at its target, as the ghost's", high=5.0),
+            Option("is a few centimetres away", 5.0, 100.0),
+            Option("is a quarter of a metre away", low=200.0),
+        ),
+        Measure(HAND, "last"),
+        tempting=0,
+    ),
+    claims=(
+        Claim(
+            "Nothing is touched.",
+            Measure(FORCE),
+            "at most",
+            0.0,
+            fails_with=("avoidance.on=false",),
+            because="then there is no filter",
+        ),
+        Claim(
+            "The hand stays more than 200 mm away from its target.",
+            Measure(HAND, "last"),
+            "at least",
+            200.0,
+            fails_with=("controller=himpc",),
+            because="inside the hierarchy the hand comes first",
+        ),
+        Claim(
+            "What changes the torque leaks into higher levels, with more than 1 m/s².",
+            Measure(LEAK),
+            "at least",
+            1.0,
+            fails_with=("controller=himpc",),
+            because="there each level leaves those above as they are (33)",
+        ),
+    ),
+    set=("avoidance.on=true", "controller=himpc_filtered"),
+    events=PAST_THE_POST,
+    duration=2.4,
+    ghost=Ghost("himpc, rows inside", ("controller=himpc",)),
+    controls=(
+        CONTROLLER,
+        ON,
+        Control("levels.orientation.enabled", "Orientation", choices=(False, True)),
+        Control("levels.posture.enabled", "Posture", choices=(False, True)),
+    ),
+    plots=(DISTANCE, HAND, LEAK),
+)
+
+LESSON = Lesson(
+    name="keeping-clear",
+    card=card_of(__doc__),
+    scene="iiwa14-table",
+    steps=(BELOW, FIRST_TASK, INSIDE, BEHIND),
+)

@@ -1,0 +1,72 @@
+"""The distance of the nearest pair of a robot's links and of what is around it, for telemetry."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.limits.avoidance import Avoidance
+from himpc.tick.distances import Distances
+from lessons.session.observed import objects_of
+from robots import Plant
+from robots.collision import Floor
+
+Array = NDArray[np.float64]
+
+EVERY = 5
+"""Ticks between two measurements."""
+
+
+class Nearest(NamedTuple):
+    """The nearest pair: what counts is by how much it is farther apart than what is kept of it.
+
+    Attributes:
+        distance: m, negative inside; NaN if no pair is near.
+        kept: m, d_safe with its margin, from which on it may come no closer; NaN unless distances are kept.
+        pair: its names.
+    """
+
+    distance: float = math.nan
+    kept: float = math.nan
+    pair: str = ""
+
+
+NOTHING = Nearest()
+
+
+class Clearance:
+    """Measures the nearest pair from the plant's true state, whatever the controller. It measures nothing
+    unless distances are kept or the world has more than a floor."""
+
+    def __init__(self, plant: Plant) -> None:
+        self._plant = plant
+        self._furnished = any(not isinstance(thing.shape, Floor) for thing in plant.world)
+        self._measures: tuple[Avoidance, Distances] | None = None
+        self.found, self._due = NOTHING, 0
+
+    def reset(self) -> None:
+        """Begins a new run."""
+        self.found, self._due = NOTHING, 0
+
+    def measure(self, q: Array, avoidance: Avoidance) -> tuple[float, float]:
+        """Distance of the nearest pair and what it keeps, m, held for EVERY ticks; q: (n,) true positions."""
+        if not (avoidance.on or self._furnished):
+            return math.nan, math.nan
+        if self._due == 0:
+            self.found = self._look(q, avoidance) if math.isfinite(q.dot(q)) else NOTHING
+        self._due = (self._due + 1) % EVERY
+        return self.found.distance, self.found.kept
+
+    def _look(self, q: Array, avoidance: Avoidance) -> Nearest:
+        if self._measures is None or self._measures[0] != avoidance:
+            self._measures = avoidance, Distances(self._plant.robot, avoidance)
+        near = self._measures[1].at(q, objects_of(self._plant))
+        if not len(near.distance):
+            return NOTHING
+        kept = near.share * (avoidance.d_safe + avoidance.margin)
+        first = int(np.argmin(near.distance - kept))
+        bound = float(kept[first]) if avoidance.on else math.nan
+        return Nearest(float(near.distance[first]), bound, near.names[first])
