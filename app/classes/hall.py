@@ -195,7 +195,8 @@ class Hall:
     def teachers(self) -> View:
         """What the teacher's page shows in addition."""
         lecture = self._lecture_of(self.robot)
-        held = () if lecture is None else lecture.holds
+        over = lecture is not None and lecture.exercise == self._state.place and lecture.phase == "done"
+        held = lecture.holds if lecture is not None and over else ()
         return {
             **for_teacher(self.state, time.monotonic()),
             "shown": [sum(each is True for each in held), len(held)],

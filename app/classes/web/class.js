@@ -17,13 +17,51 @@ function connect(opened, heard) {
     for (const name of Object.keys(news)) if (name in told) news[name] = told[name];
     if ("say" in told) say(told.say);
     heard(told);
-    if ("pose" in told || "all" in told) {
-      drawRobot(ID("robot"), news.all && news.all.robot, news.pose, DARK.matches);
-    }
+    if ("pose" in told || "all" in told) move();
   };
   socket.onclose = () => {
     say("The connection is interrupted; trying again …");
     setTimeout(() => connect(opened, heard), 1500 + 1500 * Math.random());
+  };
+}
+
+// Poses come five times a second; in between, the robot is drawn between the last two, a fifth of a second late.
+const PERIOD = 200, STILL = window.matchMedia("(prefers-reduced-motion: reduce)");
+const moving = { from: null, to: null, began: 0, drawing: false };
+
+function move() {
+  const pose = news.pose, now = performance.now();
+  if (pose !== moving.to) {
+    const same = moving.to && pose && moving.to.joints.length === pose.joints.length && pose.t >= moving.to.t;
+    moving.from = same && !STILL.matches ? between(now) : pose;
+    moving.to = pose;
+    moving.began = now;
+  }
+  if (!moving.drawing) {
+    moving.drawing = true;
+    requestAnimationFrame(draw);
+  }
+}
+
+function draw(now) {
+  drawRobot(ID("robot"), news.all && news.all.robot, between(now), DARK.matches);
+  moving.drawing = now < moving.began + PERIOD;
+  if (moving.drawing) requestAnimationFrame(draw);
+}
+
+function between(now) {
+  const { from, to, began } = moving;
+  const share = Math.min(1, Math.max(0, (now - began) / PERIOD));
+  if (!from || !to || share === 1) return to;
+  return {
+    t: to.t,
+    joints: to.joints.map((last, k) => {
+      const first = from.joints[k];
+      const sign = [3, 4, 5, 6].reduce((sum, i) => sum + first[i] * last[i], 0) < 0 ? -1 : 1;
+      const mixed = last.map((x, i) => (1 - share) * (i > 2 ? sign : 1) * first[i] + share * x);
+      const size = Math.hypot(...mixed.slice(3)) || 1;
+      return mixed.map((x, i) => (i > 2 ? x / size : x));
+    }),
   };
 }
 

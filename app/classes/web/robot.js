@@ -1,6 +1,6 @@
 "use strict";
-// Draws a robot of capsules. The camera looks from the front right, slightly from above.
-const VIEW = { turn: -2.2, tilt: 0.32 };
+// Draws a robot of capsules, seen from the front right and slightly from above; what is nearer is drawn later.
+const VIEW = { turn: 2.5, tilt: 0.3 };
 
 function drawRobot(canvas, shape, pose, dark) {
   const pixel = window.devicePixelRatio || 1;
@@ -65,9 +65,9 @@ function inWorld(at, [x, y, z]) {
 
 function turned([x, y, z]) {
   const c = Math.cos(VIEW.turn), s = Math.sin(VIEW.turn);
-  const right = -s * x + c * y, away = c * x + s * y;
+  const right = s * x - c * y, away = c * x + s * y;
   const ct = Math.cos(VIEW.tilt), st = Math.sin(VIEW.tilt);
-  return [right, -(ct * z - st * away), -(ct * away + st * z)];
+  return [right, -(ct * z + st * away), st * z - ct * away];
 }
 
 // The picture grows with what the robot reaches and never shrinks, so that it does not jump.

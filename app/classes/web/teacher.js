@@ -25,9 +25,13 @@ function write(told) {
   }
   if (told.address) {
     put("qr", told.address.qr);
-    ID("address").textContent = told.address.text.replace(/^https?:\/\//, "");
+    const [place, code] = told.address.text.replace(/^https?:\/\//, "").split(/(?=\/v\/)/);
+    const big = document.createElement("b");
+    big.textContent = code;
+    ID("address").replaceChildren(place, big);
   }
   if (told.code) ID("code").textContent = `State of learner ${told.of}, now on your robot: ${told.code}`;
+  if (news.pose) ID("clock").textContent = `t = ${news.pose.t.toFixed(1)} s.`;
   const all = news.all, mine = news.class;
   if (!all || !mine) return;
   follow(mine.place);
