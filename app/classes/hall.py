@@ -49,9 +49,9 @@ class Hall:
         self._sessions = sessions
         self._state = Gathering(named)
         self._lock = threading.RLock()
-        self._led: dict[str, tuple[LessonPlace, int, float]] = {}
-        """By learner: the step to which the class brought them, the number of their scenes before, −1 if they
-        were there already, and when."""
+        self._led: dict[str, tuple[Lecture | None, float]] = {}
+        """By learner: the run that was reported before the class brought them to its step, None if they were
+        there already, and when."""
         self._runs = 0  # of the teacher's robot before the present run
         self._shape: tuple[object, Shape | None] = (None, None)
         self.seats = Seats("" if sessions is not None else f"v/{self.code}")
@@ -82,7 +82,7 @@ class Hall:
         """Brings every learner and the teacher's robot to a step."""
         with self._lock:
             self._state = self._state.going_to(place)
-            self._led = {self.robot.token: (place, self.robot.changed, time.monotonic())}
+            self._led = {self.robot.token: (self.robot.lecture, time.monotonic())}
             self._keep()
         self.robot.load(self.robot.choice.at(place))
 
@@ -212,7 +212,9 @@ class Hall:
         return pose_of(*moment)
 
     def _follow(self) -> None:
-        while not self._closed.wait(1 / RATE):
+        due = time.monotonic()
+        while not self._closed.wait(max(0.02, due - time.monotonic())):
+            due = max(due, time.monotonic() - 1 / RATE) + 1 / RATE
             self._look()
             self._hear()
 
@@ -246,10 +248,10 @@ class Hall:
                 return
             led = self._led.get(learner.token)
             away = stays and here != place and learner.ready is not None
-            if led is not None and not (away and now - led[2] > _LOADING):
+            if led is not None and not (away and now - led[1] > _LOADING):
                 return
             moves = here != place or (lecture is not None and lecture.attempt > 0)
-            self._led[learner.token] = (place, learner.changed if moves else -1, now)
+            self._led[learner.token] = (learner.lecture if moves else None, now)
             learner.kept_at = place if stays else None
         if moves:
             learner.load_for_class(learner.choice.at(place))
@@ -263,7 +265,8 @@ class Hall:
     def _lecture_of(self, learner: SimulationClient) -> Lecture | None:
         """The run of a learner's step; None while the step that the class chose is being loaded."""
         led = self._led.get(learner.token)
-        return None if led is not None and learner.changed == led[1] else learner.lecture
+        lecture = learner.lecture
+        return None if led is not None and lecture is led[0] else lecture
 
     def _keep(self) -> None:
         for learner in self._learners():

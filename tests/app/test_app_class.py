@@ -212,6 +212,13 @@ def test_learners_stay_or_go_ahead_as_the_teacher_sets(server: PageServer) -> No
         lead.send(do="go", lesson=STEP.lesson, place=1)
         there = LessonPlace(STEP.lesson, 1)
         assert eventually(lambda: learner.choice.exercise == there and learner.lecture is not None, LONG)
+        lead.send(do="press", button="run")
+
+        def over() -> bool:
+            lecture = learner.lecture
+            return lecture is not None and (lecture.exercise, lecture.phase) == (there, "done")
+
+        assert eventually(over, LONG), "a step that follows in the same lesson runs on all pages"
         lead.send(do="set", stays=True, everywhere=False)
         lead.until("class", "stays", True)
         learner.load(learner.choice.at(STEP))
