@@ -36,10 +36,10 @@ from app.server.server import PageServer
 from benchmarks.phones import Crowd
 from browsing.wire import Wire
 from lessons.replay.progress import read_key
-from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.prediction import Choice, Value
 
 LONG = 300.0  # s
+_THIS = (sys.executable, "-m", "benchmarks.rehearsal")
 SERVERS = 2
 KEY = "a key of a rehearsal"
 Waits = dict[str, list[float]]
@@ -55,7 +55,7 @@ def main() -> int:
     parser.add_argument("--be-a-server", type=int, default=0)
     options = parser.parse_args()
     if options.be_a_server:
-        be_a_server(options.be_a_server)
+        be_a_server(options.be_a_server, options.lesson)
         return 0
     found = rehearsed(options.learners // SERVERS, options.phones // SERVERS, options.lesson)
     print(json.dumps(found, indent=1) if options.json else table(found))
@@ -65,13 +65,13 @@ def main() -> int:
 # ------------------------------------------------------------------ a server
 
 
-def be_a_server(learners: int) -> None:
+def be_a_server(learners: int, lesson: str) -> None:
     """Serves a class; tells its addresses, and for each line on stdin how long the run of each learner took
     and the processor time used so far, s."""
     with tempfile.TemporaryDirectory() as folder:
         key = Path(folder) / "key.txt"
         key.write_text(KEY)
-        choice = SceneChoice(RunSpec("iiwa14-hold"))
+        choice = SceneChoice.opening(lesson)  # a robot that waits for its step needs no processor
         server = PageServer(
             choice, port=0, max_sessions=learners, key=read_key(str(key)), class_names=True, grace=60.0
         )
@@ -116,9 +116,17 @@ def _tell(found: dict[str, Any]) -> None:
 class Host:
     """One server in a process of its own."""
 
-    def __init__(self, learners: int) -> None:
+    def __init__(self, learners: int, lesson: str) -> None:
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "benchmarks.rehearsal", "--be-a-server", str(learners)],
+            [
+                sys.executable,
+                "-m",
+                "benchmarks.rehearsal",
+                "--be-a-server",
+                str(learners),
+                "--lesson",
+                lesson,
+            ],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
@@ -206,7 +214,7 @@ class Teacher:
 
 def rehearsed(learners: int, phones: int, lesson: str) -> dict[str, Any]:
     """Everything that was measured; learners, phones: on each server."""
-    hosts = [Host(learners) for _ in range(SERVERS)]
+    hosts = [Host(learners, lesson) for _ in range(SERVERS)]
     try:
         with _people(hosts, learners, phones) as (pages, crowds, teachers):
             return _lecture(hosts, pages, crowds, teachers, lesson, learners + phones)
@@ -331,13 +339,14 @@ def _all(waits: Waits, name: str, pages: Sequence[Learner], shows: Callable[[Lea
         thread.join()
     assert len(times) == len(pages), f"{name}: {len(pages) - len(times)} learners waited in vain"
     waits.setdefault(name, []).extend(times)
+    print(f"{name}: {max(times):.1f} s", file=sys.stderr, flush=True)
 
 
 def _vote(page: Learner, asked: object, number: int) -> None:
     if isinstance(asked, Choice):
         page.use("I expect", "ABCDEFG"[number % len(asked.options)])
     elif isinstance(asked, Value):
-        page.use("My guess", STEPS // 2 + number % 7)
+        page.use("My guess", STEPS // 2 + 1 + number % 7)  # the middle is where the slider begins
 
 
 def _rows(teacher: Teacher, steps: int) -> list[dict[str, Any]]:

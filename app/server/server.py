@@ -84,7 +84,7 @@ def serve(
             for line in greeting(server, host, tuple(map(as_origin, trusted_origins))):
                 print(line, flush=True)
             if open_browser:
-                until_the_end.enter_context(opened_in_a_browser(server.link))
+                until_the_end.enter_context(opened_in_a_browser(server.first_link))
             while not stop.wait(0.5):
                 pass
     finally:
@@ -196,6 +196,12 @@ class PageServer:
     def guest_link(self) -> str:
         """The link for everybody else, with the token if one is needed."""
         return self.passes.link(self.url, "guest")
+
+    @property
+    def first_link(self) -> str:
+        """The page that opens at the start: the teacher's of a class, else that of a robot."""
+        page = "" if self.hall is None else TEACHER.lstrip("/")
+        return self.passes.link(self.url, "owner", page)
 
     @property
     def teachers_link(self) -> str:
