@@ -15,6 +15,7 @@ from test_app_load import get
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
+from app.__main__ import main
 from app.classes.words import LONGEST
 from app.client.simulation_client import STAYING
 from app.link.choice import SceneChoice
@@ -283,3 +284,14 @@ def test_a_server_without_a_class_has_none_of_its_pages(one_fork_server: None) -
         assert get(f"{server.url}/class")[0] == get(f"{server.url}/v/abcdef")[0] == 403
     finally:
         server.close()
+
+
+def test_the_command_starts_a_class(monkeypatch: pytest.MonkeyPatch) -> None:
+    from app.server import server
+
+    asked: dict[str, Any] = {}
+    monkeypatch.setattr(server, "serve", lambda _, **options: asked.update(options) or 0)
+    for given, names in (([], None), (["--class"], True), (["--class", "--no-names"], False)):
+        assert main(["--no-browser", *given]) == 0
+        assert asked["class_names"] is names
+    assert main(["--no-browser", "--no-names"]) == 2
