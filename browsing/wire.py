@@ -70,7 +70,10 @@ class Wire:
         self.notices: list[tuple[str, str]] = []
         self.standing: dict[str, tuple[str, str]] = {}
         self.eye: tuple[float, ...] = ()
-        self._socket = connect(url.replace("http", "ws", 1), subprotocols=protocol, max_size=None)
+        # Browsers send no pings, and a busy machine would answer them too late.
+        self._socket = connect(
+            url.replace("http", "ws", 1), subprotocols=protocol, max_size=None, ping_interval=None
+        )
         self.say(camera())
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()

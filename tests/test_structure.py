@@ -25,6 +25,7 @@ DOORS = {
     "llvmlite": ("himpc/export/objects.py",),
     "casadi": ("himpc/qp.py",),
     "viser": ("app/",),
+    "segno": ("app/classes/pages.py",),
     "tyro": ("app/",),
     "rich": ("app/",),
     "matplotlib": ("lessons/plots/",),
@@ -100,7 +101,8 @@ def test_himpc_is_tested_without_lessons_and_app() -> None:
 
 APP = {
     "commands": ("server", "html", "link", "__main__"),
-    "server": ("page", "panels", "client", "html", "link", "worker", "adapter"),
+    "server": ("classes", "page", "panels", "client", "html", "link", "worker", "adapter"),
+    "classes": ("client", "html", "link"),
     "page": ("panels", "view", "client", "html", "link", "adapter"),
     "panels": ("view", "client", "html", "link", "adapter"),
     "view": ("client", "html", "link", "adapter"),

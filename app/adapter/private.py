@@ -36,7 +36,8 @@ except ImportError as error:
     ) from None
 
 Guard = Callable[[Mapping[str, Any]], dict[str, Any]]
-"""From the keywords viser gives to websockets' `serve` to those that we give instead."""
+"""From the arguments viser gives to websockets' `serve`, its handler among them, to those that we give
+instead."""
 
 _SERVING = threading.Lock()
 _NEEDED = ("process_request", "max_size")
@@ -103,12 +104,13 @@ def _guarded(guard: Guard) -> Iterator[list[bool]]:
         try:
             if missing := [name for name in _NEEDED if name not in keywords]:
                 raise KeyError(*missing)
-            changed = guard(keywords)
+            handler, *place = given
+            changed = guard({**keywords, "handler": handler})
         except Exception:
             served.append(False)
             return plain(*given, **{**keywords, "process_request": refuse})
         served.append(True)
-        return plain(*given, **changed)
+        return plain(changed.pop("handler"), *place, **changed)
 
     with _SERVING:
         web.serve = serve  # pyright: ignore[reportAttributeAccessIssue]

@@ -11,8 +11,9 @@ from app.client.ghost import GhostClient
 from app.client.simulation import Simulation, aside
 from app.client.trouble import Trouble
 from app.link.choice import SceneChoice
-from app.link.exercise import Lecture
+from app.link.exercise import Lecture, LessonPlace, RunStep
 from app.link.messages import (
+    Command,
     Lead,
     Load,
     Loading,
@@ -33,6 +34,9 @@ from app.link.spares import Spares
 if TYPE_CHECKING:
     from lessons.teaching import lesson
 
+STAYING = "Your teacher keeps the class at this step: wait for the next one."
+WAITING = "Your teacher runs this step for everybody: say what you expect, and wait."
+
 
 @final
 class SimulationClient(Simulation):
@@ -47,6 +51,8 @@ class SimulationClient(Simulation):
         self.left_at = time.monotonic()
         self.ghost: GhostClient | None = None
         self.lecture: Lecture | None = None
+        self.kept_at: LessonPlace | None = None
+        """The step at which a teacher keeps this learner; None: the learner may go anywhere."""
         self._asking: deque[Queue[Told | None]] = deque()
         self._unheard: tuple[SceneChoice | None, int] | None = None
         """The scene that was requested and not yet reported (None: the present scene), and the number of
@@ -60,7 +66,34 @@ class SimulationClient(Simulation):
         return super().trouble() or (None if ghost is None else ghost.trouble())
 
     def load(self, choice: SceneChoice) -> None:
-        """Loads another scene, in a new process if the present one is in trouble."""
+        """Loads another scene, in a new process if the present one is in trouble. A learner who is kept at a
+        step gets a notice instead."""
+        if self.kept_at is not None and choice.exercise != self.kept_at:
+            self._refuse(STAYING)
+            return
+        self.load_for_class(choice)
+
+    def send(self, command: Command) -> None:
+        if self.kept_at is not None and isinstance(command, RunStep) and self._has_not_run:
+            self._refuse(WAITING)
+            return
+        super().send(command)
+
+    def run_with_class(self) -> None:
+        """Runs the step of the lesson, also if the learner is kept at it."""
+        super().send(RunStep())
+
+    @property
+    def _has_not_run(self) -> bool:
+        lecture = self.lecture
+        return lecture is not None and lecture.exercise == self.kept_at and lecture.attempt == 0
+
+    def _refuse(self, sentence: str) -> None:
+        with self._lock:
+            self._notices.append(sentence)
+
+    def load_for_class(self, choice: SceneChoice) -> None:
+        """As `load`, also for a learner who is kept at a step."""
         choice = choice.admitting(self._start_choice)
         self._start_choice = self._start_choice.admitting(choice)
         self._begin_anew(Load(choice), choice)

@@ -21,6 +21,8 @@ def serve(
     state: str | None = None,
     max_sessions: int = 4,
     classroom: bool = False,
+    class_: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(name="class")] = False,
+    no_names: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     host: str = "127.0.0.1",
     port: int = 8080,
     no_browser: bool = False,
@@ -47,6 +49,9 @@ def serve(
         state: a state code, as the page shows it: its scene, robot, settings, seed, lesson and step.
         max_sessions: number of people who may use the page at once, each with a robot of their own.
         classroom: one robot for all pages; only a page with the printed token can control it.
+        class_: a teacher's page, from which a class is led through a lesson, and a page for phones that vote;
+            docs/instructors.md describes a lecture. With --classroom, all watch the teacher's robot.
+        no_names: nobody in a class is asked for a name.
         host: address to listen on; only this machine can reach the default. The page asks for the token of
             the address that is printed.
         port: port to listen on.
@@ -72,6 +77,8 @@ def serve(
 
     if no_own_files and own_files is not None:
         raise InputError("--own-files DIR and --no-own-files contradict each other: leave one out")
+    if no_names and not class_:
+        raise InputError("--no-names is for a class: add --class, or leave it out")
     bringing = [name for name, given in (("--lesson", lesson), ("--state", state)) if given is not None]
     if len(bringing) > 1 or (bringing and (scene, urdf, tip) != (None, None, None)):
         others = "--scene, --urdf, --tip and --" + ("state" if bringing[0] == "--lesson" else "lesson")
@@ -100,4 +107,5 @@ def serve(
         key=None if key is None else read_key(key),
         token=given_token(token_file, os.environ),
         refers=one_of_several,
+        class_names=not no_names if class_ else None,
     )

@@ -60,6 +60,10 @@ class Classroom:
     def learners(self) -> tuple[SimulationClient, ...]:
         return (self._learner,)
 
+    def guide(self) -> SimulationClient:
+        """The session itself, which the teacher controls."""
+        return self._learner
+
     def is_right(self, token: str) -> bool:
         """Whether this is the instructor's token, compared in constant time."""
         return secrets.compare_digest(token.encode(errors="replace"), self.token.encode())

@@ -11,6 +11,9 @@ PER_ADDRESS = 96
 """Largest number of connections from one address: enough for two per learner of a class behind one
 address."""
 
+OF_A_CLASS = 1000, 800
+"""The same two for a class, whose phones may all be behind one address."""
+
 
 @dataclass
 class _Guest:

@@ -7,7 +7,7 @@ import re
 import socket
 from dataclasses import dataclass, field
 from http import HTTPStatus
-from urllib.parse import parse_qs, urlencode, urlsplit
+from urllib.parse import parse_qs, quote, urlencode, urlsplit
 
 from websockets.datastructures import Headers
 from websockets.http11 import Request
@@ -80,10 +80,12 @@ class Door:
 
     def is_owner(self, request: Request, who: str = "") -> bool:
         """Whether the person who started the server sent this upgrade, which must have been admitted."""
-        passes = self.passes
-        return "owner" in (passes.in_address(request.path), passes.in_cookies(request.headers, who)) and not (
-            came_through_a_proxy(request.headers)
-        )
+        return self.role(request, who) == "owner" and not came_through_a_proxy(request.headers)
+
+    def role(self, request: Request, who: str = "") -> Role | None:
+        """The role whose secret or cookie a request brings, from any machine; None if it brings none."""
+        found = self.passes.in_address(request.path), self.passes.in_cookies(request.headers, who)
+        return "owner" if "owner" in found else found[0] or found[1]
 
     def _is_ours(self, host: str) -> bool:
         found = _HOST.fullmatch(host)
@@ -122,7 +124,8 @@ class Door:
         cookie = f"{self.passes.keep(role, who)}; HttpOnly; SameSite=Strict{secure}"
         kept = (("Set-Cookie", cookie), *_NOT_KEPT)
         rest = urlencode({name: values for name, values in _query(request).items() if name != QUERY}, True)
-        page = f"./?{rest}" if rest else "./"
+        name = quote(urlsplit(request.path).path.rpartition("/")[2], safe="")
+        page = f"./{name}?{rest}" if rest else f"./{name}"
         if request.headers.get("Referer") or request.headers.get("Sec-Fetch-Site") == "cross-site":
             # A browser does not send a strict cookie with a redirect that began with a link on another site.
             return Answer(HTTPStatus.OK, "himpc-lab", "Opening …", (*kept, ("Refresh", f"0; url={page}")))

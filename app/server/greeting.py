@@ -19,9 +19,12 @@ _INSTRUCTOR = "instructor's token:"
 def greeting(server: PageServer, host: str, origins: Sequence[str]) -> Iterator[str]:
     """One line for a user who works alone; otherwise a block of addresses that says for whom each one is."""
     yield f"himpc-lab ready at {server.link}"
-    shared = server.public or isinstance(server.sessions, Classroom)
+    shared = server.public or server.hall is not None or isinstance(server.sessions, Classroom)
     if shared:
         yield from _for_others(server, host, origins)
+    if server.hall is not None:
+        yield f"  {'teacher:':{_WIDTH}}{server.teachers_link}"
+        yield f"  {'phones:':{_WIDTH}}{server.outside}/v/{server.hall.code}"
     if server.passes.token is None:
         yield "  --no-token: " + (_ALL if server.public else _ALL_HERE)
     if shared and server.passes.owner is not None:
@@ -35,6 +38,22 @@ def _for_others(server: PageServer, host: str, origins: Sequence[str]) -> Iterat
         yield f"  {what:{_WIDTH}}{server.passes.link(address, 'guest')}"
     if isinstance(server.sessions, Classroom):
         yield f"  {_INSTRUCTOR:{_WIDTH}}{server.sessions.token}"
+
+
+def seen_from_outside(host: str, url: str, origins: Sequence[str]) -> str:
+    """The address of the server for other machines: the first proxy's, or the one of this machine in its
+    network if the server listens there."""
+    if origins:
+        return origins[0]
+    if host not in ("0.0.0.0", "::"):
+        return url
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as line:
+        try:
+            line.connect(("192.0.2.1", 9))  # no machine has this address, and nothing is sent to it
+            here = line.getsockname()[0]
+        except OSError:
+            here = socket.gethostname()
+    return f"http://{here}:{urlsplit(url).port}"
 
 
 _KEEP = "Keep the first address secret: its page can run your Python files (not with --no-own-files)."

@@ -5,19 +5,20 @@ from __future__ import annotations
 import asyncio
 import ipaddress
 import logging
-from collections.abc import Callable, Mapping
-from html import escape
+from collections.abc import Awaitable, Callable, Mapping
 from http import HTTPStatus
 from typing import Any, NoReturn
 
 from websockets.asyncio.server import ServerConnection
-from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosedError
 from websockets.frames import CloseCode, Frame, Opcode
 from websockets.http11 import Request, Response
 
+from app.classes.words import LONGEST
 from app.server import budget
+from app.server.answers import CROWDED, FULL, NOT_OPEN, as_response, plain
 from app.server.budget import Budget
+from app.server.class_door import ClassDoor
 from app.server.connection_limits import ConnectionLimits
 from app.server.door import Answer, Door, is_upgrade, secured
 from app.server.load import Load, Places, load_of, report
@@ -31,11 +32,6 @@ FIRST_WORD = 45.0
 """Time, s, within which a page must send a message: the first picture may take long without a graphics
 card."""
 _SLICE = 4096  # B that are parsed between two checks of the limits
-_PAGE = (
-    '<!doctype html><html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
-    "<title>{title}</title><body style='font:16px/1.5 sans-serif;max-width:40em;margin:3em auto'>"
-    "<h1>{title}</h1>{text}</body></html>"
-)
 
 
 class ConnectionGuard:
@@ -49,14 +45,23 @@ class ConnectionGuard:
         self._door = door
         self._open = self._refers = False
         self._places: Places | None = None
+        self._class: ClassDoor | None = None
 
-    def open(self, door: Door, places: Places | None = None, refers: bool = False) -> None:
+    def open(
+        self,
+        door: Door,
+        places: Places | None = None,
+        refers: bool = False,
+        class_door: ClassDoor | None = None,
+    ) -> None:
         """Admits requests according to `door` from now on.
 
         places: the sessions, for /health and /metrics. refers: a newcomer is refused with status 503 while
             every place is used, so that a proxy tries the next server; otherwise their page says so.
+        class_door: the pages of a class, if there is one.
         """
         self._door, self._places, self._refers, self._open = door, places, refers, True
+        self._class = class_door
 
     @property
     def load(self) -> Load:
@@ -73,23 +78,31 @@ class ConnectionGuard:
         def request(connection: ServerConnection, request: Request) -> Response | None:
             told = None if is_upgrade(request) else report(request.path, self.load)
             if told is not None and self._door.refuses(request) is None:
-                return _plain(*told)
+                return plain(*told)
+            if self._class is not None and self._class.has(request.path):
+                return self._to_class(self._class, connection, request)
             answer = self._judge(connection, request)
             if answer is not None:
                 self.refused += answer.status >= HTTPStatus.BAD_REQUEST
-                return _response(answer)
+                return as_response(answer)
             if is_upgrade(request):
                 if isinstance(connection, GuardedConnection):
                     connection.is_owners = self._is_owners(connection, request)
+                    connection.teaches = self._door.role(request, _user(connection)) == "owner"
                     connection.expect_word(FIRST_WORD)
                 return None
             return files(connection, request)
+
+        async def serve(connection: ServerConnection) -> None:
+            own = connection.serves if isinstance(connection, GuardedConnection) else None
+            await (own or given["handler"])(connection)
 
         def secure(_: ServerConnection, __: Request, response: Response) -> None:
             secured(response.headers)
 
         return {
             **given,
+            "handler": serve,
             "process_request": request,
             "process_response": secure,
             "create_connection": lambda *of, **more: GuardedConnection(*of, guard=self, **more),
@@ -101,15 +114,36 @@ class ConnectionGuard:
 
     def _judge(self, connection: ServerConnection, request: Request) -> Answer | None:
         if not self._open:
-            return _NOT_OPEN
+            return NOT_OPEN
         answer = self._door.judge(request, _user(connection))
         if answer is None and not self.crowd.comes_from(connection, self.address(connection, request)):
-            return Answer(
-                HTTPStatus.SERVICE_UNAVAILABLE, "Too many pages", "<p>Close some of them and try again.</p>"
-            )
+            return CROWDED
         if answer is None and self._refers and self.load.full:
-            return _FULL
+            return FULL
         return answer
+
+    def _to_class(self, of: ClassDoor, connection: ServerConnection, request: Request) -> Response | None:
+        """The answer to a request for a page of the class; None for an upgrade that is let in."""
+        answer = self._not_open(connection, request) or self._door.refuses(request)
+        found = answer or of.answer(self._door, request, _user(connection))
+        if isinstance(found, Answer):
+            self.refused += found.status >= HTTPStatus.BAD_REQUEST
+            return as_response(found)
+        if not is_upgrade(request):
+            return plain(found.status, found.kind, found.text, found.headers)
+        if isinstance(connection, GuardedConnection):
+            connection.serves = found.serve
+            connection.accept_short()
+            connection.expect_word(FIRST_WORD)
+        return None
+
+    def _not_open(self, connection: ServerConnection, request: Request) -> Answer | None:
+        """The answer while the server is not open, or has no room for this connection."""
+        if not self._open:
+            return NOT_OPEN
+        if not self.crowd.comes_from(connection, self.address(connection, request)):
+            return CROWDED
+        return None
 
     def _is_owners(self, connection: ServerConnection, request: Request) -> bool:
         """Whether this page was opened by the person who started the server, on the machine where it runs."""
@@ -131,7 +165,8 @@ class GuardedConnection(ServerConnection):
     send.
 
     `uploads` are the uploads of the page that it serves, `refuse` shows a refusal to the user, and
-    `is_owners` is true if the person who started the server opened the page.
+    `is_owners` is true if the person who started the server opened the page, `teaches` if it was opened with
+    the owner's secret on any machine; `serves` replaces viser for a page of a class.
     """
 
     def __init__(self, *of: Any, guard: ConnectionGuard, **more: Any) -> None:
@@ -139,6 +174,8 @@ class GuardedConnection(ServerConnection):
         self.uploads: Uploads | None = None
         self.refuse: Callable[[str], object] = _nothing_said
         self.is_owners = False
+        self.teaches = False
+        self.serves: Callable[[Any], Awaitable[None]] | None = None
         self._guard = guard
         self._budget = Budget(self.loop.time)
         self._waiting = 0
@@ -204,6 +241,17 @@ class GuardedConnection(ServerConnection):
             self._guard.taken += 1
             return raw
 
+    def accept_short(self) -> None:
+        """Ends the connection, with a reason, when a message is longer than pages of a class send."""
+        self.protocol.max_message_size = LONGEST
+
+    async def recv_short(self) -> str | bytes:
+        """The next message of a page of a class."""
+        raw = await super().recv()
+        self._waiting = len(self.recv_messages.frames)
+        self._guard.crowd.spoke(self)
+        return raw
+
     async def _may_upload(self, raw: bytes) -> bool:
         await asyncio.sleep(0)  # let viser process the messages that came before
         return self.uploads is not None and self.uploads.takes(raw, self._budget)
@@ -224,31 +272,6 @@ def _nothing_said(_: str) -> None:
 
 def _nothing(_: ServerConnection, __: Request) -> Response | None:
     return None
-
-
-_NOT_OPEN = Answer(HTTPStatus.SERVICE_UNAVAILABLE, "Starting or stopping", "<p>Try again in a moment.</p>")
-_FULL = Answer(
-    HTTPStatus.SERVICE_UNAVAILABLE,
-    "All places are taken",
-    "<p>Every robot is in use. This page tries again by itself.</p>",
-    (("Retry-After", "5"), ("Refresh", "5"), ("Cache-Control", "no-store")),
-)
-
-
-def _plain(status: HTTPStatus, kind: str, text: str) -> Response:
-    body = text.encode()
-    headers = Headers({"Content-Type": kind, "Content-Length": str(len(body)), "Cache-Control": "no-store"})
-    headers["Connection"] = "close"
-    return Response(status.value, status.phrase, headers, body)
-
-
-def _response(answer: Answer) -> Response:
-    body = _PAGE.format(title=escape(answer.title), text=answer.text).encode()
-    headers = Headers(answer.headers)
-    headers["Content-Type"] = "text/html; charset=utf-8"
-    headers["Content-Length"] = str(len(body))
-    headers["Connection"] = "close"
-    return Response(answer.status.value, answer.status.phrase, headers, body)
 
 
 def _log() -> logging.Logger:

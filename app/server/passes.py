@@ -76,10 +76,11 @@ class Passes:
     cookie: str = "himpc-lab"
     key: bytes = field(default_factory=lambda: secrets.token_bytes(32), repr=False)
 
-    def link(self, address: str, role: Role) -> str:
-        """The address of the page for a visitor with this role."""
+    def link(self, address: str, role: Role, page: str = "") -> str:
+        """The address of a page for a visitor with this role; "" is the page of a robot."""
         secret = (role == "owner" and self.owner) or self.token
-        return f"{address}/?{urlencode({QUERY: secret})}" if secret else address
+        place = f"{address}/{page}" if page or secret else address
+        return f"{place}?{urlencode({QUERY: secret})}" if secret else place
 
     def in_address(self, path: str) -> Role | None:
         """The role whose secret is in an address; None if there is none."""

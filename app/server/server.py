@@ -16,10 +16,14 @@ from importlib import import_module
 import viser
 
 from app.adapter import private
+from app.classes.hall import Hall
+from app.classes.sockets import Sockets
 from app.link.choice import SceneChoice
+from app.server.class_door import TEACHER, ClassDoor
 from app.server.classroom import Classroom
+from app.server.connection_limits import OF_A_CLASS, ConnectionLimits
 from app.server.door import Door, as_origin, names_of_this_machine
-from app.server.greeting import greeting
+from app.server.greeting import greeting, seen_from_outside
 from app.server.guard import ConnectionGuard
 from app.server.malloc_tuning import few_arenas, large_arrays_apart
 from app.server.opening import opened_in_a_browser
@@ -49,6 +53,7 @@ def serve(
     key: bytes | None = None,
     token: str | None = None,
     refers: bool = False,
+    class_names: bool | None = None,
 ) -> int:
     """Serves the page until Ctrl-C or SIGTERM. Raises InputError for a scene, robot, host, port or origin
     that cannot be used.
@@ -57,7 +62,7 @@ def serve(
     The page asks for a token unless `ask_token` is False. The page whose address contains the owner's
     secret may open and run files below `own_files` by path; with None no page may. `key` signs the
     learners' progress. `token` replaces the random one; with `refers` a full server answers 503, so that a
-    proxy tries the next one.
+    proxy tries the next one. `class_names`: whether a class is asked for names; None: there is no class.
     """
     server = PageServer(
         choice,
@@ -71,6 +76,7 @@ def serve(
         key=key,
         token=token,
         refers=refers,
+        class_names=class_names,
     )
     stop = threading.Event()
     try:
@@ -78,7 +84,7 @@ def serve(
             for line in greeting(server, host, tuple(map(as_origin, trusted_origins))):
                 print(line, flush=True)
             if open_browser:
-                until_the_end.enter_context(opened_in_a_browser(server.link))
+                until_the_end.enter_context(opened_in_a_browser(server.first_link))
             while not stop.wait(0.5):
                 pass
     finally:
@@ -122,6 +128,7 @@ class PageServer:
         key: bytes | None = None,
         token: str | None = None,
         refers: bool = False,
+        class_names: bool | None = None,
     ) -> None:
         """Arguments as for `serve`; grace: time, s, that a session outlives its tab."""
         if max_sessions < 1:
@@ -152,16 +159,25 @@ class PageServer:
             raise _in_use(host, port)
         shown = "127.0.0.1" if host == "0.0.0.0" else f"[{host}]" if ":" in host else host
         self.url = f"http://{shown}:{found}"
+        self.outside = seen_from_outside(host, self.url, tuple(map(as_origin, trusted_origins)))
+        """The address for other machines, as numbers: phones rarely find a machine by its name."""
         self._viser.gui.configure_theme(show_share_button=False, show_logo=False)
         self._viser.on_client_connect(self._connect)
         self._viser.on_client_disconnect(self._disconnect)
-        owner = None if own_files is None else new_token()
+        self.hall = None if class_names is None else self._new_hall(class_names)
+        owner = None if own_files is None and self.hall is None else new_token()
         if ask_token and token is not None:
             self.passes = shared(token, owner)
         else:
             self.passes = Passes(new_token() if ask_token else None, owner, f"himpc-lab-{found}")
         door = Door(local, trusted, self.passes, names_of_this_machine())
-        self.guard.open(door, self.sessions, refers)
+        self._sockets = None if self.hall is None else Sockets(self.hall, lambda: self.outside)
+        if self.hall is not None and self._sockets is not None:
+            self._sockets.start(self._viser.get_event_loop())
+            self.guard.crowd = ConnectionLimits(*OF_A_CLASS)
+            self.guard.open(door, self.sessions, refers, ClassDoor(self.hall, self._sockets))
+        else:
+            self.guard.open(door, self.sessions, refers)
         self._loading = threading.Thread(target=_load, args=(choice,), daemon=True)
         self._loading.start()
 
@@ -181,10 +197,25 @@ class PageServer:
         """The link for everybody else, with the token if one is needed."""
         return self.passes.link(self.url, "guest")
 
+    @property
+    def first_link(self) -> str:
+        """The page that opens at the start: the teacher's of a class, else that of a robot."""
+        page = "" if self.hall is None else TEACHER.lstrip("/")
+        return self.passes.link(self.url, "owner", page)
+
+    @property
+    def teachers_link(self) -> str:
+        """The link to the teacher's page of a class, with the owner's secret."""
+        return self.passes.link(self.outside, "owner", TEACHER.lstrip("/"))
+
+    def _new_hall(self, named: bool) -> Hall:
+        alone = isinstance(self.sessions, Classroom)
+        return Hall(None if alone else self.sessions, self.sessions.guide(), named)
+
     # ---------------------------------------------------------------- clients, on viser's loop
 
     async def _connect(self, client: viser.ClientHandle) -> None:
-        visit = Visit(self._viser, client, self.sessions, self._own_files, self._key)
+        visit = Visit(self._viser, client, self.sessions, self._own_files, self._key, self.hall)
         with self._lock:
             self._visits[client.client_id] = visit
         await visit.arrive()
@@ -198,6 +229,8 @@ class PageServer:
     def close(self) -> None:
         """Closes the pages, ends the processes and stops the server."""
         self.guard.close()
+        if self._sockets is not None:
+            self._sockets.close()
         with self._lock:
             visits, self._visits = list(self._visits.values()), {}
         for visit in visits:

@@ -38,6 +38,7 @@ class Sessions:
         self._spares = Spares(WORKER)
         self._lock = threading.Lock()
         self._learners: dict[str, SimulationClient] = {}
+        self._guide: SimulationClient | None = None
         self._closed = threading.Event()
         self._spares.refill()
         self._keeper = threading.Thread(target=self._keep, daemon=True)
@@ -47,6 +48,13 @@ class Sessions:
     def learners(self) -> tuple[SimulationClient, ...]:
         with self._lock:
             return tuple(self._learners.values())
+
+    def guide(self) -> SimulationClient:
+        """The robot of a teacher, which takes no learner's place and lasts as long as the server."""
+        with self._lock:
+            if self._guide is None:
+                self._guide = SimulationClient(secrets.token_urlsafe(16), self._choice, self._spares)
+            return self._guide
 
     def enter(self, tokens: Sequence[str], refuse: Refuse | None = None) -> SimulationClient | None:
         """Returns the learner that this browser left, or a new one; None if all places are taken. A place
@@ -100,6 +108,8 @@ class Sessions:
         self._keeper.join()
         with self._lock:
             learners, self._learners = list(self._learners.values()), {}
+            if self._guide is not None:
+                learners.append(self._guide)
         threads = [threading.Thread(target=learner.close) for learner in learners]
         for thread in threads:
             thread.start()

@@ -12,11 +12,14 @@ import viser
 
 from app.adapter import private
 from app.adapter.removed_handle_errors import print_exception
+from app.classes.hall import Hall
 from app.client.progress import Notebook
+from app.client.simulation_client import SimulationClient
 from app.html.text import block
 from app.page.comfort import ASK_MOTION, MOTION, REDUCED, Comfort
 from app.page.inlet import Inlet
 from app.page.page import Page
+from app.panels.run.class_card import ClassCard
 from app.panels.run.classroom import add_watching
 from app.server.budget import UPLOADS
 from app.server.classroom import Classroom, Watcher
@@ -47,15 +50,17 @@ class Visit:
         sessions: Sessions | Classroom,
         own_files: Folder | None,
         key: bytes | None = None,
+        hall: Hall | None = None,
     ) -> None:
         """own_files: folder of the files that the owner's page may name; key: signs the learners'
-        progress."""
+        progress; hall: the class, if there is one."""
         self._server = server
         self._client = client
         self._sessions = sessions
-        self._own_files, self._key = own_files, key
+        self._own_files, self._key, self._hall = own_files, key, hall
         self._page: Page | None = None
         self._left = False
+        self._seat = ""
         self._asking: asyncio.Future[tuple[str | None, ...]] | None = None
         self._dark = False
         self._notebook = Notebook(LearnerProgress(), lambda _: None)
@@ -68,6 +73,7 @@ class Visit:
         connection = private.connection_of(server, client)
         if not (isinstance(connection, GuardedConnection) and connection.is_owners):
             self._own_files = None
+        self._teaches = isinstance(connection, GuardedConnection) and connection.teaches
         if isinstance(connection, GuardedConnection):
             connection.refuse = partial(inlet.say, "Not taken")
             connection.uploads = Uploads(
@@ -120,10 +126,14 @@ class Visit:
         before, self._page = self._page, None
         if before is not None:  # the page has only watched so far
             before.close()
-        learner = self._sessions.enter(tokens, self._refuse)
+        hall = self._hall
+        leads = hall is not None and self._teaches
+        learner = hall.robot if hall is not None and leads else self._sessions.enter(tokens, self._refuse)
         if learner is None:
             self._turn_away(tokens)
             return
+        if hall is not None and not leads and not isinstance(learner, Watcher):
+            hall.recognise(learner.token, tokens)
         kept = [token for token in tokens if token != learner.token][-7:]
         self._keep(_TOKENS, json.dumps([*kept, learner.token] if learner.token else kept))
         self._page = Page(
@@ -135,7 +145,7 @@ class Visit:
             self._notebook,
             self._comfort,
             on_dark=self._remember_dark,
-            greet=self._greet if isinstance(learner, Watcher) else _no_greeting,
+            greet=partial(self._greet, learner, leads),
         )
         self._page.start()
 
@@ -144,6 +154,8 @@ class Visit:
         if page is not None:
             page.close()
             self._sessions.leave(page.learner)
+        if self._hall is not None:
+            self._hall.seats.rise(self._seat)
         self._workers.shutdown(wait=False, cancel_futures=True)
 
     # ---------------------------------------------------------------- calls from the page
@@ -155,16 +167,23 @@ class Visit:
         self._dark = on
         self._keep(_DARK, "1" if on else "0")
 
-    def _greet(self, gui: viser.GuiApi) -> None:
-        """Adds the input for the instructor's token to a page that only watches."""
+    def _greet(self, learner: SimulationClient, leads: bool, gui: viser.GuiApi) -> None:
+        """Adds the input for the instructor's token to a page that only watches, and what a class says."""
+        hall = self._hall
+        if hall is not None and not leads:
+            watches = isinstance(learner, Watcher)
+            call = None if watches or not hall.state.named else partial(hall.call, learner.token)
+            card = ClassCard(gui, hall.name_of(learner.token), call, partial(hall.fetch, learner.token))
+            self._seat = f"watcher {id(self)}" if watches else learner.token
+            hall.seats.sit(self._seat, card.show)
+        if isinstance(learner, Watcher):
+            add_watching(gui, self._take_token)
 
-        def take(token: str) -> bool:
-            right = isinstance(self._sessions, Classroom) and self._sessions.is_right(token)
-            if right:
-                self._then([token])
-            return right
-
-        add_watching(gui, take)
+    def _take_token(self, token: str) -> bool:
+        right = isinstance(self._sessions, Classroom) and self._sessions.is_right(token)
+        if right:
+            self._then([token])
+        return right
 
     def _refuse(self, sentence: str) -> None:
         self._client.add_notification("Not allowed", sentence, color="orange", auto_close_seconds=4.0)
@@ -195,10 +214,6 @@ class Visit:
         async def _(_: object) -> None:
             modal.close()
             self._then(tokens)
-
-
-def _no_greeting(_: viser.GuiApi) -> None:
-    """Adds nothing: this page already controls the session."""
 
 
 def _tokens(stored: str | None) -> list[str]:

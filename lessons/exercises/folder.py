@@ -111,7 +111,7 @@ _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
 """First characters of cells that a spreadsheet would interpret as a formula."""
 
 
-def _cell(text: str) -> str:
+def cell(text: str) -> str:
     """The cell in a form that a spreadsheet shows as text."""
     return f"'{text}" if text.startswith(_FORMULA) else text
 
@@ -142,7 +142,7 @@ def _write(out: Path, rows: list[Row]) -> None:
         with beside.open("w", newline="", encoding="utf-8") as file:
             writer = csv.DictWriter(file, COLUMNS)
             writer.writeheader()
-            writer.writerows({name: _cell(value) for name, value in row.items()} for row in rows)
+            writer.writerows({name: cell(value) for name, value in row.items()} for row in rows)
         os.replace(beside, out)
     except OSError as error:
         raise InputError(f"{out}: cannot be written ({error.strerror}); give another file") from None

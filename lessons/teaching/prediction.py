@@ -53,6 +53,11 @@ class Choice:
         """Index of the right option for a measured number; None if no option is right."""
         return next((k for k, each in enumerate(self.options) if each.low <= value < each.high), None)
 
+    def hits(self, picked: float, value: float) -> bool | None:
+        """Whether an option is right for a measured number; None if no option is right."""
+        right = self.right(value)
+        return None if right is None else picked == right
+
     def grade(self, picked: int, rows: RunRows, ghost: RunRows | None = None) -> PredictionResult:
         """Compares the option picked with the run."""
         value = self.measure.value(rows, ghost)
@@ -84,6 +89,12 @@ class Value:
     low: float
     high: float
     factor: float = 1.5
+
+    def hits(self, guess: float, value: float) -> bool | None:
+        """Whether a guess, above 0, is right for a measured number; None if nothing was measured."""
+        if not (math.isfinite(value) and value > 0):
+            return None
+        return abs(math.log(guess / value)) <= math.log(self.factor)
 
     def grade(self, guess: float, rows: RunRows, ghost: RunRows | None = None) -> PredictionResult:
         """Compares the guess with the run."""

@@ -6,8 +6,8 @@ import viser
 
 from app.client.progress import Notebook
 from app.client.simulation_client import SimulationClient
+from app.client.state_code import code_of
 from app.html.text import block
-from app.panels.run.share import code_of
 from lessons.replay.progress import LONGEST_NAME
 from robots import InputError
 

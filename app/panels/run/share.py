@@ -7,11 +7,12 @@ from collections.abc import Callable
 import viser
 
 from app.client.simulation_client import SimulationClient
+from app.client.state_code import from_a_name, state_now
 from app.html.text import block
 from app.link.choice import SceneChoice
 from app.link.messages import Told
 from lessons.replay.script import script
-from lessons.replay.state import State, decode, encode, state_of
+from lessons.replay.state import decode, encode
 from robots import InputError
 
 
@@ -60,7 +61,7 @@ class SharePanel:
             _refuse(client, error)
 
     def _write(self, told: Told) -> None:
-        state = _state(told)
+        state = state_now(told)
         self._line.value = state.run.command_line()
         self._line.visible = True
         self._code.visible = False
@@ -68,34 +69,9 @@ class SharePanel:
         self._code.visible = True
 
     def _save(self, client: viser.ClientHandle, told: Told) -> None:
-        choice = _from_a_name(told.choice)
+        choice = from_a_name(told.choice)
         text = script(choice.run, told.log, told.t)
         client.send_file_download(f"{choice.run.scene}.py", text.encode(), save_immediately=True)
-
-
-def code_of(told: Told) -> str:
-    """The state code of the setting. Raises InputError if a state code cannot contain it."""
-    return encode(_state(told))
-
-
-def _state(told: Told) -> State:
-    choice = _from_a_name(told.choice)
-    exercise = choice.exercise
-    return state_of(
-        choice.run,
-        told.settings,
-        lesson=None if exercise is None else exercise.lesson,
-        step=None if exercise is None else exercise.place + 1,
-    )
-
-
-def _from_a_name(choice: SceneChoice) -> SceneChoice:
-    if choice.urdf_text is not None:
-        raise InputError(
-            "a code cannot contain this robot, which was uploaded: save its file and "
-            "start himpc-lab with --urdf"
-        )
-    return choice
 
 
 def _refuse(client: viser.ClientHandle | None, error: InputError) -> None:

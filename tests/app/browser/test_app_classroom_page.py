@@ -1,11 +1,14 @@
-"""A classroom: one robot for all pages, and only pages with the token can control it."""
+"""A classroom: one robot for all pages, and only pages with the token can control it. It is a class as well:
+phones vote, and the teacher's page shows it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from importlib.resources import files
+from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import Browser, Page, expect
 
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
@@ -19,7 +22,7 @@ pytestmark = pytest.mark.usefixtures("one_fork_server")
 
 @pytest.fixture(scope="module")
 def classroom() -> Iterator[PageServer]:
-    running = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, classroom=True)
+    running = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, classroom=True, class_names=True)
     yield running
     running.close()
 
@@ -28,7 +31,7 @@ def test_only_the_token_steers(browser: Browser, classroom: PageServer) -> None:
     """A page without the token shows the same robot and cannot stop it; with the token it can."""
     assert isinstance(classroom.sessions, Classroom)
     (learner,) = classroom.sessions.learners
-    page = open_page(browser, classroom.link, 1300, 700)
+    page = open_page(browser, classroom.guest_link, 1300, 700)
     watching = page.get_by_text("you are watching")
     expect(watching).to_be_visible()
     press(page, "Pause")
@@ -42,3 +45,63 @@ def test_only_the_token_steers(browser: Browser, classroom: PageServer) -> None:
     press(page, "Pause")
     assert wait_until(lambda: learner.status is not None and not learner.status.running, 60)
     page.context.close()
+
+
+LONG = 120_000  # ms
+_RULES = """() => axe.run(document, {
+  runOnly: ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa"], resultTypes: ["violations"] })"""
+
+
+def violations(page: Page) -> list[str]:
+    """What axe-core finds against WCAG 2.1 A and AA."""
+    found: Any = page.evaluate(_RULES)
+    return [f"{each['id']}: {node['html'][:150]}" for each in found["violations"] for node in each["nodes"]]
+
+
+def page_of(browser: Browser, address: str, width: int, height: int, faults: list[str]) -> Page:
+    """A page of the class. faults: gets the errors of its script and what its policy refuses."""
+    page = browser.new_context(viewport={"width": width, "height": height}).new_page()
+    page.on("pageerror", lambda error: faults.append(str(error)))
+    page.on("console", lambda said: faults.append(said.text) if said.type == "error" else None)
+    page.goto(address)
+    page.evaluate((files("axe_playwright_python") / "axe.min.js").read_text(encoding="utf-8"))
+    return page
+
+
+def test_a_phone_votes_and_the_projector_shows_who_was_right(browser: Browser, classroom: PageServer) -> None:
+    """A step with two votes and its run, by clicks; both pages fit their screens, and axe finds nothing."""
+    faults: list[str] = []
+    assert classroom.hall is not None
+    lead = page_of(browser, classroom.first_link, 1920, 1080, faults)
+    phone = page_of(browser, f"{classroom.url}/v/{classroom.hall.code}", 390, 844, faults)
+    assert "himpc-token" not in lead.url
+    expect(lead.locator("#qr svg")).to_be_visible()
+    lead.get_by_label("Lesson", exact=True).select_option("stretched-out")
+    lead.get_by_role("button", name="Go to this step").click()
+    expect(phone.locator("#question")).to_have_text(lead.locator("#question").inner_text())
+    for vote, letter in (("Vote: 1 answered", "A"), ("Second vote: 1 answered", "B")):
+        lead.get_by_role("button", name="Open the ").click()
+        phone.locator("#answers button", has_text=letter).first.click()
+        expect(phone.get_by_text("Counted.")).to_be_visible()
+        expect(phone.get_by_text(f"You said {letter}.")).to_be_visible()
+        expect(lead.get_by_text(vote)).to_be_visible()
+        expect(lead.locator("#bars li")).to_have_count(0)
+        if letter == "A":
+            assert violations(phone) + violations(lead) == []
+        lead.get_by_role("button", name="Close the vote").click()
+        expect(phone.locator("#bars li")).to_have_count(3)
+    expect(lead.locator("#bars .count").first).to_have_text("1 → 0")
+    lead.get_by_role("button", name="Run", exact=True).click()
+    expect(lead.locator("#result")).to_contain_text("The run gave", timeout=LONG)
+    expect(phone.locator("#bars .right")).to_have_count(1)
+    lead.locator("summary").click()
+    assert violations(phone) + violations(lead) == []
+    for page in (lead, phone):
+        assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "it fits its width"
+    with lead.expect_download() as told:
+        lead.get_by_text("Votes and progress as CSV").click()
+    rows = told.value.path().read_text().splitlines()
+    assert rows[0].startswith("number,name,kind") and ",A,B," in rows[1]
+    assert faults == []
+    phone.context.close()
+    lead.context.close()

@@ -1,0 +1,207 @@
+"""The state of a class as data: its step, its vote, and who is in it. Each method returns the next state."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+from app.classes.member import Kind, Member
+from app.link.exercise import Answer, Lecture, LessonPlace
+from lessons.teaching.lesson import Step
+from lessons.teaching.poll import Poll
+from lessons.teaching.prediction import Choice, Sketch, Value
+from robots import InputError
+
+MEMBERS = 2000
+"""Largest number of people in a class."""
+Stage = Literal["waiting", "open", "closed", "running", "decided"]
+"""Before a vote; while it takes votes; after it; while the robot runs; when the run has decided."""
+
+
+@dataclass(frozen=True)
+class Held:
+    """A vote that was held. truth: what the run measured; NaN if it did not run."""
+
+    place: LessonPlace
+    poll: Poll
+    truth: float
+
+
+@dataclass(frozen=True)
+class Gathering:
+    """A class.
+
+    Attributes:
+        named: whether people are asked for their names.
+        place: the step that the teacher chose.
+        poll: its vote, if one was opened.
+        truth: what its run measured; NaN before.
+        running: whether the step runs.
+        stays: whether learners stay at this step until the teacher goes on.
+        everywhere: whether the step runs on all pages; otherwise on the teacher's robot alone.
+        members: by an identity that only their page and the server know.
+        past: earlier votes.
+    """
+
+    named: bool = True
+    place: LessonPlace | None = None
+    poll: Poll | None = None
+    truth: float = math.nan
+    running: bool = False
+    stays: bool = False
+    everywhere: bool = True
+    members: Mapping[str, Member] = field(default_factory=dict)
+    past: tuple[Held, ...] = ()
+
+    @property
+    def stage(self) -> Stage:
+        if self.running:
+            return "running"
+        if not math.isnan(self.truth):
+            return "decided"
+        if self.poll is None:
+            return "waiting"
+        return "open" if self.poll.is_open else "closed"
+
+    @property
+    def votes(self) -> tuple[Held, ...]:
+        """All votes that anybody took part in, the present one last."""
+        if self.place is None or self.poll is None or not any(self.poll.rounds):
+            return self.past
+        return (*self.past, Held(self.place, self.poll, self.truth))
+
+    # ---------------------------------------------------------------- the teacher
+
+    def going_to(self, place: LessonPlace) -> Gathering:
+        """The class at another step, or at the same one from its beginning."""
+        return replace(self, place=place, poll=None, truth=math.nan, running=False, past=self.votes)
+
+    def opened(self) -> Gathering:
+        """The class with an open vote, its first or its second. Raises InputError if there is nothing to vote
+        on, or if the run has already shown the answer."""
+        asked = question_of(self.place)
+        if self.stage in ("running", "decided"):
+            raise InputError("this step has run: choose it again for a new vote, or choose another one")
+        return replace(self, poll=Poll(asked) if self.poll is None else self.poll.again())
+
+    def closed(self) -> Gathering:
+        """The class after its vote. Raises InputError if no vote is open."""
+        if self.poll is None or not self.poll.is_open:
+            raise InputError("no vote is open")
+        return replace(self, poll=self.poll.closed())
+
+    def started(self) -> Gathering:
+        """The class while its step runs; this closes the vote. Raises InputError without a step."""
+        if self.place is None:
+            raise InputError("choose a step first")
+        return replace(
+            self, running=True, truth=math.nan, poll=None if self.poll is None else self.poll.closed()
+        )
+
+    def measured(self, truth: float) -> Gathering:
+        """The class after the run. truth: the measured number; NaN if the step measures none."""
+        return replace(self, running=False, truth=truth)
+
+    def guess(self) -> Answer | None:
+        """The prediction with which a robot runs whose learner made none: the class's favourite. None if the
+        step asks for none."""
+        prediction = None if self.place is None else _prediction(self.place)
+        match prediction:
+            case None:
+                return None
+            case Sketch() as wanted:
+                return ((0.0, wanted.low), (wanted.until, wanted.low))
+            case Choice():
+                return int((self.poll or Poll(prediction)).favourite())
+            case Value():
+                return float((self.poll or Poll(prediction)).favourite())
+
+    # ---------------------------------------------------------------- the members
+
+    def entered(self, who: str, kind: Kind, now: float) -> Gathering:
+        """The class with one more member, or with one who came back. Raises InputError if it is full; a phone
+        that left without a vote makes room."""
+        known = self.members.get(who)
+        if known is not None:
+            return self if known.here else self._with(who, replace(known, here=True))
+        members = self.members
+        if len(members) >= MEMBERS:
+            voted = {voter for held in self.votes for votes in held.poll.rounds for voter in votes}
+            gone = next(
+                (one for one, each in members.items() if not (each.here or each.done or one in voted)), None
+            )
+            if gone is None:
+                raise InputError(f"this class has {MEMBERS} people, and takes no more")
+            members = {one: each for one, each in members.items() if one != gone}
+        number = 1 + max((each.number for each in members.values()), default=0)
+        return replace(self, members={**members, who: Member(number, kind, now)})
+
+    def left(self, who: str) -> Gathering:
+        """The class after a page was closed. Votes and progress stay."""
+        known = self.members.get(who)
+        return self if known is None or not known.here else self._with(who, replace(known, here=False))
+
+    def succeeded(self, who: str, before: Sequence[str]) -> Gathering:
+        """The class after a learner who had left came back under another identity."""
+        old = next((one for one in reversed(before) if one in self.members), who)
+        if old == who or self.members[old].here or who in self.members:
+            return self
+        members = {who if one == old else one: each for one, each in self.members.items()}
+        past = tuple(replace(held, poll=_handed_on(held.poll, old, who)) for held in self.past)
+        poll = None if self.poll is None else _handed_on(self.poll, old, who)
+        return replace(self, members=members, past=past, poll=poll)
+
+    def called(self, who: str, name: str) -> Gathering:
+        """The class after a member typed a name, which is ignored if the class goes without names."""
+        known = self.members.get(who)
+        return self if known is None or not self.named else self._with(who, known.named(name))
+
+    def voted(self, who: str, answer: object, now: float) -> Gathering:
+        """The class after a vote. Raises InputError if it cannot be counted."""
+        if self.poll is None:
+            raise InputError("no vote is open: wait for your teacher")
+        poll, known = self.poll.with_vote(who, answer), self.members.get(who)
+        if poll is self.poll or known is None:
+            return self
+        return replace(self._with(who, replace(known, since=now)), poll=poll)
+
+    def seen(self, who: str, at: LessonPlace | None, lecture: Lecture | None, now: float) -> Gathering:
+        """The class after a look at a learner's page, whose prediction is their vote while one is open."""
+        known = self.members.get(who)
+        if known is None:
+            return self
+        member = known.seen(at, lecture, now)
+        after = self if member is known else self._with(who, member)
+        if lecture is None or lecture.exercise != self.place or self.poll is None or not self.poll.is_open:
+            return after
+        try:
+            return after if lecture.answer is None else after.voted(who, lecture.answer, now)
+        except InputError:
+            return after  # there are too many voters, which their page need not know
+
+    def _with(self, who: str, member: Member) -> Gathering:
+        return replace(self, members={**self.members, who: member})
+
+
+def question_of(place: LessonPlace | None) -> Choice | Value:
+    """The question of a step that can be voted on. Raises InputError if there is none."""
+    if place is None:
+        raise InputError("choose a step first")
+    found = _prediction(place)
+    if isinstance(found, Sketch):
+        raise InputError("this step asks for a curve, which is not counted: let everybody draw, then run")
+    if found is None:
+        raise InputError("this step asks nothing beforehand: run it, or choose another one")
+    return found
+
+
+def _handed_on(poll: Poll, old: str, new: str) -> Poll:
+    rounds = tuple({new if one == old else one: vote for one, vote in votes.items()} for votes in poll.rounds)
+    return replace(poll, rounds=rounds)
+
+
+def _prediction(place: LessonPlace) -> Choice | Value | Sketch | None:
+    part = place.part
+    return part.prediction if isinstance(part, Step) else None

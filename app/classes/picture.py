@@ -1,0 +1,34 @@
+"""The teacher's robot as a few numbers, for pages that draw it without a library."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from robots import Robot
+from robots.cover import cover_of
+
+Shape = dict[str, Any]
+
+
+def shape_of(robot: Robot) -> Shape:
+    """The capsules of a robot: joint (0 for the base), both ends in the joint's axes and radius, mm."""
+    return {
+        "name": robot.name,
+        "capsules": [
+            [each.joint, *(round(1e3 * x) for x in (*each.start, *each.end, each.radius))]
+            for each in cover_of(robot).capsules
+        ],
+    }
+
+
+def pose_of(t: float, poses: np.ndarray) -> Shape:
+    """Simulated time, s, and the poses (n + 1, 7) of joints and hand: position, mm, and quaternion wxyz."""
+    return {
+        "t": round(t, 2),
+        "joints": [
+            [*(round(1e3 * float(x)) for x in each[:3]), *(round(float(x), 3) for x in each[3:])]
+            for each in poses
+        ],
+    }

@@ -1,0 +1,48 @@
+"""The learners' pages, each of which shows what the class does."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+
+from app.classes.gathering import Gathering
+from app.classes.views import View, for_all
+
+
+class Seats:
+    """What shows a view on each learner's page, and the view that it shows now."""
+
+    def __init__(self, vote: str) -> None:
+        """vote: the page on which watchers vote; "" if learners have robots of their own."""
+        self._vote = vote
+        self._lock = threading.Lock()
+        self._seats: dict[str, tuple[Callable[[View], object], View | None]] = {}
+
+    def sit(self, who: str, show: Callable[[View], object]) -> None:
+        """Shows the class on a learner's page from now on. show: takes a view whenever it changes."""
+        with self._lock:
+            self._seats[who] = show, None
+
+    def rise(self, who: str) -> None:
+        """Called when a learner's page was closed."""
+        with self._lock:
+            self._seats.pop(who, None)
+
+    def show(self, state: Gathering) -> None:
+        """Shows the class on all pages on which it has changed."""
+        with self._lock:
+            seats = list(self._seats.items())
+        everybody = for_all(state)
+        for who, (show, shown) in seats:
+            member = state.members.get(who)
+            away = member is not None and state.place not in (None, member.at)
+            view = {**everybody, "voted": 0, "away": away, "vote": self._vote}
+            if view == shown:
+                continue
+            try:
+                show(view)
+            except Exception:
+                continue  # the page is being built anew, or was closed
+            with self._lock:
+                if who in self._seats and self._seats[who][0] is show:
+                    self._seats[who] = show, view

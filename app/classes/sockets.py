@@ -1,0 +1,203 @@
+"""The connections of a class: phones that vote and watch, and the teacher's page. All of this runs on the
+server's loop."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import msgspec
+from websockets.asyncio.server import broadcast
+from websockets.exceptions import ConnectionClosed
+
+from app.classes.hall import Hall
+from app.classes.pages import qr
+from app.classes.views import View
+from app.classes.words import (
+    CastVote,
+    GoTo,
+    Hello,
+    Here,
+    OfTeacher,
+    OpenState,
+    Press,
+    SetClass,
+    TypedName,
+    of_phone,
+    of_teacher,
+)
+from app.client.state_code import code_of
+from app.link.choice import SceneChoice
+from lessons.replay.state import decode
+from robots import InputError
+
+PAUSE = 0.2
+"""Time, s, between two messages of one page that are read."""
+_UNSENT = 64_000  # B that may wait for a slow page before pictures are left out
+_COUNTED = "Counted. You can change it until the vote is closed."
+_NONSENSE = "this page sent something that the class does not understand: reload it"
+
+
+class Line(Protocol):
+    """A connection whose messages are limited in length and number."""
+
+    async def recv_short(self) -> str | bytes:
+        """The next message. Raises ConnectionClosed at the end."""
+        ...
+
+    async def send(self, message: str) -> None: ...
+
+
+class Sockets:
+    """The open pages of a class."""
+
+    def __init__(self, hall: Hall, address: Callable[[], str]) -> None:
+        """address: the address of the server for other machines."""
+        self._hall, self._address = hall, address
+        self._phones: dict[Any, str] = {}  # seat by connection
+        self._teachers: set[Any] = set()
+        self._said: dict[str, str] = {}
+        self._behind: set[Any] = set()
+        """Pages that were too slow for the last news; they get all of it as soon as they can."""
+        self._loop: asyncio.AbstractEventLoop | None = None
+
+    def start(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Begins to send pictures and news to all pages."""
+        self._loop = loop
+        self._hall.start(self._tell)
+
+    def close(self) -> None:
+        """Stops sending."""
+        self._hall.close()
+
+    # ---------------------------------------------------------------- one page
+
+    async def phone(self, line: Line) -> None:
+        """Serves a phone until its page is closed."""
+        seat = ""
+        try:
+            while True:
+                try:
+                    seat, answer = self._of_phone(line, seat, await line.recv_short())
+                except InputError as error:
+                    answer = {"say": _sentence(error)}
+                await line.send(json.dumps(answer))
+                await asyncio.sleep(PAUSE)
+        except ConnectionClosed:
+            pass
+        finally:
+            if self._phones.pop(line, None) is not None and seat not in self._phones.values():
+                self._hall.leave(seat)
+
+    def _of_phone(self, line: Line, seat: str, raw: str | bytes) -> tuple[str, View]:
+        said = _understood(of_phone, raw)
+        match said:
+            case Hello():
+                seat = self._hall.enter(said.seat)
+                self._phones[line] = seat
+                news = {"all": self._hall.everybody(), "seat": seat, "mine": self._hall.mine(seat)}
+                return seat, {**news, "pose": self._hall.pose(), "name": self._hall.name_of(seat)}
+            case _ if not seat:
+                raise InputError(_NONSENSE)
+            case CastVote(answer):
+                self._hall.vote(seat, answer)
+                return seat, {"mine": self._hall.mine(seat), "say": _COUNTED}
+            case TypedName(name):
+                self._hall.call(seat, name)
+                return seat, {"name": self._hall.name_of(seat)}
+            case _:
+                raise InputError(_NONSENSE)
+
+    async def teacher(self, line: Line) -> None:
+        """Serves a page of the teacher until it is closed."""
+        self._teachers.add(line)
+        try:
+            await line.send(json.dumps(self._greeting()))
+            while True:
+                try:
+                    answer = await self._of_teacher(_understood(of_teacher, await line.recv_short()))
+                except InputError as error:
+                    answer = {"say": _sentence(error)}
+                await line.send(json.dumps({"say": "", **answer, **self._news()}))
+        except ConnectionClosed:
+            pass
+        finally:
+            self._teachers.discard(line)
+
+    def _greeting(self) -> View:
+        return {"course": self._hall.course, "address": self._phones_at(""), **self._news()}
+
+    def _news(self) -> View:
+        return {"all": self._hall.everybody(), "class": self._hall.teachers(), "pose": self._hall.pose()}
+
+    def _phones_at(self, address: str) -> View:
+        whole = f"{(address or self._address()).rstrip('/')}/v/{self._hall.code}"
+        return {"text": whole, "qr": qr(whole)}
+
+    async def _of_teacher(self, said: OfTeacher) -> View:
+        hall = self._hall
+        match said:
+            case GoTo(lesson, place):
+                await asyncio.to_thread(hall.go, hall.place(lesson, place))
+            case Press("open"):
+                hall.open_vote()
+            case Press("close"):
+                hall.close_vote()
+            case Press("run"):
+                await asyncio.to_thread(hall.run)
+            case Press("back"):
+                await asyncio.to_thread(hall.show_step)
+            case Press():
+                raise InputError(_NONSENSE)
+            case SetClass(stays, everywhere):
+                hall.set(stays, everywhere)
+            case OpenState(number):
+                return {"code": await asyncio.to_thread(self._open, number), "of": number}
+            case Here(address):
+                return {"address": self._phones_at(address)}
+        return {}
+
+    def _open(self, number: int) -> str:
+        """Loads the state of a learner into the teacher's robot, and returns its code."""
+        told = self._hall.learner(number).ask()
+        if told is None:
+            raise InputError("the robot of this learner does not answer")
+        code = code_of(told)
+        self._hall.robot.load(SceneChoice.of_state(decode(code)))
+        return code
+
+    # ---------------------------------------------------------------- all pages
+
+    def _tell(self) -> None:
+        """Called on the thread of the class after every look."""
+        news = {name: json.dumps(each) for name, each in self._news().items() if each is not None}
+        loop = self._loop
+        if loop is not None and not loop.is_closed():
+            loop.call_soon_threadsafe(self._spread, news)
+
+    def _spread(self, news: dict[str, str]) -> None:
+        changed = {name: text for name, text in news.items() if self._said.get(name) != text}
+        self._said = news
+        for lines, names in ((self._phones, ("all", "pose")), (self._teachers, ("all", "class", "pose"))):
+            slow = {line for line in lines if line.transport.get_write_buffer_size() > _UNSENT}
+            again = self._behind.intersection(lines) - slow
+            for some, told in ((again, news), (set(lines) - slow - again, changed)):
+                text = ",".join(f'"{name}":{told[name]}' for name in names if name in told)
+                if text and some:
+                    broadcast(some, f"{{{text}}}")
+            self._behind = (self._behind - again) | slow
+        self._behind &= {*self._phones, *self._teachers}
+
+
+def _sentence(error: InputError) -> str:
+    text = str(error)
+    return f"{text[:1].upper()}{text[1:]}."
+
+
+def _understood(decoder: msgspec.json.Decoder[Any], raw: str | bytes) -> Any:
+    try:
+        return decoder.decode(raw)
+    except (msgspec.MsgspecError, UnicodeError, RecursionError):
+        raise InputError(_NONSENSE) from None

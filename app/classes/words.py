@@ -1,0 +1,72 @@
+"""The messages that the pages of a class may send. Everything else is refused."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
+
+LONGEST = 2000
+"""Largest message, B."""
+
+Short = Annotated[str, Meta(max_length=100)]
+Number = Annotated[float, Meta(ge=-1e12, le=1e12)]
+
+
+class Hello(msgspec.Struct, forbid_unknown_fields=True, tag_field="do", tag="hello"):
+    """A phone's first message. seat: the one it got at an earlier visit."""
+
+    seat: Short = ""
+
+
+class CastVote(msgspec.Struct, forbid_unknown_fields=True, tag_field="do", tag="vote"):
+    """A vote: the index of an option, or a number."""
+
+    answer: int | Number
+
+
+class TypedName(msgspec.Struct, forbid_unknown_fields=True, tag_field="do", tag="name"):
+    """The name that somebody typed."""
+
+    name: Short
+
+
+class GoTo(msgspec.Struct, forbid_unknown_fields=True, tag_field="do", tag="go"):
+    """The teacher's step, 0 for the first."""
+
+    lesson: Short
+    place: Annotated[int, Meta(ge=0, le=1000)]
+
+
+class Press(msgspec.Struct, forbid_unknown_fields=True, tag_field="do", tag="press"):
+    """One of the teacher's buttons: open, close, run, back."""
+
+    button: Short
+
+
+class SetClass(msgspec.Struct, forbid_unknown_fields=True, tag_field="do", tag="set"):
+    """The teacher's settings, see `app.classes.gathering.Gathering`."""
+
+    stays: bool
+    everywhere: bool
+
+
+class OpenState(msgspec.Struct, forbid_unknown_fields=True, tag_field="do", tag="state"):
+    """The number of the member whose state the teacher opens."""
+
+    number: Annotated[int, Meta(ge=0, le=2**31)]
+
+
+class Here(msgspec.Struct, forbid_unknown_fields=True, tag_field="do", tag="here"):
+    """The address of the teacher's page, without its query; empty if it is only valid on the teacher's
+    machine."""
+
+    address: Annotated[str, Meta(max_length=300)]
+
+
+OfPhone = Hello | CastVote | TypedName
+OfTeacher = GoTo | Press | SetClass | OpenState | Here
+
+of_phone = msgspec.json.Decoder(OfPhone)
+of_teacher = msgspec.json.Decoder(OfTeacher)

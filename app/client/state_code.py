@@ -1,0 +1,35 @@
+"""The setting of a page as a state and as a code."""
+
+from __future__ import annotations
+
+from app.link.choice import SceneChoice
+from app.link.messages import Told
+from lessons.replay.state import State, encode, state_of
+from robots import InputError
+
+
+def code_of(told: Told) -> str:
+    """The state code of the setting. Raises InputError if a state code cannot contain it."""
+    return encode(state_now(told))
+
+
+def state_now(told: Told) -> State:
+    """The setting on a page. Raises InputError for a robot that was uploaded."""
+    choice = from_a_name(told.choice)
+    exercise = choice.exercise
+    return state_of(
+        choice.run,
+        told.settings,
+        lesson=None if exercise is None else exercise.lesson,
+        step=None if exercise is None else exercise.place + 1,
+    )
+
+
+def from_a_name(choice: SceneChoice) -> SceneChoice:
+    """The choice itself. Raises InputError if its robot was uploaded."""
+    if choice.urdf_text is not None:
+        raise InputError(
+            "a code cannot contain this robot, which was uploaded: save its file and "
+            "start himpc-lab with --urdf"
+        )
+    return choice

@@ -1,0 +1,90 @@
+"""Who may open the pages of a class: the owner's secret opens the teacher's page, and the class's code gives
+only the right to vote and to watch."""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from http import HTTPStatus
+from typing import Any
+from urllib.parse import urlsplit
+
+from websockets.http11 import Request
+
+from app.classes.hall import Hall
+from app.classes.pages import PageName, page, policy
+from app.classes.sockets import Sockets
+from app.classes.table import table
+from app.server.door import Answer, Door, is_upgrade
+from app.server.passes import QUERY
+
+TEACHER, TABLE, PHONES = "/class", "/class.csv", "/v/"
+_NOT_KEPT = ("Cache-Control", "no-store")
+
+
+@dataclass(frozen=True)
+class Served:
+    """A response of a class.
+
+    Attributes:
+        kind: of `text`.
+        serve: serves the connection, if the request is an upgrade.
+    """
+
+    status: HTTPStatus
+    kind: str
+    text: str
+    headers: tuple[tuple[str, str], ...]
+    serve: Callable[[Any], Awaitable[None]]
+
+
+@dataclass(frozen=True)
+class ClassDoor:
+    """The pages of a class and who may open them."""
+
+    hall: Hall
+    sockets: Sockets
+
+    def has(self, path: str) -> bool:
+        """Whether an address is one of the class's."""
+        plain = urlsplit(path).path
+        return plain in (TEACHER, TABLE) or plain.startswith(PHONES)
+
+    def answer(self, door: Door, request: Request, who: str) -> Answer | Served:
+        """The response to a request that names this server and comes from one of its pages. who: identifies
+        the sender, see `app.server.peers`."""
+        plain, host = urlsplit(request.path).path, request.headers["Host"]
+        if plain.startswith(PHONES):
+            given = plain.removeprefix(PHONES).encode(errors="replace")
+            if not secrets.compare_digest(given, self.hall.code.encode()):
+                return _NO_CLASS
+            return _page("phone", host, self.sockets.phone)
+        if QUERY in request.path and not is_upgrade(request):
+            return door.judge(request, who) or _NOT_THE_TEACHER  # it puts the secret into a cookie
+        if door.role(request, who) != "owner":
+            return _NOT_THE_TEACHER
+        if plain == TEACHER:
+            return _page("teacher", host, self.sockets.teacher)
+        kept = (("Content-Disposition", 'attachment; filename="class.csv"'),)
+        text = table(self.hall.state)
+        return Served(HTTPStatus.OK, "text/csv; charset=utf-8", text, kept, self.sockets.teacher)
+
+
+def _page(name: PageName, host: str, serve: Callable[[Any], Awaitable[None]]) -> Served:
+    headers = (("Content-Security-Policy", policy(name, host)),)
+    return Served(HTTPStatus.OK, "text/html; charset=utf-8", page(name), headers, serve)
+
+
+_NO_CLASS = Answer(
+    HTTPStatus.FORBIDDEN,
+    "There is no such class",
+    "<p>Each start of a class has a new address: scan the code on the projector again.</p>",
+    (_NOT_KEPT,),
+)
+_NOT_THE_TEACHER = Answer(
+    HTTPStatus.FORBIDDEN,
+    "This is the teacher's page",
+    "<p>Open the whole address that himpc-lab printed behind <i>teacher</i> when it was started.</p>",
+    (_NOT_KEPT,),
+)

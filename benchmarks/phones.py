@@ -1,0 +1,218 @@
+"""The cost of a lecture hall: phones that vote and watch the teacher's robot.
+
+    python -m benchmarks.phones [--phones 200] [--scene S] [--seconds S] [--json -]
+
+Starts a server with a class and, in a process of their own, phones that use the page's protocol and draw
+nothing. The teacher's robot moves all the time, so that each phone gets five pictures a second; then all
+phones vote at once, twice. Exit code 0 if the server, without the robot's own process, needs at most one core
+and every vote was counted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import json
+import subprocess
+import sys
+import time
+from math import sqrt
+from statistics import quantiles
+from typing import Any
+
+import psutil
+from websockets.asyncio.client import ClientConnection, connect
+
+from app.link.choice import SceneChoice
+from app.link.exercise import LessonPlace
+from app.link.process import wait_until
+from app.server.server import PageServer
+from lessons.scenes.run_spec import RunSpec
+
+LONG = 120.0  # s
+STEP = LessonPlace("a-redundant-arm", 0)
+
+
+def main() -> int:
+    """Measures as the command line says."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--phones", type=int, default=200)
+    parser.add_argument("--scene", default="iiwa14-circle")
+    parser.add_argument("--seconds", type=float, default=20.0)
+    parser.add_argument("--json", choices=["-"], default=None)
+    parser.add_argument("--at", default=None, help="be the phones of the class at this address")
+    options = parser.parse_args()
+    if options.at is not None:
+        asyncio.run(be_phones(options.at, options.phones))
+        return 0
+    server = PageServer(
+        SceneChoice(RunSpec(options.scene)), port=0, max_sessions=1, classroom=True, class_names=True
+    )
+    try:
+        found = measured(server, options.phones, options.seconds)
+    finally:
+        server.close()
+    print(json.dumps(found, indent=1) if options.json else table(found))
+    return 0 if found["server_share"] <= 1.0 and found["counted"] == [options.phones] * 2 else 1
+
+
+# ------------------------------------------------------------------ the phones
+
+
+async def be_phones(address: str, count: int) -> None:
+    """Connects all phones. A line on stdin begins to count pictures; the next one ends that; each further one
+    is a vote, after which a line tells what was measured."""
+    phones = await asyncio.gather(*(Phone.open(address, k) for k in range(count)))
+    _tell(phones=len(phones))
+    await _line()
+    before, began = [phone.poses for phone in phones], time.monotonic()
+    await _line()
+    spent = time.monotonic() - began
+    rates = [(phone.poses - then) / spent for phone, then in zip(phones, before, strict=True)]
+    size = sum(phone.bytes for phone in phones) / count / spent
+    _tell(
+        slowest_hz=round(min(rates), 2),
+        fastest_hz=round(max(rates), 2),
+        kilobytes_per_s=round(1e-3 * size, 2),
+    )
+    while await _line():
+        waits = await asyncio.gather(*(phone.vote() for phone in phones))
+        _tell(median_ms=round(1e3 * quantiles(waits)[1]), longest_ms=round(1e3 * max(waits)))
+
+
+class Phone:
+    """A phone. poses, bytes: what it has received so far."""
+
+    def __init__(self, line: ClientConnection, number: int) -> None:
+        self._line, self._number = line, number
+        self.poses = self.bytes = 0
+        self._asked: dict[str, Any] = {}
+        self._answer: asyncio.Future[None] | None = None
+        self._reader = asyncio.ensure_future(self._read())
+
+    @classmethod
+    async def open(cls, address: str, number: int) -> Phone:
+        """A phone that said hello."""
+        await asyncio.sleep(0.01 * number)
+        line = await connect(address, max_size=None, open_timeout=LONG, ping_interval=None)
+        await line.send('{"do":"hello"}')
+        await line.recv()
+        return cls(line, number)
+
+    async def _read(self) -> None:
+        async for text in self._line:
+            self.bytes += len(text)
+            told = json.loads(text)
+            self.poses += "pose" in told
+            self._asked = told.get("all", {}).get("asked") or self._asked
+            if "say" in told and self._answer is not None and not self._answer.done():
+                self._answer.set_result(None)
+
+    async def vote(self) -> float:
+        """Votes; returns the time until the answer, s."""
+        self._answer = asyncio.get_running_loop().create_future()
+        began = time.monotonic()
+        options, scale = self._asked.get("options"), self._asked.get("scale")
+        answer = self._number % len(options or (0,)) if scale is None else sqrt(scale["low"] * scale["high"])
+        await self._line.send(json.dumps({"do": "vote", "answer": answer}))
+        await self._answer
+        return time.monotonic() - began
+
+
+async def _line() -> bool:
+    return bool(await asyncio.to_thread(sys.stdin.readline))
+
+
+def _tell(**found: float) -> None:
+    sys.stdout.write(json.dumps(found) + "\n")
+    sys.stdout.flush()
+
+
+# ------------------------------------------------------------------ the server
+
+
+class Crowd:
+    """The phones, in a process of their own."""
+
+    def __init__(self, *arguments: str) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "benchmarks.phones", *arguments],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        self.pid = self._process.pid
+
+    def go_on(self) -> None:
+        """Begins the next thing that the phones do, see `be_phones`."""
+        assert self._process.stdin is not None
+        self._process.stdin.write("go on\n")
+        self._process.stdin.flush()
+
+    def hear(self) -> dict[str, float]:
+        """What the phones tell next."""
+        assert self._process.stdout is not None
+        return json.loads(self._process.stdout.readline())
+
+    def __enter__(self) -> Crowd:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._process.kill()
+        self._process.wait()
+
+
+def measured(server: PageServer, count: int, seconds: float) -> dict[str, Any]:
+    """The server's share of a core while all phones watch, and how long they wait for their votes."""
+    hall = server.hall
+    assert hall is not None
+    address = f"{server.url.replace('http', 'ws')}/v/{hall.code}"
+    with Crowd("--phones", str(count), "--at", address) as phones:
+        assert phones.hear()["phones"] == count
+        assert wait_until(lambda: (hall.pose() or {"t": 0.0})["t"] > 0.5, LONG), "the robot does not move"
+        alone = psutil.Process(phones.pid)
+        phones.go_on()
+        busy, theirs, began = time.process_time(), sum(alone.cpu_times()[:2]), time.perf_counter()
+        time.sleep(seconds)
+        spent = time.perf_counter() - began
+        share, shares = (time.process_time() - busy) / spent, (sum(alone.cpu_times()[:2]) - theirs) / spent
+        phones.go_on()
+        watched = phones.hear()
+        hall.go(STEP)
+        assert wait_until(lambda: hall.robot.choice.exercise == STEP, LONG), "the step is not loaded"
+        counted, waits = [], []
+        for _ in range(2):
+            hall.open_vote()
+            time.sleep(1.0)  # until all phones have heard of it
+            phones.go_on()
+            waits.append(phones.hear())
+            hall.close_vote()
+            poll = hall.state.poll
+            counted.append(0 if poll is None else len(poll.latest))
+    return {
+        "phones": count,
+        "cores": psutil.cpu_count(),
+        "server_share": round(share, 3),
+        "phones_share": round(shares, 3),
+        **watched,
+        "votes": waits,
+        "counted": counted,
+        "load_average": round(psutil.getloadavg()[0], 1),
+    }
+
+
+def table(found: dict[str, Any]) -> str:
+    """The results as text."""
+    votes = "; ".join(
+        f"median {each['median_ms']} ms, longest {each['longest_ms']} ms" for each in found["votes"]
+    )
+    return (
+        f"{found['phones']} phones, {found['cores']} cores, load average {found['load_average']}\n"
+        f"server: {found['server_share']:.1%} of a core, at most 100 %; phones: {found['phones_share']:.1%}\n"
+        f"pictures: {found['slowest_hz']} to {found['fastest_hz']} Hz, {found['kilobytes_per_s']} kB/s each\n"
+        f"votes counted: {found['counted']}; until the answer: {votes}"
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,146 @@
+"""A poll: many people answer the prediction of a step, once or twice, before its run decides."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from lessons.teaching.prediction import Choice, Value
+from robots import InputError
+
+ROUNDS = 2
+"""A first vote, and a second one after people have talked."""
+VOTERS = 2000
+"""Largest number of people whose votes one poll holds."""
+_BARS = 8  # of a histogram of numbers
+
+
+@dataclass(frozen=True)
+class Bar:
+    """A bar of a histogram.
+
+    Attributes:
+        label: the option, or the interval of numbers.
+        count: number of votes.
+        right: whether the measured number is here; None before it is known.
+    """
+
+    label: str
+    count: int
+    right: bool | None = None
+
+
+@dataclass(frozen=True)
+class Poll:
+    """The votes on one question. A vote is the index of an option of a `Choice` or the number that a `Value`
+    asks for.
+
+    Attributes:
+        asked: the question.
+        rounds: the votes of each round by voter, the present round last.
+        is_open: whether the present round takes votes.
+    """
+
+    asked: Choice | Value
+    rounds: tuple[Mapping[str, float], ...] = ({},)
+    is_open: bool = True
+
+    @property
+    def latest(self) -> Mapping[str, float]:
+        """The votes of the present round."""
+        return self.rounds[-1]
+
+    def with_vote(self, voter: str, answer: object) -> Poll:
+        """The poll after a vote; a voter's later vote replaces the earlier one.
+
+        Raises:
+            InputError: the vote is closed, the answer is none of this question, or there are too many voters.
+        """
+        if not self.is_open:
+            raise InputError("the vote is closed: your answer was not counted")
+        vote = valid(self.asked, answer)
+        if voter not in self.latest and len(self.latest) >= VOTERS:
+            raise InputError(f"{VOTERS} people have voted, and this vote takes no more")
+        if self.latest.get(voter) == vote:
+            return self
+        return replace(self, rounds=(*self.rounds[:-1], {**self.latest, voter: vote}))
+
+    def closed(self) -> Poll:
+        """The poll after its present round; closing a closed poll changes nothing."""
+        return replace(self, is_open=False)
+
+    def again(self) -> Poll:
+        """The poll with one more round. Raises InputError while a round is open, and after the last one."""
+        if self.is_open:
+            raise InputError("the vote is open: close it before the second vote")
+        if len(self.rounds) >= ROUNDS:
+            raise InputError("this step has had its second vote: run it, or choose another step")
+        return replace(self, rounds=(*self.rounds, {}), is_open=True)
+
+    def favourite(self) -> float:
+        """The answer of most voters, or of the middle voter for a number; without votes the first option, or
+        the middle of the scale."""
+        votes = sorted(self.latest.values())
+        match self.asked:
+            case Choice():
+                return Counter(votes).most_common(1)[0][0] if votes else 0
+            case Value() as value:
+                return votes[len(votes) // 2] if votes else math.sqrt(value.low * value.high)
+
+    def right(self, truth: float, number: int = -1) -> int | None:
+        """How many votes of a round are right for the measured number; None if nothing was measured."""
+        hits = [self.asked.hits(vote, truth) for vote in self.rounds[number].values()]
+        known = self.asked.hits(self.favourite(), truth) is not None
+        return sum(map(bool, hits)) if known else None
+
+
+def valid(asked: Choice | Value, answer: object) -> float:
+    """The answer as a vote. Raises InputError if it is not one of this question."""
+    match asked:
+        case Choice() if type(answer) is int and 0 <= answer < len(asked.options):
+            return answer
+        case Choice():
+            raise InputError(f"this is no answer: choose one of the {len(asked.options)} options")
+        case Value() as value:
+            if isinstance(answer, (int, float)) and not isinstance(answer, bool):
+                slack = 1 + 1e-9  # a slider computes its ends with rounding
+                if value.low / slack <= answer <= value.high * slack:
+                    return float(min(max(answer, value.low), value.high))
+            raise InputError(
+                f"this is no answer: give a number from {value.low:g} to {value.high:g} {value.measure.unit}"
+            )
+
+
+def histogram(poll: Poll, number: int = -1, truth: float = math.nan) -> tuple[Bar, ...]:
+    """The bars of a round, by default the present one: one per option, or intervals of equal width on the
+    logarithmic scale. truth: the measured number, once it is known."""
+    asked, votes = poll.asked, poll.rounds[number].values()
+    match asked:
+        case Choice():
+            counts = Counter(map(int, votes))
+            right = asked.right(truth)
+            return tuple(
+                Bar(option.text, counts[k], None if right is None else k == right)
+                for k, option in enumerate(asked.options)
+            )
+        case Value() as value:
+            counts = Counter(_place(value, vote) for vote in votes)
+            known = math.isfinite(truth) and truth > 0
+            right = _place(value, min(max(truth, value.low), value.high)) if known else None
+            return tuple(
+                Bar(_interval(value, k), counts[k], None if right is None else k == right)
+                for k in range(_BARS)
+            )
+
+
+def _place(value: Value, vote: float) -> int:
+    share = math.log(vote / value.low) / math.log(value.high / value.low)
+    return min(int(share * _BARS), _BARS - 1)
+
+
+def _interval(value: Value, k: int) -> str:
+    ends = (value.low * (value.high / value.low) ** (each / _BARS) for each in (k, k + 1))
+    low, high = (f"{end:.2g}" if end < 100 else f"{end:.0f}" for end in ends)
+    return f"{low} to {high} {value.measure.unit}".rstrip()

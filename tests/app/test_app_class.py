@@ -1,0 +1,297 @@
+"""A class on a real server, with phones and a teacher that use its protocol."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import re
+from collections.abc import Iterator
+from typing import Any
+from urllib.parse import urlsplit
+
+import pytest
+from test_app_load import get
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import ClientConnection, connect
+
+from app.__main__ import main
+from app.classes.words import LONGEST
+from app.client.simulation_client import STAYING
+from app.link.choice import SceneChoice
+from app.link.exercise import LessonPlace
+from app.server.passes import QUERY
+from app.server.server import PageServer
+from browsing.wire import Wire, eventually
+from lessons.scenes.run_spec import RunSpec
+
+pytestmark = pytest.mark.usefixtures("one_fork_server")
+STEP = LessonPlace("a-redundant-arm", 0)
+LONG = 120.0
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[PageServer]:
+    running = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=2, class_names=True)
+    yield running
+    running.close()
+
+
+class Line:
+    """A page of the class. told: the latest of what the server sent."""
+
+    def __init__(self, address: str, **headers: str) -> None:
+        self.socket: ClientConnection = connect(
+            address.replace("http", "ws", 1), additional_headers=headers, max_size=None
+        )
+        self.told: dict[str, Any] = {}
+
+    def __enter__(self) -> Line:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.socket.close()
+
+    def send(self, **message: Any) -> None:
+        self.socket.send(json.dumps(message))
+
+    def hear(self, *names: str) -> dict[str, Any]:
+        """Waits for a message that contains one of the names."""
+        while True:
+            told = json.loads(self.socket.recv(timeout=LONG))
+            self.told |= told
+            if any(name in told for name in names):
+                return told
+
+    def until(self, name: str, key: str, value: object) -> dict[str, Any]:
+        """Waits until a part of what is told has a value."""
+        while self.told.get(name, {}).get(key) != value:
+            self.hear(name)
+        return self.told[name]
+
+
+def phone(server: PageServer) -> Line:
+    assert server.hall is not None
+    line = Line(f"{server.url}/v/{server.hall.code}")
+    line.send(do="hello")
+    line.hear("seat")
+    return line
+
+
+def teacher(server: PageServer) -> Line:
+    line = Line(server.teachers_link)
+    line.hear("course")
+    return line
+
+
+def test_the_address_decides_who_is_the_teacher(server: PageServer) -> None:
+    """The owner's secret opens the teacher's page and becomes a cookie; the token of guests and the code of
+    the class do not; the code opens the phones' page and nothing else."""
+    assert server.hall is not None
+    code = server.hall.code
+    status, headers, text = get(f"{server.url}/v/{code}")
+    assert status == 200 and "Vote" in text and "cookie" not in map(str.lower, headers)
+    policy = headers["Content-Security-Policy"]
+    assert "default-src 'none'" in policy and "frame-ancestors 'none'" in policy and "unsafe" not in policy
+    assert headers["X-Frame-Options"] == "DENY" and not re.search(r"""(src|href)=["'](https?:)?//""", text)
+    for path in ("/v/", "/v/xxxxxx", f"/v/{code}/", "/class", "/class.csv", f"/class?{QUERY}={code}"):
+        assert get(f"{server.url}{path}")[0] == 403, path
+    assert get(f"{server.url}/?{QUERY}={code}")[0] == 403, "the code admits nobody to the robots"
+    guests = server.guest_link.replace("/?", "/class?")
+    cookie = cookie_of(guests)
+    assert get(f"{server.url}/class", Cookie=cookie)[0] == 403
+    cookie = cookie_of(server.teachers_link)
+    status, _, text = get(f"{server.url}/class", Cookie=cookie)
+    assert status == 200 and "Open the vote" in text
+    for address, more in (
+        (f"{server.url}/class", {}),
+        (guests, {}),
+        (f"{server.url}/v/other1", {}),
+        (f"{server.url}/v/{code}", {"Origin": "http://evil.example"}),
+    ):
+        with pytest.raises(InvalidStatus) as refused:
+            Line(address, **more)
+        assert refused.value.response.status_code == 403
+
+
+def cookie_of(link: str) -> str:
+    """The cookie that a link sets before it leads to its page without the secret."""
+    import http.client
+
+    parts = urlsplit(link)
+    line = http.client.HTTPConnection(parts.hostname or "", parts.port, timeout=30)
+    line.request("GET", f"{parts.path}?{parts.query}")
+    answer = line.getresponse()
+    assert (answer.status, answer.headers["Location"]) == (303, "./class")
+    line.close()
+    return str(answer.headers["Set-Cookie"]).partition(";")[0]
+
+
+def test_a_lecture_from_the_step_to_who_was_right(server: PageServer) -> None:
+    """The teacher leads a learner with a robot and two phones through a step with two votes and its run."""
+    hall = server.hall
+    assert hall is not None
+    with teacher(server) as lead, Wire(server.guest_link) as page, phone(server) as one, phone(server) as two:
+        lead.send(do="here", address="http://lab.example:8080/prefix/")
+        shown = lead.hear("address")["address"]
+        assert shown["text"] == f"http://lab.example:8080/prefix/v/{hall.code}" and "<svg" in shown["qr"]
+        assert eventually(lambda: len(server.sessions.learners) == 1, LONG)
+        (learner,) = server.sessions.learners
+        assert eventually(lambda: page.find("Your name") is not None, LONG)
+        name = page.find("Your name")
+        assert name is not None
+        page.write(name, value="Zoë")
+        assert eventually(lambda: hall.name_of(learner.token) == "Zoë", LONG)
+        lead.send(do="go", lesson=STEP.lesson, place=STEP.place)
+        assert eventually(lambda: learner.choice.exercise == STEP and learner.lecture is not None, LONG)
+        assert eventually(lambda: page.shows("The vote is not open yet"), LONG)
+        one.send(do="vote", answer=0)
+        assert "No vote is open" in one.hear("say")["say"]
+
+        lead.send(do="press", button="open")
+        one.until("all", "stage", "open")
+        one.send(do="vote", answer=0)
+        assert one.hear("mine")["mine"] == 0
+        one.send(do="vote", answer=1)
+        assert one.hear("mine")["mine"] == 1, "a second vote replaces the first"
+        two.send(do="vote", answer="B")
+        assert "does not understand" in two.hear("say")["say"]
+        two.send(do="vote", answer=77)
+        assert "choose one of" in two.hear("say")["say"]
+        assert eventually(lambda: page.find("I expect") is not None, LONG)
+        buttons = page.find("I expect")
+        assert buttons is not None
+        page.write(buttons, value="A")
+        lead.until("all", "voted", 2)
+        assert lead.told["all"]["rounds"] == []
+
+        lead.send(do="press", button="close")
+        two.until("all", "stage", "closed")
+        two.send(do="vote", answer=0)
+        assert "was not counted" in two.hear("say")["say"]
+        (bars,) = two.told["all"]["rounds"]
+        assert [bar["count"] for bar in bars][:2] == [1, 1]
+        assert eventually(lambda: page.shows("The vote is closed"), LONG)
+
+        lead.send(do="press", button="open")
+        two.until("all", "round", 2)
+        two.send(do="vote", answer=0)
+        assert two.hear("mine")["mine"] == 0
+        lead.until("all", "voted", 2)  # the learner's prediction still counts
+        lead.send(do="press", button="run")
+        told = two.until("all", "stage", "decided")
+        assert told["result"].startswith("The run gave ") and "In the first vote:" in told["result"]
+        assert sum(bar["right"] for bar in told["rounds"][-1]) == 1
+        assert two.told["pose"]["joints"] and told["robot"]["capsules"]
+        assert eventually(lambda: learner.lecture is not None and learner.lecture.phase == "done", LONG)
+        while not lead.hear("class")["class"]["rows"][0]["done"]:
+            pass
+        (row,) = lead.told["class"]["rows"]
+        assert (row["name"], row["vote"], row["done"], row["met"] > 0) == ("Zoë", "A", 1, True)
+        assert lead.told["class"]["phones"] == 2
+
+        lead.send(do="state", number=row["number"])
+        assert lead.hear("code")["code"].startswith("hl1-")
+        lead.send(do="state", number=9999)
+        assert "has left" in lead.hear("say")["say"]
+    status, headers, text = get(f"{server.url}/class.csv", Cookie=cookie_of(server.teachers_link))
+    assert status == 200 and "attachment" in headers["Content-Disposition"]
+    rows = [row for row in csv.DictReader(io.StringIO(text)) if row["lesson"]]
+    assert sorted((row["name"], row["first vote"], row["second vote"]) for row in rows) == [
+        ("", "", "A"),
+        ("", "B", ""),
+        ("Zoë", "A", "A"),
+    ]
+
+
+def test_learners_stay_or_go_ahead_as_the_teacher_sets(server: PageServer) -> None:
+    hall = server.hall
+    assert hall is not None
+    with teacher(server) as lead, Wire(server.guest_link) as page:
+        assert eventually(lambda: any(each.attached for each in server.sessions.learners), LONG)
+        learner = next(each for each in server.sessions.learners if each.attached)
+        lead.send(do="go", lesson=STEP.lesson, place=1)
+        there = LessonPlace(STEP.lesson, 1)
+        assert eventually(lambda: learner.choice.exercise == there and learner.lecture is not None, LONG)
+        lead.send(do="press", button="run")
+
+        def over() -> bool:
+            lecture = learner.lecture
+            return lecture is not None and (lecture.exercise, lecture.phase) == (there, "done")
+
+        assert eventually(over, LONG), "a step that follows in the same lesson runs on all pages"
+        lead.send(do="set", stays=True, everywhere=False)
+        lead.until("class", "stays", True)
+        learner.load(learner.choice.at(STEP))
+        assert eventually(lambda: any(body == STAYING for _, body in list(page.notices)), LONG)
+        assert learner.choice.exercise == there
+        lead.send(do="set", stays=False, everywhere=True)
+        lead.until("class", "stays", False)
+        learner.load(learner.choice.at(STEP))
+        assert eventually(lambda: learner.choice.exercise == STEP, LONG)
+        assert eventually(lambda: page.find("Go to the class's step") is not None, LONG)
+        hall.fetch(learner.token)
+        assert eventually(lambda: learner.choice.exercise == there, LONG)
+
+
+def test_what_a_stranger_sends_ends_their_page_alone(server: PageServer) -> None:
+    """Megabytes, floods and nonsense: one answer, and another phone is answered as before."""
+    with phone(server) as good:
+        with phone(server) as bad:
+            bad.socket.send("x" * 1_000_000)
+            with pytest.raises(ConnectionClosed) as ended:
+                while True:
+                    bad.socket.recv(timeout=LONG)
+            assert ended.value.rcvd is not None and ended.value.rcvd.code == 1009
+        with phone(server) as bad:
+            for each in (
+                "",
+                "[" * LONGEST,
+                '{"do":"vote"}',
+                '{"do":"press","button":"open"}',
+                "\ud7ff",
+                b"\xff\xfe",
+            ):
+                bad.socket.send(each)
+                assert "does not understand" in bad.hear("say")["say"]
+        with phone(server) as bad:
+            for _ in range(3000):
+                try:
+                    bad.socket.send('{"do":"vote","answer":0}')
+                except ConnectionClosed:
+                    break
+            for _ in range(3):
+                good.send(do="vote", answer=0)
+                assert good.hear("say")["say"]
+
+
+def test_a_phone_that_comes_back_has_its_seat(server: PageServer) -> None:
+    assert server.hall is not None
+    with phone(server) as one:
+        seat = one.told["seat"]
+    with Line(f"{server.url}/v/{server.hall.code}") as again:
+        again.send(do="vote", answer=0)
+        assert "does not understand" in again.hear("say")["say"], "it has not said hello"
+        again.send(do="hello", seat=seat)
+        assert again.hear("seat")["seat"] == seat
+        again.send(do="hello", seat="one that nobody has")
+        assert again.hear("seat")["seat"] not in ("one that nobody has", seat)
+
+
+def test_a_server_without_a_class_has_none_of_its_pages(one_fork_server: None) -> None:
+    server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
+    try:
+        assert get(f"{server.url}/class")[0] == get(f"{server.url}/v/abcdef")[0] == 403
+    finally:
+        server.close()
+
+
+def test_the_command_starts_a_class(monkeypatch: pytest.MonkeyPatch) -> None:
+    from app.server import server
+
+    asked: dict[str, Any] = {}
+    monkeypatch.setattr(server, "serve", lambda _, **options: asked.update(options) or 0)
+    for given, names in (([], None), (["--class"], True), (["--class", "--no-names"], False)):
+        assert main(["--no-browser", *given]) == 0
+        assert asked["class_names"] is names
+    assert main(["--no-browser", "--no-names"]) == 2
