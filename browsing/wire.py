@@ -5,7 +5,7 @@ from __future__ import annotations
 import http.client
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -60,7 +60,8 @@ class Wire:
         eye: m, where the page last told the browser to look from.
     """
 
-    def __init__(self, url: str) -> None:
+    def __init__(self, url: str, headers: Mapping[str, str] | None = None) -> None:
+        """headers: what else the browser, or a proxy, sends with the handshake."""
         protocol: Any = [f"viser-v{__version__}"]
         self.controls: dict[str, dict[str, Any]] = {}
         self.commands: dict[str, dict[str, Any]] = {}
@@ -70,7 +71,12 @@ class Wire:
         self.notices: list[tuple[str, str]] = []
         self.standing: dict[str, tuple[str, str]] = {}
         self.eye: tuple[float, ...] = ()
-        self._socket = connect(url.replace("http", "ws", 1), subprotocols=protocol, max_size=None)
+        self._socket = connect(
+            url.replace("http", "ws", 1),
+            subprotocols=protocol,
+            max_size=None,
+            additional_headers=dict(headers or {}),
+        )
         self.say(camera())
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()

@@ -100,6 +100,7 @@ def test_himpc_is_tested_without_lessons_and_app() -> None:
 
 APP = {
     "commands": ("server", "html", "link", "__main__"),
+    "jupyter": ("server", "client", "link"),
     "server": ("page", "panels", "client", "html", "link", "worker", "adapter"),
     "page": ("panels", "view", "client", "html", "link", "adapter"),
     "panels": ("view", "client", "html", "link", "adapter"),

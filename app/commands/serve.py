@@ -30,6 +30,7 @@ def serve(
     no_token: bool = False,
     token_file: Annotated[str | None, tyro.conf.arg(metavar="FILE")] = None,
     one_of_several: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+    proxy_only: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     own_files: Annotated[str | None, tyro.conf.arg(metavar="DIR")] = None,
     no_own_files: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     key: str | None = None,
@@ -58,6 +59,8 @@ def serve(
             variable HIMPC_LAB_TOKEN does the same.
         one_of_several: while all places are used, answer 503, so that the proxy in front tries the next
             server; docs/serving.md describes one.
+        proxy_only: let in only a proxy that sends the token in the header X-Himpc-Lab-Token, whatever it
+            calls this server; Jupyter's launcher starts himpc-lab so.
         own_files: folder of the Python and URDF files that you can open from the page, by default the folder
             in which himpc-lab is started. Only the page of the first printed address can open them.
         no_own_files: no page can open files of this machine.
@@ -100,4 +103,5 @@ def serve(
         key=None if key is None else read_key(key),
         token=given_token(token_file, os.environ),
         refers=one_of_several,
+        proxy_only=proxy_only,
     )

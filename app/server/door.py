@@ -46,12 +46,15 @@ class Door:
         trusted: further allowed origins, as browsers write them, e.g. a reverse proxy's.
         passes: the secrets that a visitor must send in the URL or in the cookie.
         names: the names under which other machines know this one.
+        proxy_only: whether only a proxy that sends the token in its header is let in. It may use any name for
+            this server, and it says who its visitor is.
     """
 
     local: bool = True
     trusted: frozenset[str] = frozenset()
     passes: Passes = field(default_factory=Passes)
     names: frozenset[str] = frozenset()
+    proxy_only: bool = False
 
     def judge(self, request: Request, who: str = "") -> Answer | None:
         """Returns None if the request is admitted, else the response to send. An admitted request names this
@@ -85,11 +88,16 @@ class Door:
             came_through_a_proxy(request.headers)
         )
 
+    def account(self, request: Request) -> str:
+        """The name with which the sender of an admitted request has signed in at the proxy; "" if there is no
+        proxy that nobody can pass by."""
+        return self.passes.account(request.headers) if self.proxy_only else ""
+
     def _is_ours(self, host: str) -> bool:
         found = _HOST.fullmatch(host)
         if found is None:
             return False
-        if host.lower() in {urlsplit(origin).netloc for origin in self.trusted}:
+        if self.proxy_only or host.lower() in {urlsplit(origin).netloc for origin in self.trusted}:
             return True
         name = found["name"].lower().strip("[]").rstrip(".")
         try:
@@ -100,11 +108,15 @@ class Door:
         return address.is_loopback or not self.local
 
     def _is_own_page(self, origin: str, host: str) -> bool:
-        return origin in self.trusted or origin == f"http://{host.lower()}"
+        own = {f"http://{host.lower()}"} | ({f"https://{host.lower()}"} if self.proxy_only else set())
+        return origin in self.trusted or origin in own
 
     # ---------------------------------------------------------------- token
 
     def _ask_token(self, request: Request, host: str, who: str) -> Answer | None:
+        if self.proxy_only:
+            by_proxy = self.passes.in_header(request.headers)
+            return None if by_proxy else Answer(HTTPStatus.FORBIDDEN, "Not by this way", _ELSEHOW, _NOT_KEPT)
         role = self.passes.in_address(request.path)
         if role is not None:
             return None if is_upgrade(request) else self._keep(request, host, role, who)
@@ -138,6 +150,10 @@ _NEEDED = (
     "<p>Open the whole address that himpc-lab printed in the terminal where it was started; it ends in "
     f"<code>?{QUERY}=…</code>. Or give the token here:</p>{_FIELD}"
     '<p>Have you been here before? <a href="./">Open the page</a>.</p>'
+)
+_ELSEHOW = (
+    "<p>This himpc-lab can only be opened through the site that started it, for example from the launcher of "
+    "JupyterHub.</p>"
 )
 _WRONG = (
     "<p>This is not the token of the himpc-lab that runs now; each start has a new token. It is printed in "

@@ -22,6 +22,7 @@ from app.server.connection_limits import ConnectionLimits
 from app.server.door import Answer, Door, is_upgrade, secured
 from app.server.load import Load, Places, load_of, report
 from app.server.peers import ends_of
+from app.server.prefix import under_its_name
 from app.server.uploads import TRANSFER, Uploads
 from app.server.words import refusal
 
@@ -81,9 +82,11 @@ class ConnectionGuard:
             if is_upgrade(request):
                 if isinstance(connection, GuardedConnection):
                     connection.is_owners = self._is_owners(connection, request)
+                    connection.account = self._door.account(request)
                     connection.expect_word(FIRST_WORD)
                 return None
-            return files(connection, request)
+            moved = under_its_name(request)
+            return files(connection, request) if moved is None else _response(moved)
 
         def secure(_: ServerConnection, __: Request, response: Response) -> None:
             secured(response.headers)
@@ -130,8 +133,9 @@ class GuardedConnection(ServerConnection):
     """A connection that counts messages before decoding them, and passes on only messages that a page may
     send.
 
-    `uploads` are the uploads of the page that it serves, `refuse` shows a refusal to the user, and
-    `is_owners` is true if the person who started the server opened the page.
+    `uploads` are the uploads of the page that it serves, `refuse` shows a refusal to the user,
+    `is_owners` is true if the person who started the server opened the page, and `account` is the name with
+    which its user signed in at the proxy.
     """
 
     def __init__(self, *of: Any, guard: ConnectionGuard, **more: Any) -> None:
@@ -139,6 +143,7 @@ class GuardedConnection(ServerConnection):
         self.uploads: Uploads | None = None
         self.refuse: Callable[[str], object] = _nothing_said
         self.is_owners = False
+        self.account = ""
         self._guard = guard
         self._budget = Budget(self.loop.time)
         self._waiting = 0

@@ -23,7 +23,7 @@ from app.server.greeting import greeting
 from app.server.guard import ConnectionGuard
 from app.server.malloc_tuning import few_arenas, large_arrays_apart
 from app.server.opening import opened_in_a_browser
-from app.server.passes import Passes, new_token, shared
+from app.server.passes import VARIABLE, Passes, new_token, shared
 from app.server.sessions import GRACE, Sessions
 from app.server.visit import Visit
 from lessons.own.folder import Folder
@@ -49,6 +49,7 @@ def serve(
     key: bytes | None = None,
     token: str | None = None,
     refers: bool = False,
+    proxy_only: bool = False,
 ) -> int:
     """Serves the page until Ctrl-C or SIGTERM. Raises InputError for a scene, robot, host, port or origin
     that cannot be used.
@@ -57,7 +58,7 @@ def serve(
     The page asks for a token unless `ask_token` is False. The page whose address contains the owner's
     secret may open and run files below `own_files` by path; with None no page may. `key` signs the
     learners' progress. `token` replaces the random one; with `refers` a full server answers 503, so that a
-    proxy tries the next one.
+    proxy tries the next one. With `proxy_only` only a proxy that sends the token in its header is let in.
     """
     server = PageServer(
         choice,
@@ -71,6 +72,7 @@ def serve(
         key=key,
         token=token,
         refers=refers,
+        proxy_only=proxy_only,
     )
     stop = threading.Event()
     try:
@@ -122,10 +124,16 @@ class PageServer:
         key: bytes | None = None,
         token: str | None = None,
         refers: bool = False,
+        proxy_only: bool = False,
     ) -> None:
         """Arguments as for `serve`; grace: time, s, that a session outlives its tab."""
         if max_sessions < 1:
             raise InputError(f"max-sessions is {max_sessions}: give 1 or more.")
+        if proxy_only and (token is None or not ask_token):
+            raise InputError(
+                "--proxy-only needs the token that the proxy sends: give it with --token-file FILE or "
+                f"{VARIABLE}, and leave out --no-token"
+            )
         trusted = frozenset(map(as_origin, trusted_origins))
         _check_choice(choice)
         _check_address(host, port)
@@ -160,7 +168,7 @@ class PageServer:
             self.passes = shared(token, owner)
         else:
             self.passes = Passes(new_token() if ask_token else None, owner, f"himpc-lab-{found}")
-        door = Door(local, trusted, self.passes, names_of_this_machine())
+        door = Door(local, trusted, self.passes, names_of_this_machine(), proxy_only)
         self.guard.open(door, self.sessions, refers)
         self._loading = threading.Thread(target=_load, args=(choice,), daemon=True)
         self._loading.start()

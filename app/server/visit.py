@@ -68,6 +68,9 @@ class Visit:
         connection = private.connection_of(server, client)
         if not (isinstance(connection, GuardedConnection) and connection.is_owners):
             self._own_files = None
+        self._account = connection.account if isinstance(connection, GuardedConnection) else ""
+        # Pages of all accounts of a hub have one origin, so that a browser stores their values in one place.
+        self._progress_key = f"{_PROGRESS}-{self._account}" if self._account else _PROGRESS
         if isinstance(connection, GuardedConnection):
             connection.refuse = partial(inlet.say, "Not taken")
             connection.uploads = Uploads(
@@ -79,7 +82,7 @@ class Visit:
     async def arrive(self) -> None:
         """Starts the visit, on viser's loop. A browser that does not answer is treated as a new one."""
         private.run_script(self._client, ASK_MOTION)
-        keys = (_TOKENS, _DARK, _PROGRESS, MOTION)
+        keys = (_TOKENS, _DARK, self._progress_key, MOTION)
         self._asking = asyncio.ensure_future(private.read_storage(self._client, keys, STORAGE))
         try:
             found = await self._asking
@@ -89,7 +92,10 @@ class Visit:
         self._dark = dark == "1"
         self._comfort = Comfort(self._client, motion == REDUCED and isinstance(self._sessions, Sessions))
         self._notebook = Notebook(
-            found_progress(progress, self._key), lambda text: self._keep(_PROGRESS, text), self._key
+            found_progress(progress, self._key, self._account),
+            lambda text: self._keep(self._progress_key, text),
+            self._key,
+            self._account,
         )
         self._then(_tokens(tokens))
 

@@ -10,7 +10,7 @@ from websockets.datastructures import Headers
 from websockets.http11 import Request
 
 from app.server.door import Answer, Door, as_origin
-from app.server.passes import QUERY, VARIABLE, Passes, given_token, new_token, shared
+from app.server.passes import HEADER, QUERY, USER_HEADER, VARIABLE, Passes, given_token, new_token, shared
 from robots import InputError
 
 OURS = "127.0.0.1:8080"
@@ -206,6 +206,38 @@ def test_a_proxy_may_send_the_token_in_its_header() -> None:
         assert judged(TOKENED, X_Himpc_Lab_Token=wrong, **own) is not None
     assert judged(TOKENED, X_Himpc_Lab_Token=TOKEN, Origin="https://evil.example") is not None
     assert not TOKENED.is_owner(asked(X_Himpc_Lab_Token=OWNER))
+
+
+def test_a_door_for_one_proxy_lets_in_nobody_else() -> None:
+    """Only the header opens it, under any name of the server; the proxy's own pages may open web sockets, and
+    only its word about the account counts."""
+    door = Door(passes=shared(TOKEN, OWNER), proxy_only=True)
+    by_proxy = {"Host": "hub.example.org", HEADER.replace("-", "_"): TOKEN}
+    account = {USER_HEADER.replace("-", "_"): "zo%C3%AB%0A"}
+    assert judged(door, **by_proxy) is None
+    for origin, right in (
+        ("https://hub.example.org", True),
+        ("http://hub.example.org", True),
+        ("https://evil.example", False),
+        ("https://hub.example.org.evil.example", False),
+        ("null", False),
+    ):
+        assert (judged(door, **by_proxy, Origin=origin, Upgrade="websocket") is None) is right
+    cookie = door.passes.keep("owner", "")
+    for path, headers in (
+        (f"/?{QUERY}={TOKEN}", {}),
+        (f"/?{QUERY}={OWNER}", {}),
+        ("/", {"Cookie": cookie}),
+        ("/", {HEADER.replace("-", "_"): f"{TOKEN}x"}),
+        ("/", {HEADER.replace("-", "_"): [TOKEN, TOKEN]}),
+    ):
+        answer = judged(door, path, **headers, **account)
+        assert answer is not None and answer.status is HTTPStatus.FORBIDDEN
+        assert door.account(asked(path, **headers, **account)) == ""
+    assert door.account(asked(**by_proxy, **account)) == "zoë"
+    assert door.account(asked(**by_proxy)) == ""
+    everybody = Door(passes=shared(TOKEN, OWNER))  # many people have this token
+    assert everybody.account(asked(**by_proxy, **account)) == ""
 
 
 def test_servers_with_one_token_take_each_others_cookies_but_no_owner_is_made_of_it() -> None:

@@ -223,6 +223,7 @@ server {
     listen 127.0.0.1:PORT;
     location /user/zoe/lab/ {
         proxy_pass URL/;
+        proxy_set_header X-Forwarded-Prefix /user/zoe/lab;
         proxy_http_version 1.1;
         proxy_set_header Host $http_host;
         proxy_set_header Upgrade $http_upgrade;
@@ -234,7 +235,7 @@ server {
 
 def test_the_page_works_below_any_path(nginx: str, tmp_path: Path) -> None:
     """Behind a proxy that removes a prefix: the token leaves the address without leaving the prefix, the
-    cookie belongs to it, the question for the token leads back to it, and a page gets a robot."""
+    cookie belongs to it, the question for the token leads back to it, and a page gets a robot at its name."""
     port, prefix = free_port(), "/user/zoe/lab/"
     server = PageServer(
         SceneChoice(RunSpec("planar3-hold")),
@@ -263,10 +264,15 @@ def test_the_page_works_below_any_path(nginx: str, tmp_path: Path) -> None:
             assert status == 303 and urljoin(prefix, headers["Location"]) == prefix
             cookie, *attributes = headers["Set-Cookie"].split("; ")
             assert not any(each.startswith("Path") for each in attributes)  # a browser takes the prefix
-            status, _, page = ask(prefix, cookie)
+            status, headers, _ = ask(f"{prefix}?fixedDpr=1", cookie)
+            assert status == 303 and urljoin(prefix, headers["Location"]) == f"{prefix}page?fixedDpr=1"
+            status, _, page = ask(f"{prefix}page", cookie)
             assert status == 200 and not re.findall(r'(?:href|action|src)="/', page)
             assert ask(f"{prefix}health")[0] == 200
-            with Wire(f"http://127.0.0.1:{port}{prefix}?{token}"):
+            # The address at which viser's page of this name opens its web socket; nginx would redirect the
+            # prefix without its last slash.
+            assert ask(prefix.rstrip("/"))[0] == 301
+            with Wire(f"http://127.0.0.1:{port}{prefix}page?{token}"):
                 assert eventually(lambda: len(server.sessions.learners) == 1, LONG)
     finally:
         server.close()
