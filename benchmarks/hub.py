@@ -14,9 +14,9 @@ import argparse
 import sys
 import tempfile
 import time
-import urllib.error
-import urllib.request
+from http.client import HTTPConnection
 from pathlib import Path
+from urllib.parse import urlsplit
 
 from playwright.sync_api import Page, sync_playwright
 
@@ -95,17 +95,13 @@ def let_in(page: Page, url: str, user: str, port: int) -> list[str]:
 
 
 def status(url: str, headers: dict[str, str]) -> int:
-    """The status of the answer; of a redirect, 302."""
-
-    class Stay(urllib.request.HTTPRedirectHandler):
-        def redirect_request(self, *_: object) -> None:
-            return None
-
-    try:
-        with urllib.request.build_opener(Stay).open(urllib.request.Request(url, headers=headers)) as found:
-            return found.status
-    except urllib.error.HTTPError as refused:
-        return refused.code
+    """The status of the answer; redirects are not followed."""
+    parts = urlsplit(url)
+    connection = HTTPConnection(parts.hostname or "", parts.port or 80, timeout=30.0)
+    connection.request("GET", f"{parts.path}?{parts.query}", headers=headers)
+    found = connection.getresponse().status
+    connection.close()
+    return found
 
 
 if __name__ == "__main__":

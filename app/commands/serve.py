@@ -30,6 +30,7 @@ def serve(
     no_token: bool = False,
     token_file: Annotated[str | None, tyro.conf.arg(metavar="FILE")] = None,
     one_of_several: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+    drain: float = 0.0,
     proxy_only: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     own_files: Annotated[str | None, tyro.conf.arg(metavar="DIR")] = None,
     no_own_files: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
@@ -59,6 +60,8 @@ def serve(
             variable HIMPC_LAB_TOKEN does the same.
         one_of_several: while all places are used, answer 503, so that the proxy in front tries the next
             server; docs/serving.md describes one.
+        drain: time in s that open pages have after SIGTERM; newcomers are sent away meanwhile. Ctrl-C and a
+            second SIGTERM end the server at once.
         proxy_only: let in only a proxy that sends the token in the header X-Himpc-Lab-Token, whatever it
             calls this server; Jupyter's launcher starts himpc-lab so.
         own_files: folder of the Python and URDF files that you can open from the page, by default the folder
@@ -75,6 +78,8 @@ def serve(
 
     if no_own_files and own_files is not None:
         raise InputError("--own-files DIR and --no-own-files contradict each other: leave one out")
+    if not 0.0 <= drain <= 3600.0:
+        raise InputError(f"--drain {drain}: give a time from 0 to 3600 s")
     bringing = [name for name, given in (("--lesson", lesson), ("--state", state)) if given is not None]
     if len(bringing) > 1 or (bringing and (scene, urdf, tip) != (None, None, None)):
         others = "--scene, --urdf, --tip and --" + ("state" if bringing[0] == "--lesson" else "lesson")
@@ -104,4 +109,5 @@ def serve(
         token=given_token(token_file, os.environ),
         refers=one_of_several,
         proxy_only=proxy_only,
+        drain=drain,
     )

@@ -9,6 +9,7 @@ import signal
 import socket
 import sys
 import threading
+import time
 import warnings
 from collections.abc import Iterator, Sequence
 from importlib import import_module
@@ -50,6 +51,7 @@ def serve(
     token: str | None = None,
     refers: bool = False,
     proxy_only: bool = False,
+    drain: float = 0.0,
 ) -> int:
     """Serves the page until Ctrl-C or SIGTERM. Raises InputError for a scene, robot, host, port or origin
     that cannot be used.
@@ -59,6 +61,7 @@ def serve(
     secret may open and run files below `own_files` by path; with None no page may. `key` signs the
     learners' progress. `token` replaces the random one; with `refers` a full server answers 503, so that a
     proxy tries the next one. With `proxy_only` only a proxy that sends the token in its header is let in.
+    After SIGTERM the pages that are open have `drain` seconds.
     """
     server = PageServer(
         choice,
@@ -74,15 +77,16 @@ def serve(
         refers=refers,
         proxy_only=proxy_only,
     )
-    stop = threading.Event()
+    stop, now = threading.Event(), threading.Event()
     try:
-        with _ended_by_signals(stop), contextlib.ExitStack() as until_the_end:
+        with _ended_by_signals(stop, now), contextlib.ExitStack() as until_the_end:
             for line in greeting(server, host, tuple(map(as_origin, trusted_origins))):
                 print(line, flush=True)
             if open_browser:
                 until_the_end.enter_context(opened_in_a_browser(server.link))
             while not stop.wait(0.5):
                 pass
+            server.drain(drain, now)
     finally:
         server.close()
     if server.loading:
@@ -93,13 +97,20 @@ def serve(
 
 
 @contextlib.contextmanager
-def _ended_by_signals(stop: threading.Event) -> Iterator[None]:
-    """Lets Ctrl-C and SIGTERM set `stop`; the previous signal handlers are restored afterwards."""
+def _ended_by_signals(stop: threading.Event, now: threading.Event) -> Iterator[None]:
+    """Lets Ctrl-C and SIGTERM set `stop`, and Ctrl-C and every further signal also `now`; the previous signal
+    handlers are restored afterwards."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
+
+    def end(number: int, _: object) -> None:
+        if number == signal.SIGINT or stop.is_set():
+            now.set()
+        stop.set()
+
     numbers = (signal.SIGINT, signal.SIGTERM)
-    before = [signal.signal(number, lambda *_: stop.set()) for number in numbers]
+    before = [signal.signal(number, end) for number in numbers]
     try:
         yield
     finally:
@@ -146,7 +157,7 @@ class PageServer:
         """Whether other people than the users of this machine can reach the page."""
         self.guard = ConnectionGuard(Door())
         self.sessions = Classroom(choice) if classroom else Sessions(choice, max_sessions, grace)
-        self._own_files, self._key = own_files, key
+        self._own_files, self._key, self._refers = own_files, key, refers
         self._visits: dict[int, Visit] = {}
         self._lock = threading.Lock()
         try:
@@ -203,6 +214,18 @@ class PageServer:
         if visit is not None:
             visit.leave()
 
+    def drain(self, seconds: float, now: threading.Event) -> None:
+        """Lets nobody new in, tells the pages, and returns when all have left, after `seconds`, or when `now`
+        is set."""
+        self.guard.close()
+        until = time.monotonic() + seconds
+        with self._lock:
+            visits = list(self._visits.values())
+        for visit in visits if seconds > 0 else ():
+            visit.tell("The lab stops", (_GO_ON if self._refers else _HAND_IN).format(seconds))
+        while self._visits and time.monotonic() < until and not now.wait(0.1):
+            pass
+
     def close(self) -> None:
         """Closes the pages, ends the processes and stops the server."""
         self.guard.close()
@@ -214,6 +237,13 @@ class PageServer:
             visit.close()
         self.sessions.close()
         private.stop(self._viser)
+
+
+_GO_ON = (
+    "This computer stops in {:.0f} s. Your page then goes on with another one: your browser keeps scene, "
+    "settings, step and progress; the robot begins anew."
+)
+_HAND_IN = "The lab stops in {:.0f} s: save what you need, or hand in your progress (Export)."
 
 
 def _check_choice(choice: SceneChoice) -> None:

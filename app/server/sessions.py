@@ -33,7 +33,7 @@ class Sessions:
 
     def __init__(self, choice: SceneChoice, max_sessions: int, grace: float = GRACE) -> None:
         self.max_sessions = max_sessions
-        self._choice = choice
+        self.start = choice
         self._grace = grace
         self._spares = Spares(WORKER)
         self._lock = threading.Lock()
@@ -62,7 +62,7 @@ class Sessions:
                     return known
             if len(self._learners) >= self.max_sessions:
                 return None
-            learner = SimulationClient(secrets.token_urlsafe(16), self._choice, self._spares)
+            learner = SimulationClient(secrets.token_urlsafe(16), self.start, self._spares)
             learner.attached = True
             self._learners[learner.token] = learner
         return learner
