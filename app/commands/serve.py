@@ -27,6 +27,7 @@ def serve(
     trusted_origin: Annotated[
         tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="ORIGIN")
     ] = (),
+    embed_in: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="ORIGIN")] = (),
     no_token: bool = False,
     token_file: Annotated[str | None, tyro.conf.arg(metavar="FILE")] = None,
     one_of_several: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
@@ -55,6 +56,8 @@ def serve(
         no_browser: do not open a browser.
         trusted_origin: address at which a reverse proxy serves the page, e.g. https://lab.example.org;
             docs/serving.md describes a proxy with TLS.
+        embed_in: origin of a page that may show this one in a frame, e.g. https://course.example.org; no
+            other page may.
         no_token: let everybody use the page who can reach it; this includes every user of this machine.
         token_file: file with a token of your own, for several servers behind one address; the environment
             variable HIMPC_LAB_TOKEN does the same.
@@ -110,4 +113,5 @@ def serve(
         refers=one_of_several,
         proxy_only=proxy_only,
         drain=drain,
+        embed_in=embed_in,
     )

@@ -19,7 +19,7 @@ from websockets.http11 import Request, Response
 from app.server import budget
 from app.server.budget import Budget
 from app.server.connection_limits import ConnectionLimits
-from app.server.door import Answer, Door, is_upgrade, secured
+from app.server.door import Answer, Door, is_upgrade
 from app.server.load import Load, Places, load_of, report
 from app.server.peers import ends_of
 from app.server.prefix import under_its_name
@@ -89,7 +89,7 @@ class ConnectionGuard:
             return files(connection, request) if moved is None else _response(moved)
 
         def secure(_: ServerConnection, __: Request, response: Response) -> None:
-            secured(response.headers)
+            self._door.secure(response.headers)
 
         return {
             **given,

@@ -19,7 +19,7 @@ import viser
 from app.adapter import private
 from app.link.choice import SceneChoice
 from app.server.classroom import Classroom
-from app.server.door import Door, as_origin, names_of_this_machine
+from app.server.door import SELF, Door, as_origin, names_of_this_machine
 from app.server.greeting import greeting
 from app.server.guard import ConnectionGuard
 from app.server.malloc_tuning import few_arenas, large_arrays_apart
@@ -52,6 +52,7 @@ def serve(
     refers: bool = False,
     proxy_only: bool = False,
     drain: float = 0.0,
+    embed_in: Sequence[str] = (),
 ) -> int:
     """Serves the page until Ctrl-C or SIGTERM. Raises InputError for a scene, robot, host, port or origin
     that cannot be used.
@@ -61,7 +62,8 @@ def serve(
     secret may open and run files below `own_files` by path; with None no page may. `key` signs the
     learners' progress. `token` replaces the random one; with `refers` a full server answers 503, so that a
     proxy tries the next one. With `proxy_only` only a proxy that sends the token in its header is let in.
-    After SIGTERM the pages that are open have `drain` seconds.
+    After SIGTERM the pages that are open have `drain` seconds. Pages of the origins `embed_in` may show the
+    page in a frame.
     """
     server = PageServer(
         choice,
@@ -76,6 +78,7 @@ def serve(
         token=token,
         refers=refers,
         proxy_only=proxy_only,
+        embed_in=embed_in,
     )
     stop, now = threading.Event(), threading.Event()
     try:
@@ -136,8 +139,11 @@ class PageServer:
         token: str | None = None,
         refers: bool = False,
         proxy_only: bool = False,
+        embed_in: Sequence[str] = (),
+        all_steer: bool = False,
     ) -> None:
-        """Arguments as for `serve`; grace: time, s, that a session outlives its tab."""
+        """Arguments as for `serve`; grace: time, s, that a session outlives its tab; all_steer: every page of
+        a classroom controls the robot."""
         if max_sessions < 1:
             raise InputError(f"max-sessions is {max_sessions}: give 1 or more.")
         if proxy_only and (token is None or not ask_token):
@@ -146,6 +152,7 @@ class PageServer:
                 f"{VARIABLE}, and leave out --no-token"
             )
         trusted = frozenset(map(as_origin, trusted_origins))
+        framing = frozenset(each if each == SELF else as_origin(each, "--embed-in") for each in embed_in)
         _check_choice(choice)
         _check_address(host, port)
         few_arenas()
@@ -156,7 +163,7 @@ class PageServer:
         self.public = not local or bool(trusted)
         """Whether other people than the users of this machine can reach the page."""
         self.guard = ConnectionGuard(Door())
-        self.sessions = Classroom(choice) if classroom else Sessions(choice, max_sessions, grace)
+        self.sessions = Classroom(choice, all_steer) if classroom else Sessions(choice, max_sessions, grace)
         self._own_files, self._key, self._refers = own_files, key, refers
         self._visits: dict[int, Visit] = {}
         self._lock = threading.Lock()
@@ -179,7 +186,7 @@ class PageServer:
             self.passes = shared(token, owner)
         else:
             self.passes = Passes(new_token() if ask_token else None, owner, f"himpc-lab-{found}")
-        door = Door(local, trusted, self.passes, names_of_this_machine(), proxy_only)
+        door = Door(local, trusted, self.passes, names_of_this_machine(), proxy_only, framing)
         self.guard.open(door, self.sessions, refers)
         self._loading = threading.Thread(target=_load, args=(choice,), daemon=True)
         self._loading.start()
