@@ -47,6 +47,11 @@ class Tab(Wire):
         """Whether the server has not closed the connection."""
         return self._reader.is_alive()
 
+    def answered(self, header: str) -> str:
+        """A header of the answer to the handshake."""
+        response = self._socket.response
+        return "" if response is None else response.headers[header]
+
     def _take(self, message: dict[str, Any]) -> None:
         match message["type"]:
             case "LocalStorageGetItemRequestMessage":

@@ -210,7 +210,7 @@ class PageServer:
     # ---------------------------------------------------------------- clients, on viser's loop
 
     async def _connect(self, client: viser.ClientHandle) -> None:
-        visit = Visit(self._viser, client, self.sessions, self._own_files, self._key)
+        visit = Visit(self._viser, client, self.sessions, self._own_files, self._key, self._refers)
         with self._lock:
             self._visits[client.client_id] = visit
         await visit.arrive()

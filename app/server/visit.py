@@ -37,6 +37,7 @@ STORAGE = 5.0
 _TOKENS = "himpc-lab-sessions"
 _DARK = "himpc-lab-dark"
 _PROGRESS = "himpc-lab-lessons"
+_ELSEWHERE = 3.0  # s that a page is shown that there is no place, until it looks elsewhere
 _PERIOD = 1.0  # s between two looks whether the page is somewhere else
 _GOES_ON = ("You go on where you were", "Your robot begins anew, with the settings or the step that you had.")
 _LONGEST = 100_000  # characters that we read of each stored value
@@ -53,13 +54,14 @@ class Visit:
         sessions: Sessions | Classroom,
         own_files: Folder | None,
         key: bytes | None = None,
+        refers: bool = False,
     ) -> None:
-        """own_files: folder of the files that the owner's page may name; key: signs the learners'
-        progress."""
+        """own_files: folder of the files that the owner's page may name; key: signs the learners' progress;
+        refers: a page for which there is no place connects again, perhaps with another server."""
         self._server = server
         self._client = client
         self._sessions = sessions
-        self._own_files, self._key = own_files, key
+        self._own_files, self._key, self._refers = own_files, key, refers
         self._page: Page | None = None
         self._left = False
         self._asking: asyncio.Future[tuple[str | None, ...]] | None = None
@@ -241,11 +243,20 @@ class Visit:
                 )
             )
             again = gui.add_button("Try again")
+        if self._refers:
+            loop = self._server.get_event_loop()
+            loop.call_soon_threadsafe(loop.call_later, _ELSEWHERE, self._send_on)
 
         @again.on_click
         async def _(_: object) -> None:
             modal.close()
             self._then(tokens, kept)
+
+    def _send_on(self) -> None:
+        """Ends a connection for which there was no place: the page then connects again by itself."""
+        connection = private.connection_of(self._server, self._client)
+        if self._page is None and connection is not None:
+            connection.transport.abort()
 
 
 def _no_greeting(_: viser.GuiApi) -> None:
