@@ -81,8 +81,8 @@ class Page:
         self._thread = threading.Thread(target=self._loop, daemon=True)
 
     def start(self) -> None:
-        # Sent now, because docked panels will later make a desktop's scene as narrow as a phone's.
-        wide, high = self._client.camera.image_width, self._client.camera.image_height
+        camera = self._client.camera
+        wide, high = self._comfort.window or (camera.image_width, camera.image_height)
         self._phone, self._narrow = wide < high, wide < max(high, NARROW)
         gui = self._client.gui
         gui.set_panel_label("himpc-lab")

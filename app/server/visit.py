@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import re
 import secrets
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -13,11 +14,12 @@ from functools import partial
 import viser
 
 from app.adapter import private
+from app.adapter.names import STORED
 from app.adapter.removed_handle_errors import print_exception
 from app.client.progress import Notebook
 from app.html.text import block
 from app.link.choice import SceneChoice
-from app.page.comfort import ASK_MOTION, MOTION, REDUCED, Comfort
+from app.page.comfort import ASK_MOTION, ASK_WINDOW, MOTION, REDUCED, Comfort
 from app.page.inlet import Inlet
 from app.page.page import Page
 from app.panels.run.classroom import add_watching
@@ -93,18 +95,22 @@ class Visit:
         """Starts the visit, on viser's loop. A browser that does not answer is treated as a new one."""
         private.run_script(self._client, ASK_MOTION)
         here = f"himpc-lab-place-{secrets.token_hex(8)}"
+        size = f"{here}-window"
         private.run_script(self._client, place.asking(here))
-        keys = (_TOKENS, _DARK, self._progress_key, MOTION, here)
+        private.run_script(self._client, ASK_WINDOW % (STORED, size))
+        keys = (_TOKENS, _DARK, self._progress_key, MOTION, here, size)
         self._asking = asyncio.ensure_future(private.read_storage(self._client, keys, STORAGE))
         try:
             found = await self._asking
         except asyncio.CancelledError:
             return  # the tab was closed
-        self._client.local_storage.remove_item(here)
+        for key in (here, size):
+            self._client.local_storage.remove_item(key)
         short = [text if text and len(text) <= _LONGEST else None for text in found]
-        tokens, dark, progress, motion, kept = short
+        tokens, dark, progress, motion, kept, window = short
         self._dark = dark == "1"
-        self._comfort = Comfort(self._client, motion == REDUCED and isinstance(self._sessions, Sessions))
+        reduced = motion == REDUCED and isinstance(self._sessions, Sessions)
+        self._comfort = Comfort(self._client, reduced, _size(window))
         self._notebook = Notebook(
             found_progress(progress, self._key, self._account),
             lambda text: self._keep(self._progress_key, text),
@@ -261,6 +267,12 @@ class Visit:
 
 def _no_greeting(_: viser.GuiApi) -> None:
     """Adds nothing: this page already controls the session."""
+
+
+def _size(told: str | None) -> tuple[int, int] | None:
+    """Width and height, pixels, as a browser told them; None if it did not."""
+    found = re.fullmatch(r"(\d{1,5})x(\d{1,5})", told or "")
+    return None if found is None else (int(found[1]), int(found[2]))
 
 
 def _tokens(stored: str | None) -> list[str]:
