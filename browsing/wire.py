@@ -5,8 +5,8 @@ from __future__ import annotations
 import http.client
 import threading
 import time
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Self
 from urllib.parse import urlsplit
 
 import msgspec
@@ -60,7 +60,8 @@ class Wire:
         eye: m, where the page last told the browser to look from.
     """
 
-    def __init__(self, url: str) -> None:
+    def __init__(self, url: str, headers: Mapping[str, str] | None = None) -> None:
+        """headers: what else the browser, or a proxy, sends with the handshake."""
         protocol: Any = [f"viser-v{__version__}"]
         self.controls: dict[str, dict[str, Any]] = {}
         self.commands: dict[str, dict[str, Any]] = {}
@@ -72,13 +73,17 @@ class Wire:
         self.eye: tuple[float, ...] = ()
         # Browsers send no pings, and a busy machine would answer them too late.
         self._socket = connect(
-            url.replace("http", "ws", 1), subprotocols=protocol, max_size=None, ping_interval=None
+            url.replace("http", "ws", 1),
+            subprotocols=protocol,
+            max_size=None,
+            ping_interval=None,
+            additional_headers=dict(headers or {}),
         )
         self.say(camera())
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
-    def __enter__(self) -> Wire:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-ORDER = ("robots", "himpc", "lessons", "app", "tests")
+ORDER = ("robots", "himpc", "lessons", "app", "himpc_lab", "tests")
 """Each package may import itself and the packages before it."""
 
 DOORS = {
@@ -30,6 +30,8 @@ DOORS = {
     "rich": ("app/",),
     "matplotlib": ("lessons/plots/",),
     "distributed": ("lessons/cluster.py",),
+    "IPython": ("app/jupyter/lab.py",),
+    "jupyter_core": ("app/jupyter/frame.py",),
     "psutil": ("robots/processes/family.py",),
     "pyseccomp": ("lessons/exercises/inside/confine.py",),
     "py_landlock": ("lessons/exercises/inside/confine.py",),
@@ -101,6 +103,7 @@ def test_himpc_is_tested_without_lessons_and_app() -> None:
 
 APP = {
     "commands": ("server", "html", "link", "__main__"),
+    "jupyter": ("server", "client", "link"),
     "server": ("classes", "page", "panels", "client", "html", "link", "worker", "adapter"),
     "classes": ("client", "html", "link"),
     "page": ("panels", "view", "client", "html", "link", "adapter"),
@@ -431,7 +434,7 @@ def test_what_is_imported_is_declared() -> None:
     used = {name.partition(".")[0] for path in sources(*ORDER[:-1]) for name in imports(path)}
     used -= {*ORDER, *sys.stdlib_module_names}
     assert {"numpy", "pinocchio"} <= used
-    packages = {"pinocchio": "pin", "markdown_it": "markdown-it-py"}
+    packages = {"pinocchio": "pin", "markdown_it": "markdown-it-py", "IPython": "ipython"}
     assert {packages.get(name, name.replace("_", "-")) for name in used} <= declared
 
 

@@ -18,7 +18,7 @@ import pytest
 from himpc.compilation.compiling import compile_all
 
 ROOT = Path(__file__).parents[1]
-PACKAGES = ("robots", "himpc", "lessons", "app")
+PACKAGES = ("robots", "himpc", "lessons", "app", "himpc_lab")
 _ELSEWHERE = "NUMBA_CACHE_DIR" in os.environ
 """Whether the tester keeps compiled code in another folder; then there is none to copy."""
 

@@ -17,6 +17,7 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Literal
 
 import numpy as np
+import rich
 import viser
 import websockets.asyncio.server as web
 from websockets.asyncio.server import ServerConnection
@@ -54,7 +55,7 @@ def open_server(host: str, port: int, guard: Guard) -> viser.ViserServer:
     # Malformed requests of strangers are not logged on the terminal.
     warnings.filterwarnings("ignore", r"\[viser\]", UserWarning)
     # viser prints a greeting of its own, but the command promises exactly one line of output.
-    with contextlib.redirect_stdout(io.StringIO()), _guarded(guard) as served:
+    with _silent(), _guarded(guard) as served:
         server = viser.ViserServer(host=host, port=port, label="himpc-lab", verbose=False)
     try:
         require(served == [True], "how it serves")
@@ -73,15 +74,27 @@ def open_server(host: str, port: int, guard: Guard) -> viser.ViserServer:
 
 def stop(server: viser.ViserServer) -> None:
     """Stops the server without printing anything."""
-    with contextlib.redirect_stdout(io.StringIO()):
+    with _silent():
         server.stop()
+
+
+@contextlib.contextmanager
+def _silent() -> Iterator[None]:
+    """Within this context viser prints nothing, neither on the terminal nor into the cell of a notebook."""
+    console = rich.get_console()
+    before, console.quiet = console.quiet, True
+    try:
+        with contextlib.redirect_stdout(io.StringIO()):
+            yield
+    finally:
+        console.quiet = before
 
 
 def self_test(guard: Guard) -> None:
     """Checks that viser has all private names used here, and that a guard which is not yet open refuses
     requests. It uses a temporary server on this machine that serves no page. Raises InputError."""
     check_names()
-    with contextlib.redirect_stdout(io.StringIO()), _guarded(guard) as served:
+    with _silent(), _guarded(guard) as served:
         bare = infra.WebsockServer("127.0.0.1", 0, message_class=_messages.Message, verbose=False)
         bare.start()
         try:

@@ -39,8 +39,8 @@ def handed_in(file: Path, key: str | None, json: str | None) -> int:
         if name in progress.seen or name in progress.best
     ]
     if json is not None:
-        data = {"name": handed.name, "at": handed.at, "proof": proof, "code": handed.code, "lessons": lessons}
-        write_json(data, json)
+        said = {"name": handed.name, "account": handed.account, "at": handed.at, "proof": proof}
+        write_json({**said, "code": handed.code, "lessons": lessons}, json)
     else:
         rows = [
             [str(each["lesson"]), f"{len(each['steps'])} of {each['of']}", _score(each["score"])]
@@ -48,6 +48,9 @@ def handed_in(file: Path, key: str | None, json: str | None) -> int:
         ]
         print_table(f"{handed.name or 'nobody'}, {handed.at}", ("lesson", "steps run", "best score"), rows)
         print(_SAYS[proof] if key else _NOT_JUDGED)
+        if handed.account:
+            known = key is not None and proof == "signed"
+            print(f"account: {handed.account}" + ("" if known else ", which is not proven"))
         if handed.code:
             print(f"setting on the page then: himpc-lab --state {handed.code}")
     return 0 if key is None or proof == "signed" else 1

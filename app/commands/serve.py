@@ -29,9 +29,12 @@ def serve(
     trusted_origin: Annotated[
         tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="ORIGIN")
     ] = (),
+    embed_in: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="ORIGIN")] = (),
     no_token: bool = False,
     token_file: Annotated[str | None, tyro.conf.arg(metavar="FILE")] = None,
     one_of_several: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+    drain: float = 0.0,
+    proxy_only: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     own_files: Annotated[str | None, tyro.conf.arg(metavar="DIR")] = None,
     no_own_files: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     key: str | None = None,
@@ -58,11 +61,17 @@ def serve(
         no_browser: do not open a browser.
         trusted_origin: address at which a reverse proxy serves the page, e.g. https://lab.example.org;
             docs/serving.md describes a proxy with TLS.
+        embed_in: origin of a page that may show this one in a frame, e.g. https://course.example.org; no
+            other page may.
         no_token: let everybody use the page who can reach it; this includes every user of this machine.
         token_file: file with a token of your own, for several servers behind one address; the environment
             variable HIMPC_LAB_TOKEN does the same.
         one_of_several: while all places are used, answer 503, so that the proxy in front tries the next
             server; docs/serving.md describes one.
+        drain: time in s that open pages have after SIGTERM; newcomers are sent away meanwhile. Ctrl-C and a
+            second SIGTERM end the server at once.
+        proxy_only: let in only a proxy that sends the token in the header X-Himpc-Lab-Token, whatever it
+            calls this server; Jupyter's launcher starts himpc-lab so.
         own_files: folder of the Python and URDF files that you can open from the page, by default the folder
             in which himpc-lab is started. Only the page of the first printed address can open them.
         no_own_files: no page can open files of this machine.
@@ -79,6 +88,13 @@ def serve(
         raise InputError("--own-files DIR and --no-own-files contradict each other: leave one out")
     if no_names and not class_:
         raise InputError("--no-names is for a class: add --class, or leave it out")
+    if class_ and proxy_only:
+        raise InputError(
+            "--class and --proxy-only contradict each other: the teacher's page and the phones have addresses "
+            "of their own, which no proxy vouches for; leave one out"
+        )
+    if not 0.0 <= drain <= 3600.0:
+        raise InputError(f"--drain {drain}: give a time from 0 to 3600 s")
     bringing = [name for name, given in (("--lesson", lesson), ("--state", state)) if given is not None]
     if len(bringing) > 1 or (bringing and (scene, urdf, tip) != (None, None, None)):
         others = "--scene, --urdf, --tip and --" + ("state" if bringing[0] == "--lesson" else "lesson")
@@ -108,4 +124,7 @@ def serve(
         token=given_token(token_file, os.environ),
         refers=one_of_several,
         class_names=not no_names if class_ else None,
+        proxy_only=proxy_only,
+        drain=drain,
+        embed_in=embed_in,
     )

@@ -29,6 +29,11 @@ ASK_MOTION = """try {
   localStorage.setItem("%s%s", reduced ? "%s" : "");
 } catch {}""" % (STORED, MOTION, REDUCED)  # noqa: UP031
 """Stores in the browser whether its user asked for less motion."""
+ASK_WINDOW = """try {
+  localStorage.setItem("%s%s", `${window.innerWidth}x${window.innerHeight}`);
+} catch {}"""
+"""Stores the size of the window under a key: the scene of a page that connects again is narrower, as its
+panels are docked."""
 
 # A screen reader says changes of a region that was there before, so the region outlives the page's scenes.
 _BEGIN = """(() => {
@@ -51,9 +56,12 @@ _SAY = """(() => {
 class Comfort:
     """The line that says what just happened, and the pause in which a page begins."""
 
-    def __init__(self, client: viser.ClientHandle, reduced: bool) -> None:
-        """reduced: whether the user asked the browser for less motion."""
-        self._client, self._reduced = client, reduced
+    def __init__(
+        self, client: viser.ClientHandle, reduced: bool, window: tuple[int, int] | None = None
+    ) -> None:
+        """reduced: whether the user asked the browser for less motion; window: its width and height, pixels,
+        if the browser said them."""
+        self._client, self._reduced, self.window = client, reduced, window
         self.says = True
         """Whether the line is shown."""
         self._narration = Narration(time.monotonic)

@@ -67,9 +67,9 @@ class Stage:
         loop: asyncio.AbstractEventLoop,
         notebook: Notebook,
         comfort: Comfort,
-        phone: bool,
+        narrow: bool,
     ) -> None:
-        """phone: whether the page is shown on a phone, which has no panel at the left: the plots are then
+        """narrow: whether there is no room for a panel at the left, as on a phone: the plots are then
         tabs of the other panel."""
         self._client, self._learner, self._ready = client, learner, ready
         self._theme, self._comfort = theme, comfort
@@ -92,7 +92,7 @@ class Stage:
         self._resets: int | None = None
         self._ghost: GhostView | None = None
         self._shown_ghost: GhostClient | None = None
-        self._build_panels(client.gui, scenes, choose, own_files, loop, notebook, phone)
+        self._build_panels(client.gui, scenes, choose, own_files, loop, notebook, narrow)
         self._build_scene(client.scene, dark)
 
     # ---------------------------------------------------------------- building
@@ -105,7 +105,7 @@ class Stage:
         own_files: Folder | None,
         loop: asyncio.AbstractEventLoop,
         notebook: Notebook,
-        phone: bool,
+        narrow: bool,
     ) -> None:
         gui.add_html(_PHONE)
         self._playback = PlaybackPanel(gui, self._learner, loop, self._face.fastest)
@@ -113,8 +113,8 @@ class Stage:
         exercise = self._learner.choice_of(self._ready).exercise
         self._course = Course(gui, self._learner, exercise, notebook, choose, self._settings, loop)
         tabs = gui.add_tab_group()
-        plots = tabs if phone else gui.add_panel()
-        if not phone:
+        plots = tabs if narrow else gui.add_panel()
+        if not narrow:
             self._face.open_plots(plots)
         self._course.add_first_tabs(tabs, plots)
         self._face.add_tabs(gui, tabs)

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 RATE = 30.0  # Hz, poses
 PLOTS_RATE = 12.0  # Hz
-_TEXTS = 8
+_TEXTS, NARROW = 8, 1000  # pixels with no room for panels at both sides, as in the cell of a notebook
 _BROKEN = (
     "This page cannot be shown: {}. Start again loads the scene anew; if that does not help, reload the page "
     "and choose another scene."
@@ -68,7 +68,7 @@ class Page:
         self._own_files = own_files
         self._event_loop = loop
         self._notebook, self._comfort = notebook, comfort
-        self._phone = False
+        self._phone = self._narrow = False
         self._seen: tuple[str | None, ...] | None = None  # the scene to which the camera was turned
         self._stage: Stage | None = None
         self._built: Ready | None = None
@@ -81,9 +81,9 @@ class Page:
         self._thread = threading.Thread(target=self._loop, daemon=True)
 
     def start(self) -> None:
-        # Sent now, because docked panels will later make a desktop's scene as narrow as a phone's.
         camera = self._client.camera
-        self._phone = camera.image_width < camera.image_height
+        wide, high = self._comfort.window or (camera.image_width, camera.image_height)
+        self._phone, self._narrow = wide < high, wide < max(high, NARROW)
         gui = self._client.gui
         gui.set_panel_label("himpc-lab")
         gui.main_panel.dock_right()
@@ -239,7 +239,7 @@ class Page:
                 self._event_loop,
                 self._notebook,
                 self._comfort,
-                self._phone,
+                self._narrow,
             )
             add_command(self._client.gui, "Camera: all of the robot", "F", self._frame)
             self._comfort.opened(self.learner)

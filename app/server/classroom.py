@@ -50,7 +50,9 @@ class Classroom:
 
     turns_away: ClassVar[bool] = False
 
-    def __init__(self, choice: SceneChoice) -> None:
+    def __init__(self, choice: SceneChoice, all_steer: bool = False) -> None:
+        """all_steer: whether every page controls the robot, without the token."""
+        self._all_steer = all_steer
         self.token = secrets.token_urlsafe(16)
         self.max_sessions = 1
         self._spares = Spares(WORKER)
@@ -70,7 +72,7 @@ class Classroom:
 
     def enter(self, tokens: Sequence[str], refuse: Refuse) -> SimulationClient:
         """Returns the session itself to a visitor with the token, otherwise a `Watcher`."""
-        if any(map(self.is_right, tokens)):
+        if self._all_steer or any(map(self.is_right, tokens)):
             return self._learner
         return cast(SimulationClient, Watcher(self._learner, refuse))
 

@@ -17,11 +17,14 @@ from app.server.peers import came_through_a_proxy
 from robots import InputError
 
 _HOST = re.compile(r"(?P<name>\[[0-9a-fA-F:.]+\]|[A-Za-z0-9._-]+)(?::(?P<port>\d{1,5}))?")
-_ELSEWHERE = frozenset({"websocket", "playbackPath"})
+ELSEWHERE = frozenset({"websocket", "playbackPath"})
+NAME = "page"
+"""The page's name below a path of another site, see `app.server.prefix`."""
+SELF = "'self'"
+"""In place of an origin: that of the page itself, behind a proxy that serves other pages as well."""
+_NO_FRAMES = {"Content-Security-Policy": "frame-ancestors 'none'", "X-Frame-Options": "DENY"}
 _ON_EVERY_ANSWER = {
-    "Content-Security-Policy": "frame-ancestors 'none'",
     "X-Content-Type-Options": "nosniff",
-    "X-Frame-Options": "DENY",
     "Referrer-Policy": "no-referrer",
     "Cross-Origin-Resource-Policy": "same-origin",
 }
@@ -46,12 +49,17 @@ class Door:
         trusted: further allowed origins, as browsers write them, e.g. a reverse proxy's.
         passes: the secrets that a visitor must send in the URL or in the cookie.
         names: the names under which other machines know this one.
+        proxy_only: whether only a proxy that sends the token in its header is let in. It may use any name for
+            this server, and it says who its visitor is.
+        embedders: origins of the pages that may show this page in a frame.
     """
 
     local: bool = True
     trusted: frozenset[str] = frozenset()
     passes: Passes = field(default_factory=Passes)
     names: frozenset[str] = frozenset()
+    proxy_only: bool = False
+    embedders: frozenset[str] = frozenset()
 
     def judge(self, request: Request, who: str = "") -> Answer | None:
         """Returns None if the request is admitted, else the response to send. An admitted request names this
@@ -72,9 +80,9 @@ class Door:
             )
         if origins and not self._is_own_page(origins[0], hosts[0]):
             return _foreign("It comes from a page of another site.")
-        if not is_upgrade(request) and _is_embedded(headers):
+        if not is_upgrade(request) and _is_embedded(headers, bool(self.embedders)):
             return _foreign("A page of another site embeds this page.")
-        if _leads_away(request):
+        if _leads_away(request) and urlsplit(request.path).path != f"/{NAME}":
             return _foreign("Its address would connect the page to another server.")
         return None
 
@@ -87,11 +95,26 @@ class Door:
         found = self.passes.in_address(request.path), self.passes.in_cookies(request.headers, who)
         return "owner" if "owner" in found else found[0] or found[1]
 
+    def secure(self, headers: Headers) -> None:
+        """Adds the headers of every response: only the embedders may show it in a frame, and browsers may not
+        guess its type."""
+        framed = _NO_FRAMES
+        if self.embedders:
+            framed = {"Content-Security-Policy": f"frame-ancestors {' '.join(sorted(self.embedders))}"}
+        for name, value in {**framed, **_ON_EVERY_ANSWER}.items():
+            if name not in headers:
+                headers[name] = value
+
+    def account(self, request: Request) -> str:
+        """The name with which the sender of an admitted request has signed in at the proxy; "" if there is no
+        proxy that nobody can pass by."""
+        return self.passes.account(request.headers) if self.proxy_only else ""
+
     def _is_ours(self, host: str) -> bool:
         found = _HOST.fullmatch(host)
         if found is None:
             return False
-        if host.lower() in {urlsplit(origin).netloc for origin in self.trusted}:
+        if self.proxy_only or host.lower() in {urlsplit(origin).netloc for origin in self.trusted}:
             return True
         name = found["name"].lower().strip("[]").rstrip(".")
         try:
@@ -102,11 +125,15 @@ class Door:
         return address.is_loopback or not self.local
 
     def _is_own_page(self, origin: str, host: str) -> bool:
-        return origin in self.trusted or origin == f"http://{host.lower()}"
+        own = {f"http://{host.lower()}"} | ({f"https://{host.lower()}"} if self.proxy_only else set())
+        return origin in self.trusted or origin in own
 
     # ---------------------------------------------------------------- token
 
     def _ask_token(self, request: Request, host: str, who: str) -> Answer | None:
+        if self.proxy_only:
+            by_proxy = self.passes.in_header(request.headers)
+            return None if by_proxy else Answer(HTTPStatus.FORBIDDEN, "Not by this way", _ELSEHOW, _NOT_KEPT)
         role = self.passes.in_address(request.path)
         if role is not None:
             return None if is_upgrade(request) else self._keep(request, host, role, who)
@@ -114,7 +141,7 @@ class Door:
             return None
         if self.passes.token is None or self.passes.in_cookies(request.headers, who) is not None:
             return None
-        text = _WRONG if QUERY in _query(request) else _NEEDED
+        text = _WRONG if QUERY in query_of(request) else _NEEDED
         return Answer(HTTPStatus.FORBIDDEN, "A token is needed", text, _NOT_KEPT)
 
     def _keep(self, request: Request, host: str, role: Role, who: str) -> Answer:
@@ -123,7 +150,7 @@ class Door:
         secure = "; Secure" if f"https://{host.lower()}" in self.trusted else ""
         cookie = f"{self.passes.keep(role, who)}; HttpOnly; SameSite=Strict{secure}"
         kept = (("Set-Cookie", cookie), *_NOT_KEPT)
-        rest = urlencode({name: values for name, values in _query(request).items() if name != QUERY}, True)
+        rest = urlencode({name: values for name, values in query_of(request).items() if name != QUERY}, True)
         name = quote(urlsplit(request.path).path.rpartition("/")[2], safe="")
         page = f"./{name}?{rest}" if rest else f"./{name}"
         if request.headers.get("Referer") or request.headers.get("Sec-Fetch-Site") == "cross-site":
@@ -142,6 +169,10 @@ _NEEDED = (
     f"<code>?{QUERY}=…</code>. Or give the token here:</p>{_FIELD}"
     '<p>Have you been here before? <a href="./">Open the page</a>.</p>'
 )
+_ELSEHOW = (
+    "<p>This himpc-lab can only be opened through the site that started it, for example from the launcher of "
+    "JupyterHub.</p>"
+)
 _WRONG = (
     "<p>This is not the token of the himpc-lab that runs now; each start has a new token. It is printed in "
     f"the terminal where himpc-lab was started:</p>{_FIELD}"
@@ -155,8 +186,8 @@ def names_of_this_machine() -> frozenset[str]:
     return frozenset({name, short, f"{short}.local"})
 
 
-def as_origin(text: str) -> str:
-    """The origin as browsers write it. Raises InputError if it is not a valid origin."""
+def as_origin(text: str, option: str = "--trusted-origin") -> str:
+    """The origin as browsers write it. Raises InputError, naming the option, if it is not a valid origin."""
     try:
         parts = urlsplit(text.strip())
         port = parts.port
@@ -165,7 +196,7 @@ def as_origin(text: str) -> str:
     plain = parts.scheme in ("http", "https") and parts.hostname and parts.path in ("", "/")
     if not plain or parts.query or parts.fragment or "@" in parts.netloc or not _HOST.fullmatch(parts.netloc):
         raise InputError(
-            f"--trusted-origin '{text[:80]}' is not an origin: give scheme and host and, if it is not the "
+            f"{option} '{text[:80]}' is not an origin: give scheme and host and, if it is not the "
             "usual one, the port, e.g. https://lab.example.org"
         )
     host = parts.netloc.lower().rpartition(":")[0] if port is not None else parts.netloc.lower()
@@ -178,28 +209,22 @@ def is_upgrade(request: Request) -> bool:
     return request.headers.get_all("Upgrade") == ["websocket"]
 
 
-def secured(headers: Headers) -> None:
-    """Adds the headers of every response: other sites may not show it in a frame, and browsers may not guess
-    its type."""
-    for name, value in _ON_EVERY_ANSWER.items():
-        if name not in headers:
-            headers[name] = value
-
-
-def _query(request: Request) -> dict[str, list[str]]:
+def query_of(request: Request) -> dict[str, list[str]]:
+    """The parameters in the address of a request."""
     return parse_qs(urlsplit(request.path).query, keep_blank_values=True)
 
 
 def _leads_away(request: Request) -> bool:
     """Whether the address makes viser's page connect to another server or play a recording. Messages from
     there may contain scripts, which would run as a part of our page."""
-    return not _ELSEWHERE.isdisjoint(_query(request))
+    return not ELSEWHERE.isdisjoint(query_of(request))
 
 
-def _is_embedded(headers: Headers) -> bool:
-    """Whether a page of another site loads a part of its content from here. A link from there is allowed."""
+def _is_embedded(headers: Headers, framed: bool) -> bool:
+    """Whether a page of another site loads a part of its content from here. A link from there is allowed.
+    framed: frames are allowed; the browser then checks whose they are."""
     site, mode, dest = (headers.get_all(f"Sec-Fetch-{name}") for name in ("Site", "Mode", "Dest"))
-    if dest and set(dest) & {"iframe", "frame", "embed", "object"}:
+    if dest and set(dest) & {"iframe", "frame", "embed", "object"} and not (framed and dest == ["iframe"]):
         return True
     return bool(site) and site[0] not in ("same-origin", "none") and mode != ["navigate"]
 

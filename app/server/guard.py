@@ -20,9 +20,10 @@ from app.server.answers import CROWDED, FULL, NOT_OPEN, as_response, plain
 from app.server.budget import Budget
 from app.server.class_door import ClassDoor
 from app.server.connection_limits import ConnectionLimits
-from app.server.door import Answer, Door, is_upgrade, secured
+from app.server.door import Answer, Door, is_upgrade
 from app.server.load import Load, Places, load_of, report
 from app.server.peers import ends_of
+from app.server.prefix import under_its_name
 from app.server.uploads import TRANSFER, Uploads
 from app.server.words import refusal
 
@@ -89,16 +90,18 @@ class ConnectionGuard:
                 if isinstance(connection, GuardedConnection):
                     connection.is_owners = self._is_owners(connection, request)
                     connection.teaches = self._door.role(request, _user(connection)) == "owner"
+                    connection.account = self._door.account(request)
                     connection.expect_word(FIRST_WORD)
                 return None
-            return files(connection, request)
+            moved = under_its_name(request)
+            return files(connection, request) if moved is None else as_response(moved)
 
         async def serve(connection: ServerConnection) -> None:
             own = connection.serves if isinstance(connection, GuardedConnection) else None
             await (own or given["handler"])(connection)
 
         def secure(_: ServerConnection, __: Request, response: Response) -> None:
-            secured(response.headers)
+            self._door.secure(response.headers)
 
         return {
             **given,
@@ -164,9 +167,10 @@ class GuardedConnection(ServerConnection):
     """A connection that counts messages before decoding them, and passes on only messages that a page may
     send.
 
-    `uploads` are the uploads of the page that it serves, `refuse` shows a refusal to the user, and
+    `uploads` are the uploads of the page that it serves, `refuse` shows a refusal to the user,
     `is_owners` is true if the person who started the server opened the page, `teaches` if it was opened with
-    the owner's secret on any machine; `serves` replaces viser for a page of a class.
+    the owner's secret on any machine, and `account` is the name with which its user signed in at the proxy;
+    `serves` replaces viser for a page of a class.
     """
 
     def __init__(self, *of: Any, guard: ConnectionGuard, **more: Any) -> None:
@@ -176,6 +180,7 @@ class GuardedConnection(ServerConnection):
         self.is_owners = False
         self.teaches = False
         self.serves: Callable[[Any], Awaitable[None]] | None = None
+        self.account = ""
         self._guard = guard
         self._budget = Budget(self.loop.time)
         self._waiting = 0

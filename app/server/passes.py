@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
-from urllib.parse import parse_qs, urlencode, urlsplit
+from urllib.parse import parse_qs, unquote, urlencode, urlsplit
 
 from websockets.datastructures import Headers
 
@@ -20,8 +20,11 @@ QUERY = "himpc-token"
 """The name of the parameter in the address. Jupyter, which may serve a lab, uses `token` for itself."""
 HEADER = "X-Himpc-Lab-Token"
 """The name of the header in which a proxy may send the token of its visitors."""
+USER_HEADER = "X-Himpc-Lab-User"
+"""The header in which a proxy that asks for passwords sends its visitor's name, percent-encoded UTF-8."""
 VARIABLE = "HIMPC_LAB_TOKEN"
 """The environment variable with a token of the user's own."""
+LONGEST_ACCOUNT = 80  # characters
 SHORTEST = 16  # characters of a token of the user's own
 Role = Literal["guest", "owner"]
 _ROLES: tuple[Role, ...] = ("owner", "guest")
@@ -92,6 +95,13 @@ class Passes:
         """Whether a proxy sent the token in its header; the owner's secret does not count there."""
         given = headers.get_all(HEADER)
         return len(given) == 1 and _same(given[0], self.token)
+
+    def account(self, headers: Headers) -> str:
+        """The name of the visitor, as the proxy says that sent the token with it; "" if it says none."""
+        given = headers.get_all(USER_HEADER)
+        if len(given) != 1 or not self.in_header(headers):
+            return ""
+        return "".join(sign for sign in unquote(given[0])[:LONGEST_ACCOUNT] if sign.isprintable())
 
     def in_cookies(self, headers: Headers, who: str) -> Role | None:
         """The role whose cookie is in a request from `who`, see `app.server.peers`; None if there is none."""

@@ -9,6 +9,7 @@ import signal
 import socket
 import sys
 import threading
+import time
 import warnings
 from collections.abc import Iterator, Sequence
 from importlib import import_module
@@ -22,12 +23,12 @@ from app.link.choice import SceneChoice
 from app.server.class_door import TEACHER, ClassDoor
 from app.server.classroom import Classroom
 from app.server.connection_limits import OF_A_CLASS, ConnectionLimits
-from app.server.door import Door, as_origin, names_of_this_machine
+from app.server.door import SELF, Door, as_origin, names_of_this_machine
 from app.server.greeting import greeting, seen_from_outside
 from app.server.guard import ConnectionGuard
 from app.server.malloc_tuning import few_arenas, large_arrays_apart
 from app.server.opening import opened_in_a_browser
-from app.server.passes import Passes, new_token, shared
+from app.server.passes import VARIABLE, Passes, new_token, shared
 from app.server.sessions import GRACE, Sessions
 from app.server.visit import Visit
 from lessons.own.folder import Folder
@@ -54,6 +55,9 @@ def serve(
     token: str | None = None,
     refers: bool = False,
     class_names: bool | None = None,
+    proxy_only: bool = False,
+    drain: float = 0.0,
+    embed_in: Sequence[str] = (),
 ) -> int:
     """Serves the page until Ctrl-C or SIGTERM. Raises InputError for a scene, robot, host, port or origin
     that cannot be used.
@@ -63,6 +67,8 @@ def serve(
     secret may open and run files below `own_files` by path; with None no page may. `key` signs the
     learners' progress. `token` replaces the random one; with `refers` a full server answers 503, so that a
     proxy tries the next one. `class_names`: whether a class is asked for names; None: there is no class.
+    With `proxy_only` only a proxy that sends the token in its header is let in. After SIGTERM the pages that
+    are open have `drain` seconds. Pages of the origins `embed_in` may show the page in a frame.
     """
     server = PageServer(
         choice,
@@ -77,16 +83,19 @@ def serve(
         token=token,
         refers=refers,
         class_names=class_names,
+        proxy_only=proxy_only,
+        embed_in=embed_in,
     )
-    stop = threading.Event()
+    stop, now = threading.Event(), threading.Event()
     try:
-        with _ended_by_signals(stop), contextlib.ExitStack() as until_the_end:
+        with _ended_by_signals(stop, now), contextlib.ExitStack() as until_the_end:
             for line in greeting(server, host, tuple(map(as_origin, trusted_origins))):
                 print(line, flush=True)
             if open_browser:
                 until_the_end.enter_context(opened_in_a_browser(server.first_link))
             while not stop.wait(0.5):
                 pass
+            server.drain(drain, now)
     finally:
         server.close()
     if server.loading:
@@ -97,13 +106,20 @@ def serve(
 
 
 @contextlib.contextmanager
-def _ended_by_signals(stop: threading.Event) -> Iterator[None]:
-    """Lets Ctrl-C and SIGTERM set `stop`; the previous signal handlers are restored afterwards."""
+def _ended_by_signals(stop: threading.Event, now: threading.Event) -> Iterator[None]:
+    """Lets Ctrl-C and SIGTERM set `stop`, and Ctrl-C and every further signal also `now`; the previous signal
+    handlers are restored afterwards."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
+
+    def end(number: int, _: object) -> None:
+        if number == signal.SIGINT or stop.is_set():
+            now.set()
+        stop.set()
+
     numbers = (signal.SIGINT, signal.SIGTERM)
-    before = [signal.signal(number, lambda *_: stop.set()) for number in numbers]
+    before = [signal.signal(number, end) for number in numbers]
     try:
         yield
     finally:
@@ -129,11 +145,21 @@ class PageServer:
         token: str | None = None,
         refers: bool = False,
         class_names: bool | None = None,
+        proxy_only: bool = False,
+        embed_in: Sequence[str] = (),
+        all_steer: bool = False,
     ) -> None:
-        """Arguments as for `serve`; grace: time, s, that a session outlives its tab."""
+        """Arguments as for `serve`; grace: time, s, that a session outlives its tab; all_steer: every page of
+        a classroom controls the robot."""
         if max_sessions < 1:
             raise InputError(f"max-sessions is {max_sessions}: give 1 or more.")
+        if proxy_only and (token is None or not ask_token):
+            raise InputError(
+                "--proxy-only needs the token that the proxy sends: give it with --token-file FILE or "
+                f"{VARIABLE}, and leave out --no-token"
+            )
         trusted = frozenset(map(as_origin, trusted_origins))
+        framing = frozenset(each if each == SELF else as_origin(each, "--embed-in") for each in embed_in)
         _check_choice(choice)
         _check_address(host, port)
         few_arenas()
@@ -144,8 +170,8 @@ class PageServer:
         self.public = not local or bool(trusted)
         """Whether other people than the users of this machine can reach the page."""
         self.guard = ConnectionGuard(Door())
-        self.sessions = Classroom(choice) if classroom else Sessions(choice, max_sessions, grace)
-        self._own_files, self._key = own_files, key
+        self.sessions = Classroom(choice, all_steer) if classroom else Sessions(choice, max_sessions, grace)
+        self._own_files, self._key, self._refers = own_files, key, refers
         self._visits: dict[int, Visit] = {}
         self._lock = threading.Lock()
         try:
@@ -170,7 +196,7 @@ class PageServer:
             self.passes = shared(token, owner)
         else:
             self.passes = Passes(new_token() if ask_token else None, owner, f"himpc-lab-{found}")
-        door = Door(local, trusted, self.passes, names_of_this_machine())
+        door = Door(local, trusted, self.passes, names_of_this_machine(), proxy_only, framing)
         self._sockets = None if self.hall is None else Sockets(self.hall, lambda: self.outside)
         if self.hall is not None and self._sockets is not None:
             self._sockets.start(self._viser.get_event_loop())
@@ -215,7 +241,15 @@ class PageServer:
     # ---------------------------------------------------------------- clients, on viser's loop
 
     async def _connect(self, client: viser.ClientHandle) -> None:
-        visit = Visit(self._viser, client, self.sessions, self._own_files, self._key, self.hall)
+        visit = Visit(
+            self._viser,
+            client,
+            self.sessions,
+            self._own_files,
+            self._key,
+            hall=self.hall,
+            refers=self._refers,
+        )
         with self._lock:
             self._visits[client.client_id] = visit
         await visit.arrive()
@@ -225,6 +259,18 @@ class PageServer:
             visit = self._visits.pop(client.client_id, None)
         if visit is not None:
             visit.leave()
+
+    def drain(self, seconds: float, now: threading.Event) -> None:
+        """Lets nobody new in, tells the pages, and returns when all have left, after `seconds`, or when `now`
+        is set."""
+        self.guard.close()
+        until = time.monotonic() + seconds
+        with self._lock:
+            visits = list(self._visits.values())
+        for visit in visits if seconds > 0 else ():
+            visit.tell("The lab stops", (_GO_ON if self._refers else _HAND_IN).format(seconds))
+        while self._visits and time.monotonic() < until and not now.wait(0.1):
+            pass
 
     def close(self) -> None:
         """Closes the pages, ends the processes and stops the server."""
@@ -239,6 +285,13 @@ class PageServer:
             visit.close()
         self.sessions.close()
         private.stop(self._viser)
+
+
+_GO_ON = (
+    "This computer stops in {:.0f} s. Your page then goes on with another one: your browser keeps scene, "
+    "settings, step and progress; the robot begins anew."
+)
+_HAND_IN = "The lab stops in {:.0f} s: save what you need, or hand in your progress (Export)."
 
 
 def _check_choice(choice: SceneChoice) -> None:

@@ -33,7 +33,7 @@ class Sessions:
 
     def __init__(self, choice: SceneChoice, max_sessions: int, grace: float = GRACE) -> None:
         self.max_sessions = max_sessions
-        self._choice = choice
+        self.start = choice
         self._grace = grace
         self._spares = Spares(WORKER)
         self._lock = threading.Lock()
@@ -53,7 +53,7 @@ class Sessions:
         """The robot of a teacher, which takes no learner's place and lasts as long as the server."""
         with self._lock:
             if self._guide is None:
-                self._guide = SimulationClient(secrets.token_urlsafe(16), self._choice, self._spares)
+                self._guide = SimulationClient(secrets.token_urlsafe(16), self.start, self._spares)
             return self._guide
 
     def enter(self, tokens: Sequence[str], refuse: Refuse | None = None) -> SimulationClient | None:
@@ -70,7 +70,7 @@ class Sessions:
                     return known
             if len(self._learners) >= self.max_sessions:
                 return None
-            learner = SimulationClient(secrets.token_urlsafe(16), self._choice, self._spares)
+            learner = SimulationClient(secrets.token_urlsafe(16), self.start, self._spares)
             learner.attached = True
             self._learners[learner.token] = learner
         return learner

@@ -4,23 +4,29 @@ from __future__ import annotations
 
 import asyncio
 import json
+import re
+import secrets
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from functools import partial
 
 import viser
 
 from app.adapter import private
+from app.adapter.names import STORED
 from app.adapter.removed_handle_errors import print_exception
 from app.classes.hall import Hall
 from app.client.progress import Notebook
 from app.client.simulation_client import SimulationClient
 from app.html.text import block
-from app.page.comfort import ASK_MOTION, MOTION, REDUCED, Comfort
+from app.link.choice import SceneChoice
+from app.page.comfort import ASK_MOTION, ASK_WINDOW, MOTION, REDUCED, Comfort
 from app.page.inlet import Inlet
 from app.page.page import Page
 from app.panels.run.class_card import ClassCard
 from app.panels.run.classroom import add_watching
+from app.server import place
 from app.server.budget import UPLOADS
 from app.server.classroom import Classroom, Watcher
 from app.server.guard import GuardedConnection
@@ -36,6 +42,9 @@ STORAGE = 5.0
 _TOKENS = "himpc-lab-sessions"
 _DARK = "himpc-lab-dark"
 _PROGRESS = "himpc-lab-lessons"
+_ELSEWHERE = 3.0  # s that a page is shown that there is no place, until it looks elsewhere
+_PERIOD = 1.0  # s between two looks whether the page is somewhere else
+_GOES_ON = ("You go on where you were", "Your robot begins anew, with the settings or the step that you had.")
 _LONGEST = 100_000  # characters that we read of each stored value
 
 
@@ -51,18 +60,22 @@ class Visit:
         own_files: Folder | None,
         key: bytes | None = None,
         hall: Hall | None = None,
+        refers: bool = False,
     ) -> None:
-        """own_files: folder of the files that the owner's page may name; key: signs the learners'
-        progress; hall: the class, if there is one."""
+        """own_files: folder of the files that the owner's page may name; key: signs the learners' progress;
+        hall: the class, if there is one; refers: a page for which there is no place connects again, perhaps
+        with another server."""
         self._server = server
         self._client = client
         self._sessions = sessions
-        self._own_files, self._key, self._hall = own_files, key, hall
+        self._own_files, self._key, self._hall, self._refers = own_files, key, hall, refers
         self._page: Page | None = None
         self._left = False
         self._seat = ""
         self._asking: asyncio.Future[tuple[str | None, ...]] | None = None
         self._dark = False
+        self._place: SceneChoice | None = None  # where this tab was, if another server showed it
+        self._seen: tuple[object, object] | None = None  # the scene and settings that were kept last
         self._notebook = Notebook(LearnerProgress(), lambda _: None)
         self._comfort = Comfort(client, reduced=False)
         self._workers = Workers()
@@ -74,6 +87,9 @@ class Visit:
         if not (isinstance(connection, GuardedConnection) and connection.is_owners):
             self._own_files = None
         self._teaches = isinstance(connection, GuardedConnection) and connection.teaches
+        self._account = connection.account if isinstance(connection, GuardedConnection) else ""
+        # Pages of all accounts of a hub have one origin, so that a browser stores their values in one place.
+        self._progress_key = f"{_PROGRESS}-{self._account}" if self._account else _PROGRESS
         if isinstance(connection, GuardedConnection):
             connection.refuse = partial(inlet.say, "Not taken")
             connection.uploads = Uploads(
@@ -85,19 +101,31 @@ class Visit:
     async def arrive(self) -> None:
         """Starts the visit, on viser's loop. A browser that does not answer is treated as a new one."""
         private.run_script(self._client, ASK_MOTION)
-        keys = (_TOKENS, _DARK, _PROGRESS, MOTION)
+        here = f"himpc-lab-place-{secrets.token_hex(8)}"
+        size = f"{here}-window"
+        private.run_script(self._client, place.asking(here))
+        private.run_script(self._client, ASK_WINDOW % (STORED, size))
+        keys = (_TOKENS, _DARK, self._progress_key, MOTION, here, size)
         self._asking = asyncio.ensure_future(private.read_storage(self._client, keys, STORAGE))
         try:
             found = await self._asking
         except asyncio.CancelledError:
             return  # the tab was closed
-        tokens, dark, progress, motion = (text if text and len(text) <= _LONGEST else None for text in found)
+        for key in (here, size):
+            self._client.local_storage.remove_item(key)
+        short = [text if text and len(text) <= _LONGEST else None for text in found]
+        tokens, dark, progress, motion, kept, window = short
         self._dark = dark == "1"
-        self._comfort = Comfort(self._client, motion == REDUCED and isinstance(self._sessions, Sessions))
+        reduced = motion == REDUCED and isinstance(self._sessions, Sessions)
+        self._comfort = Comfort(self._client, reduced, _size(window))
         self._notebook = Notebook(
-            found_progress(progress, self._key), lambda text: self._keep(_PROGRESS, text), self._key
+            found_progress(progress, self._key, self._account),
+            lambda text: self._keep(self._progress_key, text),
+            self._key,
+            self._account,
         )
-        self._then(_tokens(tokens))
+        self._then(_tokens(tokens), kept)
+        self._watch()
 
     def leave(self) -> None:
         """Ends the visit after the tab was closed. Returns at once."""
@@ -115,27 +143,32 @@ class Visit:
 
     # ---------------------------------------------------------------- steps, on a thread of their own
 
-    def _then(self, tokens: Sequence[str]) -> None:
-        """Tries to admit the page, for the first time or again."""
+    def _then(self, tokens: Sequence[str], kept: str | None = None) -> None:
+        """Tries to admit the page, for the first time or again. kept: the place that its tab stored."""
         if not self._left:
-            self._steps.submit(self._admit, tokens).add_done_callback(print_exception)
+            self._steps.submit(self._admit, tokens, kept).add_done_callback(print_exception)
 
-    def _admit(self, tokens: Sequence[str]) -> None:
+    def _admit(self, tokens: Sequence[str], kept: str | None) -> None:
         if self._left:
             return
-        before, self._page = self._page, None
-        if before is not None:  # the page has only watched so far
-            before.close()
+        watching, self._page = self._page, None
+        if watching is not None:  # the page has only watched so far
+            watching.close()
         hall = self._hall
         leads = hall is not None and self._teaches
         learner = hall.robot if hall is not None and leads else self._sessions.enter(tokens, self._refuse)
         if learner is None:
-            self._turn_away(tokens)
+            self._turn_away(tokens, kept)
             return
         if hall is not None and not leads and not isinstance(learner, Watcher):
             hall.recognise(learner.token, tokens)
-        kept = [token for token in tokens if token != learner.token][-7:]
-        self._keep(_TOKENS, json.dumps([*kept, learner.token] if learner.token else kept))
+        if isinstance(self._sessions, Sessions) and not leads and learner.token not in tokens:
+            before = place.read(kept, self._sessions.start)
+            if before is not None:
+                learner.load(before)
+                self._client.add_notification(*_GOES_ON, color="green", auto_close_seconds=8.0)
+        others = [token for token in tokens if token != learner.token][-7:]
+        self._keep(_TOKENS, json.dumps([*others, learner.token] if learner.token else others))
         self._page = Page(
             self._client,
             learner,
@@ -157,6 +190,29 @@ class Visit:
         if self._hall is not None:
             self._hall.seats.rise(self._seat)
         self._workers.shutdown(wait=False, cancel_futures=True)
+
+    # ---------------------------------------------------------------- where the page is
+
+    def _watch(self) -> None:
+        """Lets the tab keep its place whenever scene or settings have changed. On viser's loop."""
+        if self._left or not isinstance(self._sessions, Sessions):
+            return
+        page = self._page
+        if page is not None:
+            choice, settings = page.learner.choice, page.learner.settings
+            new = self._seen is None or choice != self._seen[0] or settings is not self._seen[1]
+            if new and page.learner.ready is not None:
+                self._seen = choice, settings
+                with suppress(RuntimeError):  # the tab was closed
+                    keeping = self._steps.submit(self._keep_place, page, self._sessions.start)
+                    keeping.add_done_callback(print_exception)
+        self._server.get_event_loop().call_later(_PERIOD, self._watch)
+
+    def _keep_place(self, page: Page, start: SceneChoice) -> None:
+        ready = page.learner.ready
+        if ready is not None and not self._left:
+            choice, settings = page.learner.choice_of(ready), page.learner.settings_of(ready)
+            private.run_script(self._client, place.keeping(place.written(choice, settings, start)))
 
     # ---------------------------------------------------------------- calls from the page
 
@@ -196,7 +252,11 @@ class Visit:
             color="red",
         )
 
-    def _turn_away(self, tokens: Sequence[str]) -> None:
+    def tell(self, title: str, sentence: str) -> None:
+        """Shows a sentence that stays until the user closes it."""
+        self._client.add_notification(title, sentence, color="orange")
+
+    def _turn_away(self, tokens: Sequence[str], kept: str | None) -> None:
         gui = self._client.gui
         gui.configure_theme(dark_mode=self._dark, show_share_button=False, show_logo=False)
         modal = gui.add_modal("All places are taken")
@@ -209,11 +269,26 @@ class Visit:
                 )
             )
             again = gui.add_button("Try again")
+        if self._refers:
+            loop = self._server.get_event_loop()
+            loop.call_soon_threadsafe(loop.call_later, _ELSEWHERE, self._send_on)
 
         @again.on_click
         async def _(_: object) -> None:
             modal.close()
-            self._then(tokens)
+            self._then(tokens, kept)
+
+    def _send_on(self) -> None:
+        """Ends a connection for which there was no place: the page then connects again by itself."""
+        connection = private.connection_of(self._server, self._client)
+        if self._page is None and connection is not None:
+            connection.transport.abort()
+
+
+def _size(told: str | None) -> tuple[int, int] | None:
+    """Width and height, pixels, as a browser told them; None if it did not."""
+    found = re.fullmatch(r"(\d{1,5})x(\d{1,5})", told or "")
+    return None if found is None else (int(found[1]), int(found[2]))
 
 
 def _tokens(stored: str | None) -> list[str]:

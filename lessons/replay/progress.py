@@ -63,20 +63,26 @@ class LearnerProgress:
         )
 
 
-def kept(progress: LearnerProgress, key: bytes | None) -> str:
-    """The progress in the form that the browser stores."""
+def kept(progress: LearnerProgress, key: bytes | None, account: str = "") -> str:
+    """The progress in the form that the browser stores. account: the name with which the learner signed in;
+    with a key, it is signed as well."""
     text = progress.dumped()
-    return text if key is None else _seal(text.encode(), key) + text
+    return text if key is None else _seal(_of(account, text), key) + text
 
 
-def found(text: str | None, key: bytes | None) -> LearnerProgress:
-    """The progress that a browser stored; with a key, only progress that is signed with it."""
+def found(text: str | None, key: bytes | None, account: str = "") -> LearnerProgress:
+    """The progress that a browser stored; with a key, only progress of this account that is signed with
+    it."""
     if key is None or not text:
         return progress_from(text)
     seal, body = text[:64], text[64:]
     return progress_from(
-        body if hmac.compare_digest(seal.encode(), _seal(body.encode(), key).encode()) else None
+        body if hmac.compare_digest(seal.encode(), _seal(_of(account, body), key).encode()) else None
     )
+
+
+def _of(account: str, text: str) -> bytes:
+    return (f"{account}\0{text}" if account else text).encode()
 
 
 def progress_from(text: str | None) -> LearnerProgress:
@@ -117,17 +123,21 @@ class HandedIn:
         at: time, ISO 8601.
         progress: progress in the lessons.
         code: state code of the setting on the page at that time; "" if none could be made.
+        account: the name with which the learner signed in, as the proxy in front of the lab told it; "" if
+            there was none.
     """
 
     name: str
     at: str
     progress: LearnerProgress
     code: str = ""
+    account: str = ""
 
 
 def written(handed: HandedIn, key: bytes | None) -> str:
     """What a learner hands in, as a text of letters, digits, "-" and "_"."""
     given = {"n": handed.name[:LONGEST_NAME], "t": handed.at, "p": handed.progress.dumped(), "c": handed.code}
+    given |= {"a": handed.account} if handed.account else {}
     body = base64.urlsafe_b64encode(zlib.compress(json.dumps(given, ensure_ascii=False).encode(), 9))
     text = f"hp{VERSION}{'s' if key is not None else ''}-{body.decode().rstrip('=')}"
     return f"{text}-{_seal(text.encode(), key)}"
@@ -159,7 +169,9 @@ def read_handed_in(text: str, key: bytes | None) -> tuple[HandedIn, Proof]:
         name, at, progress, code = (str(given[key]) for key in "ntpc")
     except (ValueError, binascii.Error, zlib.error, RecursionError, KeyError, TypeError):
         raise _damaged() from None
-    handed = HandedIn(_plain(name)[:LONGEST_NAME], _plain(at)[:40], progress_from(progress), code[:20_000])
+    account = _plain(str(given["a"]))[:LONGEST_NAME] if "a" in given else ""
+    name, at = _plain(name)[:LONGEST_NAME], _plain(at)[:40]
+    handed = HandedIn(name, at, progress_from(progress), code[:20_000], account)
     if not signed or key is None:
         return handed, "not signed"
     right = hmac.compare_digest(seal, _seal(whole, key))

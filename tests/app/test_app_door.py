@@ -10,7 +10,8 @@ from websockets.datastructures import Headers
 from websockets.http11 import Request
 
 from app.server.door import Answer, Door, as_origin
-from app.server.passes import QUERY, VARIABLE, Passes, given_token, new_token, shared
+from app.server.passes import HEADER, QUERY, USER_HEADER, VARIABLE, Passes, given_token, new_token, shared
+from app.server.prefix import under_its_name
 from robots import InputError
 
 OURS = "127.0.0.1:8080"
@@ -208,6 +209,38 @@ def test_a_proxy_may_send_the_token_in_its_header() -> None:
     assert not TOKENED.is_owner(asked(X_Himpc_Lab_Token=OWNER))
 
 
+def test_a_door_for_one_proxy_lets_in_nobody_else() -> None:
+    """Only the header opens it, under any name of the server; the proxy's own pages may open web sockets, and
+    only its word about the account counts."""
+    door = Door(passes=shared(TOKEN, OWNER), proxy_only=True)
+    by_proxy = {"Host": "hub.example.org", HEADER.replace("-", "_"): TOKEN}
+    account = {USER_HEADER.replace("-", "_"): "zo%C3%AB%0A"}
+    assert judged(door, **by_proxy) is None
+    for origin, right in (
+        ("https://hub.example.org", True),
+        ("http://hub.example.org", True),
+        ("https://evil.example", False),
+        ("https://hub.example.org.evil.example", False),
+        ("null", False),
+    ):
+        assert (judged(door, **by_proxy, Origin=origin, Upgrade="websocket") is None) is right
+    cookie = door.passes.keep("owner", "")
+    for path, headers in (
+        (f"/?{QUERY}={TOKEN}", {}),
+        (f"/?{QUERY}={OWNER}", {}),
+        ("/", {"Cookie": cookie}),
+        ("/", {HEADER.replace("-", "_"): f"{TOKEN}x"}),
+        ("/", {HEADER.replace("-", "_"): [TOKEN, TOKEN]}),
+    ):
+        answer = judged(door, path, **headers, **account)
+        assert answer is not None and answer.status is HTTPStatus.FORBIDDEN
+        assert door.account(asked(path, **headers, **account)) == ""
+    assert door.account(asked(**by_proxy, **account)) == "zoë"
+    assert door.account(asked(**by_proxy)) == ""
+    everybody = Door(passes=shared(TOKEN, OWNER))  # many people have this token
+    assert everybody.account(asked(**by_proxy, **account)) == ""
+
+
 def test_servers_with_one_token_take_each_others_cookies_but_no_owner_is_made_of_it() -> None:
     """Who has the token can compute the key, but the owner's cookie also needs the owner's secret."""
     first, second = shared(TOKEN, OWNER), shared(TOKEN, new_token())
@@ -232,3 +265,34 @@ def test_a_token_of_ones_own_comes_from_a_file_or_the_environment(tmp_path: Path
             given_token(None, {VARIABLE: wrong})
     with pytest.raises(InputError, match="cannot be read"):
         given_token(str(tmp_path / "none"), {})
+
+
+def test_only_the_embedders_may_show_the_page_in_a_frame() -> None:
+    """Without one, nobody may. The browser compares the origins; other ways to embed the page stay closed."""
+    for origins, policy in (
+        (frozenset[str](), "frame-ancestors 'none'"),
+        (
+            frozenset({"https://b.example", "https://a.example"}),
+            "frame-ancestors https://a.example https://b.example",
+        ),
+    ):
+        door, headers = Door(embedders=origins), Headers()
+        door.secure(headers)
+        assert headers["Content-Security-Policy"] == policy
+        assert ("X-Frame-Options" in headers) is not bool(origins)
+        for dest, right in (("iframe", bool(origins)), ("embed", False), ("object", False), ("frame", False)):
+            frame = {"Sec_Fetch_Site": "cross-site", "Sec_Fetch_Mode": "navigate", "Sec_Fetch_Dest": dest}
+            assert (judged(door, **frame) is None) is right
+        assert judged(door, Origin="https://a.example", Upgrade="websocket") is not None
+
+
+@pytest.mark.parametrize("given", ["websocket=wss://evil.example", "playbackPath=https://evil.example/x"])
+def test_a_server_in_the_address_of_the_page_below_a_path_is_taken_out(given: str) -> None:
+    """viser's page adds its own there, which a reload sends; another one has no effect either."""
+    request = asked(f"/page?{given}&fixedDpr=1", X_Forwarded_Prefix="/user/zoe/lab")
+    assert LOCAL.judge(request) is None
+    moved = under_its_name(request)
+    assert moved is not None and dict(moved.headers)["Location"] == "./page?fixedDpr=1"
+    request = asked("/page?fixedDpr=1")
+    assert under_its_name(request) is None and request.path == "/?fixedDpr=1"
+    assert under_its_name(asked("/")) is None

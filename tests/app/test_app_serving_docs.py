@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import http.client
+import json
 import os
 import re
 import shutil
 import socket
 import ssl
 import subprocess
+import threading
 import urllib.error
 import urllib.request
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -23,10 +25,14 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from app.__main__ import main
+from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
+from app.link.exercise import LessonPlace
 from app.link.process import wait_until
+from app.server import place
 from app.server.passes import HEADER, QUERY
 from app.server.server import PageServer
+from browsing.tab import Storage, opened
 from browsing.wire import Wire, camera, eventually, pack
 from lessons.own.folder import Folder
 from lessons.scenes.run_spec import RunSpec
@@ -223,6 +229,7 @@ server {
     listen 127.0.0.1:PORT;
     location /user/zoe/lab/ {
         proxy_pass URL/;
+        proxy_set_header X-Forwarded-Prefix /user/zoe/lab;
         proxy_http_version 1.1;
         proxy_set_header Host $http_host;
         proxy_set_header Upgrade $http_upgrade;
@@ -234,7 +241,7 @@ server {
 
 def test_the_page_works_below_any_path(nginx: str, tmp_path: Path) -> None:
     """Behind a proxy that removes a prefix: the token leaves the address without leaving the prefix, the
-    cookie belongs to it, the question for the token leads back to it, and a page gets a robot."""
+    cookie belongs to it, the question for the token leads back to it, and a page gets a robot at its name."""
     port, prefix = free_port(), "/user/zoe/lab/"
     server = PageServer(
         SceneChoice(RunSpec("planar3-hold")),
@@ -263,21 +270,26 @@ def test_the_page_works_below_any_path(nginx: str, tmp_path: Path) -> None:
             assert status == 303 and urljoin(prefix, headers["Location"]) == prefix
             cookie, *attributes = headers["Set-Cookie"].split("; ")
             assert not any(each.startswith("Path") for each in attributes)  # a browser takes the prefix
-            status, _, page = ask(prefix, cookie)
+            status, headers, _ = ask(f"{prefix}?fixedDpr=1", cookie)
+            assert status == 303 and urljoin(prefix, headers["Location"]) == f"{prefix}page?fixedDpr=1"
+            status, _, page = ask(f"{prefix}page", cookie)
             assert status == 200 and not re.findall(r'(?:href|action|src)="/', page)
             assert ask(f"{prefix}health")[0] == 200
-            with Wire(f"http://127.0.0.1:{port}{prefix}?{token}"):
+            # The address at which viser's page of this name opens its web socket; nginx would redirect the
+            # prefix without its last slash.
+            assert ask(prefix.rstrip("/"))[0] == 301
+            with Wire(f"http://127.0.0.1:{port}{prefix}page?{token}"):
                 assert eventually(lambda: len(server.sessions.learners) == 1, LONG)
     finally:
         server.close()
 
 
-def test_a_full_server_behind_the_printed_balancer_is_passed_over(nginx: str, tmp_path: Path) -> None:
-    """Two servers of one session each, with one token: the second learner gets the second robot, the third is
-    asked to wait, and gets the place that becomes free."""
+@contextmanager
+def balanced(nginx: str, folder: Path, servers: int) -> Iterator[tuple[str, list[PageServer]]]:
+    """Servers of one session each with one token, behind the printed balancer; yields the link of all."""
     port, token = free_port(), "one-token-for-all-servers"
     origin = f"http://127.0.0.1:{port}"
-    servers = [
+    running = [
         PageServer(
             SceneChoice(RunSpec("planar3-hold")),
             port=0,
@@ -287,40 +299,117 @@ def test_a_full_server_behind_the_printed_balancer_is_passed_over(nginx: str, tm
             token=token,
             refers=True,
         )
-        for _ in range(2)
+        for _ in range(servers)
     ]
     (site,) = re.findall(r"```text\n(upstream .*?)```", PAGE.read_text(), re.DOTALL)
     for text, here in (
-        ("lab-1.example.org:8080", servers[0].url.removeprefix("http://")),
-        ("lab-2.example.org:8080", servers[1].url.removeprefix("http://")),
+        ("lab-1.example.org:8080", running[0].url.removeprefix("http://")),
+        ("lab-2.example.org:8080", running[1].url.removeprefix("http://")),
         ("listen 80;", f"listen 127.0.0.1:{port};"),
     ):
         assert site.count(text) == 1
         site = site.replace(text, here)
-    link = f"{origin}/?{QUERY}={token}"
     try:
-        with nginx_with(nginx, tmp_path, site, port):
-
-            def taken() -> int:
-                return sum(learner.attached for each in servers for learner in each.sessions.learners)
-
-            with Wire(link):
-                assert eventually(lambda: taken() == 1, LONG)
-                with Wire(link):
-                    assert eventually(lambda: taken() == 2, LONG)
-                    assert [len(each.sessions.learners) for each in servers] == [1, 1]
-                    with pytest.raises(InvalidStatus) as refused:
-                        connect(link.replace("http", "ws"), subprotocols=PROTOCOL)
-                    assert refused.value.response.status_code == 503
-                    with pytest.raises(urllib.error.HTTPError) as waiting:
-                        urllib.request.urlopen(urllib.request.Request(origin, headers={HEADER: token}))
-                    assert waiting.value.code == 503 and waiting.value.headers["Refresh"] == "5"
-                assert eventually(lambda: sum(len(each.sessions.learners) for each in servers) == 1, LONG)
-                with Wire(link):
-                    assert eventually(lambda: taken() == 2, LONG)
+        with nginx_with(nginx, folder, site, port):
+            yield f"{origin}/?{QUERY}={token}", running
     finally:
-        for each in servers:
+        for each in running:
             each.close()
+
+
+def learners(servers: Sequence[PageServer]) -> list[SimulationClient]:
+    return [each for server in servers for each in server.sessions.learners if each.attached]
+
+
+def test_a_full_server_behind_the_printed_balancer_is_passed_over(nginx: str, tmp_path: Path) -> None:
+    """Two servers of one session each, with one token: the second learner gets the second robot, the third is
+    asked to wait, and gets the place that becomes free."""
+    with balanced(nginx, tmp_path, 2) as (link, servers):
+        origin, _, token = link.partition(f"/?{QUERY}=")
+        with Wire(link):
+            assert eventually(lambda: len(learners(servers)) == 1, LONG)
+            with Wire(link):
+                assert eventually(lambda: len(learners(servers)) == 2, LONG)
+                assert [len(each.sessions.learners) for each in servers] == [1, 1]
+                with pytest.raises(InvalidStatus) as refused:
+                    connect(link.replace("http", "ws"), subprotocols=PROTOCOL)
+                assert refused.value.response.status_code == 503
+                with pytest.raises(urllib.error.HTTPError) as waiting:
+                    urllib.request.urlopen(urllib.request.Request(origin, headers={HEADER: token}))
+                assert waiting.value.code == 503 and waiting.value.headers["Refresh"] == "5"
+            assert eventually(lambda: sum(len(each.sessions.learners) for each in servers) == 1, LONG)
+            with Wire(link):
+                assert eventually(lambda: len(learners(servers)) == 2, LONG)
+
+
+def test_a_page_goes_on_with_another_server_where_it_was(nginx: str, tmp_path: Path) -> None:
+    """A server that is to stop lets nobody in and tells its page; once it is gone, the page's browser brings
+    the step of its lesson, or the settings of its scene, to the other server."""
+    lesson = SceneChoice.of_lesson(LessonPlace.at("one-task", 2))
+    with balanced(nginx, tmp_path, 2) as (link, servers):
+        storage = Storage()
+        with opened(link, storage, LONG) as page:
+            assert eventually(lambda: len(learners(servers)) == 1, LONG)
+            (learner,) = learners(servers)
+            (first,) = (each for each in servers if each.sessions.learners)
+            (second,) = (each for each in servers if each is not first)
+            learner.load(lesson)
+            assert eventually(lambda: '"step": 2' in "".join(storage.session.values()), LONG)
+            now = threading.Event()
+            draining = threading.Thread(target=first.drain, args=(LONG, now))
+            draining.start()
+            assert eventually(lambda: any(title == "The lab stops" for title, _ in page.notices), LONG)
+            assert page.is_open
+            with pytest.raises(urllib.error.HTTPError) as health:
+                urllib.request.urlopen(f"{first.url}/health")
+            assert json.loads(health.value.read())["state"] == "stopping"
+            now.set()
+            draining.join()
+            first.close()
+            assert eventually(lambda: not page.is_open, LONG)
+        with opened(link, storage, LONG) as page:
+            assert eventually(lambda: len(learners([second])) == 1, LONG)
+            (learner,) = learners([second])
+            assert eventually(lambda: learner.choice.exercise == lesson.exercise, LONG)
+            assert eventually(lambda: page.shows("2 of"), LONG)
+            assert not [key for key in storage.local if "place" in key]
+            learner.load(SceneChoice(RunSpec("planar3-hold", set=("horizon=7",))))
+            assert eventually(lambda: '"code"' in "".join(storage.session.values()), LONG)
+        assert eventually(lambda: not second.sessions.learners, LONG)
+        storage.session, kept = {}, storage.session
+        with opened(link, storage, LONG):  # another tab of this browser begins anew
+            assert eventually(lambda: len(learners([second])) == 1, LONG)
+            (learner,) = learners([second])
+            assert eventually(lambda: learner.settings is not None, LONG)
+            assert learner.settings is not None and learner.settings.horizon != 7
+        assert eventually(lambda: not second.sessions.learners, LONG)
+        storage.session = kept
+        with opened(link, storage, LONG):
+            assert eventually(lambda: len(learners([second])) == 1, LONG)
+            (learner,) = learners([second])
+            assert eventually(lambda: getattr(learner.settings, "horizon", 0) == 7, LONG)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("", "{", "[1]", "[" * 9000, '{"start": 1}', '{"start": "S", "code": "hl1-AAAA"}'),
+        '{"start": "S", "lesson": "/etc/passwd", "step": 1}',
+        '{"start": "S", "lesson": ["one-task"], "step": 1}',
+        '{"start": "S", "lesson": "one-task", "step": 99}',
+        '{"start": "S", "code": 5}',
+        '{"start": "T", "lesson": "one-task", "step": 1}',
+    ],
+)
+def test_a_place_that_cannot_be_read_is_none(text: str) -> None:
+    """Anybody may have written it: nothing is opened but a step of the course or a state code, and only for a
+    server that was started with the same scene."""
+    start = SceneChoice(RunSpec("planar3-hold"))
+    step = SceneChoice.of_lesson(LessonPlace.at("one-task", 2))
+    right = place.written(step, step.scene().settings, start)
+    assert place.read(right, start) == step
+    assert place.read(right, step) is None
+    assert place.read(text.replace('"S"', json.dumps(json.loads(right)["start"])), start) is None
 
 
 def test_the_command_takes_what_the_page_shows(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -69,6 +70,31 @@ def test_what_was_changed_is_not_signed() -> None:
 def test_damage_to_what_is_handed_in_is_a_sentence(text: str, words: str) -> None:
     with pytest.raises(InputError, match=words):
         read_handed_in(text, KEY)
+
+
+def test_the_account_is_signed_with_the_progress() -> None:
+    """The text names the account that the proxy told. What one account's browser stored is nothing for
+    another account, nor for a lab without accounts."""
+    text = written(replace(HANDED, account="zoe"), KEY)
+    handed, proof = read_handed_in(text, KEY)
+    assert (handed.account, proof) == ("zoe", "signed")
+    stored = kept(DONE, KEY, "zoe")
+    assert found(stored, KEY, "zoe") == DONE
+    for account in ("ben", "", "zo"):
+        assert found(stored, KEY, account) == LearnerProgress()
+    assert found(kept(DONE, KEY), KEY, "zoe") == LearnerProgress()
+
+
+def test_the_command_says_whether_an_account_is_proven(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    key, file = tmp_path / "key", tmp_path / "zoe.txt"
+    key.write_bytes(KEY)
+    file.write_text(written(replace(HANDED, account="zoe"), KEY))
+    assert grade(file, key=str(key)) == 0
+    assert "account: zoe\n" in capsys.readouterr().out
+    assert grade(file) == 0
+    assert "account: zoe, which is not proven" in capsys.readouterr().out
 
 
 def test_a_lab_with_a_key_believes_only_what_it_wrote_into_the_browser() -> None:

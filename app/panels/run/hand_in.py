@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from html import escape
+
 import viser
 
 from app.client.progress import Notebook
@@ -15,8 +17,9 @@ from robots import InputError
 def add_hand_in(gui: viser.GuiApi, learner: SimulationClient, notebook: Notebook) -> None:
     """Adds a folder to the current container. The text is made on request, on viser's threads."""
     with gui.add_folder("Hand in your progress", expand_by_default=False):
-        gui.add_html(block(_SIGNED if notebook.signs else _NOT_SIGNED))
-        name = gui.add_text("Your name", "")
+        told = f" It names your account, <b>{escape(notebook.account)}</b>." if notebook.account else ""
+        gui.add_html(block((_SIGNED if notebook.signs else _NOT_SIGNED) + told))
+        name = gui.add_text("Your name", notebook.account[:LONGEST_NAME])
         make = gui.add_button("Write the text")
         text = gui.add_text("To hand in", "", multiline=True, visible=False)
 

@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-LAB = ("robots", "himpc", "lessons", "app")
+LAB = ("robots", "himpc", "lessons", "app", "himpc_lab")
 HANDED = ("himpc", "himpc.qp")
 """The modules of the lab that a solution may import."""
 _PARENT_DIES = 1  # PR_SET_PDEATHSIG of Linux

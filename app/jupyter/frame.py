@@ -1,0 +1,74 @@
+"""Where Jupyter's page is, and from which address it can show a server of this kernel in a frame."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from urllib.parse import urlsplit
+
+from app.server.door import SELF, as_origin
+
+_PROXY = "jupyter_server_proxy"
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """The Jupyter server of this kernel.
+
+    Attributes:
+        address: what its user opens, e.g. http://localhost:8888/user/zoe/; only the path if it is not known.
+        proxied: whether it passes on requests for other ports, with jupyter-server-proxy.
+    """
+
+    address: str
+    proxied: bool
+
+    @property
+    def origin(self) -> str | None:
+        """Its origin as browsers write it; None if only the path is known."""
+        parts = urlsplit(self.address)
+        return as_origin(f"{parts.scheme}://{parts.netloc}") if parts.netloc else None
+
+    def source(self, port: int, query: str) -> str:
+        """The address of a frame with the server at a port of this machine. Through Jupyter it needs no name
+        of a host: it works whatever the user calls the machine."""
+        parts = urlsplit(self.address)
+        if self.proxied:
+            return f"{parts.path.rstrip('/')}/proxy/{port}/?{query}"
+        return f"http://{parts.hostname or 'localhost'}:{port}/?{query}"
+
+    @property
+    def embedders(self) -> tuple[str, ...]:
+        """The pages that may show the frame: through Jupyter, those of the same origin."""
+        if self.proxied:
+            return (SELF,)
+        return () if self.origin is None else (self.origin,)
+
+
+def surroundings(environment: Mapping[str, str]) -> Surroundings | None:
+    """The Jupyter server that started this process; None if there is none."""
+    proxied = find_spec(_PROXY) is not None
+    prefix = environment.get("JUPYTERHUB_SERVICE_PREFIX")
+    if prefix is not None:
+        public = urlsplit(environment.get("JUPYTERHUB_PUBLIC_URL", ""))
+        where = f"{public.scheme}://{public.netloc}" if public.netloc else ""
+        return Surroundings(where + prefix, proxied)
+    server = environment.get("JPY_PARENT_PID", "")
+    if not server.isdigit() or find_spec("jupyter_core") is None:
+        return None
+    from jupyter_core.paths import jupyter_runtime_dir
+
+    about = Path(jupyter_runtime_dir()) / f"jpserver-{server}.json"
+    try:
+        return Surroundings(str(json.loads(about.read_text())["url"]), proxied)
+    except (OSError, ValueError, KeyError):
+        return None
+
+
+def here() -> Surroundings | None:
+    """The Jupyter server of this process."""
+    return surroundings(os.environ)

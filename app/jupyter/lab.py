@@ -1,0 +1,194 @@
+"""A robot in a notebook: the page in the cell, and the same robot in Python."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+import weakref
+from collections.abc import Sequence
+from html import escape
+from typing import Any, Self, final
+from urllib.parse import urlsplit
+
+import numpy as np
+
+from app.client.simulation_client import SimulationClient
+from app.jupyter.frame import here
+from app.link.choice import SceneChoice
+from app.link.messages import Post, Ready
+from app.link.process import wait_until
+from app.server.server import PageServer
+from lessons.events import MoveTarget, Set
+from lessons.recording.arrays import named
+from lessons.scenes.run_spec import RunSpec
+from lessons.settings.settings import SceneSettings
+from robots import InputError
+from robots.errors import unknown_name
+
+_PATIENCE = 120.0
+"""Time, s, within which the simulation must answer: the first start of an installation compiles."""
+_PERIOD = 0.2  # s between two readings of the telemetry
+
+
+def show(
+    scene: str = "iiwa14-hold",
+    *,
+    lesson: str | None = None,
+    set: Sequence[str] = (),
+    height: int = 640,
+    embed_in: str | None = None,
+) -> Lab:
+    """Starts a robot and shows its page in the cell.
+
+    Args:
+        scene: name of a scene, as `himpc-lab scenes` lists them; lesson: instead, the name of a lesson.
+        set: settings as assignments, e.g. "horizon=10".
+        height: of the frame in the cell, pixels.
+        embed_in: the origin of the notebook's page, e.g. https://hub.example.org, if it cannot be found out:
+            behind a hub that does not tell its public address, or for a Jupyter opened under another name.
+
+    Raises:
+        InputError: there is no such scene, lesson or setting, or the origin is not valid.
+    """
+    run = RunSpec(scene, set=tuple(set))
+    choice = SceneChoice.of_run(run) if lesson is None else SceneChoice.opening(lesson)
+    around = here()
+    known = () if around is None else (*around.embedders, *filter(None, [around.origin]))
+    origins = tuple(dict.fromkeys((*known, *filter(None, [embed_in]))))
+    lab = Lab(choice, origins)
+    _display(lab.url if around is None else around.source(*lab.address), height if origins else 0)
+    return lab
+
+
+@final
+class Lab:
+    """A robot with its server, which runs in this process until `stop`, or until the program ends."""
+
+    def __init__(self, choice: SceneChoice, embed_in: Sequence[str] = ()) -> None:
+        """embed_in: origins of the pages that may show the robot's page in a frame."""
+        trusted = [origin for origin in embed_in if "://" in origin]
+        self._server = PageServer(
+            choice, port=0, classroom=True, all_steer=True, trusted_origins=trusted, embed_in=embed_in
+        )
+        (self._learner,) = self._server.sessions.learners
+        ended = threading.Event()
+        reader = threading.Thread(target=_read, args=(self._learner, ended), daemon=True)
+        reader.start()
+        self._end = weakref.finalize(self, _end, self._server, ended, reader)
+
+    @property
+    def url(self) -> str:
+        """The address of the page, with its token, for a browser on this machine."""
+        return self._server.guest_link
+
+    @property
+    def address(self) -> tuple[int, str]:
+        """Port and query of `url`."""
+        parts = urlsplit(self.url)
+        return parts.port or 0, parts.query
+
+    @property
+    def settings(self) -> SceneSettings:
+        """The settings in force."""
+        return self._learner.settings_of(self._ready())
+
+    @property
+    def tasks(self) -> tuple[str, ...]:
+        """The names of the tasks whose targets can be moved."""
+        return tuple(task.name for task in self._ready().tasks if task.raw is not None)
+
+    def set(self, path: str, value: Any) -> None:
+        """Changes a setting while the robot moves, and returns when it is in force. path: as in `himpc-lab
+        run SCENE --set PATH=VALUE`. Raises InputError if there is no such setting or value."""
+        self.settings.changed(path, value)
+        self._learner.send(Post(Set(path, value)))
+        self._until(lambda: _has(self.settings, path, value), f"'{path}' is not in force")
+
+    def move(self, task: str, to: Sequence[float]) -> None:
+        """Moves a task's target, and returns when the controller has it. to: position in m, quaternion (x y z
+        w) or joints in rad. Raises InputError for an unknown task and for wrong numbers."""
+        ready = self._ready()
+        target = next((each.raw for each in ready.tasks if each.name == task and each.raw is not None), None)
+        if target is None:
+            raise unknown_name("task with a target", task, self.tasks)
+        value = tuple(float(each) for each in to)
+        if len(value) != target.size or not np.isfinite(value).all():
+            raise InputError(f"the target of '{task}' has {target.size} finite numbers, and {to} were given")
+        self._learner.send(Post(MoveTarget(task, value)))
+        asked = self._learner.ask(_PATIENCE)  # it answers in order, so the target is in the mailbox then
+        ticks = self._ticks()
+        self._until(lambda: asked is not None and self._ticks() != ticks, "the target did not arrive")
+
+    def rows(self) -> dict[str, Any]:
+        """The run since the last reset as arrays with the names of `himpc-lab run --npz`, 100 rows per
+        simulated second: `t` (k,) in s, `q` and `tau` (k, n) in rad and N·m, `error/TASK` (k, m), and so
+        on."""
+        ready = self._ready()
+        self._learner.look()
+        record = self._learner.record
+        rows = None if record is None else self._learner.read(lambda *_: record.whole())
+        if record is None or rows is None:
+            raise InputError("the simulation was stopped: call show again")
+        run = self._learner.choice.run
+        how = {"scene": run.scene, "urdf": run.urdf, "tip": run.tip, "seed": run.seed}
+        return named(ready.robot, self.settings, record.layout, rows, how)
+
+    def stop(self) -> None:
+        """Ends the robot and its page; a second call does nothing."""
+        self._end()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+    def _ticks(self) -> int:
+        status = self._learner.status
+        return -1 if status is None else status.ticks
+
+    def _ready(self) -> Ready:
+        self._until(lambda: self._learner.status is not None, "the simulation does not answer")
+        assert self._learner.ready is not None
+        return self._learner.ready
+
+    def _until(self, condition: Any, otherwise: str) -> None:
+        """Waits for a condition. Raises InputError if the simulation has ended or does not reach it."""
+        if not self._end.alive:
+            raise InputError("the lab was stopped: call show again")
+
+        def settled() -> bool:
+            return self._learner.failure is not None or condition()
+
+        if not wait_until(settled, _PATIENCE) or self._learner.failure is not None:
+            raise InputError(self._learner.failure or f"{otherwise} after {_PATIENCE:g} s: call show again")
+
+
+def _has(settings: SceneSettings, path: str, value: Any) -> bool:
+    return settings.changed(path, value) == settings
+
+
+def _read(learner: SimulationClient, ended: threading.Event) -> None:
+    """Reads the telemetry, also while no page is open."""
+    while not ended.wait(_PERIOD):
+        learner.look()
+
+
+def _end(server: PageServer, ended: threading.Event, reader: threading.Thread) -> None:
+    ended.set()
+    reader.join()
+    server.close()
+
+
+def _display(source: str, height: int) -> None:
+    """Shows the page in the cell, or a link to it if the height is 0; does nothing where there is no
+    notebook."""
+    with contextlib.suppress(ImportError):
+        from IPython.core.getipython import get_ipython
+        from IPython.display import HTML, IFrame, display
+
+        if get_ipython() is not None:
+            link = (
+                f'<a href="{escape(source)}" target="_blank" rel="noopener">Open the page of this robot</a>'
+            )
+            display(IFrame(source, "100%", height) if height else HTML(link))

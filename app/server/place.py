@@ -1,0 +1,70 @@
+"""Where a page is, kept in its browser: another server of the same address goes on from there.
+
+Every tab has a storage of its own, which outlives a reload and the server. viser reads only the storage that
+all tabs share, so a script copies the value there, under a key that this visit alone uses.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from typing import TYPE_CHECKING
+
+from app.adapter.names import STORED
+from app.client.state_code import code_of
+from app.link.choice import SceneChoice
+from app.link.exercise import LessonPlace
+from app.link.messages import Told
+from lessons.course import COURSE
+from robots import InputError
+
+if TYPE_CHECKING:
+    from lessons.settings.settings import SceneSettings
+
+_KEY = "himpc-lab-place"
+
+
+def asking(key: str) -> str:
+    """The script that makes the tab's value readable under `key`."""
+    kept = f"sessionStorage.getItem({json.dumps(_KEY)})"
+    return f'try {{ localStorage.setItem({json.dumps(STORED + key)}, {kept} ?? ""); }} catch {{}}'
+
+
+def keeping(text: str) -> str:
+    """The script that stores the value in the tab."""
+    return f"try {{ sessionStorage.setItem({json.dumps(_KEY)}, {json.dumps(text)}); }} catch {{}}"
+
+
+def written(choice: SceneChoice, settings: SceneSettings, start: SceneChoice) -> str:
+    """The place of a page as text: the step of a lesson, or the code of its scene and settings. start: what
+    new pages of this server show; only servers with the same start go on from the place."""
+    place: dict[str, str | int] = {"start": _digest(start)}
+    exercise = choice.exercise
+    if exercise is not None:
+        return json.dumps({**place, "lesson": exercise.lesson, "step": exercise.place + 1})
+    try:
+        return json.dumps({**place, "code": code_of(Told(choice, settings, (), 0.0))})
+    except InputError:
+        return ""  # e.g. an uploaded robot: another server begins anew
+
+
+def read(text: str | None, start: SceneChoice) -> SceneChoice | None:
+    """The choice that a tab kept; None if there is none that can be loaded. The text may be anybody's."""
+    try:
+        found = json.loads(text or "{}")
+        if not isinstance(found, dict) or found.get("start") != _digest(start):
+            return None
+        lesson, step, code = found.get("lesson"), found.get("step"), found.get("code")
+        if lesson in COURSE and type(step) is int:
+            return SceneChoice.of_lesson(LessonPlace.at(str(lesson), step)).admitting(start)
+        if not isinstance(code, str):
+            return None
+        from lessons.replay.state import decode
+
+        return SceneChoice.of_state(decode(code)).admitting(start)
+    except (InputError, ValueError, RecursionError, TypeError):
+        return None
+
+
+def _digest(start: SceneChoice) -> str:
+    return hashlib.sha256(repr(start).encode()).hexdigest()[:16]
