@@ -31,6 +31,7 @@ DOORS = {
     "distributed": ("lessons/cluster.py",),
     "psutil": ("robots/processes/family.py",),
     "pyseccomp": ("lessons/exercises/inside/confine.py",),
+    "pylibfranka": ("robots/franka.py",),
     "py_landlock": ("lessons/exercises/inside/confine.py",),
 }
 
@@ -99,19 +100,21 @@ def test_himpc_is_tested_without_lessons_and_app() -> None:
 
 
 APP = {
-    "commands": ("server", "html", "link", "__main__"),
+    "commands": ("server", "arm", "html", "link", "__main__"),
     "server": ("page", "panels", "client", "html", "link", "worker", "adapter"),
     "page": ("panels", "view", "client", "html", "link", "adapter"),
     "panels": ("view", "client", "html", "link", "adapter"),
     "view": ("client", "html", "link", "adapter"),
     "client": ("html", "link"),
     "worker": ("link",),
+    "arm": ("link",),
     "link": (),
     "html": (),
     "adapter": (),
 }
 """The folders that each folder of app/ may import beside itself: page and simulation meet only in `link`.
-Only the server imports both; it passes the entry point of the simulation on."""
+Only the server imports both; it passes the entry point of the simulation on. The loop of a real arm stands
+beside the simulation."""
 
 
 def test_app_is_the_folders_it_says() -> None:
