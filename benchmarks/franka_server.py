@@ -12,11 +12,12 @@ import logging
 import sys
 import time
 from importlib import import_module
+from typing import Any
 
 import numpy as np
 
-simulation = import_module("franka_sim.mujoco_franka_sim")
-FrankaSimServer = import_module("franka_sim").FrankaSimServer
+simulation: Any = import_module("franka_sim.mujoco_franka_sim")
+FrankaSimServer: Any = import_module("franka_sim").FrankaSimServer
 
 
 class Stepped(simulation.MujocoFrankaSim):

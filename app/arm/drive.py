@@ -66,11 +66,18 @@ class Drive:
 
 
 class Driven(NamedTuple):
-    """A drive that is over: why it ended; whether the arm came to rest under control; the rows of the loop,
-    (k, Columns.width); and the positions (rad) and torques (N·m, without gravity) of the model at these rows,
-    (k, n)."""
+    """A drive that is over.
+
+    Attributes:
+        why: why it ended.
+        wanted: whether the time was over or it was interrupted, and nothing else.
+        gently: whether the arm came to rest under control.
+        rows: of the loop, (k, Columns.width).
+        q_model, tau_model: of the model at these rows, (k, n) rad and N·m (without gravity).
+    """
 
     why: str
+    wanted: bool
     gently: bool
     rows: Array
     q_model: Array
@@ -90,7 +97,7 @@ def drive(plan: Drive, model: Model, tell: Callable[[str], None] = print) -> Dri
     try:
         watcher.watch()
     except KeyboardInterrupt:
-        watcher.ask("it was interrupted")
+        watcher.ask("it was interrupted", True)
     except BaseException:
         watcher.ask("the watcher failed")
         watcher.wait()
@@ -109,6 +116,7 @@ class _Watcher:
         self._orders = Orders(len(controller.manifest["tasks"]))
         self._block = Block(self._at.width, controller.n + 1)
         self._asked: str | None = None
+        self._wanted = False
         self._given: list[Order] = []
         self._applied = 0
         self._rows: list[tuple[Array, Array, Array]] = []
@@ -128,14 +136,14 @@ class _Watcher:
             while drags and drags[0].t <= t:
                 self._give(drags.pop(0).order)
             if t >= self._plan.duration:
-                self.ask(f"the {self._plan.duration:g} s are over")
+                self.ask(f"the {self._plan.duration:g} s are over", True)
             if over:
                 break
 
-    def ask(self, why: str) -> None:
-        """Asks the loop to end gently."""
+    def ask(self, why: str, wanted: bool = False) -> None:
+        """Asks the loop to end gently; wanted: whether nothing is wrong."""
         if self._asked is None:
-            self._asked = why
+            self._asked, self._wanted = why, wanted
             self._orders.stop()
 
     def wait(self) -> None:
@@ -158,10 +166,11 @@ class _Watcher:
         if ended is None:
             code = self._child.exitcode
             ended = Ended(f"the process of the loop ended (exit code {code})", False, len(self._rows))
-        why = self._asked if self._asked and ended.why == ASKED else ended.why
+        ours = self._asked is not None and ended.why == ASKED
+        why = self._asked if self._asked is not None and ours else ended.why
         width = (self._at.width, n, n)
         rows, q, tau = (np.array([each[k] for each in self._rows]).reshape(-1, width[k]) for k in range(3))
-        return Driven(why, ended.gently, rows, q, tau)
+        return Driven(why, ours and self._wanted, ended.gently, rows, q, tau)
 
     def _give(self, order: Order) -> None:
         self._orders.drag(order)

@@ -61,7 +61,7 @@ class ArmGuard:
             now: s, by this computer's clock.
         """
         tolerances = self._tolerances
-        self._share += (missed - self._share) * min(1.0, self._period * (1 + missed))
+        self._share += (missed / (1 + missed) - self._share) * min(1.0, self._period * (1 + missed))
         self._hurried = self._hurried + 1 if hurried else 0
         self._lost = self._lost + 1 if fallback == _HOLD else 0
         if beats != self._beats:

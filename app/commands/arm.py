@@ -100,7 +100,7 @@ def arm(
         how: dict[str, Any] = {"scene": scene, "robot": robot, "set": list(set), "drag": list(drag)}
         _save(npz, driven, ready.image, how)
         print(f"{len(driven.rows)} rows written to {npz}")
-    return 0 if driven.gently else 1
+    return 0 if driven.wanted and driven.gently else 1
 
 
 def _arm(scene: TorqueScene, robot: str, real_time: bool, start: Any) -> Arm:
