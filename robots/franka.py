@@ -6,10 +6,12 @@ from importlib import import_module
 from typing import Any, final
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from robots.arm import Arm, ArmLimits, ArmLost, Reading
 from robots.errors import InputError
+from robots.robot import Robot
 
 Array = NDArray[np.float64]
 
@@ -20,6 +22,8 @@ _TAU_RATE = 990.0  # N·m/s; the arm stops itself above 1000
 _V = (2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61)  # rad/s
 _Q_LOWER = (-2.7437, -1.7628, -2.8973, -3.0421, -2.8065, 0.5445, -2.8973)  # rad
 _Q_UPPER = (2.7437, 1.7628, 2.8973, -0.1518, 2.8065, 3.7525, 2.8973)  # rad
+_ASIDE, _FARTHEST = 0.01, 0.2
+"""m: the flange is on the axis of the last joint; 0.107 m along it, by Franka's documentation (given)."""
 
 
 @final
@@ -48,12 +52,29 @@ class Franka(Arm):
         self._control: Any = None
         self._finished = False
 
-    def at_rest(self) -> Array:
-        """The joint positions, (7,) rad, without taking control. Raises ArmLost."""
+    def at_rest(self, robot: Robot) -> Array:
+        """The joint positions, (7,) rad, without taking control. Raises ArmLost, and InputError if with these
+        positions a description of a robot has its last joint elsewhere than this arm."""
         try:
-            return np.array(self._robot.read_once().q)
+            state = self._robot.read_once()
         except (RuntimeError, self._library.FrankaException) as error:
             raise ArmLost(_told(error)) from None
+        q = np.array(state.q)
+        base_to_end, flange_to_end = (
+            np.reshape(each, (4, 4), order="F") for each in (state.O_T_EE, state.F_T_EE)
+        )
+        flange = (base_to_end @ np.linalg.inv(flange_to_end))[:3, 3]
+        if robot.n == len(q):
+            data = robot.model.createData()
+            pin.forwardKinematics(robot.model, data, q)
+            last = data.oMi[robot.n]
+            x, y, z = last.rotation.T @ (flange - last.translation)
+            if not (max(abs(x), abs(y)) < _ASIDE and -_ASIDE < z < _FARTHEST):
+                raise InputError(
+                    f"the scene's robot '{robot.name}' is not this arm: at the arm's joint positions the "
+                    "flange would be elsewhere; choose a scene of that arm, such as panda-hold"
+                )
+        return q
 
     def read(self) -> Reading:
         try:

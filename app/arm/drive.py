@@ -180,6 +180,7 @@ class _Watcher:
         """Reads the new rows and moves the model on; returns the time of the last row since the first, s."""
         first, rows = self._block.since(self._count)
         for place, row in enumerate(rows):
+            self._orders.beat()
             self._beside(row)
             self._count = first + place + 1
         return 0.0 if self._first is None else float(self._rows[-1][0][self._at.t]) - self._first

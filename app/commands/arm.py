@@ -127,7 +127,7 @@ def _found(scene: TorqueScene, robot: str, real_time: bool) -> tuple[Any, Any]:
         raise InputError(f"T_s is {scene.settings.T_s} s: a Franka arm takes a torque every 0.001 s")
     there = Franka(robot, real_time)
     try:
-        return there.limits, there.at_rest()
+        return there.limits, there.at_rest(scene.robot)
     except ArmLost as error:
         raise InputError(f"--robot {robot}: {error}") from None
 

@@ -127,8 +127,12 @@ class Bench:
         duration: float = 0.3,
         drags: tuple[Drag, ...] = (),
         tolerances: Tolerances = PATIENT,
+        elsewhere: float = 0.0,
     ) -> Driven:
-        """A drive with the loop in a process of its own."""
+        """A drive with the loop in a process of its own; elsewhere: rad, how far joint 2 of the model is
+        off."""
+        beside = self.plant()
+        beside.reset(self.scene.q_0 + elsewhere * np.eye(7)[1])
         wanted = Drive(
             lambda: Scripted(self.plant(), happen, T_S),
             self.make,
@@ -139,7 +143,7 @@ class Bench:
             drags,
             tolerances,
         )
-        return drive(wanted, Model(self.plant(), self.make(), self.ready.limits, T_S), tell)
+        return drive(wanted, Model(beside, self.make(), self.ready.limits, T_S), tell)
 
     def order(self, *moved: float) -> Order:
         """The hand's target moves, m."""
@@ -326,17 +330,11 @@ def test_a_drive_holds_drags_and_ends(bench: Bench) -> None:
 
 
 def test_an_arm_far_from_its_model_is_stopped(bench: Bench) -> None:
-    """An arm that is pushed away ends the drive, and the reason names the joint."""
-
-    def push(k: int, arm: Scripted) -> None:
-        if k == 50:
-            arm.plant.push(arm.plant.robot.tip, np.array([0.0, 150.0, 0.0]))
-        if k == 150:
-            arm.plant.push(None)
-
-    driven = bench.drive(push, duration=20.0, tolerances=replace(PATIENT, distance=0.02, rate=10_000))
-    assert "rad away from the model" in driven.why
+    """A model that stands elsewhere ends the drive, and the reason names the joint."""
+    driven = bench.drive(duration=60.0, tolerances=replace(PATIENT, distance=0.05), elsewhere=0.1)
+    assert driven.why == "joint 2 is 0.10 rad away from the model"
     assert driven.gently
+    assert not driven.wanted
 
 
 def test_a_killed_loop_is_told_and_its_rows_stay(bench: Bench) -> None:
@@ -507,6 +505,7 @@ class FakeLibrary:
     def __init__(self) -> None:
         self.sent: list[FakeLibrary.Torques] = []
         self.fails = False
+        self.q, self.end, self.hand = [0.1] * 7, np.eye(4), np.eye(4)
 
     def Robot(self, address: str, config: str) -> FakeLibrary:
         if address == "nowhere":
@@ -524,7 +523,8 @@ class FakeLibrary:
         if self.fails:
             raise RuntimeError("libfranka: UDP receive: Timeout")
         clock = type("Clock", (), {"to_sec": lambda self: 2.5})()
-        state = {"q": [0.1] * 7, "dq": [0.2] * 7, "tau_J": [30.0] * 7, "tau_J_d": [0.5] * 7, "time": clock}
+        state: dict[str, Any] = {"dq": [0.2] * 7, "tau_J": [30.0] * 7, "tau_J_d": [0.5] * 7, "time": clock}
+        state |= {"q": self.q, "O_T_EE": self.end.T.ravel().tolist(), "F_T_EE": self.hand.T.ravel().tolist()}
         return type("State", (), state)(), None
 
     def writeOnce(self, torques: FakeLibrary.Torques) -> None:
@@ -566,6 +566,19 @@ def test_the_door_tells_what_the_library_tells(library: FakeLibrary) -> None:
         arm.read()
     arm.stop()
     assert library.sent == []
+
+
+def test_the_arm_must_be_the_scene_s_robot(library: FakeLibrary, bench: Bench) -> None:
+    """The flange that the arm tells must be on the last axis of the description; another arm of seven joints
+    is refused."""
+    robot = bench.scene.robot
+    library.q = robot.home.tolist()
+    rotation, position = bench.plant().frame_pose("flange" if "flange" in robot.frames else "link8")
+    library.hand[:3, 3] = 0.0, 0.02, 0.1
+    library.end[:3, :3], library.end[:3, 3] = rotation, position + rotation @ library.hand[:3, 3]
+    assert np.array_equal(door.Franka("arm").at_rest(robot), robot.home)
+    with pytest.raises(InputError, match="'iiwa14' is not this arm"):
+        door.Franka("arm").at_rest(torque_scene("iiwa14-hold").robot)
 
 
 def test_nobody_answers_at_this_machine() -> None:
