@@ -12,7 +12,6 @@ import tyro
 from robots import InputError
 
 if TYPE_CHECKING:
-    from app.arm.drive import Driven
     from himpc.export.image import Image
     from lessons.scenes.torque_scene import TorqueScene
     from robots.arm import Arm
@@ -38,6 +37,7 @@ def arm(
     delay: int = 0,
     real_time: bool = False,
     npz: str | None = None,
+    plot: str | None = None,
 ) -> int:
     """Drive a Franka arm by a scene's exported controller, and watch it beside a simulated one.
 
@@ -55,11 +55,13 @@ def arm(
         delay: after how many periods a torque acts; 0 believes the arm's own word for what acted.
         real_time: refuse to run where the kernel has no real-time scheduling.
         npz: write one row per period to this file.
+        plot: draw arm and model over each other, errors and torques, as arm.png in this folder.
     """
     from app.arm.drive import Drive, drive
     from app.arm.guard import Tolerances
     from app.arm.model import Model
     from app.arm.prepared import check_start, maker, prepared
+    from app.arm.recorded import arrays
     from himpc.export.native import build
     from lessons.scenes.catalog import as_torque_scene
     from lessons.scenes.run_spec import RunSpec
@@ -96,10 +98,13 @@ def arm(
         driven = drive(wanted, model, lambda text: print(text, flush=True))
     rest = "it came to rest under control" if driven.gently else "it was not brought to rest by us"
     print(f"ended: {driven.why}; {rest}")
+    data = arrays(driven, ready.image)
     if npz is not None:
         how: dict[str, Any] = {"scene": scene, "robot": robot, "set": list(set), "drag": list(drag)}
-        _save(npz, driven, ready.image, how)
+        _save(npz, data, how)
         print(f"{len(driven.rows)} rows written to {npz}")
+    if plot is not None and len(driven.rows):
+        print(f"drawn: {_drawn(plot, data, ready.image)}")
     return 0 if driven.wanted and driven.gently else 1
 
 
@@ -132,12 +137,23 @@ def _found(scene: TorqueScene, robot: str, real_time: bool) -> tuple[Any, Any]:
         raise InputError(f"--robot {robot}: {error}") from None
 
 
-def _save(path: str, driven: Driven, image: Image, how: dict[str, Any]) -> None:
+def _save(path: str, data: dict[str, Any], how: dict[str, Any]) -> None:
     import numpy as np
 
-    from app.arm.recorded import arrays
-
     try:
-        np.savez_compressed(path, **arrays(driven, image), settings=np.array(json.dumps(how)))
+        np.savez_compressed(path, **data, settings=np.array(json.dumps(how)))
     except OSError as error:
         raise InputError(f"--npz {path}: cannot be written ({error.strerror}); give another file") from None
+
+
+def _drawn(folder: str, data: dict[str, Any], image: Image) -> Path:
+    from app.arm.picture import picture
+    from lessons.plots.draw import draw
+
+    try:
+        Path(folder).mkdir(parents=True, exist_ok=True)
+        return draw(picture("arm", data, image), Path(folder))
+    except OSError as error:
+        raise InputError(
+            f"--plot {folder}: cannot be written ({error.strerror}); give another folder"
+        ) from None

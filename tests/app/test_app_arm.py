@@ -434,7 +434,8 @@ def test_the_command_drives_and_records(tmp_path: Path, capsys: pytest.CaptureFi
     needed("cc")
     path = tmp_path / "run.npz"
     words = "arm panda-hold --robot simulated --duration 1.2 --drag 0.2:position=0.02,0,0 --missed 10000"
-    main([*words.split(), "--npz", str(path)])
+    main([*words.split(), "--npz", str(path), "--plot", str(tmp_path)])
+    assert (tmp_path / "arm.png").read_bytes()[:4] == b"\x89PNG"
     told = capsys.readouterr().out
     assert "the loop has taken over" in told
     assert "ended: " in told
