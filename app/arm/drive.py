@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from app.arm.bounded import STUCK, Bounded
 from app.arm.guard import Tolerances
 from app.arm.loop import ASKED, Columns, Ended, run
 from app.arm.model import Model
@@ -52,6 +53,7 @@ class Drive:
         drags: in the order of their times.
         tolerances: see `ArmGuard` and `Tolerances.distance`.
         delay: see `run`.
+        stuck: see `Bounded`.
     """
 
     arm: Callable[[], Arm]
@@ -63,6 +65,7 @@ class Drive:
     drags: Sequence[Drag] = ()
     tolerances: Tolerances = field(default_factory=Tolerances)
     delay: int = 0
+    stuck: float = STUCK
 
 
 class Driven(NamedTuple):
@@ -235,7 +238,7 @@ def _work(plan: Drive, controller: NativeController, orders: Orders, block: Bloc
     with contextlib.suppress(OSError, AttributeError):
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_PRIORITY))
     try:
-        arm = plan.arm()
+        arm = Bounded(plan.arm(), plan.stuck)
         ended = run(
             arm, controller, plan.limits, plan.start, orders, block, plan.tolerances, plan.period, plan.delay
         )

@@ -350,6 +350,28 @@ def test_a_killed_loop_is_told_and_its_rows_stay(bench: Bench) -> None:
     assert len(driven.rows) == 100
 
 
+def test_a_library_that_hangs_ends_the_loop_s_process(bench: Bench) -> None:
+    """No process stays behind that waits for an answer of the arm for ever."""
+
+    def hang(k: int, arm: Scripted) -> None:
+        if k == 20:
+            time.sleep(1000.0)
+
+    wanted = Drive(
+        lambda: Scripted(bench.plant(), hang, T_S),
+        bench.make,
+        bench.ready.limits,
+        bench.scene.q_0,
+        T_S,
+        60.0,
+        tolerances=PATIENT,
+        stuck=0.5,
+    )
+    driven = drive(wanted, Model(bench.plant(), bench.make(), bench.ready.limits, T_S), lambda text: None)
+    assert driven.why == f"the process of the loop ended (exit code {-signal.SIGALRM})"
+    assert len(driven.rows) == 20
+
+
 def test_a_watcher_that_hangs_delays_nothing(bench: Bench) -> None:
     """The loop notices its silence and stops the arm gently meanwhile."""
     over = multiprocessing.get_context("fork").Event()
