@@ -25,6 +25,7 @@ COMMANDS: dict[str, str] = {
     "reproduce": "the papers' tables and figures: our number beside the printed one",
     "sweep": "a grid of runs over settings, as a map; a stopped sweep can be continued",
     "export": "a controller as C or WebAssembly, with its numbers and a recorded run to replay",
+    "arm": "drive a real arm, or a simulated one, by an exported controller",
     "tune": "find M̄ step by step, as Remark 4 of the HIMPC paper says",
 }
 """One line per command; the function `NAME(…) -> exit code` is in `app/commands/NAME.py`."""

@@ -34,6 +34,7 @@ DOORS = {
     "jupyter_core": ("app/jupyter/frame.py",),
     "psutil": ("robots/processes/family.py",),
     "pyseccomp": ("lessons/exercises/inside/confine.py",),
+    "pylibfranka": ("robots/franka.py",),
     "py_landlock": ("lessons/exercises/inside/confine.py",),
 }
 
@@ -102,7 +103,7 @@ def test_himpc_is_tested_without_lessons_and_app() -> None:
 
 
 APP = {
-    "commands": ("server", "html", "link", "__main__"),
+    "commands": ("server", "arm", "html", "link", "__main__"),
     "jupyter": ("server", "client", "link"),
     "server": ("classes", "page", "panels", "client", "html", "link", "worker", "adapter"),
     "classes": ("client", "html", "link"),
@@ -111,12 +112,14 @@ APP = {
     "view": ("client", "html", "link", "adapter"),
     "client": ("html", "link"),
     "worker": ("link",),
+    "arm": ("link",),
     "link": (),
     "html": (),
     "adapter": (),
 }
 """The folders that each folder of app/ may import beside itself: page and simulation meet only in `link`.
-Only the server imports both; it passes the entry point of the simulation on."""
+Only the server imports both; it passes the entry point of the simulation on. The loop of a real arm stands
+beside the simulation."""
 
 
 def test_app_is_the_folders_it_says() -> None:

@@ -90,7 +90,7 @@ def serve(
         raise InputError("--no-names is for a class: add --class, or leave it out")
     if class_ and proxy_only:
         raise InputError(
-            "--class and --proxy-only contradict each other: the teacher's page and the phones have addresses "
+            "--class and --proxy-only contradict each other: the pages of a teacher and of phones have addresses "
             "of their own, which no proxy vouches for; leave one out"
         )
     if not 0.0 <= drain <= 3600.0:

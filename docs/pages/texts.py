@@ -5,7 +5,19 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-IN_DOCS = ("serving", "export", "authoring", "instructors", "disagreements", "settings", "results", "house")
+IN_DOCS = (
+    *(
+        "serving",
+        "export",
+        "arm",
+        "authoring",
+        "instructors",
+        "disagreements",
+        "settings",
+        "results",
+        "house",
+    ),
+)
 LINKS = {
     **{f"{where}{name}.md": f"{name}.md" for name in IN_DOCS for where in ("docs/", "")},
     "docs/lessons/README.md": "lessons/index.md",

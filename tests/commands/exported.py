@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import json
 import os
 import shutil
@@ -14,8 +13,7 @@ import numpy as np
 import pytest
 
 from app.__main__ import main
-
-N_P = np.ctypeslib.ndpointer(np.float64, flags="C")
+from himpc.export.native import NativeController, link
 
 
 def needed(*programs: str) -> None:
@@ -50,55 +48,13 @@ def told(answer: str) -> tuple[int, float, str]:
     return int(words[0]), float(words[words.index("difference") + 1]), answer
 
 
-class Exported:
-    """A controller of an exported folder, called through its C interface."""
-
-    def __init__(self, folder: Path) -> None:
-        library = folder / "himpc.so"
-        if not library.exists():
-            subprocess.run(
-                ["cc", "-shared", "-o", library, folder / "himpc.o", "-lm"],
-                check=True,
-            )
-        self._c = ctypes.CDLL(str(library))
-        self._c.himpc_tick.argtypes = [ctypes.c_void_p, N_P, N_P, ctypes.c_void_p, N_P]
-        self._c.himpc_set.argtypes = [ctypes.c_void_p, ctypes.c_int, ctypes.c_int, N_P, ctypes.c_int]
-        self._c.himpc_reset.argtypes = [ctypes.c_void_p, ctypes.c_void_p]
-        self._c.himpc_check.argtypes = [ctypes.c_void_p, ctypes.c_uint]
-        self.manifest: dict[str, Any] = json.loads((folder / "controller.json").read_text())
-        self.n = len(self.manifest["joints"])
-        image = (folder / "controller.bin").read_bytes()
-        self._room = np.zeros(len(image) // 8 + 8)
-        start = -self._room.ctypes.data % 64
-        self.memory = self._room.view(np.uint8)[start : start + len(image)]
-        self.memory[:] = np.frombuffer(image, np.uint8)
-        self.at = self.memory.ctypes.data
-        assert self._c.himpc_check(self.at, len(image)) == 0
-        self._c.himpc_reset(self.at, None)
-
-    def check(self, size: int) -> int:
-        """`himpc_check` of its memory."""
-        return self._c.himpc_check(self.at, size)
-
-    def tick(self, q: Any, v: Any, applied: Any = None) -> tuple[np.ndarray, int]:
-        """One period: the torque, and which fallback acted."""
-        given = [np.array(each, float) for each in (q, v)]
-        torque = None if applied is None else np.array(applied, float)
-        tau = np.full(self.n, np.nan)
-        fallback = self._c.himpc_tick(self.at, *given, None if torque is None else torque.ctypes.data, tau)
-        return tau, fallback
-
-    def set(self, what: int, index: int, values: Any) -> int:
-        """Changes a setting."""
-        numbers = np.array(values, float).ravel()
-        return self._c.himpc_set(self.at, what, index, numbers, numbers.size)
-
-    def view(self, name: str) -> np.ndarray:
-        """An array of the manifest, in its place."""
-        (found,) = (each for each in self.manifest["arrays"] if each["name"] == name)
-        count = int(np.prod(found["shape"]))
-        part = self.memory[found["offset"] : found["offset"] + 8 * count]
-        return part.view(found["type"]).reshape(found["shape"])
+def controller_in(folder: Path) -> NativeController:
+    """The controller of an exported folder, called through its C interface."""
+    library = folder / "himpc.so"
+    if not library.exists():
+        link(folder / "himpc.o", library)
+    manifest: dict[str, Any] = json.loads((folder / "controller.json").read_text())
+    return NativeController(library, (folder / "controller.bin").read_bytes(), manifest)
 
 
 def rows_of(folder: Path, n: int) -> np.ndarray:

@@ -25,7 +25,7 @@ from himpc.tick.kernel.linearize import linearize
 from himpc.tick.kernel.solve_level import solve_level
 from lessons.scenes.catalog import torque_scene
 from lessons.session.torque import TorqueSession
-from tests.commands.exported import Exported, exported, needed, replayed, rows_of, told
+from tests.commands.exported import controller_in, exported, needed, replayed, rows_of, told
 
 SCENES = ("planar3-conflict", "iiwa14-circle", "iiwa14-hold")
 M_BAR, GAINS, Q, R, LIMITS, ENABLED = range(1, 7)
@@ -48,7 +48,7 @@ def test_two_controllers_in_turns_replay_what_python_did(folders: dict[str, Path
     assert ticks == 1000
     assert worst < 1e-9
     assert "0 ticks with a fallback" in answer
-    rows = rows_of(folders[scene], Exported(folders[scene]).n)
+    rows = rows_of(folders[scene], controller_in(folders[scene]).n)
     assert np.abs(np.diff(rows[:, 3], axis=0)).max() > 1e-3, "nothing moved"
 
 
@@ -70,10 +70,10 @@ def test_controllers_of_two_robots_do_not_notice_each_other(folders: dict[str, P
     names = ("planar3-conflict", "iiwa14-circle", "iiwa14-circle")
     alone = []
     for name in names[:2]:
-        one = Exported(folders[name])
+        one = controller_in(folders[name])
         alone.append([one.tick(*row[:3])[0] for row in rows_of(folders[name], one.n)[:60]])
     alone.append(alone[1])
-    mixed = [Exported(folders[name]) for name in names]
+    mixed = [controller_in(folders[name]) for name in names]
     for k in range(60):
         for name, each, wanted in zip(names, mixed, alone, strict=True):
             tau, fallback = each.tick(*rows_of(folders[name], each.n)[k, :3])
@@ -84,7 +84,7 @@ def test_controllers_of_two_robots_do_not_notice_each_other(folders: dict[str, P
 def test_without_optima_the_joints_brake_inside_the_rows(folders: dict[str, Path]) -> None:
     """With no budget no level has an optimum. The increments still meet all rows of torque and velocity
     whenever any increments do, and brake the joints."""
-    one = Exported(folders["iiwa14-hold"])
+    one = controller_in(folders["iiwa14-hold"])
     scene = torque_scene("iiwa14-hold")
     settings = scene.settings.for_controller()
     force = in_force(scene.robot, settings.limits)
@@ -122,7 +122,7 @@ def test_settings_do_what_they_do_in_python(folders: dict[str, Path]) -> None:
     controller with the same settings."""
     scene = torque_scene("iiwa14-hold")
     settings = replace(scene.settings.for_controller())
-    python, one = HIMPC(scene.robot, settings), Exported(folders["iiwa14-hold"])
+    python, one = HIMPC(scene.robot, settings), controller_in(folders["iiwa14-hold"])
     references = TorqueSession(scene).references
     low, high = settings.stack[0], settings.stack[1:]
     limits = in_force(scene.robot, settings.limits)
@@ -166,7 +166,7 @@ def test_settings_do_what_they_do_in_python(folders: dict[str, Path]) -> None:
 
 def test_settings_that_do_not_fit_change_nothing(folders: dict[str, Path]) -> None:
     """Wrong numbers, wrong names and fixed motions are refused, and the memory stays as it was."""
-    one, fixed = Exported(folders["iiwa14-hold"]), Exported(folders["iiwa14-circle"])
+    one, fixed = controller_in(folders["iiwa14-hold"]), controller_in(folders["iiwa14-circle"])
     before = one.memory.copy()
     nan, inf = float("nan"), float("inf")
     assert one.set(0, 0, [nan, 0.0, 0.0]) == -3

@@ -19,7 +19,19 @@ from lessons.exercises import EXERCISES, load_exercise, start_of
 from lessons.teaching.lesson import Step
 
 ROOT = Path(__file__).parents[2]
-_IN_DOCS = ("authoring", "disagreements", "export", "house", "instructors", "results", "serving", "settings")
+_IN_DOCS = (
+    *(
+        "arm",
+        "authoring",
+        "disagreements",
+        "export",
+        "house",
+        "instructors",
+        "results",
+        "serving",
+        "settings",
+    ),
+)
 DOCUMENTS = {
     "README": "README.md",
     "contributing": "CONTRIBUTING.md",

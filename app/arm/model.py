@@ -1,0 +1,51 @@
+"""The simulated robot beside the arm: the same controller with the same orders."""
+
+from __future__ import annotations
+
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.arm.loop import accepted
+from app.arm.orders import Order
+from himpc.export.kernel.adjust import LIMITS, TARGET
+from himpc.export.native import NativeController
+from robots.arm import ArmLimits
+from robots.plant import Plant
+from robots.simulated_arm import SimulatedArm
+
+Array = NDArray[np.float64]
+
+
+@final
+class Model:
+    """Follows the clock of the arm, so that missed periods pass here, too.
+
+    Attributes:
+        q, tau: of the simulated robot, (n,) rad and N·m (without gravity).
+    """
+
+    def __init__(self, plant: Plant, controller: NativeController, limits: ArmLimits, period: float) -> None:
+        """plant: where the arm starts; controller: a controller of its own; limits: as of the arm's loop;
+        period: s."""
+        self._arm = SimulatedArm(plant, period, in_step=False)
+        self._controller, self._limits, self._period = controller, limits, period
+        controller.set(LIMITS, 0, [*limits.tau, *limits.v, *limits.q_lower, *limits.q_upper])
+        controller.reset()
+        self.q, self.tau = plant.q, np.zeros(controller.n)
+        self._periods = 0
+
+    def take(self, order: Order) -> None:
+        """Drags a target before the next period."""
+        self._controller.set(TARGET, order.task, order.values)
+
+    def follow(self, t: float) -> None:
+        """Simulates until t (s after the start)."""
+        while (self._periods - 0.5) * self._period < t:
+            reading = self._arm.read()
+            self.q = reading.q
+            wanted, _ = self._controller.tick(reading.q, reading.v, reading.tau)
+            self.tau = accepted(wanted, reading.tau, self._limits, self._period)
+            self._arm.write(self.tau)
+            self._periods += 1

@@ -1,0 +1,88 @@
+"""Shared memory between the loop of an arm and its watcher: orders go down, and nobody waits.
+
+The watcher writes targets and a beat that says that it is still there. The loop looks once per period; if the
+watcher is writing at that moment, the loop looks again in the next period.
+"""
+
+from __future__ import annotations
+
+import mmap
+from typing import NamedTuple, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+VALUES = 32
+"""Largest number of values of a target."""
+_WRITES, _BEAT, _STOP = range(3)
+
+
+class Order(NamedTuple):
+    """A target that was dragged: the index of the task, and the values as `himpc_set` takes them."""
+
+    task: int
+    values: Array
+
+
+@final
+class Orders:
+    """The memory, which forked processes share. One process writes, one reads."""
+
+    def __init__(self, tasks: int) -> None:
+        """tasks: number of tasks."""
+        memory = mmap.mmap(-1, 8 * (3 + tasks * (2 + VALUES)))
+        self._head = np.ndarray((3,), np.int64, memory)
+        self._counts = np.ndarray((tasks, 2), np.int64, memory, 24)
+        self._values = np.ndarray((tasks, VALUES), np.float64, memory, 24 + 16 * tasks)
+        self._taken = np.zeros(tasks, np.int64)
+        self._seen = 0
+
+    # ---------------------------------------------------------------- the watcher
+
+    def beat(self) -> None:
+        """Says that the watcher is there."""
+        self._head[_BEAT] += 1
+
+    def stop(self) -> None:
+        """Asks the loop to end gently."""
+        self._head[_STOP] = 1
+
+    def drag(self, order: Order) -> None:
+        """Moves a target; only the last place of each task counts."""
+        size = len(order.values)
+        self._head[_WRITES] += 1  # odd: a write is in progress
+        self._values[order.task, :size] = order.values
+        self._counts[order.task, 0] += 1
+        self._counts[order.task, 1] = size
+        self._head[_WRITES] += 1
+
+    # ---------------------------------------------------------------- the loop
+
+    @property
+    def beats(self) -> int:
+        """How often the watcher has said that it is there."""
+        return int(self._head[_BEAT])
+
+    @property
+    def stopped(self) -> bool:
+        """Whether the loop shall end."""
+        return bool(self._head[_STOP])
+
+    @property
+    def taken(self) -> int:
+        """How many orders `news` has returned or replaced by later ones."""
+        return int(self._taken.sum())
+
+    def news(self) -> list[Order]:
+        """The targets that were dragged since the last call; none while they are being written."""
+        before = int(self._head[_WRITES])
+        if before == self._seen or before % 2:
+            return []
+        counts, values = self._counts.copy(), self._values.copy()
+        if int(self._head[_WRITES]) != before:
+            return []
+        moved = np.flatnonzero(counts[:, 0] != self._taken)
+        self._taken, self._seen = counts[:, 0], before
+        return [Order(int(task), values[task, : counts[task, 1]]) for task in moved]

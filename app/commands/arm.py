@@ -1,0 +1,159 @@
+"""`himpc-lab arm`."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+
+from robots import InputError
+
+if TYPE_CHECKING:
+    from himpc.export.image import Image
+    from lessons.scenes.torque_scene import TorqueScene
+    from robots.arm import Arm
+
+SIMULATED = "simulated"
+_LONGEST_DELAY = 20
+_LONGEST = 600.0  # s: every row is kept
+
+
+def arm(
+    scene: tyro.conf.Positional[str],
+    robot: str,
+    urdf: str | None = None,
+    tip: str | None = None,
+    controller: str | None = None,
+    set: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="PATH=VALUE")] = (),
+    drag: Annotated[
+        tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="TIME:TASK=X,Y,Z")
+    ] = (),
+    duration: float = 10.0,
+    distance: float = 0.2,
+    missed: int = 10,
+    delay: int = 0,
+    real_time: bool = False,
+    npz: str | None = None,
+    plot: str | None = None,
+) -> int:
+    """Drive a Franka arm by a scene's exported controller, and watch it beside a simulated one.
+
+    Args:
+        scene: name of a scene whose robot is the arm, e.g. panda-hold. Its targets begin where the arm is.
+        robot: address of the arm, or "simulated" for one in MuJoCo behind the same interface.
+        urdf: URDF file or catalog name, for the scene "hold".
+        tip: end-effector frame, for the scene "hold".
+        controller: himpc, hiqp, nhimpc or weighted; the scene's own by default.
+        set: change a setting, e.g. --set M_bar_scale=2 --set limits.velocity_scale=0.3.
+        drag: after so many seconds, move the target of a task by so much, e.g. --drag 2:position=0,0.05,0.
+        duration: seconds; then the arm is stopped gently.
+        distance: how far a joint may be from the simulated one, rad.
+        missed: how many periods may be missed one after another.
+        delay: after how many periods a torque acts; 0 believes the arm's own word for what acted.
+        real_time: refuse to run where the kernel has no real-time scheduling.
+        npz: write one row per period to this file.
+        plot: draw arm and model over each other, errors and torques, as arm.png in this folder.
+    """
+    from app.arm.drive import Drive, drive
+    from app.arm.guard import Tolerances
+    from app.arm.model import Model
+    from app.arm.prepared import check_start, maker, prepared
+    from app.arm.recorded import arrays
+    from himpc.export.native import build
+    from lessons.scenes.catalog import as_torque_scene
+    from lessons.scenes.run_spec import RunSpec
+
+    if not 0.0 < duration <= _LONGEST:
+        raise InputError(f"--duration is {duration} s: give a time above 0 and at most {_LONGEST:g}")
+    if not distance > 0.0:
+        raise InputError(f"--distance is {distance}: give a distance above 0")
+    if not 0 <= delay <= _LONGEST_DELAY:
+        raise InputError(f"--delay is {delay}: give a number of periods from 0 to {_LONGEST_DELAY}")
+    if missed < 0:
+        raise InputError(f"--missed is {missed}: give a number of periods, 0 or more")
+    spec = RunSpec(scene, urdf, tip, controller=controller).but(*set)
+    loaded = as_torque_scene(spec.prepared(), "an arm")
+    limits, start = _found(loaded, robot, real_time)
+    ready = prepared(loaded, start, limits, drag)
+    with tempfile.TemporaryDirectory() as folder:
+        print("compiling the controller: up to a minute at the first time …", flush=True)
+        make = maker(build(Path(folder)), ready.image)
+        check_start(make(), start)
+        period = loaded.settings.T_s
+        wanted = Drive(
+            arm=lambda: _arm(loaded, robot, real_time, start),
+            controller=make,
+            limits=ready.limits,
+            start=start,
+            period=period,
+            duration=duration,
+            drags=ready.drags,
+            tolerances=Tolerances(missed=missed, distance=distance),
+            delay=delay,
+        )
+        model = Model(ready.plant, make(), ready.limits, period)
+        driven = drive(wanted, model, lambda text: print(text, flush=True))
+    rest = "it came to rest under control" if driven.gently else "it was not brought to rest by us"
+    print(f"ended: {driven.why}; {rest}")
+    data = arrays(driven, ready.image)
+    if npz is not None:
+        how: dict[str, Any] = {"scene": scene, "robot": robot, "set": list(set), "drag": list(drag)}
+        _save(npz, data, how)
+        print(f"{len(driven.rows)} rows written to {npz}")
+    if plot is not None and len(driven.rows):
+        print(f"drawn: {_drawn(plot, data, ready.image)}")
+    return 0 if driven.wanted and driven.gently else 1
+
+
+def _arm(scene: TorqueScene, robot: str, real_time: bool, start: Any) -> Arm:
+    """The arm, not yet under control."""
+    from robots import Plant
+    from robots.franka import Franka
+    from robots.simulated_arm import SimulatedArm
+
+    if robot != SIMULATED:
+        return Franka(robot, real_time)
+    plant = Plant(scene.robot, scene.settings.plant, scene.settings.T_s, scene.world)
+    plant.reset(start)
+    return SimulatedArm(plant, scene.settings.T_s)
+
+
+def _found(scene: TorqueScene, robot: str, real_time: bool) -> tuple[Any, Any]:
+    """The limits of the arm, and where it is."""
+    from robots.arm import ArmLost
+    from robots.franka import Franka
+
+    if robot == SIMULATED:
+        return _arm(scene, robot, real_time, scene.q_0).limits, scene.q_0
+    if scene.settings.T_s != 1e-3:
+        raise InputError(f"T_s is {scene.settings.T_s} s: a Franka arm takes a torque every 0.001 s")
+    there = Franka(robot, real_time)
+    try:
+        return there.limits, there.at_rest(scene.robot)
+    except ArmLost as error:
+        raise InputError(f"--robot {robot}: {error}") from None
+
+
+def _save(path: str, data: dict[str, Any], how: dict[str, Any]) -> None:
+    import numpy as np
+
+    try:
+        np.savez_compressed(path, **data, settings=np.array(json.dumps(how)))
+    except OSError as error:
+        raise InputError(f"--npz {path}: cannot be written ({error.strerror}); give another file") from None
+
+
+def _drawn(folder: str, data: dict[str, Any], image: Image) -> Path:
+    from app.arm.picture import picture
+    from lessons.plots.draw import draw
+
+    try:
+        Path(folder).mkdir(parents=True, exist_ok=True)
+        return draw(picture("arm", data, image), Path(folder))
+    except OSError as error:
+        raise InputError(
+            f"--plot {folder}: cannot be written ({error.strerror}); give another folder"
+        ) from None

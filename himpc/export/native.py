@@ -1,0 +1,118 @@
+"""Exported controllers in this process, through the same C interface that other programs use."""
+
+from __future__ import annotations
+
+import ctypes
+import platform
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.export.image import Image
+from himpc.export.objects import object_code, target_named
+from robots.errors import InputError
+
+Array = NDArray[np.float64]
+
+_ALIGNMENT = 64
+
+
+def target_here() -> str:
+    """Returns the name of the export target that this machine runs. Raises InputError if there is none."""
+    system = {"linux": "linux", "darwin": "macos"}.get(sys.platform, sys.platform)
+    machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(platform.machine().lower(), platform.machine())
+    target_named(f"{machine}-{system}")
+    return f"{machine}-{system}"
+
+
+def build(folder: Path) -> Path:
+    """Compiles and links the exported controller for this machine; returns the shared library in `folder`.
+    Raises InputError if there is no C compiler."""
+    compiler = shutil.which("cc")
+    if compiler is None:
+        raise InputError("the controller is linked by a C compiler, and there is none called cc: install one")
+    made, library = folder / "himpc.o", folder / "himpc.so"
+    made.write_bytes(object_code(target_named(target_here())))
+    link(made, library)
+    return library
+
+
+def link(made: Path, library: Path) -> None:
+    """Links an object file to a shared library by the C compiler."""
+    subprocess.run(["cc", "-shared", "-o", library, made, "-lm"], check=True)
+
+
+@final
+class NativeController:
+    """A controller of a shared library: `himpc_tick`, `himpc_reset` and `himpc_set` of `himpc.h`."""
+
+    def __init__(self, library: Path, image: bytes, manifest: dict[str, Any]) -> None:
+        """library: as `build` makes it; image, manifest: see `Image`. Raises ValueError if the image is for
+        another kernel."""
+        self._c = ctypes.CDLL(str(library))
+        pointer, whole = ctypes.c_void_p, ctypes.c_int
+        self._c.himpc_tick.argtypes = [pointer] * 5
+        self._c.himpc_set.argtypes = [pointer, whole, whole, pointer, whole]
+        self._c.himpc_reset.argtypes = [pointer] * 2
+        self._c.himpc_check.argtypes = [pointer, ctypes.c_uint]
+        self.manifest = manifest
+        self.n = len(manifest["joints"])
+        self._room = np.zeros(len(image) // 8 + _ALIGNMENT // 8)
+        start = -self._room.ctypes.data % _ALIGNMENT
+        self.memory = self._room.view(np.uint8)[start : start + len(image)]
+        self.memory[:] = np.frombuffer(image, np.uint8)
+        self._at = self.memory.ctypes.data
+        self._numbers = np.zeros((4, self.n))
+        self._places = [row.ctypes.data for row in self._numbers]
+        if self.check(len(image)) != 0:
+            raise ValueError("this memory of a controller is for another kernel")
+        self.reset()
+
+    @classmethod
+    def of(cls, library: Path, image: Image) -> NativeController:
+        return cls(library, image.memory, image.manifest)
+
+    def check(self, size: int) -> int:
+        """`himpc_check` of its memory."""
+        return self._c.himpc_check(self._at, size)
+
+    def reset(self, tau: Array | None = None) -> None:
+        """Forgets everything but the settings; tau: the torque that acts now, (n,) N·m, zero if it is not
+        given."""
+        self._numbers[3] = 0.0 if tau is None else tau
+        self._c.himpc_reset(self._at, self._places[3])
+
+    def tick(self, q: Array, v: Array, tau_applied: Array | None = None) -> tuple[Array, int]:
+        """One period.
+
+        Args:
+            q, v: measured state, (n,) rad and rad/s.
+            tau_applied: the torque that acted during the last period, (n,) N·m; None: that of the last tick.
+
+        Returns:
+            (the torque to apply, (n,) N·m; which fallback acted, an index of `FALLBACKS`).
+        """
+        numbers, places = self._numbers, self._places
+        numbers[0], numbers[1] = q, v
+        given = None
+        if tau_applied is not None:
+            numbers[2], given = tau_applied, places[2]
+        fallback = self._c.himpc_tick(self._at, places[0], places[1], given, places[3])
+        return numbers[3].copy(), fallback
+
+    def set(self, what: int, index: int, values: Any) -> int:
+        """Changes a setting, see `himpc.export.kernel.adjust`; returns 0 or what is wrong."""
+        numbers = np.array(values, float).ravel()
+        return self._c.himpc_set(self._at, what, index, numbers.ctypes.data, numbers.size)
+
+    def view(self, name: str) -> np.ndarray:
+        """An array of the manifest, in its place."""
+        (found,) = (each for each in self.manifest["arrays"] if each["name"] == name)
+        count = int(np.prod(found["shape"]))
+        part = self.memory[found["offset"] : found["offset"] + 8 * count]
+        return part.view(found["type"]).reshape(found["shape"])

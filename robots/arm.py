@@ -1,0 +1,93 @@
+"""The interface to an arm that is driven by torques: a real one or a simulated one."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.errors import InputError
+from robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+class Reading(NamedTuple):
+    """What an arm says once per period.
+
+    Attributes:
+        q, v: measured joint positions, (n,) rad, and velocities, (n,) rad/s.
+        tau: the torque without gravity that acted during the last period, (n,) N·m.
+        t: the arm's clock, s. It moves on by more than one period if periods were missed.
+    """
+
+    q: Array
+    v: Array
+    tau: Array
+    t: float
+
+
+@dataclass(frozen=True, eq=False)
+class ArmLimits:
+    """What an arm accepts.
+
+    Attributes:
+        tau: largest torque without gravity, (n,) N·m.
+        tau_rate: largest change of that torque, (n,) N·m/s.
+        v: largest joint velocity, (n,) rad/s.
+        q_lower, q_upper: joint ranges, (n,) rad.
+    """
+
+    tau: Array
+    tau_rate: Array
+    v: Array
+    q_lower: Array
+    q_upper: Array
+
+    def with_robot(self, robot: Robot) -> ArmLimits:
+        """Returns what both this arm and the description of a robot accept. Raises InputError if the two
+        differ in their number of joints, or have no common range of a joint."""
+        if len(self.tau) != robot.n:
+            raise InputError(
+                f"the arm has {len(self.tau)} joints and the scene's robot '{robot.name}' has {robot.n}: "
+                "choose a scene of that arm, such as panda-hold"
+            )
+        lower, upper = np.maximum(self.q_lower, robot.q_lower), np.minimum(self.q_upper, robot.q_upper)
+        for name, low, high in zip(robot.joint_names, lower, upper, strict=True):
+            if not low < high:
+                raise InputError(
+                    f"the arm and the scene's robot '{robot.name}' have no common range of joint '{name}': "
+                    "choose a scene of that arm"
+                )
+        tau, v = np.minimum(self.tau, robot.tau_limit), np.minimum(self.v, robot.v_limit)
+        return ArmLimits(tau, self.tau_rate, v, lower, upper)
+
+
+class ArmLost(Exception):
+    """The arm does not answer any more, or has stopped by itself. The message says what it told."""
+
+
+class Arm(ABC):
+    """An arm that compensates its own gravity: a torque of zero keeps it where it is, if nothing is wrong
+    with the load that it was told.
+
+    Torques are always those without gravity. An arm that did not compensate its gravity would need g(q) added
+    to what is written, and subtracted from what is read.
+    """
+
+    limits: ArmLimits
+
+    @abstractmethod
+    def read(self) -> Reading:
+        """Waits for the next period and returns its reading. Raises ArmLost."""
+
+    @abstractmethod
+    def write(self, tau: Array) -> None:
+        """Sets the torque without gravity, (n,) N·m, that acts from now on. Raises ArmLost."""
+
+    @abstractmethod
+    def stop(self) -> None:
+        """Ends the control by torques: the arm holds its position by itself. Never raises."""
