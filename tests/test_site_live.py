@@ -18,9 +18,12 @@ from playwright.sync_api import Browser, Page
 
 from browsing.browser_actions import SLOW, eventually
 from docs.figures import front
+from docs.figures.pack import Pack
+from docs.figures.scene import scene_data
 from docs.figures.steps import judged, robot_of, scene_of_step, why_not
 from docs.pages import lessons
 from lessons.course import COURSE, load_lesson
+from lessons.events import MoveLevel, MoveTarget, Push, Set
 from lessons.replay.state import State, decode, encode
 from lessons.scenes.catalog import load_scene
 from lessons.scenes.run_spec import RunSpec
@@ -243,3 +246,37 @@ def test_without_node_the_site_has_recordings(monkeypatch: pytest.MonkeyPatch) -
     pages = lessons.pages(front.ROOT, live=False)
     assert not any("data-live" in text for text in pages.values())
     assert any('class="curves"' in text for text in pages.values())
+
+
+CHANGES = (
+    (0.1, MoveTarget("position", (0.5, 0.2, 0.5))),
+    (0.3, Set("M_bar_scale", 1.5)),
+    (0.4, MoveLevel("posture", 0)),
+    (0.6, Set("levels.orientation.enabled", False)),
+    (0.7, Set("plant.payload_kg", 2.0)),
+    (0.8, Set("tasks.position.K_p", 60.0)),
+    (0.9, Set("levels.orientation.enabled", True)),
+    (1.0, MoveLevel("position", 0)),
+    (1.1, Set("levels.position.Q", 50.0)),
+    (1.2, Set("levels.posture.R", 40.0)),
+    (1.3, Push("link_4", (20.0, 0.0, 10.0))),
+    (1.4, Set("limits.torque_scale", 0.6)),
+    (1.5, Set("limits.velocity_scale", 0.9)),
+    (1.6, Set("horizon", 10)),
+    (1.7, MoveTarget("position", (0.55, -0.1, 0.45))),
+    (1.8, Set("horizon", 2)),
+    (2.0, Set("plant.friction", 0.5)),
+)
+
+
+def test_what_is_changed_while_the_robot_moves_acts_as_in_the_lab(simulated: Page) -> None:
+    """Targets, order, levels, N, M̄, gains, weights, limits, payload, friction and pushes, one by one."""
+    scene = load_scene("iiwa14-hold")
+    assert isinstance(scene, TorqueScene)
+    changed, pack = replace(scene, events=CHANGES), Pack()
+    script = pack.script("scene/changed", {"scene": scene_data(changed, pack, (2, 10))})
+    simulated.add_script_tag(content=script)
+    wanted = torques(changed, 2.2)
+    found = replayed(simulated, "scene/changed", "iiwa14", None, len(wanted))
+    apart = np.abs(found["tau"] - wanted).max(axis=1)
+    assert apart.max() < 1e-8, f"apart by {apart.max():.1e} N·m, first at {np.argmax(apart > 1e-8)} ms"

@@ -55,7 +55,8 @@ export interface Asked {
 }
 
 export class Figure {
-  private view!: View;
+  /** None in a browser without WebGL. */
+  private view: View | null = null;
   private plots!: Plots;
   private panel!: Panel;
   private scene!: SceneData;
@@ -89,13 +90,17 @@ export class Figure {
     const places = tasks.filter((task) => this.placed(task.name) && task.target === "position");
     const draggable = places.map((task) => ({ task: task.name, axes: this.axes(task.name) }));
     const planar = robot.told.bodies.every((body) => Math.abs(body.pos[2]) < 1e-6);
-    this.view = new View(robot, Object.fromEntries(scene.levels.flatMap((level) => level.tasks)
-      .filter((task) => task.frame).map((task) => [task.name, colours[task.name]])), planar, new Set(draggable.map((each) => each.task)));
+    const balls = scene.levels.flatMap((level) => level.tasks).filter((task) => task.frame).map((task) => [task.name, colours[task.name]]);
+    try {
+      this.view = new View(robot, Object.fromEntries(balls), planar, new Set(draggable.map((each) => each.task)));
+      this.view.onMove = (task, place) => this.drag(task, place);
+    } catch {
+      this.say("This browser has no WebGL, which the 3D view needs: plots and controls work without it.");
+    }
     this.plots = new Plots(tasks.map((task) => ({ ...task, colour: colours[task.name] })), robot.told.joints.length);
     this.panel = new Panel(scene, robot.told, { set: (path, value) => this.set(path, value),
       push: (joint, force) => engine.say({ kind: "push", joint, force, seconds: 0.1 }),
       target: (task, place) => this.drag(task, place) }, draggable, asked.wide);
-    this.view.onMove = (task, place) => this.drag(task, place);
     engine.hear = (message) => this.hear(message);
     this.lay();
     engine.say({ kind: "pause" });
@@ -123,7 +128,7 @@ export class Figure {
       "The code opens in himpc-lab: himpc-lab --state CODE.");
     this.root.classList.add("hl-figure");
     this.root.classList.toggle("hl-wide", asked.wide);
-    const view = element("div", { class: "hl-view" }, this.view.canvas);
+    const view = element("div", { class: "hl-view" }, ...(this.view ? [this.view.canvas] : []));
     const lesson = step ? this.asking(step) : [];
     this.root.replaceChildren(view, element("div", { class: "hl-side" }, ...lesson, bar, this.notice, this.panel.root, link), this.plots.root, foot);
     void this.recode();
@@ -189,7 +194,7 @@ export class Figure {
   }
 
   /** Where the target of a task is on the screen, in pixels; for tests. */
-  pixel(task: string): [number, number] { return this.view.pixel(task); }
+  pixel(task: string): [number, number] { return this.view!.pixel(task); }
 
   private say(words: string): void { this.notice.textContent = words; }
 
@@ -256,7 +261,7 @@ export class Figure {
     this.frame = frame;
     this.running = frame.running;
     this.run.textContent = frame.running ? "Pause" : "Run";
-    this.view.show(frame);
+    this.view?.show(frame);
     this.plots.take(frame);
     this.panel.show(frame);
     for (const { task, kind, value } of frame.targets) {
@@ -266,7 +271,7 @@ export class Figure {
       const filtered = here.map((own, a) => (axes.includes("xyz"[a]) ? value[axes.indexOf("xyz"[a])] : own));
       const raw = this.raw.get(task)?.map((own, a) => (axes.includes("xyz"[a]) ? own : here[a])) ?? filtered;
       if (!this.raw.has(task) && frame.restarted) this.panel.aimed(task, filtered);
-      this.view.place(task, filtered, raw);
+      this.view?.place(task, filtered, raw);
     }
     const slow = frame.running && frame.speed < 0.97 ? ` · time runs at ${frame.speed.toFixed(2)} × here` : "";
     this.status.textContent = `t = ${frame.t.toFixed(2)} s${frame.running ? "" : " · paused"}${slow}` +
