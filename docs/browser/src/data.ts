@@ -66,7 +66,8 @@ declare global {
 export async function unwrapped(name: string): Promise<ArrayBuffer> {
   const text = window.HIMPC_PACKS?.[name];
   if (text === undefined) throw new Error(`the file with ${name} was not loaded`);
-  const bytes = Uint8Array.from(atob(text), (each) => each.charCodeAt(0));
+  const letters = atob(text), bytes = new Uint8Array(letters.length);
+  for (let k = 0; k < letters.length; k++) bytes[k] = letters.charCodeAt(k);
   return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
 }
 
