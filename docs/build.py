@@ -2,7 +2,8 @@
 
 Each build makes all pages anew: lessons from the course, the reference from docstrings, examples from their
 files, the rest from README, CONTRIBUTING and docs/. Every warning is an error. The result is static and needs
-no server: open index.html.
+no server: open index.html. With Node and the extra `export` the figures of lessons run in the browser, and
+there is the page try.html; without them the site has recordings.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import sys
 from pathlib import Path
 
 from docs import films
+from docs.figures import front
 from docs.pages import api, examples, exercises, lessons, texts
 from docs.record import FOLDER
 from lessons.course import COURSE, load_lesson
@@ -20,13 +22,16 @@ from lessons.course import COURSE, load_lesson
 ROOT = Path(__file__).parents[1]
 
 
-def write_sources(folder: Path) -> None:
-    """Writes all pages in the form that Sphinx reads."""
+def write_sources(folder: Path, live: bool) -> None:
+    """Writes all pages in the form that Sphinx reads, with places for live figures if there are any."""
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(ROOT / "docs" / "site", folder, ignore=shutil.ignore_patterns("__pycache__", "*.json"))
     pages: dict[str, str] = {}
-    for kind in (texts, lessons, exercises, examples, api):
+    for kind in (texts, exercises, examples, api):
         pages |= kind.pages(ROOT)
+    pages |= lessons.pages(ROOT, live)
+    index = folder / "index.md"
+    index.write_text(with_live(index.read_text(encoding="utf-8"), live), encoding="utf-8")
     for name, text in pages.items():
         path = folder / f"{name}.md"
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -34,6 +39,11 @@ def write_sources(folder: Path) -> None:
     shutil.copy(ROOT / "docs" / "page.webp", folder / "page.webp")
     for picture in sorted((ROOT / "docs" / "lessons").glob("*.webp")):
         shutil.copy(picture, folder / "lessons" / picture.name)
+
+
+def with_live(text: str, live: bool) -> str:
+    """Returns the first page with the link to *Try it*, or with a sentence that says why there is none."""
+    return text.replace("@try@", front.INVITATION if live else front.WITHOUT)
 
 
 def write_films(folder: Path) -> None:
@@ -50,10 +60,15 @@ def build(out: Path) -> int:
     from sphinx.cmd.build import build_main
 
     source = out.parent / f"{out.name}-source"
-    write_sources(source)
+    missing = front.missing()
+    if missing:
+        print(missing, file=sys.stderr)
+    write_sources(source, missing is None)
     shutil.rmtree(out, ignore_errors=True)
     sys.path.insert(0, str(ROOT))
     write_films(out / "films")
+    if missing is None:
+        front.write(out)
     return build_main(
         ["-q", "-W", "--keep-going", "-b", "html", "-d", str(source / "_build"), str(source), str(out)]
     )

@@ -38,9 +38,10 @@ _TOGETHER = (
         "tests/lessons/test_lessons_quoted.py",
         "tests/lessons/test_lessons_interventions.py",
     ),
+    ("tests/test_site.py", "tests/test_site_live.py"),
 )
-"""Beginnings of the paths of test files that share an expensive resource: a browser, or all runs of the
-course."""
+"""Beginnings of the paths of test files that share an expensive resource: a browser, all runs of the
+course, or the built site."""
 
 
 class OneWorkerForWhatIsShared(LoadScopeScheduling):
@@ -58,6 +59,7 @@ _LONG = (
     "tests/app/test_app_rough.py",
     "tests/lessons/test_lessons_every_controller.py",
     "tests/test_site.py",
+    "tests/test_site_live.py",
     "tests/lessons/test_lessons_course.py",
     "tests/lessons/test_lessons_quoted.py",
     "tests/lessons/test_lessons_interventions.py",
@@ -179,6 +181,16 @@ def browser() -> Iterator[Browser]:
         chromium = playwright.chromium.launch(executable_path=path, args=CHROMIUM_ARGS)
         yield chromium
         chromium.close()
+
+
+@pytest.fixture(scope="session")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The site, built by the function of the command; every warning would be an error."""
+    from docs.build import build
+
+    out = tmp_path_factory.mktemp("docs") / "site"
+    assert build(out) == 0
+    return out
 
 
 @pytest.fixture(scope="session")

@@ -15,7 +15,6 @@ from playwright.sync_api import Browser
 
 from app.__main__ import main
 from browsing.browser_actions import SLOW, eventually
-from docs.build import build
 from docs.further import further
 from docs.pages.lessons import MEASURED, measured
 from docs.record import FOLDER, plot, runs_of
@@ -46,14 +45,6 @@ class Parts(HTMLParser):
             self.loads.append(given["href"])
         elif "src" in given:
             self.loads.append(given["src"])
-
-
-@pytest.fixture(scope="module")
-def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The site, built by the function of the command; every warning would be an error."""
-    out = tmp_path_factory.mktemp("docs") / "site"
-    assert build(out) == 0
-    return out
 
 
 def test_every_link_leads_somewhere(site: Path) -> None:

@@ -9,6 +9,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from docs.figures.steps import robot_of, told_settings, why_not
 from docs.further import further
 from docs.further.kit import Further
 from docs.pages.curves import figure
@@ -28,15 +29,15 @@ RECORDED = FOLDER.relative_to(Path(__file__).parents[2])
 Checks = dict[tuple[str, str], dict[str, Any]]
 
 
-def pages(root: Path) -> dict[str, str]:
-    """Returns the name and Markdown of each page and of their index."""
+def pages(root: Path, live: bool = False) -> dict[str, str]:
+    """Returns the name and Markdown of each page and of their index; live: whether figures run here."""
     known = measured(root / MEASURED)
     found, rows = {}, []
     for number, name in enumerate(COURSE, start=1):
         lesson = load_lesson(name)
         picture = (root / "docs" / "lessons" / f"{name}.webp").exists()
         film = json.loads((root / RECORDED / f"{name}.json").read_text(encoding="utf-8"))
-        found[f"lessons/{name}"] = page(lesson, known.get(name, {}), film, further(name), picture)
+        found[f"lessons/{name}"] = page(lesson, known.get(name, {}), film, further(name), picture, live)
         card = lesson.card
         rows.append(f"| {number} | [{card.title}]({name}.md) | {cell(card.question)} | {card.minutes} |")
     listed = "\n".join(COURSE)
@@ -61,7 +62,9 @@ def measured(path: Path) -> dict[str, Checks]:
     }
 
 
-def page(lesson: Lesson, checks: Checks, film: Mapping[str, Any], more: Further, picture: bool) -> str:
+def page(
+    lesson: Lesson, checks: Checks, film: Mapping[str, Any], more: Further, picture: bool, live: bool = False
+) -> str:
     """Returns the page of one lesson."""
     card = lesson.card
     parts = [
@@ -71,7 +74,8 @@ def page(lesson: Lesson, checks: Checks, film: Mapping[str, Any], more: Further,
         f"`himpc-lab --lesson {lesson.name}` opens it, `himpc-lab lessons --check {lesson.name}` judges it.",
     ]
     for number, step in enumerate(lesson.steps, start=1):
-        parts += step_parts(step, number, checks, film["steps"][number - 1])
+        here = runs_here(lesson, number - 1) if live else ""
+        parts += step_parts(step, number, checks, film["steps"][number - 1], here)
         if number - 1 == film["motion"]["step"]:
             parts.append(watch(lesson.name, f"{card.title}: {step.title}", step, "../"))
     if lesson.challenge is not None:
@@ -122,14 +126,31 @@ def questions(more: Further) -> list[str]:
     return parts
 
 
-def step_parts(step: Step, number: int, checks: Checks, film: Mapping[str, Any]) -> list[str]:
-    """Returns the part of a page about one step of the lesson."""
+def runs_here(lesson: Lesson, place: int) -> str:
+    """Returns the HTML of a step's live figure, which is loaded on a click, or why there is none."""
+    reason = why_not(lesson.name, place)
+    if reason is not None:
+        told = f"This step runs in himpc-lab only; here is its recording. {escape(reason)}."
+        return f'<p class="recorded">{told}</p>'
+    step = lesson.steps[place]
+    robot, own = robot_of(lesson, step), told_settings(lesson, step)
+    return (
+        f'<figure class="live"><button type="button" data-live="{lesson.name}/{place + 1}/{robot}" '
+        f"data-root='../' data-set='{escape(json.dumps(own))}'>▶ Run this step here, in the browser</button>"
+        "<figcaption>Controller and MuJoCo run on this device: nothing is loaded from elsewhere.</figcaption>"
+        "</figure>"
+    )
+
+
+def step_parts(step: Step, number: int, checks: Checks, film: Mapping[str, Any], here: str = "") -> list[str]:
+    """Returns the part of a page about one step of the lesson; here: the HTML of its live figure."""
     parts = [f"## {number}. {step.title}", unindented(step.text)]
     if step.prediction is not None:
         asked = [f"**What do you think?** {step.prediction.question}"]
         if isinstance(step.prediction, Choice):
             asked.append("\n".join(f"- {option.text}" for option in step.prediction.options))
         parts += asked
+    parts += [here] if here else []
     parts.append(figure(film, step.ghost.words if step.ghost else None))
     parts += ["**What the run shows**", table(step.claims, step.title, checks)]
     parts += ["<details><summary>Why</summary>", unindented(step.why), "</details>"]

@@ -1,0 +1,40 @@
+/** State codes, as lessons/replay/state.py reads and writes them: all settings of a run in a link. */
+const PREFIX = "hl1-", MOST = 12_000;
+
+export interface State { s: string; r?: string; a?: string[]; l?: string; p?: number }
+
+async function through(bytes: Uint8Array<ArrayBuffer>, stream: CompressionStream | DecompressionStream): Promise<Uint8Array<ArrayBuffer>> {
+  return new Uint8Array(await new Response(new Blob([bytes]).stream().pipeThrough(stream)).arrayBuffer());
+}
+
+export async function encode(state: State): Promise<string> {
+  const packed = await through(new TextEncoder().encode(JSON.stringify(state)), new CompressionStream("deflate"));
+  return PREFIX + btoa(String.fromCharCode(...packed)).replace(/\+/g, "-").replace(/\//g, "_").replace(/=+$/, "");
+}
+
+/** The state of a code; null for a text that is none. Nothing in it is run: names and numbers, checked where they are used. */
+export async function decode(code: string): Promise<State | null> {
+  if (!code.startsWith(PREFIX) || code.length > MOST || !/^[\w-]+$/.test(code)) return null;
+  try {
+    const text = atob(code.slice(PREFIX.length).replace(/-/g, "+").replace(/_/g, "/"));
+    const bytes = await through(Uint8Array.from(text, (each) => each.charCodeAt(0)), new DecompressionStream("deflate"));
+    const given = JSON.parse(new TextDecoder().decode(bytes)) as State;
+    const list = given.a ?? [];
+    const fine = typeof given.s === "string" && Array.isArray(list) && list.length <= 500 && list.every((each) => typeof each === "string" && each.includes("="));
+    return fine ? given : null;
+  } catch {
+    return null;
+  }
+}
+
+export function parsed(value: string): unknown {
+  try {
+    return JSON.parse(value);
+  } catch {
+    return value;
+  }
+}
+
+/** "PATH=VALUE" of a changed setting. */
+export const assignment = (path: string, value: unknown): string =>
+  `${path}=${typeof value === "string" ? value : JSON.stringify(value)}`;

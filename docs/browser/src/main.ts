@@ -1,0 +1,27 @@
+/** What pages call: a live figure in a lesson, and the page Try it. */
+import uPlotStyle from "uplot/dist/uPlot.min.css";
+import { decode, encode } from "./code";
+import { unpacked, unwrapped } from "./data";
+import { Engine, Figure, type Asked } from "./figure";
+import style from "./style.css";
+
+let engine: Engine | null = null, shown: Figure | null = null;
+
+/** Opens a figure in an element; an earlier one on the page ends. */
+async function open(root: HTMLElement, asked: Asked): Promise<Figure> {
+  engine?.end();
+  engine = await new Engine().load();
+  shown = await new Figure(root, engine, asked).open();
+  return shown;
+}
+
+const sheet = document.createElement("style");
+sheet.textContent = uPlotStyle + style;
+document.head.append(sheet);
+
+const HIMPC = { open, decode, encode, unpacked, unwrapped, Engine, calm: () => matchMedia("(prefers-reduced-motion: reduce)").matches,
+  get shown() { return shown; } };
+declare global {
+  interface Window { HIMPC: typeof HIMPC }
+}
+window.HIMPC = HIMPC;

@@ -1,0 +1,46 @@
+"""Data for the browser: one script per pack. A page that was opened from a disk may load scripts, but no
+other files."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import json
+import math
+from collections.abc import Sequence
+from typing import Any
+
+_LINE = 8
+"""Pieces begin at multiples of so many bytes."""
+
+
+class Pack:
+    """A description with pieces of bytes that it refers to by (offset, bytes)."""
+
+    def __init__(self) -> None:
+        self._pieces = bytearray()
+
+    def add(self, piece: bytes) -> tuple[int, int]:
+        """Adds a piece; returns what refers to it."""
+        self._pieces += bytes(-len(self._pieces) % _LINE)
+        start = len(self._pieces)
+        self._pieces += piece
+        return start, len(piece)
+
+    def script(self, name: str, told: dict[str, Any]) -> str:
+        """Returns the script that gives the pack to the page: length of the description (8 bytes),
+        description, pieces."""
+        text = json.dumps(told, ensure_ascii=False, separators=(",", ":"), allow_nan=False).encode()
+        text += b" " * (-len(text) % _LINE)
+        return wrapped(name, len(text).to_bytes(8, "little") + text + bytes(self._pieces))
+
+
+def wrapped(name: str, content: bytes) -> str:
+    """Returns the script that gives bytes to the page, compressed."""
+    packed = base64.b64encode(gzip.compress(content, 9, mtime=0)).decode()
+    return f'(window.HIMPC_PACKS??={{}})["{name}"]="{packed}";\n'
+
+
+def plain(values: Sequence[float]) -> list[float | None]:
+    """Returns numbers for JSON; None for those that are not finite."""
+    return [float(each) if math.isfinite(each) else None for each in values]

@@ -1,0 +1,143 @@
+"""A torque-level scene as data for a browser: settings, start, script, and the memory of its controllers."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Iterator
+from dataclasses import fields, replace
+from typing import Any
+
+import numpy as np
+
+from docs.figures.pack import Pack
+from himpc.export.image import Image, image_of
+from himpc.tasks import FramePosition, Task
+from himpc.tasks.axes import OnAxes
+from lessons.events import Event, Push, as_data
+from lessons.scenes.torque_scene import TorqueScene
+from lessons.session.controllers import controller_of
+from lessons.session.torque import TorqueSession
+from lessons.settings.torque import TorqueSettings
+from robots import InputError, Robot
+from robots.world import Floor, World
+
+MOST_ORDERS = 3
+"""Of a stack with more levels only the scene's own order is written: there would be too many."""
+
+
+def scene_data(scene: TorqueScene, pack: Pack, horizons: Iterable[int] = ()) -> dict[str, Any]:
+    """Returns a scene; the controllers' memory goes into the pack.
+
+    Args:
+        scene: with its settings.
+        pack: for the memory of the controllers.
+        horizons: N that can be chosen besides the scene's own.
+
+    Raises:
+        InputError: its controller cannot be exported.
+    """
+    settings, robot = scene.settings, scene.robot
+    references = TorqueSession(replace(scene, events=()), 0).references
+    force = settings.limits
+    plant = {field.name: getattr(settings.plant, field.name) for field in fields(settings.plant)}
+    own = tuple(level.name for level in settings.levels)
+    images = {}
+    for N in dict.fromkeys((settings.horizon, *horizons)):
+        for order in _orders(own) if settings.controller != "weighted" else [own]:
+            changed = settings.changed("horizon", N).changed("order", ",".join(order))
+            assert isinstance(changed, TorqueSettings)
+            image = image_of(controller_of(changed, robot), robot, references)
+            images[f"{N}|{','.join(order)}"] = _told(image, pack)
+    return {
+        "name": scene.name,
+        "robot": robot.name,
+        "controller": settings.controller,
+        "period": settings.T_s,
+        "horizon": settings.horizon,
+        "order": list(own),
+        "duration": scene.duration,
+        "start": {
+            "q": scene.q_0.tolist(),
+            "v": scene.v_0.tolist(),
+            "tau": None if scene.tau_0 is None else scene.tau_0.tolist(),
+        },
+        "M_bar": list(settings.M_bar),
+        "M_bar_scale": settings.M_bar_scale,
+        "R_on": settings.R_on,
+        "deadline_ms": settings.deadline_ms,
+        "solve_ms_per_knot": settings.solve_ms_per_knot,
+        "levels": [
+            {"name": level.name, "Q": level.Q, "R": level.R, "enabled": level.enabled}
+            | {"tasks": [_task(robot, task) for task in level.tasks]}
+            for level in settings.levels
+        ],
+        "limits": {
+            name: getattr(force, name)
+            for name in ("torque", "velocity", "position", "torque_scale", "velocity_scale")
+        },
+        "plant": plant,
+        "world": [_thing(thing) for thing in _standing(scene.world)],
+        "events": [{"t": t, **_event(robot, event)} for t, event in scene.events],
+        "images": images,
+    }
+
+
+def refuse(scene: TorqueScene) -> None:
+    """Raises InputError if a browser cannot run a scene."""
+    plant = scene.settings.plant
+    if np.any(np.asarray(plant.diagonal_scale) != 1.0) or plant.torque_lag_ms or plant.delay_ms:
+        raise InputError(
+            "diagonal_scale, torque_lag_ms and delay_ms of the plant are not simulated in a browser"
+        )
+    session = TorqueSession(replace(scene, events=()), 0)
+    image_of(session.controller, scene.robot, session.references)
+
+
+def _task(robot: Robot, task: Task) -> dict[str, Any]:
+    frame = None
+    if isinstance(task, FramePosition):
+        found = robot.model.frames[robot.frame_id(task.frame or robot.tip)]
+        frame = {"joint": found.parentJoint, "pos": found.placement.translation.tolist()}
+    return {
+        "name": task.name,
+        "axes": task.axes if isinstance(task, OnAxes) else "",
+        "unit": task.unit,
+        "K_p": task.K_p,
+        "K_v": task.K_v,
+        "frame": frame,
+    }
+
+
+def _event(robot: Robot, event: Event) -> dict[str, Any]:
+    body = {"joint": robot.moving_body(event.body)} if isinstance(event, Push) else {}
+    return as_data(event) | body
+
+
+def _orders(own: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
+    return itertools.permutations(own) if len(own) <= MOST_ORDERS else iter([own])
+
+
+def _standing(world: World) -> World:
+    if any(thing.free for thing in world):
+        raise ValueError("free objects are not simulated in a browser")
+    return world
+
+
+def _thing(thing: Any) -> dict[str, Any]:
+    if not isinstance(thing.shape, Floor):
+        raise ValueError(f"a browser has a floor only, no {type(thing.shape).__name__}")
+    return {"height": thing.shape.height, "friction": thing.friction}
+
+
+def _told(image: Image, pack: Pack) -> dict[str, Any]:
+    """The memory, and what of its manifest the page needs."""
+    manifest = image.manifest
+    return {
+        "memory": pack.add(image.memory),
+        "manifest": {key: manifest[key] for key in ("joints", "tasks", "levels")}
+        | {
+            "arrays": [
+                [each[key] for key in ("name", "type", "shape", "offset")] for each in manifest["arrays"]
+            ]
+        },
+    }

@@ -1,0 +1,53 @@
+// Live figures are loaded when they are asked for. All they need are scripts beside the pages: a page that was opened
+// from a disk may load scripts, but no other files.
+const himpcScripts = {};
+function himpcScript(address) {
+  return himpcScripts[address] ??= new Promise((done, fail) => {
+    const made = Object.assign(document.createElement("script"), { src: address, onload: done });
+    made.onerror = () => fail(new Error(`the file ${address} was not found`));
+    document.head.append(made);
+  });
+}
+const himpcLoad = (root, names) => Promise.all(["live", ...names].map((name) => himpcScript(`${root}live/${name}.js`)));
+
+async function himpcFigure(place, { root, pack, file, robot, step, assignments, wide }) {
+  if (typeof WebAssembly !== "object" || typeof DecompressionStream !== "function")
+    throw new Error("this browser has no WebAssembly or cannot decompress; the recording shows the same run");
+  await himpcLoad(root, ["mujoco", "kernel", `robot-${robot}`, file]);
+  return HIMPC.open(place, { pack, robot, step, assignments, wide, running: wide && !HIMPC.calm() });
+}
+
+document.addEventListener("click", (event) => {
+  const button = event.target instanceof Element ? event.target.closest("button[data-live]") : null;
+  if (button) himpcStep(button, []);
+});
+async function himpcStep(button, assignments) {
+  const [file, step, robot] = button.dataset.live.split("/"), figure = button.closest("figure"), words = button.textContent;
+  button.disabled = true;
+  button.textContent = "Loading: the controller and MuJoCo, about 3 MB …";
+  const place = document.createElement("div");
+  try {
+    await himpcFigure(place, { root: button.dataset.root, pack: `lesson/${file}`, file, robot, step, assignments, wide: false });
+    // One figure runs at a time; the place of an earlier one has its button again.
+    for (const other of document.querySelectorAll("figure.live.open")) other.replaceChildren(...other.himpcBefore), other.classList.remove("open");
+    figure.himpcBefore = [...figure.childNodes];
+    figure.classList.add("open");
+    figure.replaceChildren(place);
+  } catch (error) {
+    figure.append(Object.assign(document.createElement("p"), { textContent: `This did not work: ${error.message}.` }));
+  }
+  button.disabled = false;
+  button.textContent = words;
+}
+// A link with the code of a step opens it.
+document.addEventListener("DOMContentLoaded", async () => {
+  const code = location.hash.slice(1), first = document.querySelector("button[data-live]");
+  if (!code.startsWith("hl") || !first) return;
+  await himpcLoad(first.dataset.root, []);
+  const state = await HIMPC.decode(code);
+  const button = state && document.querySelector(`button[data-live^="${first.dataset.live.split("/")[0]}/${Number(state.p)}/"]`);
+  if (!button || state.l !== button.dataset.live.split("/")[0]) return;
+  button.scrollIntoView();
+  const own = JSON.parse(button.dataset.set);
+  himpcStep(button, (state.a ?? []).filter((each) => !own.includes(each)));
+});
