@@ -90,8 +90,8 @@ def serve(
         raise InputError("--no-names is for a class: add --class, or leave it out")
     if class_ and proxy_only:
         raise InputError(
-            "--class and --proxy-only contradict each other: the pages of a class have addresses of their own, "
-            "for which no proxy vouches; leave one out"
+            "--class and --proxy-only contradict each other: the pages of a class have addresses of their "
+            "own, for which no proxy vouches; leave one out"
         )
     if not 0.0 <= drain <= 3600.0:
         raise InputError(f"--drain {drain}: give a time from 0 to 3600 s")
