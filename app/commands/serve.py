@@ -80,7 +80,7 @@ def serve(
     from app.link.choice import SceneChoice
     from app.server.passes import given_token
     from app.server.server import FIRST
-    from app.server.server import serve as serve_page
+    from app.server.serving import serve as serve_page
     from lessons.own.folder import Folder
     from lessons.replay.progress import read_key
 

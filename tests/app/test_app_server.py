@@ -17,7 +17,8 @@ from viser import _messages
 
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
-from app.server.server import PageServer, serve
+from app.server.server import PageServer
+from app.server.serving import serve
 from browsing.wire import let_in
 from lessons.scenes.run_spec import RunSpec
 from robots import InputError
@@ -65,7 +66,7 @@ def test_wrong_addresses_and_scenes_are_one_sentence() -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_one_line_and_a_clean_end(number: signal.Signals) -> None:
-    code = "from app.server.server import serve; import sys; sys.exit(serve(port=0, open_browser=False))"
+    code = "from app.server.serving import serve; import sys; sys.exit(serve(port=0, open_browser=False))"
     process = subprocess.Popen(
         [sys.executable, "-c", code],
         cwd=ROOT,
