@@ -19,7 +19,7 @@ from lessons.session.controllers import controller_of
 from lessons.session.torque import TorqueSession
 from lessons.settings.torque import TorqueSettings
 from robots import InputError, Robot
-from robots.world import Floor, World
+from robots.world import Floor, Thing
 
 MOST_ORDERS = 3
 """Of a stack with more levels only the scene's own order is written: there would be too many."""
@@ -76,7 +76,7 @@ def scene_data(scene: TorqueScene, pack: Pack, horizons: Iterable[int] = ()) -> 
             for name in ("torque", "velocity", "position", "torque_scale", "velocity_scale")
         },
         "plant": plant,
-        "world": [_thing(thing) for thing in _standing(scene.world)],
+        "world": [_floor(thing) for thing in scene.world],
         "events": [{"t": t, **_event(robot, event)} for t, event in scene.events],
         "images": images,
     }
@@ -89,6 +89,8 @@ def refuse(scene: TorqueScene) -> None:
         raise InputError(
             "diagonal_scale, torque_lag_ms and delay_ms of the plant are not simulated in a browser"
         )
+    if any(thing.free or not isinstance(thing.shape, Floor) for thing in scene.world):
+        raise InputError("a browser simulates the robot and a floor, no other objects")
     session = TorqueSession(replace(scene, events=()), 0)
     image_of(session.controller, scene.robot, session.references)
 
@@ -117,15 +119,8 @@ def _orders(own: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
     return itertools.permutations(own) if len(own) <= MOST_ORDERS else iter([own])
 
 
-def _standing(world: World) -> World:
-    if any(thing.free for thing in world):
-        raise ValueError("free objects are not simulated in a browser")
-    return world
-
-
-def _thing(thing: Any) -> dict[str, Any]:
-    if not isinstance(thing.shape, Floor):
-        raise ValueError(f"a browser has a floor only, no {type(thing.shape).__name__}")
+def _floor(thing: Thing) -> dict[str, float]:
+    assert isinstance(thing.shape, Floor)  # `refuse` has checked it
     return {"height": thing.shape.height, "friction": thing.friction}
 
 
