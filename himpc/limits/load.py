@@ -1,4 +1,4 @@
-"""Slows joints down whose motors have little torque left, so that they can still stop."""
+"""Lower velocity limits for joints whose motors have little torque left."""
 
 from __future__ import annotations
 
