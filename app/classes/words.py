@@ -1,4 +1,4 @@
-"""The messages that the pages of a class may send. Everything else is refused."""
+"""What the pages of a class may send; everything else is refused."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from msgspec import Meta
 
 LONGEST = 2000
 """Largest message, B."""
+TEACHER = "class"
+"""The name of the teacher's page in an address."""
 
 Short = Annotated[str, Meta(max_length=100)]
 Number = Annotated[float, Meta(ge=-1e12, le=1e12)]

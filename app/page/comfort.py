@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import time
 from typing import TYPE_CHECKING
 
@@ -96,3 +97,9 @@ class Comfort:
 
     def _show(self, sentence: str) -> None:
         private.run_script(self._client, _SAY % (json.dumps(LINE), json.dumps(sentence)))
+
+
+def window_size(told: str | None) -> tuple[int, int] | None:
+    """Width and height, pixels, as a browser told them; None if it did not."""
+    found = re.fullmatch(r"(\d{1,5})x(\d{1,5})", told or "")
+    return None if found is None else (int(found[1]), int(found[2]))

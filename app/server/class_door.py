@@ -16,10 +16,11 @@ from app.classes.hall import Hall
 from app.classes.pages import PageName, page, policy
 from app.classes.sockets import Sockets
 from app.classes.table import table
+from app.classes.words import TEACHER
 from app.server.door import Answer, Door, is_upgrade
 from app.server.passes import QUERY
 
-TEACHER, TABLE, PHONES = "/class", "/class.csv", "/v/"
+_TEACHER, TABLE, PHONES = f"/{TEACHER}", f"/{TEACHER}.csv", "/v/"
 _NOT_KEPT = ("Cache-Control", "no-store")
 
 
@@ -49,7 +50,7 @@ class ClassDoor:
     def has(self, path: str) -> bool:
         """Whether an address is one of the class's."""
         plain = urlsplit(path).path
-        return plain in (TEACHER, TABLE) or plain.startswith(PHONES)
+        return plain in (_TEACHER, TABLE) or plain.startswith(PHONES)
 
     def answer(self, door: Door, request: Request, who: str) -> Answer | Served:
         """The response to a request that names this server and comes from one of its pages. who: identifies
@@ -64,7 +65,7 @@ class ClassDoor:
             return door.judge(request, who) or _NOT_THE_TEACHER  # it puts the secret into a cookie
         if door.role(request, who) != "owner":
             return _NOT_THE_TEACHER
-        if plain == TEACHER:
+        if plain == _TEACHER:
             return _page("teacher", host, self.sockets.teacher)
         kept = (("Content-Disposition", 'attachment; filename="class.csv"'),)
         text = table(self.hall.state)

@@ -7,7 +7,7 @@ import ipaddress
 import logging
 from collections.abc import Awaitable, Callable, Mapping
 from http import HTTPStatus
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from websockets.asyncio.server import ServerConnection
 from websockets.exceptions import ConnectionClosedError
@@ -18,7 +18,6 @@ from app.classes.words import LONGEST
 from app.server import budget
 from app.server.answers import CROWDED, FULL, NOT_OPEN, as_response, plain
 from app.server.budget import Budget
-from app.server.class_door import ClassDoor
 from app.server.connection_limits import ConnectionLimits
 from app.server.door import Answer, Door, is_upgrade
 from app.server.load import Load, Places, load_of, report
@@ -26,6 +25,9 @@ from app.server.peers import ends_of
 from app.server.prefix import under_its_name
 from app.server.uploads import TRANSFER, Uploads
 from app.server.words import refusal
+
+if TYPE_CHECKING:  # a class computes: the server listens before that is loaded
+    from app.server.class_door import ClassDoor
 
 HANDSHAKE = 5.0
 """Time, s, within which a request must be complete."""

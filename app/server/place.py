@@ -11,7 +11,6 @@ import json
 from typing import TYPE_CHECKING
 
 from app.adapter.names import STORED
-from app.client.state_code import code_of
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
 from app.link.messages import Told
@@ -42,6 +41,8 @@ def written(choice: SceneChoice, settings: SceneSettings, start: SceneChoice) ->
     exercise = choice.exercise
     if exercise is not None:
         return json.dumps({**place, "lesson": exercise.lesson, "step": exercise.place + 1})
+    from app.client.state_code import code_of  # imported here: the server listens before panels are loaded
+
     try:
         return json.dumps({**place, "code": code_of(Told(choice, settings, (), 0.0))})
     except InputError:

@@ -9,14 +9,13 @@ import time
 import warnings
 from collections.abc import Sequence
 from importlib import import_module
+from typing import TYPE_CHECKING
 
 import viser
 
 from app.adapter import private
-from app.classes.hall import Hall
-from app.classes.sockets import Sockets
+from app.classes.words import TEACHER
 from app.link.choice import SceneChoice
-from app.server.class_door import TEACHER, ClassDoor
 from app.server.classroom import Classroom
 from app.server.connection_limits import OF_A_CLASS, ConnectionLimits
 from app.server.door import SELF, Door, as_origin, names_of_this_machine
@@ -29,6 +28,10 @@ from app.server.visit import Visit
 from lessons.own.folder import Folder
 from lessons.scenes.run_spec import RunSpec
 from robots import InputError
+
+if TYPE_CHECKING:  # a class computes: the server listens before that is loaded
+    from app.classes.hall import Hall
+    from app.classes.sockets import Sockets
 
 _LOOPBACK = ("127.0.0.1", "localhost", "::1")
 FIRST = SceneChoice(RunSpec("iiwa14-hold"))
@@ -105,13 +108,11 @@ class PageServer:
         else:
             self.passes = Passes(new_token() if ask_token else None, owner, f"himpc-lab-{found}")
         door = Door(local, trusted, self.passes, names_of_this_machine(), proxy_only, framing)
-        self._sockets = None if self.hall is None else Sockets(self.hall, lambda: self.outside)
-        if self.hall is not None and self._sockets is not None:
-            self._sockets.start(self._viser.get_event_loop())
-            self.guard.crowd = ConnectionLimits(*OF_A_CLASS)
-            self.guard.open(door, self.sessions, refers, ClassDoor(self.hall, self._sockets))
-        else:
+        self._sockets: Sockets | None = None
+        if self.hall is None:
             self.guard.open(door, self.sessions, refers)
+        else:
+            self._open_class(door, refers, self.hall)
         self._loading = threading.Thread(target=_load, args=(choice,), daemon=True)
         self._loading.start()
 
@@ -134,17 +135,27 @@ class PageServer:
     @property
     def first_link(self) -> str:
         """The page that opens at the start: the teacher's of a class, else that of a robot."""
-        page = "" if self.hall is None else TEACHER.lstrip("/")
-        return self.passes.link(self.url, "owner", page)
+        return self.passes.link(self.url, "owner", "" if self.hall is None else TEACHER)
 
     @property
     def teachers_link(self) -> str:
         """The link to the teacher's page of a class, with the owner's secret."""
-        return self.passes.link(self.outside, "owner", TEACHER.lstrip("/"))
+        return self.passes.link(self.outside, "owner", TEACHER)
 
     def _new_hall(self, named: bool) -> Hall:
+        from app.classes.hall import Hall
+
         alone = isinstance(self.sessions, Classroom)
         return Hall(None if alone else self.sessions, self.sessions.guide(), named)
+
+    def _open_class(self, door: Door, refers: bool, hall: Hall) -> None:
+        from app.classes.sockets import Sockets
+        from app.server.class_door import ClassDoor
+
+        self._sockets = Sockets(hall, lambda: self.outside)
+        self._sockets.start(self._viser.get_event_loop())
+        self.guard.crowd = ConnectionLimits(*OF_A_CLASS)
+        self.guard.open(door, self.sessions, refers, ClassDoor(hall, self._sockets))
 
     # ---------------------------------------------------------------- clients, on viser's loop
 

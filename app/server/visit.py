@@ -4,24 +4,23 @@ from __future__ import annotations
 
 import asyncio
 import json
-import re
 import secrets
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from functools import partial
+from typing import TYPE_CHECKING
 
 import viser
 
 from app.adapter import private
 from app.adapter.names import STORED
 from app.adapter.removed_handle_errors import print_exception
-from app.classes.hall import Hall
 from app.client.progress import Notebook
 from app.client.simulation_client import SimulationClient
 from app.html.text import block
 from app.link.choice import SceneChoice
-from app.page.comfort import ASK_MOTION, ASK_WINDOW, MOTION, REDUCED, Comfort
+from app.page.comfort import ASK_MOTION, ASK_WINDOW, MOTION, REDUCED, Comfort, window_size
 from app.page.inlet import Inlet
 from app.page.page import Page
 from app.panels.run.class_card import ClassCard
@@ -36,6 +35,9 @@ from app.server.workers import Workers
 from lessons.own.folder import Folder
 from lessons.replay.progress import LearnerProgress
 from lessons.replay.progress import found as found_progress
+
+if TYPE_CHECKING:  # a class computes: the server listens before that is loaded
+    from app.classes.hall import Hall
 
 STORAGE = 5.0
 """Time, s, within which a browser must send the values that it has stored."""
@@ -117,7 +119,7 @@ class Visit:
         tokens, dark, progress, motion, kept, window = short
         self._dark = dark == "1"
         reduced = motion == REDUCED and isinstance(self._sessions, Sessions)
-        self._comfort = Comfort(self._client, reduced, _size(window))
+        self._comfort = Comfort(self._client, reduced, window_size(window))
         self._notebook = Notebook(
             found_progress(progress, self._key, self._account),
             lambda text: self._keep(self._progress_key, text),
@@ -283,12 +285,6 @@ class Visit:
         connection = private.connection_of(self._server, self._client)
         if self._page is None and connection is not None:
             connection.transport.abort()
-
-
-def _size(told: str | None) -> tuple[int, int] | None:
-    """Width and height, pixels, as a browser told them; None if it did not."""
-    found = re.fullmatch(r"(\d{1,5})x(\d{1,5})", told or "")
-    return None if found is None else (int(found[1]), int(found[2]))
 
 
 def _tokens(stored: str | None) -> list[str]:

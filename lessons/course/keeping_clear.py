@@ -127,7 +127,7 @@ INSIDE = Step(
     do="Open the list of active bounds: which links meet what? Then put the orientation first.",
     why=r"""
     The bound is shared by all levels, and the order decides who pays for it. The hand comes first: its
-    target is reached, and the hand's orientation gives way by 29°. With the orientation first it is the
+    target is reached, and the hand's orientation gives way by 28°. With the orientation first it is the
     other way round: then the hand stays 6 cm away. Where there is room, nobody pays anything.
     """,
     prediction=Choice(

@@ -95,7 +95,7 @@ LIMIT_ROWS = (
     # ---------------------------------------- keeping-clear
     Intervention(
         "keeping-clear/0", "The position fixes the hand's height, so nothing is left for the distance",
-        FORCE, (280, 300), ("order=distance,position,orientation,posture",), (0, 0),
+        FORCE, (280, 300), ("order=distance,position,orientation,posture",), (0, 1),
     ),
     Intervention(
         "keeping-clear/0", "as if there were no task of a distance",
@@ -107,7 +107,7 @@ LIMIT_ROWS = (
     ),
     Intervention(
         "keeping-clear/2", "the order decides who pays for it",
-        TILT_AT_THE_END, (28.5, 29.5), ("order=orientation,position,posture",), (0, 0.5),
+        TILT_AT_THE_END, (27.5, 28.5), ("order=orientation,position,posture",), (0, 0.5),
     ),
     Intervention(
         "keeping-clear/2", "then the hand stays 6 cm away",

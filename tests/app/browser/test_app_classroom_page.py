@@ -78,6 +78,7 @@ def test_a_phone_votes_and_the_projector_shows_who_was_right(browser: Browser, c
     expect(lead.locator("#qr svg")).to_be_visible()
     lead.get_by_label("Lesson", exact=True).select_option("stretched-out")
     lead.get_by_role("button", name="Go to this step").click()
+    expect(lead.locator("#question")).not_to_have_text("Choose a lesson and a step.")
     expect(phone.locator("#question")).to_have_text(lead.locator("#question").inner_text())
     for vote, letter in (("Vote: 1 answered", "A"), ("Second vote: 1 answered", "B")):
         lead.get_by_role("button", name="Open the ").click()
