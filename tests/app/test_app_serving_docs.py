@@ -98,6 +98,7 @@ def proxied(nginx: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[tu
 @contextmanager
 def nginx_with(nginx: str, folder: Path, site: str, port: int) -> Iterator[None]:
     """Runs nginx with a configuration that listens on a port, until the context ends."""
+    assert not answers(port), f"another server listens on port {port}, and would be taken for nginx"
     folders = "".join(
         f"{kind}_temp_path {folder}/{kind};\n"
         for kind in ("client_body", "proxy", "fastcgi", "uwsgi", "scgi")
@@ -197,10 +198,10 @@ def test_strangers_that_a_forgotten_proxy_lets_through_run_nothing(
     """The server behind the proxy was started without --trusted-origin. Whatever host the proxy passes on,
     visitors need the token; and through a proxy that adds forwarding headers, even the owner cannot open
     files."""
-    port = free_port()
     server = PageServer(
         SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1, own_files=Folder.at(str(tmp_path))
     )
+    port = free_port()
     forwarded = "" if host == "$proxy_host" else "proxy_set_header X-Forwarded-For $remote_addr;"
     site = _BARE
     for word, here in (("PORT", str(port)), ("URL", server.url), ("HOST", host), ("MORE", forwarded)):
