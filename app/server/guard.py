@@ -118,14 +118,8 @@ class ConnectionGuard:
         }
 
     def _judge(self, connection: ServerConnection, request: Request) -> Answer | None:
-        if not self._open:
-            return NOT_OPEN
-        answer = self._door.judge(request, _user(connection))
-        if answer is None and not self.crowd.comes_from(connection, self.address(connection, request)):
-            return CROWDED
-        if answer is None and self._refers and self.load.full:
-            return FULL
-        return answer
+        answer = self._not_open(connection, request) or self._door.judge(request, _user(connection))
+        return FULL if answer is None and self._refers and self.load.full else answer
 
     def _to_class(self, of: ClassDoor, connection: ServerConnection, request: Request) -> Response | None:
         """The answer to a request for a page of the class; None for an upgrade that is let in."""
