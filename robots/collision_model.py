@@ -78,7 +78,7 @@ class CollisionModel:
         parts = [text.format(counts[source]) for source, text in words.items() if counts[source]]
         near = sum(pair.why == "neighbours" for pair in self.excluded)
         text = f"contacts use {', '.join(parts)}; left out are {near} pair(s) of neighbours"
-        return text + told(self.excluded)
+        return text + excluded_pairs(self.excluded)
 
 
 _SHOWN = 8
@@ -90,7 +90,7 @@ _TOLD = (
 )
 
 
-def told(excluded: tuple[Excluded, ...]) -> str:
+def excluded_pairs(excluded: tuple[Excluded, ...]) -> str:
     """The end of a sentence of the import report: pairs that are left out, without neighbours."""
     text = ""
     for why, said in _TOLD:

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from robots.collision_model import Excluded, Point, frozen, told
+from robots.collision_model import Excluded, Point, excluded_pairs, frozen
 
 if TYPE_CHECKING:
     from robots.robot import Robot
@@ -46,7 +46,7 @@ class Cover:
             return "the robot has no capsules: no distance is kept"
         near = sum(pair.why == "neighbours" for pair in self.excluded)
         text = f"distances use {len(self.capsules)} capsules that contain the links"
-        return f"{text}; left out are {near} pair(s) of neighbours{told(self.excluded)}"
+        return f"{text}; left out are {near} pair(s) of neighbours{excluded_pairs(self.excluded)}"
 
 
 def cover_of(robot: Robot) -> Cover:

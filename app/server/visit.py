@@ -33,8 +33,7 @@ from app.server.sessions import Sessions
 from app.server.uploads import Uploads
 from app.server.workers import Workers
 from lessons.own.folder import Folder
-from lessons.replay.progress import LearnerProgress
-from lessons.replay.progress import found as found_progress
+from lessons.replay.progress import LearnerProgress, load_progress
 
 if TYPE_CHECKING:  # a class computes: the server listens before that is loaded
     from app.classes.hall import Hall
@@ -121,7 +120,7 @@ class Visit:
         reduced = motion == REDUCED and isinstance(self._sessions, Sessions)
         self._comfort = Comfort(self._client, reduced, window_size(window))
         self._notebook = Notebook(
-            found_progress(progress, self._key, self._account),
+            load_progress(progress, self._key, self._account),
             lambda text: self._keep(self._progress_key, text),
             self._key,
             self._account,

@@ -25,7 +25,7 @@ def solve_problems(
     arena = arena_of(problems, rows, previous)
     fallbacks = solve_levels(arena, rows, FallbackBudget())
     finish_tick(*arena.arguments, False)
-    return solutions([problem.name for problem in problems], arena.found(), fallbacks)
+    return solutions([problem.name for problem in problems], arena.snapshot(), fallbacks)
 
 
 def arena_of(problems: Sequence[LevelProblem], rows: Rows, previous: Mapping[str, LevelSolution]) -> Arena:

@@ -106,7 +106,7 @@ class CompiledTick:
         f, i = self.arena.f, self.arena.i
         known = bool(i["known"][0])
         fallbacks: list[tuple[Fallback, float]] = [("solve", math.nan)] * len(self._levels)
-        levels = self._solutions(self.arena.found(), fallbacks) if i["known"][1] else []
+        levels = self._solutions(self.arena.snapshot(), fallbacks) if i["known"][1] else []
         return Memory(
             f["q_was"].copy(),
             f["v_was"].copy(),
@@ -257,7 +257,7 @@ class CompiledTick:
         )
 
     def _evidence(self, fallbacks: Sequence[tuple[Fallback, float]]) -> Evidence:
-        found = self.arena.found()
+        found = self.arena.snapshot()
         R, value, error = found("R_now"), found("value"), found("error")
         stopping = found("stopping") > 0.0 if self._settings.limits.position == "viability" else None
         return Evidence(

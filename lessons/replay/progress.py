@@ -70,7 +70,7 @@ def kept(progress: LearnerProgress, key: bytes | None, account: str = "") -> str
     return text if key is None else _seal(_of(account, text), key) + text
 
 
-def found(text: str | None, key: bytes | None, account: str = "") -> LearnerProgress:
+def load_progress(text: str | None, key: bytes | None, account: str = "") -> LearnerProgress:
     """The progress that a browser stored; with a key, only progress of this account that is signed with
     it."""
     if key is None or not text:

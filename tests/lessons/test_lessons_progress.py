@@ -14,8 +14,8 @@ from app.commands.grade import grade
 from lessons.replay.progress import (
     HandedIn,
     LearnerProgress,
-    found,
     kept,
+    load_progress,
     progress_from,
     read_handed_in,
     read_key,
@@ -79,10 +79,10 @@ def test_the_account_is_signed_with_the_progress() -> None:
     handed, proof = read_handed_in(text, KEY)
     assert (handed.account, proof) == ("zoe", "signed")
     stored = kept(DONE, KEY, "zoe")
-    assert found(stored, KEY, "zoe") == DONE
+    assert load_progress(stored, KEY, "zoe") == DONE
     for account in ("ben", "", "zo"):
-        assert found(stored, KEY, account) == LearnerProgress()
-    assert found(kept(DONE, KEY), KEY, "zoe") == LearnerProgress()
+        assert load_progress(stored, KEY, account) == LearnerProgress()
+    assert load_progress(kept(DONE, KEY), KEY, "zoe") == LearnerProgress()
 
 
 def test_the_command_says_whether_an_account_is_proven(
@@ -98,11 +98,11 @@ def test_the_command_says_whether_an_account_is_proven(
 
 
 def test_a_lab_with_a_key_believes_only_what_it_wrote_into_the_browser() -> None:
-    assert found(kept(DONE, KEY), KEY) == DONE
-    assert found(kept(DONE, None), None) == DONE
+    assert load_progress(kept(DONE, KEY), KEY) == DONE
+    assert load_progress(kept(DONE, None), None) == DONE
     forged = kept(DONE, KEY)[:64] + DONE.with_points("deadlines", 100.0).dumped()
     for text in (None, "", "{", DONE.dumped(), kept(DONE, OTHER), forged, "ü" * 200):
-        assert found(text, KEY) == LearnerProgress()
+        assert load_progress(text, KEY) == LearnerProgress()
     assert progress_from(kept(DONE, KEY)) == LearnerProgress()
 
 

@@ -33,7 +33,7 @@ class Arena:
         whole_begin, whole_end = self.whole_where[[WHOLE_AT.active_row, WHOLE_AT.end]].tolist()
         self._found = slice(begin, end), slice(whole_begin, whole_end)
 
-    def found(self) -> Snapshot:
+    def snapshot(self) -> Snapshot:
         """What this tick found, which stays when the next one comes."""
         numbers, wholes = self._found
         return Snapshot(self, self.data[numbers].copy(), self.whole[wholes].copy())
