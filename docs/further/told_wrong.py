@@ -89,9 +89,9 @@ FURTHER = Further(
         ),
         Question(
             "And which one would have covered the report of the lesson? What would the robot have done?",
-            "$5 + ⟨offset⟩$ = ⟨margin⟩ cm. With that margin the base would leave its line for any crate that "
-            "is reported beside it. As it was, the robot overlapped the crate by ⟨depth⟩ cm; with the truth at "
-            "5 s it kept ⟨kept⟩ cm.",
+            "$5 + ⟨offset⟩$ = ⟨margin⟩ cm. With that margin the base would have to leave its line also for a "
+            "crate beside it that is reported right. As it was, the robot overlapped the crate by ⟨depth⟩ "
+            "cm; with the truth at 5 s it kept ⟨kept⟩ cm.",
             {
                 "offset": (OFFSET, ".0f"),
                 "margin": (5.0 + OFFSET, ".0f"),

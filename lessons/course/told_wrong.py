@@ -109,7 +109,7 @@ THERE = Step(
     """,
     do="How late may the report be corrected? Find the last time at which 5 cm are kept.",
     why=r"""
-    It drives 40 cm into the crate, and its base is never more than 3 mm from its line. The bound
+    It drives 40 cm into the crate; until 7 s its base is never more than 3 mm from its line. The bound
     keeps clear of what is reported; what is there does not enter it. How early the truth arrives decides.
     At 5 s nothing is lost: 5 cm are kept and the hand stays on its line. At 5.4 s it is nearly too
     late: 2 cm are left. The hand swings out by 12 cm meanwhile: (7c) bounds level 1, too. At 5.6 s it is

@@ -133,7 +133,7 @@ MOBILE_ROWS = (
         "told-wrong/1", "It drives 40 cm into the crate", DEEP, (-0.405, -0.395), ("report_end=5",), KEPT,
     ),
     Intervention(
-        "told-wrong/1", "its base is never more than 3 mm from its line",
+        "told-wrong/1", "until 7 s its base is never more than 3 mm from its line",
         of("error/base", "m", "largest", until=7.0), (0.001, 0.003), ("false_report=false",), (0.5, 0.6),
     ),
     Intervention(
@@ -146,7 +146,7 @@ MOBILE_ROWS = (
     ),
     Intervention(
         "told-wrong/1", "The hand swings out by 12 cm meanwhile",
-        EE, (119, 125), ("report_end=5",), (0, 1), of=("report_end=5.4",),
+        EE, (115, 125), ("report_end=5",), (0, 1), of=("report_end=5.4",),
     ),
     Intervention(
         "told-wrong/1", "At 5.6 s it is too late: the robot overlaps the crate by 7 cm",
