@@ -29,13 +29,13 @@ from app.view.follow import FollowBase
 from app.view.goals import Goals
 from app.view.movable import Movable
 from app.view.obstacles import Obstacles
+from app.view.reported import ReportedObstacles
 from app.view.robot import RobotView, gizmo_size, look_at
 from app.view.surroundings import Carried, People, ReachCircle
 from app.view.target import TargetFrames
 from app.view.trails import Trails
 from himpc.htmpc import base_joints
 from lessons.events import Appear, Set
-from lessons.settings.missions import ArchitectureOptions
 from lessons.settings.velocity import VelocitySettings
 from robots.collision import Ball, Box
 from robots.stretch import horizontal_reach
@@ -75,7 +75,7 @@ class VelocityFace:
                 self._status,
                 lambda: self._goals.places,
                 Controls(gui, bindings, context.settings),
-                isinstance(context.settings.options, ArchitectureOptions),
+                context.settings.options,
             )
         with tabs.add_tab("Tasks"):
             self._roles = RolesPanel(gui, bindings, context.settings, colours, self._settings)
@@ -108,6 +108,7 @@ class VelocityFace:
         size = gizmo_size(ready.robot)
         self._frames = TargetFrames(scene)
         self._obstacles = Obstacles(scene, self._put)
+        self._reported = ReportedObstacles(scene)
         self._people = People(scene)
         self._carried = Carried(scene)
         self._goals = Goals(
@@ -216,6 +217,9 @@ class VelocityFace:
         fields = self._context.ready.layout.fields
         self._goals.follow(status, latest, fields)
         self._obstacles.show(settings.htmpc.obstacles, bool(self._begin.arrows.value))
+        t = float(latest[fields["t"]][0])
+        told = settings.options.reported(settings.htmpc.obstacles, t)
+        self._reported.show(settings.htmpc.obstacles, told)
         self._frames.show(bool(self._begin.frames.value))
         if self._circle is not None:
             self._circle.show(bool(self._begin.reach.value))

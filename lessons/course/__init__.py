@@ -34,6 +34,7 @@ COURSE: tuple[str, ...] = (
     "how-strict-is-strict",
     "seeing-ahead",
     "deliveries",
+    "told-wrong",
     "your-robot",
 )
 """The lessons by name, in the order in which to take them."""

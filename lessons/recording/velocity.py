@@ -50,6 +50,8 @@ def block(recording: Recording) -> dict[str, Any]:
         "line_search": {"mean_step": _mean(steps), "zero_share": _mean((steps == 0).astype(float))},
         **way,
         "clearance_min_m": float(recording["clearance"].min()),
+        "clearance_reported_min_m": float(recording["clearance_reported"].min()),
+        "report": _report(recording),
         "completed": progress.done,
         "completion_time_s": round(progress.completed[-1][1], 9) if progress.done else None,
         "mission": [{"task": name, "completed_s": round(t, 9)} for name, t in progress.completed],
@@ -76,6 +78,25 @@ def _part(recording: Recording, name: str, start: float, end: float) -> dict[str
         "final_base_error": float(base[-1] / base[0]),
         "ee_error_mm": {"mean": float(ee.mean()), "std": float(ee.std()), "max": float(ee.max())},
     }
+
+
+def _report(recording: Recording) -> dict[str, Any] | None:
+    """The largest error of each task before, while and after an obstacle is reported wrongly, m, and the
+    error at the end; None for runs without wrong reports."""
+    wrong = recording.session.settings.options.misreported
+    if wrong is None:
+        return None
+    t, (start, end) = recording["t"][:, 0], wrong
+    spans = {"before": t < start - 1e-9, "after": t >= end - 1e-9}
+    spans["wrong"] = ~spans["before"] & ~spans["after"]
+    told: dict[str, Any] = {"wrong_from_s": start, "wrong_until_s": end}
+    for task in recording.layout.tasks:
+        error = np.linalg.norm(recording[f"error/{task.name}"], axis=1)
+        told[task.name] = {
+            **{f"max_{name}_m": peak(error[spans[name]]) for name in ("before", "wrong", "after")},
+            "end_m": float(error[-1]),
+        }
+    return told
 
 
 def _limits(recording: Recording) -> dict[str, dict[str, float | None]]:

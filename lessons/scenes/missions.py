@@ -1,4 +1,4 @@
-"""The mobile manipulator's scenes: hold, square wave, waypoints, delivery, handover, cluttered."""
+"""The velocity-level scenes: the mobile manipulator's missions, and two arms."""
 
 from __future__ import annotations
 
@@ -14,16 +14,21 @@ from lessons.events import Event, MoveTarget, Release
 from lessons.scenes.names import VELOCITY_SCENES
 from lessons.scenes.velocity_scene import VelocityScene
 from lessons.settings.missions import (
-    CLUTTER,
-    ClutteredOptions,
     DeliveryOptions,
     MissionOptions,
     SquareOptions,
     Stay,
     WaypointOptions,
 )
+from lessons.settings.obstacle_missions import (
+    BESIDE_THE_WAY,
+    CLUTTER,
+    ClutteredOptions,
+    PerceptionOptions,
+)
 from lessons.settings.velocity import STAGE_WEIGHT, VelocitySettings
 from robots import Robot, load_robot
+from robots.collision import Obstacle
 
 DELIVERY_SPEEDS = (0.5, 0.5, 1.0, 0.5, 1.0, 1.0, 2.0, 2.0, 2.0)
 """m/s and rad/s: a robot that works among people."""
@@ -81,9 +86,8 @@ def _handover() -> VelocityScene:
     return _among_people(_ridgeback("ridgeback-ur10-handover", options, 60.0, events))
 
 
-def _cluttered() -> VelocityScene:
-    scene = _ridgeback("ridgeback-ur10-cluttered", ClutteredOptions(), 30.0)
-    htmpc = replace(scene.settings.htmpc, obstacles=CLUTTER)
+def _among(scene: VelocityScene, obstacles: tuple[Obstacle, ...]) -> VelocityScene:
+    htmpc = replace(scene.settings.htmpc, obstacles=obstacles)
     return replace(scene, settings=replace(scene.settings, htmpc=htmpc))
 
 
@@ -103,7 +107,12 @@ _MAKERS: dict[str, Callable[[], VelocityScene]] = {
         _ridgeback("ridgeback-ur10-delivery", DeliveryOptions(), 400.0)
     ),
     "ridgeback-ur10-handover": _handover,
-    "ridgeback-ur10-cluttered": _cluttered,
+    "ridgeback-ur10-cluttered": lambda: _among(
+        _ridgeback("ridgeback-ur10-cluttered", ClutteredOptions(), 30.0), CLUTTER
+    ),
+    "ridgeback-ur10-perception": lambda: _among(
+        _ridgeback("ridgeback-ur10-perception", PerceptionOptions(), 16.0), BESIDE_THE_WAY
+    ),
     "iiwa14-htmpc": lambda: _arm("iiwa14"),
     "panda-htmpc": lambda: _arm("panda"),
 }

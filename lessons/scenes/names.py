@@ -29,6 +29,7 @@ VELOCITY_SCENES: dict[str, str] = {
     "ridgeback-ur10-delivery": "a delivery round to three people, four times (Fig. 9)",
     "ridgeback-ur10-handover": "the hand waits until the ball is taken; people move meanwhile",
     "ridgeback-ur10-cluttered": "the base drives past obstacles that it must avoid",
+    "ridgeback-ur10-perception": "a crate beside the way is reported on the way for a while",
     "iiwa14-htmpc": "KUKA iiwa 14 under HTMPC: position, then orientation",
     "panda-htmpc": "Franka Panda under HTMPC: position, then orientation",
 }

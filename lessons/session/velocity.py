@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.htmpc import HTMPCSettings, VelocityPlan, base_joints, bounds
-from himpc.htmpc.clearance import CollisionModel
 from himpc.kinematics.configuration import Configuration
 from himpc.missions import Progress, advanced, insert, move, release, remove, reorder, where
 from himpc.plan import Binding
@@ -18,6 +17,7 @@ from himpc.references import Reference, previews
 from himpc.stack import Level, Stack
 from lessons.events import Event, InsertTask, MoveLevel, MoveTarget, Release, RemoveTask
 from lessons.scenes.velocity_scene import VelocityScene
+from lessons.session.obstacle_distances import ObstacleDistances
 from lessons.session.servo_commands import Commands, command_step
 from lessons.session.session import LOST_SPEED, Session
 from lessons.session.velocity_controllers import VelocityController, make_velocity_controller
@@ -29,9 +29,6 @@ from robots import InputError, VelocityPlant
 from robots.errors import unknown_name
 
 Array = NDArray[np.float64]
-
-CLEARANCE_WITHIN = 1.0
-"""m: obstacles farther away than this are not measured."""
 
 
 @final
@@ -78,7 +75,7 @@ class VelocitySession(Session):
         self._solve_ms = 0.0
         self._commands: Commands | None = None
         self._commanded = self._input = np.zeros(self.robot.n)
-        self._nearest = math.inf
+        self._nearest = np.full(2, np.inf)
 
     @property
     def over(self) -> bool:
@@ -133,20 +130,13 @@ class VelocitySession(Session):
             # it.
             still = set(range(self.robot.n)) - set(base) if driving else set(base[:2])
             hold = (*hold, *(self.robot.joint_names[joint] for joint in sorted(still)))
-        return replace(settings.htmpc, stack=self._stack, delay_s=lag, hold=hold)
+        told = settings.options.reported(settings.htmpc.obstacles, self.t)
+        return replace(settings.htmpc, stack=self._stack, delay_s=lag, hold=hold, obstacles=told)
 
     def _take_settings(self, settings: VelocitySettings) -> None:
         self.settings = settings
         self.bounds = bounds(self.robot, settings.htmpc.limits)
-        self._collision = CollisionModel(self.robot, settings.htmpc.obstacles, settings.htmpc.self_collision)
-
-    def _clearance(self) -> float:
-        """Distance from the robot to the nearest obstacle, m; infinite if none is within
-        `CLEARANCE_WITHIN`."""
-        if self._collision.empty:
-            return math.inf
-        near = self._collision.clearances(self.plant.q[None], CLEARANCE_WITHIN, gradients=False)
-        return float(near.distance.min(initial=math.inf))
+        self._distances = ObstacleDistances(self.robot, settings.htmpc)
 
     def predicted_path(self, role: str) -> Array:
         """The positions of a role's point in the last plan, knots 0 … N, (N+1, m) m; empty before the first
@@ -174,10 +164,10 @@ class VelocitySession(Session):
         period is over, else None."""
         if self._commands is None:
             self._commands = self._decide()
-            self._nearest = self._clearance()
+            self._nearest = self._distances.at(self.plant.q)
         commands = self._commands
         self.plant.step(commands.next(), commands.h)
-        self._nearest = min(self._nearest, self._clearance())
+        self._nearest = np.minimum(self._nearest, self._distances.at(self.plant.q))
         if not commands.done:
             return None
         self._commands = None
@@ -216,7 +206,8 @@ class VelocitySession(Session):
         """Writes the fields that are known at the end of the period."""
         fields, U = self.layout.fields, commands.plan.motion.U
         row[fields["tau"]] = row[fields["tau_demand"]] = commands.last
-        row[fields["acceleration"]], row[fields["clearance"]] = commands.sharpest, self._nearest
+        row[fields["acceleration"]] = commands.sharpest
+        row[fields["clearance"]], row[fields["clearance_reported"]] = self._nearest
         row[fields["jerk"]] = (U[0] - self._input) / min(commands.period, self.settings.htmpc.dt)
         write_bounds(row, self.layout)
         self._commanded, self._input = commands.last, U[0]
@@ -237,6 +228,7 @@ class VelocitySession(Session):
             references[level.name] = active.reference
         self._stack = tuple(stack)
         wanted = self._for_controller(self.settings)
+        self._distances.tell(wanted.obstacles)
         if self.controller is None:
             self.controller = make_velocity_controller(self.settings.controller, self.robot, wanted)
         elif wanted != self.controller.settings:

@@ -24,7 +24,17 @@ AT_ACCELERATION = AT_TORQUE
 _AT = 1e-3
 """A value whose distance from its bound is less than this share of the bound counts as at the bound."""
 
-_SCALARS = ("t", "step_us", "priority_leak", "unsolved", "place", "left", "clearance", "manipulability")
+_SCALARS = (
+    "t",
+    "step_us",
+    "priority_leak",
+    "unsolved",
+    "place",
+    "left",
+    "clearance",
+    "clearance_reported",
+    "manipulability",
+)
 _PER_JOINT = (
     "q",
     "v",
@@ -47,14 +57,15 @@ _PER_LEVEL = ("cost", "kkt", "rung", "time_us", "step", "active", "bound")
 def layout_of(robot: Robot, roles: Stack) -> Layout:
     """The indices of the fields of a row.
 
-    `place` is the number of completed tasks of the mission, `left` the number of the others. Per joint,
-    besides the usual fields: `tau` is the velocity commanded from that tick on, `tau_demand` the same,
-    `tau_0` the velocity commanded until then, `acceleration` and `jerk` those of the command, `at_bound` the
-    bits AT_ACCELERATION, AT_VELOCITY and AT_POSITION. Per role the fields of a task and `level/<role>`, its
-    place in the window (NaN: it is not in the window). Per level of the stack cost, kkt, rung, time_us, the
-    accepted line-search step, the number of active constraints and
-    `bound`, see `write_plan`. `manipulability` is w = √det(J Jᵀ) of the hand's position under the arm's
-    joints alone, m³.
+    `place` is the number of completed tasks of the mission, `left` the number of the others. `clearance` is
+    the least distance to an obstacle in the control period, m, and `clearance_reported` the least distance
+    to the obstacles as they are reported; they are infinite if no obstacle is near. Per joint, besides the
+    usual fields: `tau` is the velocity commanded from that tick on, `tau_demand` the same, `tau_0` the
+    velocity commanded until then, `acceleration` and `jerk` those of the command, `at_bound` the bits
+    AT_ACCELERATION, AT_VELOCITY and AT_POSITION. Per role the fields of a task and `level/<role>`, its place
+    in the window (NaN: it is not in the window). Per level of the stack cost, kkt, rung, time_us, the
+    accepted line-search step, the number of active constraints and `bound`, see `write_plan`.
+    `manipulability` is w = √det(J Jᵀ) of the hand's position under the arm's joints alone, m³.
     """
     levels = tuple(level.name for level in roles)
     return arranged(robot, roles, levels, _SCALARS, _PER_JOINT, _PER_LEVEL, per_task=("level",))

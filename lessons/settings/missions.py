@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from himpc.missions import Follow, Go, Mission, MissionTask
 from himpc.references import Hold, SquareWave
 from robots import InputError
-from robots.collision import Ball, Box, Floor, Obstacle
+from robots.collision import Obstacle
 from robots.ranges import Range, check_fields
 
 Array = NDArray[np.float64]
@@ -55,6 +55,17 @@ class MissionOptions(ABC):
     def person(self, task: str) -> int | None:
         """The person that a task of the mission visits, 0 the first; None: nobody."""
         return None
+
+    @property
+    def misreported(self) -> tuple[float, float] | None:
+        """The time from which an obstacle is reported where it is not, and the time from which it is reported
+        right again, s; None: the controller is never told anything wrong."""
+        return None
+
+    def reported(self, obstacles: tuple[Obstacle, ...], t: float) -> tuple[Obstacle, ...]:
+        """The obstacles as the controller is told of them at time t, s."""
+        del t
+        return obstacles
 
 
 @dataclass(frozen=True)
@@ -265,29 +276,3 @@ class DeliveryOptions(ArchitectureOptions):
 def _visit(role: str, number: int) -> str:
     """The name of a task of a delivery's visit."""
     return f"{role} {number}"
-
-
-CLUTTER: tuple[Obstacle, ...] = (
-    Floor(),
-    Box("table", (2.0, 0.95, 0.4), (1.2, 0.5, 0.8)),
-    Ball("bin", (1.6, -1.0, 0.3), 0.3),
-    Ball("lamp", (3.4, 0.55, 1.3), 0.2),
-)
-"""Obstacles on both sides of the base's path."""
-
-
-@dataclass(frozen=True)
-class ClutteredOptions(MissionOptions):
-    """The base is sent past obstacles; the EE goes first to a place beside the way.
-
-    Attributes:
-        goal: goal of the base, m.
-    """
-
-    goal: tuple[float, ...] = (4.0, 0.0)
-
-    def mission(self, home: Home) -> Mission:
-        return (
-            MissionTask("ee", "ee", Go((4.9, 0.2, 0.9)), hold=3.0),
-            MissionTask("base", "base", Go(self.goal), 0.02),
-        )

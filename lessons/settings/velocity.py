@@ -107,6 +107,8 @@ class VelocitySettings(SceneSettings):
         return _places(tuple(level.name for level in self.levels), type(self.options))
 
     def elements(self, path: str) -> int:
+        if path == "report_offset":
+            return 3
         return max(len(self.htmpc.gains), len(self.levels)) if path == "gains" else 0
 
     def place(self, path: str) -> Place:

@@ -102,5 +102,13 @@ VELOCITY_ENTRIES = (
     Entry("rounds", "Rounds", "Number of visits to each person", low=1, high=10),
     Entry("cruise", "Cruise", "Speed along the planned paths of the base", "m/s", 0.1, 1.0, 0.05),
     Entry("goal", "Goal", "Goal of the base, x and y", "m"),
+    Entry("false_report", "Reported wrongly", "Whether the controller is told for a while that the crate is "
+          "where it is not",
+          tries=("false", "true"), name="false report"),
+    Entry("report_offset", "Reported minus true position", "Position of the crate as it is reported, minus "
+          "its true position, while the report is wrong", "m", -3.0, 3.0, 0.05),
+    Entry("report_start", "Wrong from", "Time from which the report is wrong", "s", 0.0, 12.0, 0.5),
+    Entry("report_end", "Right again from", "Time from which the report is right again", "s", 0.0, 12.0, 0.5,
+          tries=("5", "6", "7", "8", "9"), name="report right again from, s"),
 )  # fmt: skip
 """The order is that of the page. An entry with `tries` is offered for comparisons."""

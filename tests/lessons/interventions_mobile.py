@@ -10,6 +10,8 @@ EE = of("error/ee", "mm")
 NO_LIMITS = ("limits.velocity=false", "limits.acceleration=false", "limits.jerk=false")
 TILT = of("error/orientation", "deg", "last")
 BASE_10 = of("error/base", "m", "mean", 10.0, 10.2)
+DEEP = of("clearance", "m", "smallest")
+KEPT = (0.045, 0.055)
 
 # fmt: off
 MOBILE_ROWS = (
@@ -103,6 +105,52 @@ MOBILE_ROWS = (
     Intervention(
         "seeing-ahead/3", "the base is as quick as before",
         of("error/base", "m", "mean", 8.0), (0.18, 0.21), ("gains=[20,2]",), (0.18, 0.21), stays=True,
+    ),
+
+    # ---------------------------------------- told-wrong
+    Intervention(
+        "told-wrong/0", "it leaves its line by 57 cm",
+        of("error/base", "m"), (0.565, 0.575), ("false_report=false",), (0, 0.005),
+    ),
+    Intervention(
+        "told-wrong/0", "the hand stays within half a millimetre of its own",
+        EE, (0.3, 0.5), ("order=base,ee",), (470, 490),
+    ),
+    Intervention(
+        "told-wrong/0", "with the base first the hand swings out by 48 cm",
+        EE, (475, 485), ("false_report=false",), (0, 5), of=("order=base,ee",),
+    ),
+    Intervention(
+        "told-wrong/0", "from 9 s on the base is within 2 cm of its line",
+        of("error/base", "m", "largest", 9.0), (0.005, 0.02), ("report_end=12",), (0.1, 0.2),
+    ),
+    Intervention(
+        "told-wrong/0", "at 12 s its base is still 71 cm away",
+        of("error/base", "m", "mean", 11.85), (0.705, 0.715), ("controller=htmpc",), (0, 0.005),
+        of=("controller=stmpc",),
+    ),
+    Intervention(
+        "told-wrong/1", "It drives 40 cm into the crate", DEEP, (-0.405, -0.395), ("report_end=5",), KEPT,
+    ),
+    Intervention(
+        "told-wrong/1", "until 7 s its base is never more than 3 mm from its line",
+        of("error/base", "m", "largest", until=7.0), (0.001, 0.003), ("false_report=false",), (0.5, 0.6),
+    ),
+    Intervention(
+        "told-wrong/1", "At 5 s nothing is lost: 5 cm are kept", DEEP, KEPT, ("report_end=5.6",),
+        (-0.075, -0.065), of=("report_end=5",),
+    ),
+    Intervention(
+        "told-wrong/1", "At 5.4 s it is nearly too late: 2 cm are left",
+        DEEP, (0.015, 0.025), ("report_end=5",), KEPT, of=("report_end=5.4",),
+    ),
+    Intervention(
+        "told-wrong/1", "The hand swings out by 12 cm meanwhile",
+        EE, (115, 125), ("report_end=5",), (0, 1), of=("report_end=5.4",),
+    ),
+    Intervention(
+        "told-wrong/1", "At 5.6 s it is too late: the robot overlaps the crate by 7 cm",
+        DEEP, (-0.075, -0.065), ("report_end=5",), KEPT, of=("report_end=5.6",),
     ),
 
     # ---------------------------------------- your-robot

@@ -16,6 +16,8 @@ from app.panels.widgets.command import on_click
 from app.panels.widgets.controls import Controls
 from app.panels.widgets.snapshot import SessionSnapshot
 from lessons.events import InsertTask, MoveLevel, Release, RemoveTask
+from lessons.settings.missions import ArchitectureOptions, MissionOptions
+from lessons.settings.obstacle_missions import PerceptionOptions
 from lessons.settings.velocity import VelocitySettings
 
 _EARLIER, _LATER, _REMOVE = "▲ Earlier", "▼ Later", "Remove"
@@ -35,17 +37,23 @@ class MissionPanel:
         status: Callable[[], Status | None],
         places: Callable[[], dict[str, np.ndarray]],
         controls: Controls[VelocitySettings],
-        architectures: bool,
+        options: MissionOptions,
     ) -> None:
         """points: the points that can get a target; colours: by role; status: the newest one; places:
-        position at which each role's goal is drawn, (3,) m; architectures: whether the scene has several."""
+        position at which each role's goal is drawn, (3,) m; options: of the scene."""
         self._points = {task.name: task for task in points}
         self._colours, self._post, self._status, self._places = colours, post, status, places
         self._filled = False
         self._list = gui.add_html("")
         self._swap = gui.add_button("Swap which comes first", hint="The first two tasks change places")
         self._release = gui.add_button("Release", visible=False, color=button(GOOD))
-        if architectures:
+        if isinstance(options, PerceptionOptions):
+            with gui.add_folder("What the controller is told of the crate"):
+                controls.add("false_report", "report_start", "report_end")
+                controls.add_elements(
+                    "report_offset", ("x [m]", "y [m]", "z [m]"), "Reported minus true position"
+                )
+        if isinstance(options, ArchitectureOptions):
             with gui.add_folder("How it is carried out, from the next Reset", expand_by_default=False):
                 controls.add("architecture", "base_tolerance", "base_at_rest")
         with gui.add_folder("Change a task"):

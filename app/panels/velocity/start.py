@@ -139,6 +139,12 @@ _FIRST = {
         "The hand has to stay ({ee}); the base is sent out of reach for 8 s, then home ({base}). "
         "Reset and swap which comes first, or set N to 1 in <b>Control</b>.",
     ),
+    "ridgeback-ur10-perception": (
+        "Watch the robot make way for a crate that is not there.",
+        "For a while the controller is told that the crate stands where the outline is. The hand ({ee}) and "
+        "the base ({base}) move along straight paths. What is told, and when, is set in the tab "
+        "<b>Mission</b>.",
+    ),
 }
 _WATCH = (
     "Watch the robot do the next task while it finishes this one.",

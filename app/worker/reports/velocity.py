@@ -10,7 +10,8 @@ from app.link.messages import TaskView
 from app.link.mission_view import MissionRow, MissionView, Person
 from app.worker.reports.report import SessionReport
 from himpc.htmpc import base_joints
-from himpc.missions import Go, MissionTask
+from himpc.missions import Follow, Go, MissionTask
+from himpc.references import Path
 from himpc.rotation import quaternion
 from himpc.tasks import FramePosition, Task
 from lessons.session.velocity import VelocitySession
@@ -75,6 +76,8 @@ class VelocityRun(SessionReport):
             return np.zeros((0, 3))
         tasks = self.session.progress.mission
         goals = [_point(task.motion.goal) for task in tasks if isinstance(task.motion, Go)]
+        follows = [task.motion.reference for task in tasks if isinstance(task.motion, Follow)]
+        goals += [_point(each.points[-1]) for each in follows if isinstance(each, Path)]
         corners = [np.array([x, y, 0.0]) for x in (-_AROUND, _AROUND) for y in (-_AROUND, _AROUND)]
         return np.array([*goals, *corners])
 

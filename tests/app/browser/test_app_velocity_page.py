@@ -28,7 +28,7 @@ from browsing.browser_actions import (
     target_position,
     wait_for_scene,
 )
-from lessons.events import MoveTarget
+from lessons.events import MoveTarget, Set
 from lessons.scenes.run_spec import RunSpec
 from lessons.settings.velocity import VelocitySettings
 from robots.collision import Ball, Box, Floor
@@ -251,3 +251,17 @@ def test_obstacles_are_moved_by_hand_and_put_in_the_way(page: Page, learner: Sim
     tab(page, "Start")
     press(page, "Reset all")
     assert eventually(page, lambda: obstacles() == before)
+
+
+def test_a_crate_is_outlined_where_it_is_reported(page: Page, learner: SimulationClient) -> None:
+    """The outline is drawn while the report is wrong; the solid crate stays where it is."""
+    load(page, learner, "ridgeback-ur10-perception")
+    learner.send(Post(Set("report_end", 1000.0)))
+    press(page, "Reset")
+    assert eventually(page, lambda: is_drawn(page, "/reported/0"))
+    np.testing.assert_allclose(position(page, "/reported/0"), (1.9, 0.3, 0.25), atol=1e-6)
+    np.testing.assert_allclose(position(page, "/obstacle/0"), (1.9, 1.4, 0.25), atol=1e-6)
+    tab(page, "Mission")
+    row(page, "Reported wrongly").locator("input").click()
+    assert eventually(page, lambda: not is_drawn(page, "/reported/0"))
+    assert latest(learner, "clearance") == latest(learner, "clearance_reported")

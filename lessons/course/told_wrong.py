@@ -1,0 +1,167 @@
+"""Told wrong
+
+A robot is told that a crate stands in its way, and it does not: what does the mistake cost?
+
+Minutes: 10
+You need: lesson "first-hold-then-reach"
+"""
+
+from __future__ import annotations
+
+from lessons.teaching.claim import Claim
+from lessons.teaching.control import Control
+from lessons.teaching.lesson import Ghost, Lesson, Step, card_of
+from lessons.teaching.measure import Measure, Signal
+from lessons.teaching.prediction import Choice, Option
+
+HAND = Signal("error/ee", "mm")
+BASE = Signal("error/base", "m")
+DISTANCE = Signal("clearance", "mm")
+REPORTED = Signal("clearance_reported", "mm")
+NEVER_WRONG = ("false_report=false",)
+IN_TIME = ("report_end=5",)
+ON_THE_WAY = ("obstacles.crate=[1.9,0.3,0.25]", "report_offset=[0,1.1,0]")
+WRONG = Control("false_report", "The report is wrong for a while", choices=(False, True))
+UNTIL = Control("report_end", "Right again from, s", 2.0, 12.0)
+
+NOT_THERE = Step(
+    title="A crate that is not there",
+    text=r"""
+    The hand has to move along a line for 4 m: level 1. The base has a line of its own, level 2. A crate
+    stands 1.4 m beside it. Every plan keeps the signed distance of each body $B$ of the robot to each
+    obstacle $O$ at every knot,
+
+    $$\mathrm{sd}(B(q_k), O) \ge d_{\mathrm{safe}} \quad (7c),$$
+
+    here 5 cm. But $O$ is what a camera and a map report. From 1 s to 7 s they report the crate 1.1 m
+    away from where it is, next to the line of the base: the outline. It is low enough for the hand to
+    pass above it, and the base has to make way. Then the report is corrected.
+    """,
+    do="Correct the report at 5 s. Then put the base first, in the tab Mission.",
+    why=r"""
+    The base makes way: it leaves its line by 57 cm, and the hand stays within half a millimetre of its
+    own. The distance bounds every level, and the order says who pays for it: with the base first the hand
+    swings out by 48 cm. Nothing in the controller remembers a report. The next plan is made with the
+    crate where it is, and from 9 s on the base is within 2 cm of its line. The ghost knows the hand
+    alone. It makes way as well, but comes back only as far as its hand needs: at 12 s its base is still
+    71 cm away.
+    """,
+    prediction=Choice(
+        "The base cannot pass where the crate is reported. The hand leaves its line by …",
+        (
+            Option("more than 10 cm: it sits on the base", low=100.0),
+            Option("some millimetres or centimetres", 1.0, 100.0),
+            Option("less than 1 mm", high=1.0),
+        ),
+        Measure(HAND),
+        tempting=0,
+    ),
+    claims=(
+        Claim(
+            "The hand stays within 1 mm of its reference.",
+            Measure(HAND),
+            "at most",
+            1.0,
+            fails_with=("order=base,ee",),
+            because="then the hand makes way for the base",
+        ),
+        Claim(
+            "The base leaves its reference by at least 50 cm.",
+            Measure(BASE),
+            "at least",
+            0.5,
+            fails_with=NEVER_WRONG,
+            because="then nothing is in its way",
+        ),
+        Claim(
+            "From 9.5 s on the base is within 1 cm of its reference.",
+            Measure(BASE, after=9.5),
+            "at most",
+            0.01,
+            fails_with=("controller=stmpc",),
+            because="then nobody asks for the base",
+        ),
+        Claim(
+            "The crate is never nearer than 40 cm.",
+            Measure(DISTANCE, "smallest"),
+            "at least",
+            400.0,
+            fails_with=("obstacles.crate=[1.9,0.8,0.25]",),
+            because="then the crate itself stands near the way",
+        ),
+    ),
+    duration=12.0,
+    ghost=Ghost("the hand alone", ("controller=stmpc",)),
+    controls=(
+        Control("controller", "Controller", choices=("htmpc", "stmpc", "htidkc")),
+        WRONG,
+        UNTIL,
+    ),
+    plots=(BASE, HAND, DISTANCE, REPORTED),
+)
+
+THERE = Step(
+    title="A crate that is there",
+    text=r"""
+    Now the other way round: the crate stands next to the line of the base, and until 7 s it is reported
+    1.1 m away from there. Nothing else has changed. At velocity level the simulation has no contacts: no
+    crate stops the robot, and the distance becomes negative where the two overlap.
+    """,
+    do="How late may the report be corrected? Find the last time at which 5 cm are kept.",
+    why=r"""
+    It drives 40 cm into the crate; until 7 s its base is never more than 3 mm from its line. The bound
+    keeps clear of what is reported; what is there does not enter it. How early the truth arrives decides.
+    At 5 s nothing is lost: 5 cm are kept and the hand stays on its line. At 5.4 s it is nearly too
+    late: 2 cm are left. The hand swings out by 12 cm meanwhile: (7c) bounds level 1, too. At 5.6 s it is
+    too late: the robot overlaps the crate by 7 cm. A larger margin helps against small errors of a
+    report. The authors of HTMPC keep a map instead, and infer with Bayes' rule from what is seen which
+    objects still stand where the map has them (given, not measured here).
+    """,
+    prediction=Choice(
+        "The crate is reported beside the way until 7 s. The least distance to it is …",
+        (
+            Option("5 cm, as always", low=40.0),
+            Option("less, but the robot stops before the crate", 0.0, 40.0),
+            Option("none: the robot drives into the crate", high=0.0),
+        ),
+        Measure(DISTANCE, "smallest"),
+        tempting=0,
+    ),
+    claims=(
+        Claim(
+            "The robot overlaps the crate by at least 30 cm.",
+            Measure(DISTANCE, "smallest"),
+            "at most",
+            -300.0,
+            fails_with=IN_TIME,
+            because="then the controller learns of the crate in time",
+        ),
+        Claim(
+            "Until 7 s the base stays within 5 mm of its reference.",
+            Measure(BASE, until=7.0),
+            "at most",
+            0.005,
+            fails_with=NEVER_WRONG,
+            because="then it makes way",
+        ),
+        Claim(
+            "From 8.5 s on the robot is at least 4 cm away from the crate.",
+            Measure(DISTANCE, "smallest", after=8.5),
+            "at least",
+            40.0,
+            fails_with=("report_end=12",),
+            because="then nobody has corrected the report yet",
+        ),
+    ),
+    set=ON_THE_WAY,
+    duration=12.0,
+    controls=(WRONG, UNTIL),
+    plots=(DISTANCE, REPORTED, BASE, HAND),
+)
+
+LESSON = Lesson(
+    name="told-wrong",
+    card=card_of(__doc__),
+    scene="ridgeback-ur10-perception",
+    steps=(NOT_THERE, THERE),
+)
