@@ -119,6 +119,7 @@ def write_index(out: Path) -> None:
                     "```sh",
                     *each.commands(),
                     "```",
+                    *(["", each.before] if each.before else []),
                 ]
     (out / "README.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
 

@@ -31,7 +31,9 @@ def new(
     if exercise is not None and start is not None and exercise.start:
         lines = (f"himpc-lab grade {start} {file}",)
     elif exercise is not None:
-        lines = (f"himpc-lab run {exercise.scene} --controller {file}", *exercise.commands(file)[1:])
+        settings = "".join(f" --set {each}" for each in exercise.live)
+        run = f"himpc-lab run {exercise.scene} --controller {file}{settings}"
+        lines = (run, *exercise.commands(file)[1:])
     else:
         own = f"planar3-circle --controller {file}" if kind == "controller" else file
         lines = {

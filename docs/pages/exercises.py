@@ -37,6 +37,7 @@ def part(exercise: Exercise) -> str:
             f"About {card.minutes} minutes; after [{lesson}](lessons/{exercise.lesson}.md).",
             f"$$\n{exercise.equation}\n$$",
             f"```sh\n{commands}\n```",
+            *([exercise.before] if exercise.before else []),
             f"```python\n{start_of(exercise.name).strip()}\n```",
             "\n".join(checks),
             *hints,

@@ -13,16 +13,19 @@ from numpy.typing import NDArray
 from himpc.controllers.answers import OwnFault, checked, next_cost, no_rows, solution
 from himpc.controllers.base import TorqueController
 from himpc.controllers.one_step import leak as leak_of
-from himpc.controllers.view import Bounds, LevelView, View, read_only
+from himpc.controllers.view import Bounds, LevelView, NearView, View, read_only
 from himpc.formulation.forms import StackForm, measure, prepare, usable
 from himpc.formulation.settings import Settings, check_solver
 from himpc.kinematics.configuration import Configuration
 from himpc.limits import LimitsInForce, in_force, ramp, viability_bounds
+from himpc.limits.distance import Near
 from himpc.limits.velocity import reaction
 from himpc.plan import Evidence, Plan
 from himpc.references import Preview
 from himpc.references.hold import still
+from himpc.references.outlook import observed_by
 from himpc.tasks import Damping
+from himpc.tick.distances import Distances
 from robots import NominalModel, Robot
 
 Array = NDArray[np.float64]
@@ -90,6 +93,8 @@ class OwnController(TorqueController):
         self._form, self._idle, self._off = prepared
         self._goal = in_force(self.robot, settings.limits)
         self._M_bar = read_only(np.array(settings.M_bar))
+        avoidance = settings.limits.avoidance
+        self._distances = Distances(self.robot, avoidance) if avoidance.on else None
         self._settings = settings
 
     def step(
@@ -181,6 +186,7 @@ class OwnController(TorqueController):
             M_bar=self._M_bar,
             levels=tuple(levels),
             bounds=self._bounds(q),
+            near=self._near(q, previews),
             nominal=self._nominal,
         )
 
@@ -204,6 +210,22 @@ class OwnController(TorqueController):
             q_lower=read_only(force.q_lower),
             q_upper=read_only(force.q_upper),
             approach=rate,
+        )
+
+    def _near(self, q: Array, previews: Mapping[str, Preview]) -> NearView:
+        avoidance, n = self._settings.limits.avoidance, self.robot.n
+        none = np.zeros(0)
+        near = Near(none, np.zeros((0, n)), none, none, ())
+        if self._distances is not None:
+            near = self._distances.at(q, observed_by(previews))
+        return NearView(
+            names=near.names,
+            d=read_only(near.distance),
+            gradient=read_only(near.gradient),
+            d_safe=read_only(near.share * (avoidance.d_safe + avoidance.margin)),
+            moving=read_only(near.moving),
+            reaction=avoidance.reaction,
+            deceleration=avoidance.deceleration,
         )
 
     # ---------------------------------------------------------------- the use of the law's torque

@@ -76,6 +76,30 @@ class Bounds:
 
 
 @dataclass(frozen=True, eq=False)
+class NearView:
+    """The nearest pairs of two links, or of a link and an object, nearest first; r is 0 unless
+    `avoidance.on`. Pairs that are farther apart than 0.25 m are left out.
+
+    Attributes:
+        names: of each pair.
+        d: distance, (r,) m, negative inside.
+        gradient: ∇d at the measured q, (r, n) m/rad.
+        d_safe: the distance that is kept, with its margin, (r,) m; less for links that are close at home.
+        moving: what the object's own motion takes from d per second, (r,) m/s.
+        reaction: t, time before the robot brakes, which the bound allows for, s.
+        deceleration: a, of the decrease of d, that the bound counts on, m/s².
+    """
+
+    names: tuple[str, ...]
+    d: Array
+    gradient: Array
+    d_safe: Array
+    moving: Array
+    reaction: float
+    deceleration: float
+
+
+@dataclass(frozen=True, eq=False)
 class View:
     """Everything a controller sees at tick k. Arrays are read-only.
 
@@ -88,6 +112,7 @@ class View:
         M_bar: diagonal of M̄, (n,) kg·m².
         levels: highest priority first.
         bounds: the bounds of this tick.
+        near: the distances to keep.
         nominal: the nominal dynamic model, for model-based controllers.
     """
 
@@ -100,6 +125,7 @@ class View:
     M_bar: Array
     levels: tuple[LevelView, ...]
     bounds: Bounds
+    near: NearView
     nominal: NominalModel
 
     @property

@@ -21,6 +21,7 @@ EXERCISES: dict[str, str] = {
     "time-delay": "time-delay estimation: no model, and no load sags",
     "one-level-qp": "one level of the QP (35), one knot, with its bounds",
     "two-levels": "two levels with the equality (33)",
+    "distance-row": "rows that keep distances, above all levels",
 }
 """Each exercise with one line, in the recommended order."""
 

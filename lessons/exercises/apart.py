@@ -161,6 +161,7 @@ class Apart:
             raise OwnFault(f"{self._source.path}: its process has ended")
         message, arrays = b"", numbers_of(now)
         marks = [now.T_s, now.N, now.bounds.approach, *(level.name for level in now.levels)]
+        marks += [now.near.names, now.near.reaction, now.near.deceleration]
         marks += [each.shape for each in arrays]
         if marks != self._marks:
             message, self._marks = wire.packed(wire.SHAPE, wire.of_json(shape_of(now))), marks

@@ -10,6 +10,8 @@ import numpy as np
 from lessons.events import Push
 from lessons.exercises.mistakes import Mistake
 from lessons.scenes.run_spec import RunSpec
+from lessons.settings.entry import entry_at
+from lessons.settings.torque_entries import TORQUE_ENTRIES
 from lessons.teaching.claim import Relation, condition, holds
 from lessons.teaching.control import Script
 from lessons.teaching.lesson import Card
@@ -72,6 +74,7 @@ class Exercise:
         mistakes: frequent mistakes, which the grade names.
         start, solution: the file with the missing lines and the right one, of a teacher's own exercise; ""
             for the lab's.
+        live: assignments "PATH=VALUE" with which to watch a solution.
     """
 
     name: str
@@ -84,11 +87,19 @@ class Exercise:
     mistakes: tuple[Mistake, ...] = ()
     start: str = ""
     solution: str = ""
+    live: tuple[str, ...] = ()
 
     @property
     def scene(self) -> str:
         """The scene in which to watch the solution live."""
         return self.checks(0)[-1].run.scene
+
+    @property
+    def before(self) -> str:
+        """What to set on the page before a solution is watched there; "" if nothing."""
+        pairs = [each.split("=", 1) for each in self.live]
+        said = [f"“{entry_at(TORQUE_ENTRIES, path).label}” to {value}" for path, value in pairs]
+        return f"On the page, first set {', '.join(said)}." if said else ""
 
     @property
     def file(self) -> str:

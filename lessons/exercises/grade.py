@@ -13,7 +13,6 @@ import numpy as np
 
 from himpc.controllers.own import OwnController
 from himpc.controllers.view import View
-from himpc.references import Preview
 from lessons.exercises import EXERCISES, load_exercise
 from lessons.exercises.apart import Apart, Exhausted
 from lessons.exercises.exercise import Exercise, GradeCheck
@@ -244,8 +243,7 @@ def beside(scene: TorqueScene, shown: Shown, diagnosis: Diagnosis, duration: flo
         session.tick()
         given, plan = session.given, session.plan
         assert given is not None and plan is not None
-        previews: dict[str, Preview] = dict(given.previews)
-        answer = other.step(given.q, given.v, previews, applied)
+        answer = other.step(given.q, given.v, given.previews, applied)
         if answer.notice is not None:
             raise InputError(answer.notice)
         worst = max(worst, float(np.abs(answer.tau - plan.tau).max()))

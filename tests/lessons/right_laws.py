@@ -53,7 +53,28 @@ QP = (
     )
 )
 ONE = QP.replace("in now.levels:", "in now.levels[:1]:")
-RIGHT = {"joint-pd": PD, "null-space": OSF, "time-delay": TDE, "one-level-qp": ONE, "two-levels": QP}
+_ROWS = start_of("distance-row").replace('EXERCISE = "distance-row"', "")
+_NO_ROWS = "    return np.zeros((0, now.n)), np.zeros(0)\n"
+DISTANCE = _ROWS.replace(
+    _NO_ROWS,
+    """
+    near, T, t, a = now.near, now.T_s, now.near.reaction, now.near.deceleration
+    slopes, distance, speed = near.gradient, near.d, near.gradient @ now.q_dot
+    room = np.maximum(distance - near.d_safe, 0.0)
+    v_stop = a * (np.sqrt(t**2 + 2.0 * room / a) - t)
+    share = min(1.0, now.bounds.approach * T or 1.0)
+    D = T * slopes / now.M_bar
+    return D, share * (-v_stop - speed) - T * slopes @ now.q_ddot
+""",
+)
+RIGHT = {
+    "joint-pd": PD,
+    "null-space": OSF,
+    "time-delay": TDE,
+    "one-level-qp": ONE,
+    "two-levels": QP,
+    "distance-row": DISTANCE,
+}
 
 # The same laws in other styles of programming.
 _PD_CLASS = """
@@ -177,11 +198,50 @@ _TWO_BY_ELIMINATION = (
         "            continue\n",
     )
 )
+_DISTANCE_LOOP = _ROWS.replace(
+    _NO_ROWS,
+    """
+    rows, lower = [], []
+    for d, d_safe, slope in zip(now.near.d, now.near.d_safe, now.near.gradient):
+        a, t = now.near.deceleration, now.near.reaction
+        fastest = a * ((t * t + 2 * max(d - d_safe, 0) / a) ** 0.5 - t)
+        left = -fastest - slope.dot(now.q_dot)
+        allowed = left * min(1, now.bounds.approach * now.T_s) / now.T_s
+        # N·m, a direction of length one
+        along = slope / now.M_bar
+        length = np.linalg.norm(along)
+        rows.append(along / length)
+        lower.append((allowed - slope.dot(now.q_ddot)) / length)
+    return np.array(rows).reshape(-1, now.n), np.array(lower)
+""",
+)
+_DISTANCE_CLASS = (
+    _ROWS.replace("def torque(now):", "def _torque(now):")
+    + """
+
+class Controller:
+    \"\"\"Rows of the next velocity, which are turned into rows of the increment.\"\"\"
+
+    def torque(self, now):
+        A, least = self.velocity_rows(now)
+        coasting = now.q_dot + now.T_s * now.q_ddot
+        return cascade(now, A @ np.diag(now.T_s / now.M_bar), least - A @ coasting)
+
+    def velocity_rows(self, now):
+        near, share = now.near, now.T_s * now.bounds.approach
+        a, t = near.deceleration, near.reaction
+        room = np.where(near.d > near.d_safe, near.d - near.d_safe, 0.0)
+        stop = 2.0 * room / (np.sqrt(t**2 + 2.0 * room / a) + t)
+        now_growing = near.gradient @ now.q_dot
+        return near.gradient, now_growing - share * (stop + now_growing)
+"""
+)
 STYLES: dict[str, tuple[str, ...]] = {
     "joint-pd": (PD, _PD_CLASS, _PD_LOOP),
     "null-space": (OSF, _OSF_ONE_BY_ONE, _OSF_CLASS),
     "time-delay": (TDE, _TDE_ESTIMATE, _TDE_CLASS),
     "one-level-qp": (ONE, _QP_OF_TORQUES, _ONE_OF_ACCELERATIONS),
     "two-levels": (QP, _TWO_BY_BASIS, _TWO_BY_ELIMINATION),
+    "distance-row": (DISTANCE, _DISTANCE_LOOP, _DISTANCE_CLASS),
 }
 """Correct solutions in three styles each."""

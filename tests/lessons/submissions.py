@@ -16,12 +16,14 @@ class Mistake:
         good, bad: the lines that are replaced and their replacement; good "": `bad` is the whole text.
         most: the largest allowed number of points.
         words: words that name the mistake.
+        fails: words of a check that it must fail; "": any.
     """
 
     good: str
     bad: str
     most: int
     words: str
+    fails: str = ""
 
     def text(self, exercise: str) -> str:
         """Returns the submission."""
@@ -131,6 +133,51 @@ MISTAKES: dict[str, dict[str, Mistake]] = {
         ),
         "holds the torque": Mistake("", _HELD, 2, "the torque is constant"),
         "no R": Mistake("np.diag(level.R)", "1e-9 * np.eye(now.n)", 7, "R is missing"),
+    },
+    "distance-row": {
+        "no row": Mistake(
+            "    return D, share",
+            "    D, slopes, v_stop, speed = D[:0], slopes[:0], 0, 0\n    return D, share",
+            4,
+            "no pair has a row",
+            "no distance falls below",
+        ),
+        "sign of ∇d": Mistake(
+            "near.gradient, near.d, near", "-near.gradient, near.d, -near", 2, "∇d has the wrong sign: "
+        ),
+        "no M̄": Mistake("slopes / now.M_bar", "slopes", 5, "M̄ is missing in D", "as near"),
+        "no d_safe": Mistake(
+            "distance - near.d_safe", "distance", 4, "d_safe is missing", "no distance falls"
+        ),
+        "constant bound": Mistake(
+            "-v_stop - speed", "-speed", 3, "the bound is constant", "reaches a target that is free"
+        ),
+        "no reaction": Mistake(
+            "np.sqrt(t**2 + 2.0 * room / a) - t", "np.sqrt(2.0 * room / a)", 4, "t is missing"
+        ),
+        "only the nearest": Mistake(
+            "return D, share * (-v_stop - speed) - T * slopes @ now.q_ddot",
+            "return D[:1], (share * (-v_stop - speed) - T * slopes @ now.q_ddot)[:1]",
+            4,
+            "only the nearest pair",
+            "the torque is the optimum",
+        ),
+        "at contact": Mistake(
+            "    return D, share",
+            "    D, slopes, v_stop, speed = (each[room == 0.0] for each in (D, slopes, v_stop, speed))\n"
+            "    return D, share",
+            4,
+            "it is too late to stop",
+        ),
+        "stops altogether": Mistake(
+            "    D, lower = distance_rows(now)\n",
+            "    if (now.near.d < 0.1).any():\n"
+            "        return now.tau_0 - now.M_bar * (now.q_ddot + 5.0 * now.q_dot)\n"
+            "    D, lower = distance_rows(now)\n",
+            3,
+            "the arm stops altogether",
+            "reaches a target that is free",
+        ),
     },
 }
 

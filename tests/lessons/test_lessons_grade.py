@@ -131,6 +131,7 @@ def test_a_known_mistake_costs_grade_points_and_is_named(exercise: str, name: st
     whys = [line.why for line in lines if line.why]
     named = [why for why in whys if known.words in why]
     assert named, whys
+    assert any(known.fails in line.check for line in lines if line.why)
     # Other messages name a failure of the code itself, for example a number that is not finite.
     assert all(why.startswith("mine.py") for why in whys if why not in named), whys
 

@@ -15,7 +15,7 @@ from right_laws import PD
 
 from himpc.controllers.answers import OwnFault
 from himpc.controllers.own import OwnController
-from himpc.controllers.view import Bounds, LevelView, View
+from himpc.controllers.view import Bounds, LevelView, NearView, View
 from lessons.exercises.apart import Apart, Exhausted
 from lessons.exercises.folder import grade_folder
 from lessons.exercises.inside import now as told
@@ -70,8 +70,12 @@ def said(text: str, now: View, kernel: bool = True, **limits) -> str:
 
 def test_a_grade_is_made_of_the_same_numbers_on_both_sides(now: View) -> None:
     names = {each.name for each in dataclasses.fields(View)} | {"M", "bias", "gravity"}
-    assert names == {*told.OF_TICK, "T_s", "N", "levels", "bounds", "nominal"}
+    assert names == {*told.OF_TICK, "T_s", "N", "levels", "bounds", "near", "nominal"}
     assert {each.name for each in dataclasses.fields(Bounds)} == {*told.OF_BOUNDS, "approach"}
+    assert {each.name for each in dataclasses.fields(NearView)} == {
+        *told.OF_NEAR,
+        *("names", "reaction", "deceleration"),
+    }
     assert {each.name for each in dataclasses.fields(LevelView)} == {
         *told.OF_LEVEL,
         *("name", "tasks", "x", "jacobian"),

@@ -34,7 +34,7 @@ def card(exercise: Exercise) -> str:
         f"<b>{esc(exercise.card.title)}</b><br>{rendered_line(exercise.card.question)}"
         f'<div style="opacity:0.75">{exercise.card.minutes} min · after “{esc(lesson)}”</div>'
         f"{formula(exercise.equation)}"
-        f'<div style="overflow-wrap:anywhere">{lines}</div>'
+        f'<div style="overflow-wrap:anywhere">{lines}</div>{esc(exercise.before)}'
         f"{_judged_by(exercise)}{_hints(exercise.hints)}",
         f"border-left:3px solid {css(LEVELS[0])};margin:0.3em 0",
     )

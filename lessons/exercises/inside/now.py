@@ -17,6 +17,7 @@ Ask = Callable[[str, int, list[Array]], Array]
 
 OF_TICK = ("q", "q_dot", "q_ddot", "tau_0", "M_bar", "M", "bias", "gravity")
 OF_BOUNDS = ("tau_lower", "tau_upper", "v_lower", "v_upper", "q_lower", "q_upper")
+OF_NEAR = ("d", "gradient", "d_safe", "moving")
 OF_LEVEL = ("error", "x_dot", "x_ddot", "J", "J_dot_q_dot", "displacement_d", "x_dot_d", "x_ddot_d",
             "K_p", "K_v", "Q", "R")  # fmt: skip
 """The arrays of `himpc.controllers.view`, in the order in which they are sent."""
@@ -27,6 +28,7 @@ def numbers_of(now: Any) -> list[Array]:
     bounds = now.bounds
     found = [getattr(now, name) for name in OF_TICK]
     found += [getattr(bounds, name) for name in OF_BOUNDS]
+    found += [getattr(now.near, name) for name in OF_NEAR]
     for level in now.levels:
         found += [getattr(level, name) for name in OF_LEVEL]
         found += level.x.values()
@@ -39,6 +41,7 @@ def shape_of(now: Any) -> dict[str, Any]:
         "T_s": now.T_s,
         "N": now.N,
         "approach": now.bounds.approach,
+        "near": [now.near.names, now.near.reaction, now.near.deceleration],
         "levels": [[level.name, level.tasks, list(level.x)] for level in now.levels],
         "shapes": [each.shape for each in numbers_of(now)],
     }
@@ -50,7 +53,7 @@ def _read_only(_: object, name: str, __: Any) -> None:
 
 @final
 class Part(SimpleNamespace):
-    """A level, or the bounds: names and numbers, in the symbols of the HIMPC paper."""
+    """A level, the bounds, or the distances: names and numbers, in the symbols of the HIMPC paper."""
 
     __setattr__ = _read_only
 
@@ -92,6 +95,13 @@ def rebuilt(shape: dict[str, Any], data: bytes, ask: Ask) -> Now:
     following = iter(arrays)
     tick = {name: next(following) for name in OF_TICK}
     bounds = Part(**{name: next(following) for name in OF_BOUNDS}, approach=shape["approach"])
+    names, reaction, deceleration = shape["near"]
+    near = Part(
+        **{name: next(following) for name in OF_NEAR},
+        names=tuple(names),
+        reaction=reaction,
+        deceleration=deceleration,
+    )
     levels = []
     for place, (name, tasks, values) in enumerate(shape["levels"]):
         parts: dict[str, Any] = {each: next(following) for each in OF_LEVEL}
@@ -99,7 +109,15 @@ def rebuilt(shape: dict[str, Any], data: bytes, ask: Ask) -> Now:
         parts["jacobian"] = partial(_asked, ask, "jacobian", place)
         levels.append(Part(name=name, tasks=tuple(tasks), **parts))
     nominal = Part(mass_matrix=partial(_asked, ask, "mass_matrix", 0), bias=partial(_asked, ask, "bias", 0))
-    return Now(**tick, T_s=shape["T_s"], N=shape["N"], levels=tuple(levels), bounds=bounds, nominal=nominal)
+    return Now(
+        **tick,
+        T_s=shape["T_s"],
+        N=shape["N"],
+        levels=tuple(levels),
+        bounds=bounds,
+        near=near,
+        nominal=nominal,
+    )
 
 
 def _asked(ask: Ask, name: str, level: int, *args: Any) -> Array:

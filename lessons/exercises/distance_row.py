@@ -1,0 +1,158 @@
+"""The distance row
+
+An arm must not touch a table and a post: which bound on its torque guarantees this?
+
+Minutes: 30
+You need: exercise "two-levels"; lesson "keeping-clear"
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from himpc.controllers.view import View
+from lessons.events import MoveTarget
+from lessons.exercises.exercise import Exercise, GradeCheck, pushed
+from lessons.exercises.laws import Array
+from lessons.exercises.mistakes import Mistake, wrong
+from lessons.exercises.starts.distance_row import cascade
+from lessons.scenes.run_spec import RunSpec
+from lessons.teaching.lesson import card_of
+from lessons.teaching.measure import Measure, Signal
+
+SETTINGS = (
+    *("avoidance.on=true", "avoidance.pull=0", "levels.orientation.enabled=false"),
+    *("horizon=1", "damping=false", "T_s=0.002"),
+)
+NEAREST = Signal("distance", "mm")
+DOWN = MoveTarget("position", (0.556, 0.0, 0.19))
+UP = MoveTarget("position", (0.6, 0.0, 0.26))
+PAST_THE_POST = MoveTarget("position", (0.4, -0.4, 0.4))
+BACK = MoveTarget("position", (0.5, 0.0, 0.5))
+_run = partial(RunSpec, "iiwa14-table", set=SETTINGS)
+INTO = _run(events=((0.0, DOWN), (0.9, UP)), duration=1.4)
+PAST = _run(events=((0.0, PAST_THE_POST), (0.45, BACK)), duration=0.7)
+
+
+def checks(seed: int) -> tuple[GradeCheck, ...]:
+    return (
+        GradeCheck(
+            "If the hand is sent into the table, no distance falls below 5 mm.",
+            "the row does not bound how fast d may shrink, or does so too late",
+            INTO,
+            5.0,
+            "at least",
+            measure=Measure(NEAREST, "smallest"),
+            points=3,
+        ),
+        GradeCheck(
+            "The hand comes as near to the table as it may.",
+            "the bound must be looser where there is room, and reach 0 at d_safe",
+            INTO,
+            25.0,
+            measure=Measure(NEAREST, "last", until=0.9),
+            points=2,
+        ),
+        GradeCheck(
+            "Then it reaches a target that is free, 6 cm above the table.",
+            "the bound is tighter than the stopping distance, or the arm goes out of control",
+            INTO,
+            15.0,
+            measure=Measure(Signal("error/position", "mm"), "last"),
+            points=2,
+        ),
+        GradeCheck(
+            "On a way past the post, with a push, the torque is the optimum of both levels.",
+            "D = T_s ∇dᵀM̄⁻¹ or its lower bound is wrong: v_stop, ∇dᵀq̇, ∇dᵀq̈₀ or `approach`",
+            pushed(PAST, seed, "link_5", 20.0),
+            1e-6,
+            beside="hiqp",
+            points=3,
+        ),
+    )
+
+
+def _rows(
+    now: View,
+    *,
+    D: float = 1.0,
+    gradient: float = 1.0,
+    M_bar: bool = True,
+    T_s: bool = True,
+    d_safe: float = 1.0,
+    v_stop: str = "viable",
+    speed: float = 1.0,
+    q_ddot: float = 1.0,
+    at_once: bool = False,
+    pairs: str = "all",
+) -> tuple[Array, Array]:
+    """D and the lower bounds; the arguments are factors on terms, or switch parts of them off."""
+    near, T = now.near, now.T_s
+    slopes = gradient * near.gradient
+    room = np.maximum(near.d - d_safe * near.d_safe, 0.0)
+    t, a = near.reaction, near.deceleration
+    stop = {
+        "viable": a * (np.sqrt(t**2 + 2.0 * room / a) - t),
+        "no reaction": np.sqrt(2.0 * a * room),
+        "upwards": -a * (np.sqrt(t**2 + 2.0 * room / a) - t),
+        "none": 0.0 * room,
+        "linear": room / t,
+    }[v_stop]
+    share = 1.0 if at_once else min(1.0, now.bounds.approach * T or 1.0)
+    lower = share * (near.moving - stop - speed * slopes @ now.q_dot) - q_ddot * T * slopes @ now.q_ddot
+    rows = D * (T if T_s else 1.0) * (slopes / now.M_bar if M_bar else slopes)
+    chosen = {
+        "all": slice(None),
+        "nearest": slice(1),
+        "touching": near.d <= near.d_safe,
+        "none": slice(0),
+    }[pairs]
+    return rows[chosen], lower[chosen]
+
+
+def _law(now: View, **how: Any) -> Any:
+    return cascade(now, *_rows(now, **how))
+
+
+MISTAKES: tuple[Mistake, ...] = (
+    wrong("no pair has a row", _law, pairs="none"),
+    wrong("∇d has the wrong sign: d may grow as fast as it likes, but not shrink", _law, gradient=-1.0),
+    wrong("∇d has the wrong sign in D", _law, D=-1.0),
+    wrong("M̄ is missing in D = T_s ∇dᵀM̄⁻¹", _law, M_bar=False),
+    wrong("T_s is missing in D = T_s ∇dᵀM̄⁻¹", _law, T_s=False),
+    wrong("d_safe is missing: the room to stop is d − d_safe", _law, d_safe=0.0),
+    wrong("the arm stops altogether: −v_stop lets d shrink where there is room", _law, v_stop="upwards"),
+    wrong("the bound is constant: d may never shrink, however much room there is", _law, v_stop="none"),
+    wrong("the bound is linear in the room: the speed of a stop is a square root", _law, v_stop="linear"),
+    wrong("the reaction t is missing in v_stop", _law, v_stop="no reaction"),
+    wrong("∇dᵀq̇ is missing: Δτ changes the present velocity", _law, speed=0.0),
+    wrong("q̈₀ is missing: without Δτ the robot goes on accelerating", _law, q_ddot=0.0),
+    wrong("the bound is approached at once: `approach` is not used", _law, at_once=True),
+    wrong("only the nearest pair has a row", _law, pairs="nearest"),
+    wrong("a pair has a row only at d_safe or below: then it is too late to stop", _law, pairs="touching"),
+)
+
+
+EXERCISE = Exercise(
+    name="distance-row",
+    card=card_of(__doc__),
+    equation=r"\nabla d^\top \left(\dot q + T_s (\ddot q_0 + \bar M^{-1} \Delta\tau)\right) \ge "
+    r"-v_\mathrm{stop}(d - d_\mathrm{safe}), \quad "
+    r"v_\mathrm{stop}(s) = a \left(\sqrt{t^2 + 2 s/a} - t\right)",
+    plain="∇dᵀ(q̇ + T_s (q̈₀ + M̄⁻¹Δτ)) ≥ −v_stop(d − d_safe), v_stop(s) = a (√(t² + 2s/a) − t)",
+    hints=(
+        "`now.near.gradient @ now.q_dot` is how fast each distance grows. The next velocity is "
+        "q̇ + T_s (q̈₀ + M̄⁻¹Δτ).",
+        "What stands before Δτ is D = T_s ∇dᵀM̄⁻¹, a row for each pair; the rest goes to the right.",
+        "The room is s = max(d − d_safe, 0); below d_safe, v_stop is 0.",
+        "As a bound of a joint, in one period it may use at most min(1, approach · T_s) of what is left: "
+        "share · (−v_stop − ∇dᵀq̇) is the least change of ∇dᵀq̇.",
+    ),
+    lesson="keeping-clear",
+    checks=checks,
+    mistakes=MISTAKES,
+    live=("avoidance.on=true",),
+)

@@ -1,0 +1,71 @@
+"""Exercise distance-row: rows that keep distances, above all levels.
+
+    himpc-lab grade FILE.py
+    himpc-lab --scene iiwa14-table --controller FILE.py    # then set "Keep distances"
+
+∇dᵀ q̇ at the next knot at least −v_stop(d − d_safe), for each of the nearest pairs.
+"""
+
+import numpy as np
+
+from himpc.qp import solve_qp
+
+EXERCISE = "distance-row"
+
+
+def distance_rows(now):
+    """Rows D (r, n) and their lower bounds (r,): D Δτ ≥ lower, one row for each pair."""
+    # `now.near` has d and d_safe (r,), gradient (r, n), reaction (t, s) and deceleration (a, m/s²).
+    # TODO: the next velocity is q̇ + T_s (q̈₀ + M̄⁻¹ Δτ). Which D and which lower bound follow from this?
+    return np.zeros((0, now.n)), np.zeros(0)
+
+
+def torque(now):
+    D, lower = distance_rows(now)
+    return cascade(now, D, lower)
+
+
+# ------------------------------------------------------------ the levels: exercise two-levels, nothing to add
+
+
+def cascade(now, D, least):
+    """The torques of the levels under all bounds, D Δτ ≥ least among them."""
+    torques, found = [], np.zeros(now.n)
+    for level in now.levels:
+        H, f = quadratic(now, level)
+        rows, lower, upper = bounds(now)
+        rows, lower = np.vstack([rows, D]), np.r_[lower, least]
+        upper = np.r_[upper, np.full(len(D), np.inf)]
+        if torques:
+            lower, upper = np.minimum(lower, rows @ found), np.maximum(upper, rows @ found)
+        for above in now.levels[: len(torques)]:
+            B = above.J / now.M_bar
+            rows, lower, upper = np.vstack([rows, B]), np.r_[lower, B @ found], np.r_[upper, B @ found]
+        solution = solve_qp(H, f, rows, lower, upper)
+        if not solution.solved:  # no torque meets all rows: come to rest
+            return now.tau_0 - now.M_bar * (now.q_ddot + 5.0 * now.q_dot)
+        found = solution.x
+        torques.append(now.tau_0 + found)
+    return torques  # one row per level: the last one acts
+
+
+def quadratic(now, level):
+    """H and f of ½ΔτᵀHΔτ + fᵀΔτ for ‖e⁰ + G Δτ‖²_Q + ‖Δτ‖²_R: exercise one-level-qp."""
+    T = now.T_s
+    G = (1.0 + level.K_v * T)[:, None] * level.J / now.M_bar
+    e = (
+        level.x_ddot
+        - level.x_ddot_d[1]
+        + level.K_v * (level.x_dot + T * level.x_ddot - level.x_dot_d[1])
+        + level.K_p * (level.error + T * level.x_dot - level.displacement_d[1])
+    )
+    return G.T @ (level.Q[:, None] * G) + np.diag(level.R), G.T @ (level.Q * e)
+
+
+def bounds(now):
+    """lower ≤ rows Δτ ≤ upper: the torque, and the next velocity in N·m."""
+    T, limit, share = now.T_s, now.bounds, min(1.0, now.bounds.approach * now.T_s or 1.0)
+    scale = now.M_bar / T
+    lower = [limit.tau_lower - now.tau_0, (share * (limit.v_lower - now.q_dot) - T * now.q_ddot) * scale]
+    upper = [limit.tau_upper - now.tau_0, (share * (limit.v_upper - now.q_dot) - T * now.q_ddot) * scale]
+    return np.vstack([np.eye(now.n), np.eye(now.n)]), np.concatenate(lower), np.concatenate(upper)
