@@ -16,6 +16,7 @@ from himpc.limits import Limits, in_force
 from himpc.limits.avoidance import Avoidance
 from himpc.limits.distance import Near, least_rates
 from himpc.limits.load import loaded, spared
+from himpc.limits.overrun import anticipated, followed
 from himpc.limits.stall import SLOWEST, going, slowed, stalled
 from himpc.references.observed import Observed
 from himpc.tick.distances import Distances
@@ -158,6 +159,25 @@ def test_a_joint_with_little_torque_left_becomes_slow(robot: Robot) -> None:
     assert share[1] == pytest.approx(0.05 / 0.3, rel=1e-3)
     assert np.delete(share, 1) == pytest.approx(1.0)
     assert spared(limits, np.zeros(robot.n)) is limits
+
+
+def test_a_joint_that_accelerates_towards_its_limit_gets_a_lower_one(robot: Robot) -> None:
+    """Only the joint that becomes faster, and no less than half of its limit; one that brakes keeps it."""
+    limits = in_force(robot, Limits())
+    assert anticipated(limits, 0.4 * limits.v_limit, 0.4 * limits.v_limit) is limits
+    v = 0.6 * limits.v_limit
+    v[2] = -v[2]
+    mean = v.copy()
+    acceleration = np.zeros(robot.n)
+    acceleration[:4] = 2.0, -2.0, -2.0, 100.0
+    for _ in range(200):
+        v = v + 1e-3 * acceleration / 5.0
+        mean = followed(mean, v, 1e-3)
+    share = anticipated(limits, v, mean).v_limit / limits.v_limit
+    lower = 1.0 - 0.12 * 0.4 / limits.v_limit
+    assert share[[0, 2]] == pytest.approx(lower[[0, 2]], abs=0.01)
+    assert share[3] == 0.5
+    assert share[[1, 4, 5, 6]] == pytest.approx(1.0)
 
 
 def test_a_robot_without_progress_becomes_slow(robot: Robot) -> None:

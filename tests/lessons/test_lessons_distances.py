@@ -45,6 +45,30 @@ def test_without_the_stall_the_arm_would_not_come_to_rest(monkeypatch: pytest.Mo
     assert found["contact_depth"].max() == 0.0
 
 
+def test_a_joint_that_others_accelerate_stays_within_its_velocity_limit(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Two drags with a turn move five joints of a panda near their limits at once; the true inertia of the
+    third one is 70 times M̄, so that its torque acts late. Without the look ahead it overruns its limit,
+    although every row is met at every tick."""
+    drags = (
+        (0.0, MoveTarget("position", (0.3506, -0.1572, 0.3096))),
+        (0.0, MoveTarget("orientation", (0.8861, 0.3817, -0.1184, 0.2346))),
+        (1.0, MoveTarget("position", (0.6732, -0.2356, 0.0960))),
+        (1.0, MoveTarget("orientation", (0.8460, 0.3230, -0.4232, -0.0309))),
+    )
+    quick = replace(scene("panda-hold", "avoidance.on=true"), events=drags)
+
+    def fastest() -> float:
+        found = run(quick, 1.8)
+        assert not found["unsolved"].any()
+        return float(np.abs(found["v"] / quick.robot.v_limit).max())
+
+    assert fastest() < 1.03
+    monkeypatch.setattr(stall_guard, "anticipated", lambda limits, *_: limits)
+    assert fastest() > 1.2
+
+
 def test_both_routes_keep_the_same_distances() -> None:
     """Near the floor, with rows of distances that hold a level, torques and bounds of the two routes are
     those of one problem."""
