@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from benchmarks.avoidance import generated
 from himpc.controllers import stall_guard
 from himpc.limits import CONSTRAINTS
 from himpc.limits.distance import DISTANCE
@@ -149,3 +151,19 @@ def test_a_scene_without_rows_of_distances_is_as_before() -> None:
     plain = run(scene("iiwa14-hold"), 0.1)
     changed = run(scene("iiwa14-hold", "avoidance.d_safe=0.1", "avoidance.pull=0.01"), 0.1)
     assert np.array_equal(plain["tau"], changed["tau"])
+
+
+def test_an_own_robot_gets_contacts_and_rows_from_its_urdf_alone(tmp_path: Path) -> None:
+    """A generated arm, and a lamp without a collision shape, both dragged into their foot: without rows they
+    press on it, with rows they touch nothing, by MuJoCo's geometry."""
+    arm = tmp_path / "arm.urdf"
+    arm.write_text(generated(3))
+    drag = ((0.0, MoveTarget("position", (0.03, 0.0, 0.02))),)
+    for urdf in (str(arm), "lessons/course/lamp.urdf"):
+        deepest = []
+        for on in ("false", "true"):
+            found = torque_scene("hold", urdf=urdf)
+            settings = with_assignments(found.settings, (f"avoidance.on={on}",))
+            deepest.append(run(replace(found, settings=settings, events=drag), 2.0)["contact_depth"].max())
+        assert deepest[0] > 0.0, urdf
+        assert deepest[1] == 0.0, urdf
