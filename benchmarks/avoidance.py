@@ -10,15 +10,16 @@ instead, from 0.6 m before a moving link to as far behind it, with 0.15 to 0.5 m
 first three joints, which cannot make way. Any controller can run. Prints a line of a Markdown table for each
 robot: drags, the deepest penetration between bodies whose distance is kept, by MuJoCo's geometry, the chains
 in which it exceeds 1 mm, the largest share of the velocity limits, lost runs, unsolved QPs, the chains whose
-joints are slower than 0.05 rad/s at the end, and the median and the longest processor time of a step. Exit
-code 1 if a penetration exceeds 1 mm, a run is lost, or more than 5 % of the chains do not come to rest.
+joints are slower than 0.05 rad/s at the end, and the median and the longest processor time of a step; on the
+error stream one line after every chain. Exit code 1 if a penetration exceeds 1 mm, a run is lost, or more
+than 5 % of the chains do not come to rest.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from time import thread_time_ns
 from typing import Any, NamedTuple, cast
@@ -180,9 +181,16 @@ def joint_of(robot: Robot, name: str) -> int:
 
 
 def run(
-    robot: str, chains: int, seed: int, changes: Sequence[str], controller: str, balls: bool = False
+    robot: str,
+    chains: int,
+    seed: int,
+    changes: Sequence[str],
+    controller: str,
+    balls: bool = False,
+    tell: Callable[[Total, list[float]], None] = lambda *_: None,
 ) -> tuple[Total, list[float]]:
-    """Runs all chains of a robot: of dragged targets or, with `balls`, of a ball dragged through the arm."""
+    """Runs all chains of a robot: of dragged targets or, with `balls`, of a ball dragged through the arm.
+    `tell` is called with the results after each."""
     rng, total, times = np.random.default_rng(seed), Total(), []
     scene = scene_of(robot, seed)
     settings = with_assignments(replace(scene.settings, controller=controller), changes)
@@ -224,7 +232,17 @@ def run(
         total.speed = max(total.speed, fastest)
         total.lost += session.plant.broken or not fastest <= LOST_SPEED
         total.resting += bool(np.abs(session.plant.v).max() < AT_REST)
+        tell(total, times)
     return total, times
+
+
+def line(robot: str, total: Total, times: Sequence[float]) -> str:
+    """A line of the table."""
+    return (
+        f"| {robot} | {total.drags} | {1e3 * total.deepest:.2f} {total.where} | {total.deep} | "
+        f"{total.speed:.2f} | {total.lost} | {total.unsolved} | {total.resting} of {total.chains} | "
+        f"{np.median(times):.2f}, {max(times):.1f} |"
+    )
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -244,13 +262,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     print("|---|---|---|---|---|---|---|---|---|")
     worst = 0
     for robot in given.robots:
-        total, times = run(robot, given.chains, given.seed, changes, given.controller, given.balls)
-        print(
-            f"| {robot} | {total.drags} | {1e3 * total.deepest:.2f} {total.where} | {total.deep} | "
-            f"{total.speed:.2f} | {total.lost} | {total.unsolved} | {total.resting} of {total.chains} | "
-            f"{np.median(times):.2f}, {max(times):.1f} |",
-            flush=True,
+        total, times = run(
+            *(robot, given.chains, given.seed, changes, given.controller, given.balls),
+            tell=lambda *found, robot=robot: print(line(robot, *found), file=sys.stderr, flush=True),
         )
+        print(line(robot, total, times), flush=True)
         bad = total.deep or total.lost or total.resting < 0.95 * total.chains
         worst = max(worst, int(bool(bad)))
     return worst

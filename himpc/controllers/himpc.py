@@ -131,7 +131,7 @@ class HIMPC(TorqueController):
         memory = self._memory or Memory.start(q, v, T_s)
         state = JointState(q, v, (v - memory.v) / memory.period)
         self._limits = ramp(self._limits, self._goal, self._tau_0, q, v, T_s)
-        limits = self._slowed(previews)
+        limits = self._slowed(v)
         values: dict[str, Array] = {}
         errors: dict[str, Array] = {}
         with np.errstate(all="ignore"):
@@ -146,7 +146,7 @@ class HIMPC(TorqueController):
         solutions, predicted_q = found.solutions, found.predicted_q
         first = solutions[-1].U[0] if solutions else 0.0
         if self._distances is not None:
-            self._guard.errors = self._form.lengths(errors)
+            self._guard.errors, self._guard.fastest = self._form.lengths(errors), self._form.fastest(previews)
         tau = np.minimum(np.maximum(self._tau_0 + first, limits.tau_lower), limits.tau_upper)
         if not usable(tau):
             return self._hold(q, started)
@@ -175,21 +175,21 @@ class HIMPC(TorqueController):
             for place, level in enumerate(self._form.levels):
                 tick.fade(place, self._faded(level))
 
-        plan = tick.step(q, v, previews, self._tau_0, self._slowed(previews), started)
+        plan = tick.step(q, v, previews, self._tau_0, self._slowed(v), started)
         if plan is None:
             return self._hold(q, started)
         if self._settings.limits.avoidance.on:
-            self._guard.errors = tick.error_lengths(self._form.tasks)
+            self._guard.errors, self._guard.fastest = tick.progress()
         self._tau_0 = plan.tau
         return plan
 
-    def _slowed(self, previews: Mapping[str, Preview]) -> LimitsInForce:
-        """The limits in force, with lower velocities while a robot that keeps distances is stalled."""
+    def _slowed(self, v: Array) -> LimitsInForce:
+        """The limits in force; those of a robot that keeps distances have lower velocities, see
+        `StallGuard`."""
         distances = self._distances if self.kernel is None else self.kernel.distances
-        if distances is None:
-            return self._limits
-        fastest = self._form.fastest(previews) if self.kernel is None else self.kernel.fastest_reference
-        return self._guard.limits(self._limits, self._tau_0, fastest, distances)
+        return (
+            self._limits if distances is None else self._guard.limits(self._limits, self._tau_0, v, distances)
+        )
 
     def _adapt(self, q: Array) -> None:
         """Adapts M̄ to the torque that acted."""

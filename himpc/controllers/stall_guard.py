@@ -1,4 +1,5 @@
-"""Slows the joints down while a robot is stalled, for a controller that keeps distances."""
+"""Slows joints down while a controller keeps distances: those of a stalled robot, those with little torque
+left, and those that accelerate."""
 
 from __future__ import annotations
 
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from himpc.limits import LimitsInForce
 from himpc.limits.load import loaded, spared
+from himpc.limits.overrun import anticipated, followed
 from himpc.limits.stall import PROGRESS, going, slowed, stalled
 from himpc.tick.distances import Distances
 
@@ -21,32 +23,35 @@ class StallGuard:
 
     Attributes:
         errors: (T,) the lengths of the tasks' errors at the last tick, m or rad; None before the first one.
+        fastest: the largest velocity of a row of a reference at the last tick, m/s or rad/s.
         stall: how far it is stalled.
         load: (n,) the mean load of its joints, as a share of their torque limits; None before the first tick.
+        mean: (n,) rad/s, their mean velocities.
     """
 
     def __init__(self, tasks: int, T_s: float) -> None:
         self._T_s = T_s
         self.errors: Array | None = None
+        self.fastest = 0.0
         self.stall = going(tasks)
         self.load: Array | None = None
+        self.mean: Array | None = None
 
-    def limits(
-        self, limits: LimitsInForce, tau: Array, fastest: float, distances: Distances
-    ) -> LimitsInForce:
+    def limits(self, limits: LimitsInForce, tau: Array, v: Array, distances: Distances) -> LimitsInForce:
         """The limits in force at this tick, with lower velocities while the robot is stalled, and of joints
-        with little torque left.
+        that accelerate or have little torque left.
 
         Args:
             limits: without that.
             tau: torque that acts, (n,) N·m.
-            fastest: the largest velocity of a row of a reference, m/s or rad/s.
+            v: measured, (n,) rad/s.
             distances: the pairs of the last tick.
         """
-        before = np.zeros_like(tau) if self.load is None else self.load
-        self.load = loaded(before, tau, limits, self._T_s)
-        limits = spared(limits, self.load)
+        T_s = self._T_s
+        self.load = loaded(np.zeros_like(tau) if self.load is None else self.load, tau, limits, T_s)
+        self.mean = followed(v if self.mean is None else self.mean, v, T_s)
+        limits = anticipated(spared(limits, self.load), v, self.mean)
         if self.errors is not None:
-            moves = distances.moves or fastest > PROGRESS
-            self.stall = stalled(self.stall, self.errors, moves, distances.room, self._T_s)
+            moves = distances.moves or self.fastest > PROGRESS
+            self.stall = stalled(self.stall, self.errors, moves, distances.room, T_s)
         return slowed(limits, self.stall)

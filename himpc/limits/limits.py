@@ -83,6 +83,11 @@ class LimitsInForce:
         return np.array((self.tau_lower, self.tau_upper))
 
     @cached_property
+    def largest_torque(self) -> Array:
+        """The larger of both torque bounds, (n,) N·m."""
+        return np.maximum(self.tau_upper, -self.tau_lower)
+
+    @cached_property
     def stops(self) -> tuple[Array, Array]:
         """Positions at which joints are stopped, POSITION_MARGIN before their limits, (n,) rad each."""
         return self.q_lower + POSITION_MARGIN, self.q_upper - POSITION_MARGIN

@@ -28,11 +28,13 @@ def loaded(before: Array, tau: Array, limits: LimitsInForce, T_s: float) -> Arra
         limits: in force.
         T_s: s.
     """
-    share = np.abs(tau) / np.maximum(limits.tau_upper, -limits.tau_lower)
+    share = np.abs(tau) / limits.largest_torque
     return before + min(1.0, T_s / _SECONDS) * (share - before)
 
 
 def spared(limits: LimitsInForce, load: Array) -> LimitsInForce:
     """The limits in force with lower velocities of joints that are loaded."""
+    if load.max() <= 1.0 - _RESERVE:
+        return limits
     share = np.clip((1.0 - load) / _RESERVE, _SLOWEST, 1.0)
-    return limits if (share == 1.0).all() else replace(limits, v_limit=share * limits.v_limit)
+    return replace(limits, v_limit=share * limits.v_limit)

@@ -15,8 +15,9 @@ Array = NDArray[np.float64]
 
 BLOCKED = 0.1
 """m: only a robot with a pair that has less room than this can be stalled."""
-INSIDE = -0.008
-"""m: a robot that is farther inside must come out, and is not slowed down."""
+INSIDE = -0.03
+"""m: a robot that is farther inside must come out, and is not slowed down; one that is a little inside and
+does not come out is stalled too."""
 PROGRESS = 0.05
 """m/s, rad/s: the least decrease of an error that counts as progress; a reference that is faster moves."""
 SHARE = 0.25

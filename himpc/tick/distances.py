@@ -18,7 +18,14 @@ from himpc.limits.distance import Near, row_count
 from himpc.limits.stall import PROGRESS
 from himpc.references.observed import NOTHING, Observed
 from himpc.tick.kernel.arena import Arena
-from himpc.tick.kernel.distance_rows import distance_rows, nearest, place_joints
+from himpc.tick.kernel.distance_rows import (
+    CHANGED,
+    FASTEST,
+    ROOM,
+    distance_rows,
+    nearest,
+    place_joints,
+)
 from himpc.tick.kernel.near import near
 from robots import Robot
 from robots.collision import Surroundings
@@ -35,6 +42,10 @@ _GRID = 15
 """Postures of a joint that stands between two links."""
 _NEVER = 0.03
 """m: links with at most two joints between them that are farther apart in all postures need no row."""
+
+
+_STILL = np.zeros((0, 3))
+"""The velocities of objects that are at rest."""
 
 
 class _Pairs:
@@ -116,25 +127,30 @@ def _placements(robot: Robot, data: pin.Data, q: Array) -> tuple[Array, Array]:
 
 
 class Distances:
-    """The distances of a robot's cover from the objects that a controller knows, and between its links.
-
-    Attributes:
-        room: by how much the nearest pair of the last tick was farther apart than d_safe, m; infinite if no
-            pair was within `WITHIN`.
-    """
+    """The distances of a robot's cover from the objects that a controller knows, and between its links."""
 
     def __init__(self, robot: Robot, avoidance: Avoidance) -> None:
         self._robot, self._avoidance, self._data = robot, avoidance, robot.model.createData()
         self._chosen = np.zeros(row_count(robot.n), np.intp)
+        self._links, self._others = np.full((2, len(self._chosen)), -1)
         self._moving, self._share = np.zeros(len(self._chosen)), np.ones(len(self._chosen))
-        self.room = math.inf
+        self._about, self._named = np.array([math.inf, 0.0, 0.0]), ("",) * robot.n
+        self._numbers = np.array(
+            (avoidance.d_safe, avoidance.margin, avoidance.reaction, avoidance.deceleration)
+        )
         self._observed = NOTHING
         self._know(NOTHING)
 
     @property
+    def room(self) -> float:
+        """By how much the nearest pair of the last tick was farther apart than d_safe, m; infinite if no pair
+        was within `WITHIN`."""
+        return float(self._about[ROOM])
+
+    @property
     def moves(self) -> bool:
         """Whether an object with a row moves."""
-        return bool(np.any(np.abs(self._moving) > PROGRESS))
+        return bool(self._about[FASTEST] > PROGRESS)
 
     def observe(self, observed: Observed) -> None:
         """Takes over where the objects are."""
@@ -160,29 +176,23 @@ class Distances:
             _Pairs(geometry(self._robot), around),
             np.zeros(around.meets.sum() + 1, np.intp),
         )
+        self._links[:], self._named = -1, ("",) * self._robot.n
         self._names = [[f"{link} – {name}" for link in around.links] for name in around.names]
 
     def _find(self, placed: Array, z: Array) -> int:
         """Chooses the nearest pairs; returns their number."""
-        pairs = self._pairs
+        pairs, velocity = self._pairs, self._observed.velocity
         pairs.find(placed, z, WITHIN)
-        count = nearest(pairs.count, pairs.distance, self._chosen, self._taken)
-        chosen = self._chosen[:count]
-        distance, shape, sphere = pairs.distance[chosen], pairs.shape[chosen], pairs.sphere[chosen]
-        self._share[:count] = self._shares[shape, sphere]
-        self.room = float((distance - self._avoidance.d_safe * self._share[:count]).min(initial=math.inf))
-        velocity = self._observed.velocity
-        self._moving[:] = 0.0
-        if velocity is not None:
-            objects = shape < len(velocity)
-            normal = pairs.normal[chosen[objects]]
-            self._moving[:count][objects] = np.sum(normal * velocity[shape[objects]], axis=1)
+        count = nearest(
+            *(pairs.count, pairs.distance, pairs.sphere, pairs.shape, pairs.normal, self._shares),
+            *(_STILL if velocity is None else velocity, self._avoidance.d_safe, self._taken),
+            *(self._chosen, self._links, self._others, self._share, self._moving, self._about),
+        )
+        if self._about[CHANGED]:
+            at = zip(self._others[:count].tolist(), self._links[:count].tolist(), strict=True)
+            names = [self._names[other][link] for other, link in at]
+            self._named = (*names, *[""] * (self._robot.n - count))
         return count
-
-    def _named(self, count: int) -> tuple[str, ...]:
-        pairs, chosen = self._pairs, self._chosen[:count]
-        at = zip(pairs.shape[chosen].tolist(), pairs.sphere[chosen].tolist(), strict=True)
-        return tuple(self._names[shape][sphere] for shape, sphere in at)
 
     def at(self, q: Array, observed: Observed) -> Near:
         """The nearest pairs at the positions q, (n,)."""
@@ -190,23 +200,21 @@ class Distances:
         count = self._find(*_placements(self._robot, self._data, q))
         pairs, chosen = self._pairs, self._chosen[:count]
         moving, share = self._moving[:count].copy(), self._share[:count].copy()
-        return Near(pairs.distance[chosen], pairs.slopes[chosen], moving, share, self._named(count))
+        return Near(pairs.distance[chosen], pairs.slopes[chosen], moving, share, self._named[:count])
 
     def write(self, arena: Arena, block: int) -> Directions:
         """Writes the rows of this tick to an arena that holds the measured state.
 
         block: which set of directions is that of distances.
         """
-        avoidance, pairs = self._avoidance, self._pairs
+        pairs = self._pairs
         place_joints(*arena.arguments)
         count = self._find(arena.f["placed"][None], arena.f["axis_now"][None])
-        numbers = (avoidance.d_safe, avoidance.margin, avoidance.reaction, avoidance.deceleration)
         distance_rows(
             *(*arena.arguments, block, count, self._chosen, pairs.distance, pairs.slopes),
-            *(self._moving, self._share, np.array(numbers)),
+            *(self._moving, self._share, self._numbers),
         )
-        names = (*self._named(count), *[""] * (self._robot.n - count))
-        return Directions(arena.f["direction"][block].copy(), names)
+        return Directions(arena.f["direction"][block].copy(), self._named)
 
 
 def _kind(shape: WorldShape) -> tuple[object, ...]:

@@ -46,18 +46,23 @@ class GivenBounds:
         """
         if not self._given:
             return rows
-        f, settings, N = self._arena.f, self._settings, self._settings.horizon
-        state = JointState(f["q"], f["v"], (f["v"] - f["v_was"]) / f["scalars"][PERIOD])
-        now = Moment(state, f["tau_0"], f["M_bar"], settings.limits, force, N, settings.T_s)
+        f, N, now = self._arena.f, self._settings.horizon, None
         directions: list[Directions | None] = [None] * self._known
         for place, constraint in enumerate(self._given):
             if constraint is DISTANCE and self.distances is not None:
                 self.distances.observe(observed)
                 directions.append(self.distances.write(self._arena, place))
                 continue
+            now = now or self._moment(force)
             block = constraint.bounds(now)
             start = (self._known + place) * N
             f["lower"][start : start + N], f["upper"][start : start + N] = block.lower, block.upper
             f["direction"][place] = np.eye(len(f["q"])) if block.directions is None else block.directions.D
             directions.append(block.directions)
         return rows._replace(directions=tuple(directions) if any(directions) else ())
+
+    def _moment(self, force: LimitsInForce) -> Moment:
+        f, settings = self._arena.f, self._settings
+        state = JointState(f["q"], f["v"], (f["v"] - f["v_was"]) / f["scalars"][PERIOD])
+        N, T_s = settings.horizon, settings.T_s
+        return Moment(state, f["tau_0"], f["M_bar"], settings.limits, force, N, T_s)

@@ -29,6 +29,7 @@ from himpc.tick.kernel.arena import Snapshot
 from himpc.tick.kernel.arrays import Array
 from himpc.tick.kernel.finish_tick import finish_tick
 from himpc.tick.kernel.linearize import linearize
+from himpc.tick.kernel.progress import progress
 from himpc.tick.preview_writer import PreviewWriter
 from himpc.tick.problems import press, solutions
 from himpc.tick.tables import LevelTable, budget_of, write_effects
@@ -62,6 +63,7 @@ class CompiledTick:
         self._form, self._settings, self._levels = form, settings, levels
         self.arena, self._spans = arena_for(robot, settings, form, off, levels)
         self._given = GivenRows(robot, self.arena, self._spans)
+        self._ends = np.array([span.stop for _, _, span in self._spans[: len(form.tasks)]], np.intp)
         constraints, f = imposed(settings.limits), self.arena.f
         self._rows = Rows(f["L"], f["lower"], f["upper"], constraints)
         self._given_bounds = GivenBounds(robot, self.arena, settings, constraints)
@@ -122,16 +124,11 @@ class CompiledTick:
         """The pairs whose distances are kept; None if none are."""
         return self._given_bounds.distances
 
-    @property
-    def fastest_reference(self) -> float:
-        """The largest velocity of a row of a reference at the last tick, m/s or rad/s."""
-        return float(np.abs(self.arena.f["motion"][1, 0]).max(initial=0.0))
-
-    def error_lengths(self, tasks: Sequence[Task]) -> Array:
-        """The length of the last error of each of the first tasks, m or rad."""
-        error = self.arena.f["error"]
-        spans = (span for _, _, span in self._spans[: len(tasks)])
-        return np.array([math.sqrt(error[span].dot(error[span])) for span in spans])
+    def progress(self) -> tuple[Array, float]:
+        """Returns the length of the last error of each task that is solved for, m or rad, and the largest
+        velocity of a row of a reference, m/s or rad/s."""
+        lengths = np.empty(len(self._ends))
+        return lengths, progress(*self.arena.arguments, self._ends, lengths)
 
     def fade(self, place: int, share: float | Array) -> None:
         """Multiplies a level's √Q by `share`, one number or one per row."""

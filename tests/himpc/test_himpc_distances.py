@@ -16,6 +16,7 @@ from himpc.limits import Limits, in_force
 from himpc.limits.avoidance import Avoidance
 from himpc.limits.distance import Near, least_rates
 from himpc.limits.load import loaded, spared
+from himpc.limits.overrun import anticipated, followed
 from himpc.limits.stall import SLOWEST, going, slowed, stalled
 from himpc.references.observed import Observed
 from himpc.tick.distances import Distances
@@ -160,11 +161,32 @@ def test_a_joint_with_little_torque_left_becomes_slow(robot: Robot) -> None:
     assert spared(limits, np.zeros(robot.n)) is limits
 
 
+def test_a_joint_that_accelerates_towards_its_limit_gets_a_lower_one(robot: Robot) -> None:
+    """Only the joint that becomes faster, and no less than 70 % of its limit; one that brakes keeps it."""
+    limits = in_force(robot, Limits())
+    assert anticipated(limits, 0.4 * limits.v_limit, 0.4 * limits.v_limit) is limits
+    v = 0.8 * limits.v_limit
+    v[2] = -v[2]
+    mean = v.copy()
+    acceleration = np.zeros(robot.n)
+    acceleration[:4] = 2.0, -2.0, -2.0, 100.0
+    for _ in range(200):
+        v = v + 1e-3 * acceleration / 5.0
+        mean = followed(mean, v, 1e-3)
+    share = anticipated(limits, v, mean).v_limit / limits.v_limit
+    lower = 1.0 - 0.067 * 0.4 / limits.v_limit
+    assert share[[0, 2]] == pytest.approx(lower[[0, 2]], abs=0.01)
+    assert share[3] == pytest.approx(0.7)
+    assert share[[1, 4, 5, 6]] == pytest.approx(1.0)
+
+
 def test_a_robot_without_progress_becomes_slow(robot: Robot) -> None:
     """Only while something is near, nothing moves, a task is away from its target, and none comes closer."""
     cases = {
         "stalled": (0.3, False, 0.01),
+        "a little inside": (0.3, False, -0.012),
         "far from everything": (0.3, False, 0.2),
+        "far inside": (0.3, False, -0.04),
         "a target moves": (0.3, True, 0.01),
         "there": (0.005, False, 0.01),
     }
@@ -175,6 +197,7 @@ def test_a_robot_without_progress_becomes_slow(robot: Robot) -> None:
             stall = stalled(stall, np.array([error, 0.0]), moves, room, 1e-3)
         shares[name] = stall.share
     assert shares.pop("stalled") < 0.01
+    assert shares.pop("a little inside") < 0.01
     assert set(shares.values()) == {1.0}
     stall, error = going(1), 0.5
     for _ in range(2000):

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from benchmarks.avoidance import generated
 from himpc.controllers import stall_guard
 from himpc.limits import CONSTRAINTS
 from himpc.limits.distance import DISTANCE
@@ -43,6 +45,30 @@ def test_without_the_stall_the_arm_would_not_come_to_rest(monkeypatch: pytest.Mo
     found = run(replace(scene("iiwa14-hold", "avoidance.on=true"), events=DOWN), 4.0)
     assert float(np.abs(found["v"][-500:]).max()) > 0.2
     assert found["contact_depth"].max() == 0.0
+
+
+def test_a_joint_that_others_accelerate_stays_within_its_velocity_limit(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Two drags with a turn move five joints of a panda near their limits at once; the true inertia of the
+    third one is 70 times M̄, so that its torque acts late. Without the look ahead it overruns its limit,
+    although every row is met at every tick."""
+    drags = (
+        (0.0, MoveTarget("position", (0.3506, -0.1572, 0.3096))),
+        (0.0, MoveTarget("orientation", (0.8861, 0.3817, -0.1184, 0.2346))),
+        (1.0, MoveTarget("position", (0.6732, -0.2356, 0.0960))),
+        (1.0, MoveTarget("orientation", (0.8460, 0.3230, -0.4232, -0.0309))),
+    )
+    quick = replace(scene("panda-hold", "avoidance.on=true"), events=drags)
+
+    def fastest() -> float:
+        found = run(quick, 1.8)
+        assert not found["unsolved"].any()
+        return float(np.abs(found["v"] / quick.robot.v_limit).max())
+
+    assert fastest() < 1.03
+    monkeypatch.setattr(stall_guard, "anticipated", lambda limits, *_: limits)
+    assert fastest() > 1.2
 
 
 def test_both_routes_keep_the_same_distances() -> None:
@@ -125,3 +151,19 @@ def test_a_scene_without_rows_of_distances_is_as_before() -> None:
     plain = run(scene("iiwa14-hold"), 0.1)
     changed = run(scene("iiwa14-hold", "avoidance.d_safe=0.1", "avoidance.pull=0.01"), 0.1)
     assert np.array_equal(plain["tau"], changed["tau"])
+
+
+def test_an_own_robot_gets_contacts_and_rows_from_its_urdf_alone(tmp_path: Path) -> None:
+    """A generated arm, and a lamp without a collision shape, both dragged into their foot: without rows they
+    press on it, with rows they touch nothing, by MuJoCo's geometry."""
+    arm = tmp_path / "arm.urdf"
+    arm.write_text(generated(3))
+    drag = ((0.0, MoveTarget("position", (0.03, 0.0, 0.02))),)
+    for urdf in (str(arm), "lessons/course/lamp.urdf"):
+        deepest = []
+        for on in ("false", "true"):
+            found = torque_scene("hold", urdf=urdf)
+            settings = with_assignments(found.settings, (f"avoidance.on={on}",))
+            deepest.append(run(replace(found, settings=settings, events=drag), 2.0)["contact_depth"].max())
+        assert deepest[0] > 0.0, urdf
+        assert deepest[1] == 0.0, urdf

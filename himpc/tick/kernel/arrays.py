@@ -43,7 +43,7 @@ class TickArrays(NamedTuple):
     x_d: Annotated[Array, "M", "m, rad", "configure kinematics linearize preview_writer → gather"]
     R_d: Annotated[Array, "T 3 3", "1", "configure kinematics preview_writer → finish_tick linearize"]
     # x_d(k+j) − x_d(k), ẋ_d and ẍ_d
-    motion: Annotated[Array, "3 N1 M", "m, m/s, m/s²", "configure linearize preview_writer → gather tick"]
+    motion: Annotated[Array, "3 N1 M", "m, m/s, m/s²", "configure linearize preview_writer → gather progress"]
     given: Annotated[Array, "N1 G n", "m, 1", "given → linearize"]
     curve: Annotated[Array, "M 4", "m, rad", "configure → linearize"]
     pace: Annotated[Array, "T 2", "rad/s, rad", "configure → linearize"]
@@ -100,7 +100,7 @@ class TickArrays(NamedTuple):
     U: Annotated[Array, "r N n", "N·m", "fallbacks solve_level → finish_tick problems tables tick"]
     predicted: Annotated[Array, "N1 n", "rad", "finish_tick → tick"]
     value: Annotated[Array, "M", "m, rad", "given linearize → gather kinematics tick"]
-    error: Annotated[Array, "M", "m, rad", "given linearize → gather kinematics tick"]
+    error: Annotated[Array, "M", "m, rad", "given linearize → gather kinematics progress tick"]
     R_now: Annotated[Array, "T 3 3", "1", "given linearize → finish_tick kinematics tick"]
     lower: Annotated[
         Array,

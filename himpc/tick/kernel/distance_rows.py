@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from himpc.compilation.compiled import INDICES, MATRIX, VECTOR, WHOLE, inline_kernel, kernel
+from himpc.compilation.compiled import INDICES, MATRIX, NUMBER, VECTOR, WHOLE, inline_kernel, kernel
 from himpc.compilation.views import borrowed
 from himpc.constants import FADE, RETREAT, RETURN_RATE, WITHIN
 from himpc.tick.kernel.arrays import DIRECTED, PERIOD, T_S, Array, Whole
@@ -31,21 +31,67 @@ def least_rate(distance: float, d_safe: float, margin: float, reaction: float, d
     return -stop / fade if fade > 0.0 else -math.inf
 
 
-@kernel(WHOLE, VECTOR, INDICES, INDICES)
-def nearest(count: int, distance: Array, chosen: Whole, taken: Whole) -> int:
+ROOM, FASTEST, CHANGED = range(3)
+"""Numbers about the chosen pairs: by how much the nearest one is farther apart than it must be, m; the
+largest speed at which an object moves towards or away from a link, m/s; 1 if they are others than before."""
+
+
+@kernel(
+    *(WHOLE, VECTOR, INDICES, INDICES, MATRIX, MATRIX, MATRIX, NUMBER),
+    *(INDICES, INDICES, INDICES, INDICES, VECTOR, VECTOR, VECTOR),
+)
+def nearest(
+    count: int,
+    distance: Array,
+    sphere: Whole,
+    shape: Whole,
+    normal: Array,
+    shares: Array,
+    velocity: Array,
+    d_safe: float,
+    taken: Whole,
+    chosen: Whole,
+    links: Whole,
+    others: Whole,
+    share: Array,
+    moving: Array,
+    about: Array,
+) -> int:
     """Chooses the nearest of `count` pairs, at most as many as `chosen` has room for, nearest first; returns
-    their number. taken: scratch, one per pair."""
+    their number.
+
+    Args:
+        count, distance, sphere, shape, normal: of all pairs, see `near`.
+        shares: (B, S) share of d_safe and the margin that each pair keeps.
+        velocity: (b, 3) m/s, of the first b shapes, which are objects.
+        d_safe: m.
+        taken: scratch, one per pair.
+        chosen: which ones; the result.
+        links, others: `sphere` and `shape` of each chosen pair, −1 where there is none; updated.
+        share, moving: of each chosen pair, see `distance_rows`; the result.
+        about: numbers about them, see ROOM; the result.
+    """
     for r in range(count):
         taken[r] = 0
+    about[ROOM], about[FASTEST], about[CHANGED] = math.inf, 0.0, 0.0
     found = 0
-    while found < min(count, chosen.size):
+    for c in range(chosen.size):
         best = -1
         for r in range(count):
             if not taken[r] and (best < 0 or distance[r] < distance[best]):
                 best = r
-        taken[best] = 1
-        chosen[found] = best
-        found += 1
+        s, o = (sphere[best], shape[best]) if best >= 0 else (-1, -1)
+        if links[c] != s or others[c] != o:
+            links[c], others[c], about[CHANGED] = s, o, 1.0
+        moving[c] = 0.0
+        if best < 0:
+            continue
+        taken[best], chosen[c], share[c], found = 1, best, shares[o, s], c + 1
+        about[ROOM] = min(about[ROOM], distance[best] - d_safe * share[c])
+        if o < len(velocity):
+            for a in range(3):
+                moving[c] += normal[best, a] * velocity[o, a]
+        about[FASTEST] = max(about[FASTEST], abs(moving[c]))
     return found
 
 

@@ -1,0 +1,33 @@
+"""Entry: how far tasks are from their targets, and how fast these move. A robot without progress is
+stalled."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from himpc.compilation.compiled import INDICES, VECTOR, kernel
+from himpc.tick.kernel.arrays import Array, Whole
+from himpc.tick.kernel.arrays_of import arrays_of
+
+
+@kernel(VECTOR, INDICES, INDICES, INDICES, INDICES, VECTOR)
+def progress(data: Any, where: Whole, whole: Whole, whole_where: Whole, ends: Whole, lengths: Array) -> float:
+    """Writes the length of the last error of each of the first tasks, m or rad, and returns the largest
+    velocity of a row of a reference, m/s or rad/s.
+
+    Args:
+        data, where, whole, whole_where: the arena.
+        ends: where the rows of each task end. lengths: the result, one per task.
+    """
+    t = arrays_of(data, where, whole, whole_where)
+    first = 0
+    for p in range(len(ends)):
+        squares = 0.0
+        for i in range(first, ends[p]):
+            squares += t.error[i] * t.error[i]
+        lengths[p], first = math.sqrt(squares), ends[p]
+    fastest = 0.0
+    for i in range(t.motion.shape[2]):
+        fastest = max(fastest, abs(t.motion[1, 0, i]))
+    return fastest
