@@ -1,10 +1,9 @@
 """A dual active-set method (Goldfarb and Idnani) for min ½xᵀHx + gᵀx under lower ≤ Ax ≤ upper, compiled.
 
-With H = LLᵀ and z = Lᵀx the cost is ½‖z − z₀‖², and a row a becomes nᵀz ≥ β with n = ±L⁻¹a. The method starts
-at the unconstrained optimum and adds violated rows one by one, the most violated row first. Rows whose
-multiplier would become negative are removed. The active rows are stored as combinations of orthonormal ones.
-A row that depends on them does not enlarge this basis, so it replaces one of them, or the rows contradict
-each other.
+With H = LLᵀ and z = Lᵀx the cost is ½‖z − z₀‖², and the coefficients of a row become L⁻¹a. The method starts
+at the unconstrained optimum and adds violated rows one by one, the most violated row first, by the steps that
+HIMPC takes at a level, `himpc.tick.kernel.goldfarb_idnani`. Equalities are never removed. A row that depends
+on those taken does not enlarge their basis, so it replaces one of them, or the rows contradict each other.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ from time import perf_counter_ns
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.htmpc.kernel.active_set import SCRATCH, factor, solve
+from himpc.htmpc.kernel.active_set import VECTORS, factor, solve
 from himpc.htmpc.rows import ConstraintRows
 from himpc.qp import QPSolution
 
@@ -32,16 +31,14 @@ class ActiveSetSolver:
         self._room(0)
 
     def _room(self, n: int) -> None:
-        self._L = np.empty((n, n))
-        self._active, self._side = np.empty(n, np.intp), np.empty(n)
-        self._corner, self._basis = np.empty((n + 1, n + 1)), np.empty((n + 1, n))
-        self._scratch, self._watched = np.empty((SCRATCH, n + 1)), np.empty(0, np.intp)
-        self._count = 0
+        self._L, self._count = np.empty((n, n)), 0
+        self._held, self._vectors = np.zeros((3, n + 1), np.int64), np.empty((VECTORS, n + 1))
+        self._normals, self._cholesky_factor = np.empty((3, n + 1, n)), np.empty((n + 1, n + 1))
 
     def begin(self, H: Array) -> bool:
         """Factors a Hessian (k, k) and clears the active rows. Returns False if it is not positive
         definite."""
-        if len(H) != len(self._active):
+        if len(H) != len(self._L):
             self._room(len(H))
         self._H, self._count = H, 0
         return factor(H, self._L)
@@ -54,17 +51,14 @@ class ActiveSetSolver:
             same: number of the first rows that are the same as in the QP before.
         """
         started = perf_counter_ns()
-        held = self._active[: self._count]
-        if (held >= same).any():
+        if (self._held[0, : self._count] >= same).any():
             self._count = 0
         k, count = len(g), len(rows.A)
-        if count > len(self._watched):
-            self._watched = np.empty(2 * count, np.intp)
         x, multipliers = np.empty(k), np.zeros(count)
         residual, status, self._count = solve(
             *(self._L, self._H, g, np.ascontiguousarray(rows.A), rows.lower, rows.upper),
-            *(self._active, self._side, self._count, self._corner, self._basis, self._scratch),
-            *(self._watched, np.zeros(count, np.intp), x, multipliers),
+            *(self._held, self._count, self._normals, self._cholesky_factor, self._vectors),
+            *(np.empty(count, np.intp), np.empty(count), x, multipliers),
         )
         time_us = (perf_counter_ns() - started) / 1e3
         return QPSolution(x, multipliers, residual, _STATUS[status], time_us)

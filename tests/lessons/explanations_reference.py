@@ -121,7 +121,7 @@ REFERENCE = (
         ("himpc/kinematics/configuration.py", "Only geometry is used, no inertia or gravity"),
     )),
     Exempt("software", HTMPC + "active_set.py::test_rows_that_contradict_each_other_are_found_out", (
-        ("himpc/htmpc/active_set.py", "A row that depends on them does not enlarge this basis, so"),
+        ("himpc/htmpc/active_set.py", "A row that depends on those taken does not enlarge their basis, so"),
     )),
     Exempt("software", HTMPC + "loop.py::test_every_setting_changes_live_without_a_jump", (
         ("himpc/htmpc/htmpc.py", "`configure` changes settings and keeps that plan"),

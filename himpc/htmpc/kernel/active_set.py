@@ -1,44 +1,35 @@
-"""The compiled dual method of Goldfarb and Idnani for one QP, see `htmpc.active_set`."""
+"""One QP of HTMPC: its rows, and which one is violated most, for the dual method of `goldfarb_idnani`."""
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
-from himpc.compilation.compiled import INDICES, MATRIX, VECTOR, WHOLE, inline_kernel, kernel
+from himpc.compilation.compiled import INDICES, MATRICES, MATRIX, TABLE, VECTOR, WHOLE, inline_kernel, kernel
 from himpc.compilation.views import borrowed
-from himpc.tick.kernel.linear import (
-    backward,
-    close_gap,
-    copy,
-    copy_rows,
-    dot,
-    factorise,
-    forward,
-    split,
-    subtract,
+from himpc.tick.kernel.active_set import (
+    ActiveSet,
+    Quadratic,
+    correct,
+    evaluate,
+    point_from_multipliers,
+    scale,
+    unscale,
+    update_multipliers,
+    without,
 )
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
+from himpc.tick.kernel.arrays import Array, Whole
+from himpc.tick.kernel.goldfarb_idnani import ROUNDED, TOLERANCE, release, take
+from himpc.tick.kernel.linear import copy, copy_rows, dot, factorise, forward, subtract
 
 SOLVED, CONTRADICTION, LIMIT = range(3)
-SCRATCH = 7
-"""Number of rows of the scratch array."""
-MOST_STEPS = 600
-"""Largest number of rows that are added or removed in one QP: it bounds the computing time."""
+VECTORS = 8
+"""Number of rows of the vectors of `solve`."""
+_STEPS = 600
+"""One QP may take as many multiplications as this many rows that are added or removed: it bounds the time."""
+_ROUGH = 1e-8
+"""A point that is not refined may seem to miss a row by as much."""
 _CLOSE = 0.05
 """Rows whose bound is nearer to x = 0 than this share of their range, or of one unit, are checked first."""
-_SATISFIED = 1e-9
-_DEPENDENT = 1e-10
-"""A row depends on the active rows if its part outside their span is shorter than this share of its
-length."""
-_ENOUGH = 0.5
-"""See `split`: if less than this share of a row is left, a second round of orthogonalisation follows."""
-_ROUNDING = 1e-7
-"""Largest violation of a row that depends on the others; a larger one is a contradiction."""
 
 
 @inline_kernel
@@ -50,9 +41,10 @@ def residual_of(
     upper: Array,
     x: Array,
     multipliers: Array,
+    value: Array,
     gradient: Array,
 ) -> float:
-    """Returns `himpc.qp.kkt_residual`; gradient is scratch, (n,)."""
+    """Returns `himpc.qp.kkt_residual`; value is Ax, and gradient is scratch, (n,)."""
     n = len(g)
     squares, worst, total = 0.0, 0.0, 0.0
     for i in range(n):
@@ -60,10 +52,9 @@ def residual_of(
         squares += dot(H[i], H[i], n)
     scale = max(1.0, math.sqrt(squares) * math.sqrt(dot(x, x, n)), math.sqrt(dot(g, g, n)))
     for i in range(len(A)):
-        value = dot(A[i], x, n)
-        worst = max(worst, lower[i] - value, value - upper[i])
+        worst = max(worst, lower[i] - value[i], value[i] - upper[i])
         if multipliers[i] != 0.0:
-            own = upper[i] - value if multipliers[i] > 0.0 else value - lower[i]
+            own = upper[i] - value[i] if multipliers[i] > 0.0 else value[i] - lower[i]
             worst = max(worst, abs(multipliers[i]) * min(abs(own), 1e6) / scale)
             subtract(-multipliers[i], A[i], gradient, n)
     for i in range(n):
@@ -71,53 +62,6 @@ def residual_of(
         total += x[i]
     # `max` may ignore NaN, a sum cannot.
     return worst if math.isfinite(total) else math.inf
-
-
-@inline_kernel
-def bounds_of(active: Indices, side: Array, count: int, lower: Array, upper: Array, beta: Array) -> None:
-    """Writes β of the active rows."""
-    for c in range(count):
-        beta[c] = lower[active[c]] if side[c] > 0.0 else -upper[active[c]]
-
-
-@inline_kernel
-def at_rows(
-    cholesky_factor: Array,
-    orthonormal_basis: Array,
-    z_0: Array,
-    beta: Array,
-    y: Array,
-    u: Array,
-    z: Array,
-    count: int,
-) -> None:
-    """Writes z and u for the active rows as equalities: F (y + B z₀) = β, z = z₀ + Bᵀy, Fᵀu = y, with the
-    Cholesky factor F and the orthonormal basis B."""
-    n = len(z)
-    copy(beta, y, count)
-    forward(cholesky_factor, y, count)
-    copy(z_0, z, n)
-    for i in range(count):
-        y[i] -= dot(orthonormal_basis[i], z_0, n)
-        subtract(-y[i], orthonormal_basis[i], z, n)
-    copy(y, u, count)
-    backward(cholesky_factor, u, count)
-
-
-@inline_kernel
-def let_go(
-    cholesky_factor: Array,
-    orthonormal_basis: Array,
-    active: Indices,
-    side: Array,
-    u: Array,
-    index: int,
-    count: int,
-) -> None:
-    """Removes the active row at an index."""
-    for c in range(index, count - 1):
-        active[c], side[c], u[c] = active[c + 1], side[c + 1], u[c + 1]
-    close_gap(cholesky_factor, orthonormal_basis, index, count, orthonormal_basis.shape[1])
 
 
 @kernel(MATRIX, MATRIX)
@@ -128,9 +72,28 @@ def factor(H: Array, L: Array) -> bool:
     return factorise(L, len(L))
 
 
+@inline_kernel
+def hold(active: ActiveSet, index: int, upper_side: bool, lower: Array, upper: Array) -> None:
+    """Sets side and target of a row that is taken; an equality has side 0 and stays."""
+    i = active.row[index]
+    active.target[index] = upper[i] if upper_side else lower[i]
+    active.side[index] = 0 if lower[i] == upper[i] else (1 if upper_side else -1)
+
+
+@inline_kernel
+def refine(
+    active: ActiveSet, cost: Quadratic, k: int, H: Array, g: Array, slope: Array, z: Array, x: Array
+) -> None:
+    """Removes the rounding errors of the accumulated steps from a point and its multipliers."""
+    for i in range(len(g)):
+        slope[i] = g[i] + dot(H[i], x, len(g))
+    evaluate(active, x, k, len(g), slope)
+    correct(active, cost, k, slope, z, x)
+
+
 @kernel(
     *(MATRIX, MATRIX, VECTOR, MATRIX, VECTOR, VECTOR),
-    *(INDICES, VECTOR, WHOLE, MATRIX, MATRIX, MATRIX, INDICES, INDICES, VECTOR, VECTOR),
+    *(TABLE, WHOLE, MATRICES, MATRIX, MATRIX, INDICES, VECTOR, VECTOR, VECTOR),
 )
 def solve(
     L: Array,
@@ -139,14 +102,13 @@ def solve(
     A: Array,
     lower: Array,
     upper: Array,
-    active: Indices,
-    side: Array,
+    held: Whole,
     count: int,
+    normals: Array,
     cholesky_factor: Array,
-    orthonormal_basis: Array,
-    scratch: Array,
-    watched: Indices,
-    seen: Indices,
+    vectors: Array,
+    watched: Whole,
+    value: Array,
     x: Array,
     multipliers: Array,
 ) -> tuple[float, int, int]:
@@ -155,115 +117,90 @@ def solve(
 
     Args:
         L, H, g, A, lower, upper: the QP, H = LLᵀ (n, n).
-        active, side, count: the active rows, space for n; on entry those of the QP before.
-        cholesky_factor, orthonormal_basis: of the active rows, see `linear`, space for n + 1.
-        scratch: (SCRATCH, n + 1).
-        watched, seen: scratch, as long as A; seen is zero.
+        held, normals, cholesky_factor, vectors: the `ActiveSet` and scratch: (3, n + 1), (3, n + 1, n),
+            (n + 1, n + 1), (VECTORS, n + 1).
+        count: the number of active rows; those of the QP before on entry.
+        watched, value: scratch, as long as A.
         x: (n,), the result.
         multipliers: as long as A, zero; the result.
     """
     n, rows = len(g), len(A)
-    A, H, L, scratch = borrowed(A), borrowed(H), borrowed(L), borrowed(scratch)
-    cholesky_factor, orthonormal_basis = borrowed(cholesky_factor), borrowed(orthonormal_basis)
-    z_0, z, normal = scratch[0, :n], scratch[1, :n], scratch[2, :n]
-    r, u, y, beta = scratch[3], scratch[4], scratch[5], scratch[6]
+    A, H, L, vectors = borrowed(A), borrowed(H), borrowed(L), borrowed(vectors)
+    normals, cholesky_factor = borrowed(normals), borrowed(cholesky_factor)
+    ideal, z, slope, budget = vectors[0], vectors[1], vectors[2], vectors[3]
+    active = ActiveSet(
+        *(held[0], held[1], held[2], normals[0], normals[1], normals[2], cholesky_factor),
+        *(vectors[4], vectors[5], vectors[6], vectors[7]),
+    )
+    cost = Quadratic(L, ideal, 1.0, n, n)
+    budget[0] = _STEPS * n * (rows + 12.0 * n)
     for i in range(n):
-        z_0[i] = -g[i]
-    forward(L, z_0, n)
-    watching = 0
+        ideal[i] = -g[i]
+    forward(L, ideal, n)
     for i in range(rows):
         near = _CLOSE * min(upper[i] - lower[i], 1.0)
-        if lower[i] > -near or upper[i] < near:
-            seen[i] = 1
-    for c in range(count):
-        seen[active[c]] = 1
-    for i in range(rows):
-        if seen[i]:
-            watched[watching] = i
-            watching += 1
+        watched[i] = lower[i] > -near or upper[i] < near
+    for p in range(count):
+        watched[active.row[p]] = 1
     # Active rows of the QP before are kept if their multipliers have the right sign here.
-    while True:
-        bounds_of(active, side, count, lower, upper, beta)
-        at_rows(cholesky_factor, orthonormal_basis, z_0, beta, y, u, z, count)
-        least, worst = 0.0, -1
-        for c in range(count):
-            free = lower[active[c]] < upper[active[c]]
-            if not math.isfinite(beta[c]):
-                least, worst = -math.inf, c
-            elif free and u[c] < least:
-                least, worst = u[c], c
-        if worst < 0:
-            break
-        let_go(cholesky_factor, orthonormal_basis, active, side, u, worst, count)
-        count -= 1
-    status, steps = LIMIT, 0
-    while steps < MOST_STEPS:
-        copy(z, x, n)
-        backward(L, x, n)
-        p, excess, sign = -1, 0.0, 0.0
-        for index in range(watching):
-            i = watched[index]
-            value = dot(A[i], x, n)
-            missing = max(lower[i] - value, value - upper[i])
-            if missing > max(excess, _SATISFIED) and seen[i] != 2:
-                p, excess = i, missing
-                sign = 1.0 if value < lower[i] else -1.0
+    for p in range(count - 1, -1, -1):
+        hold(active, p, active.multiplier[p] > 0.0, lower, upper)
+        if not math.isfinite(active.target[p]):
+            without(active, p, count, n, budget)
+            count -= 1
+    update_multipliers(active, cost, count)
+    count = release(active, cost, count, budget)
+    point_from_multipliers(active, cost, count, z)
+    unscale(cost, z, x)
+    if count:
+        refine(active, cost, count, H, g, slope, z, x)
+    status, exact = LIMIT, True
+    while budget[0] > 0.0:
+        budget[0] -= n * (rows + 2.0 * n + 2.0 * count)
+        p, excess, above = -1, TOLERANCE if exact else _ROUGH, False
+        for i in range(rows):
+            if watched[i]:
+                value[i] = dot(A[i], x, n)
+                missing = max(lower[i] - value[i], value[i] - upper[i])
+                if missing > excess and watched[i] != 2:
+                    p, excess, above = i, missing, value[i] > upper[i]
         if p < 0:
-            # This removes the rounding errors of the accumulated steps before the other rows are checked.
-            bounds_of(active, side, count, lower, upper, beta)
-            at_rows(cholesky_factor, orthonormal_basis, z_0, beta, y, u, z, count)
-            copy(z, x, n)
-            backward(L, x, n)
-            more = False
-            for i in range(rows):
-                if seen[i] == 0:
-                    value = dot(A[i], x, n)
-                    if max(lower[i] - value, value - upper[i]) > _SATISFIED:
-                        seen[i], more = 1, True
-                        watched[watching] = i
-                        watching += 1
-            if more:
+            if not exact:
+                refine(active, cost, count, H, g, slope, z, x)
+                exact = True
                 continue
             status = SOLVED
+            for i in range(rows):
+                if not watched[i]:
+                    value[i] = dot(A[i], x, n)
+                    if max(lower[i] - value[i], value[i] - upper[i]) > TOLERANCE:
+                        watched[i], status = 1, LIMIT
+            if status == SOLVED:
+                break
+            continue
+        active.row[count], active.side[count] = p, 1 if above else -1
+        copy(A[p], active.normal[count], n)
+        scale(cost, active.normal[count], active.scaled_normal[count])
+        if exact:
+            point_from_multipliers(active, cost, count, z)
+        met, count = take(active, count, excess, z, n, budget)
+        if met:
+            hold(active, count - 1, above, lower, upper)
+        elif budget[0] < 0.0:
             break
-        for i in range(n):
-            normal[i] = sign * A[p, i]
-        forward(L, normal, n)
-        bound = lower[p] if sign > 0.0 else -upper[p]
-        own, size = 0.0, dot(normal, normal, n)
-        while steps < MOST_STEPS:
-            steps += 1
-            shares, rest = cholesky_factor[count], orthonormal_basis[count]
-            across = split(normal, orthonormal_basis, count, n, shares, rest, _ENOUGH)
-            copy(shares, r, count)
-            backward(cholesky_factor, r, count)
-            first, blocking = math.inf, -1
-            for c in range(count):
-                if r[c] > 0.0 and lower[active[c]] < upper[active[c]] and u[c] < first * r[c]:
-                    first, blocking = max(u[c], 0.0) / r[c], c
-            missing = bound - dot(normal, z, n)
-            depends = across <= _DEPENDENT * _DEPENDENT * size or count == n
-            full = math.inf if depends else missing / across
-            if depends and blocking < 0:
-                if missing > _ROUNDING:
-                    return math.inf, CONTRADICTION, count
-                seen[p] = 2
-                break
-            step = min(first, full)
-            subtract(step, r, u, count)
-            own += step
-            if not depends:
-                subtract(-step, rest, z, n)
-            if full <= first:
-                length = math.sqrt(across)
-                for i in range(n):
-                    rest[i] /= length
-                shares[count] = length
-                active[count], side[count], u[count] = p, sign, own
-                count += 1
-                break
-            let_go(cholesky_factor, orthonormal_basis, active, side, u, blocking, count)
-            count -= 1
-    for c in range(count):
-        multipliers[active[c]] -= side[c] * u[c]
-    return residual_of(H, g, A, lower, upper, x, multipliers, normal), status, count
+        elif exact and excess > ROUNDED:
+            return math.inf, CONTRADICTION, count
+        else:
+            watched[p] = 2 if exact else 1
+            update_multipliers(active, cost, count)
+            count = release(active, cost, count, budget)
+            point_from_multipliers(active, cost, count, z)
+        unscale(cost, z, x)
+        exact = not met  # a point that is not refined may only seem to miss a row that depends on others
+        if exact:
+            refine(active, cost, count, H, g, slope, z, x)
+    for p in range(count):
+        multipliers[active.row[p]] += active.multiplier[p]
+    for i in range(0 if status == SOLVED else rows):
+        value[i] = dot(A[i], x, n)
+    return residual_of(H, g, A, lower, upper, x, multipliers, value, slope), status, count

@@ -6,6 +6,7 @@ import math
 from typing import NamedTuple
 
 from himpc.compilation.compiled import inline_kernel
+from himpc.tick.kernel.active_set import Quadratic
 from himpc.tick.kernel.arrays import Array, Whole
 from himpc.tick.kernel.linear import dot, factorise, forward
 from himpc.tick.kernel.residual import add_effects, effects, gather, gather_effects, hessian
@@ -32,8 +33,7 @@ class LevelQP(NamedTuple):
         rest: (N+1,) where those beyond stand; they end all coordinates.
         fixed: (N, n) what the levels above keep, N·m.
         Q, metric: directions (N, n, n), and the joints' units of effort, (n,).
-        F: the Cholesky factor of ρ + GᵀG.
-        ideal: the optimum without any row of bounds, in white coordinates Fᵀx.
+        cost: the quadratic above, F the Cholesky factor of ρ + GᵀG.
         x: the point, own coordinates and those beyond.
         z: scratch.
         slope: the gradient.
@@ -60,8 +60,7 @@ class LevelQP(NamedTuple):
     fixed: Array
     Q: Array
     metric: Array
-    F: Array
-    ideal: Array
+    cost: Quadratic
     x: Array
     z: Array
     slope: Array
@@ -70,7 +69,7 @@ class LevelQP(NamedTuple):
 
 @inline_kernel
 def prepare(level: LevelQP) -> bool:
-    """e₀, the factor F and `ideal`. False if the Hessian is not positive: nothing is finite then."""
+    """e₀, and F and `ideal` of the cost. False if the Hessian is not positive: nothing is finite then."""
     first, last = level.first, level.last
     N = len(level.start)
     total = 0.0
@@ -82,17 +81,17 @@ def prepare(level: LevelQP) -> bool:
     for k in range(N):
         total += dot(level.e_0[k, first:last], level.e_0[k, first:last], last - first)
     trace = hessian(
-        level.S, level.projected_jacobian, first, last, level.start, level.offset, level.rho, level.F
+        level.S, level.projected_jacobian, first, last, level.start, level.offset, level.rho, level.cost.F
     )
     level.size[0], level.size[1] = math.sqrt(trace), math.sqrt(total)
     gather_effects(level.C, level.e_0, first, last, level.row_knots, level.pushed)
     gather(level.projected_jacobian, level.pushed, first, last, level.start, level.offset, level.slope)
-    d = level.offset[N]
-    if not factorise(level.F, d):
+    d = level.cost.d
+    if not factorise(level.cost.F, d):
         return False
     for c in range(d):
-        level.ideal[c] = -level.slope[c]
-    forward(level.F, level.ideal, d)
+        level.cost.ideal[c] = -level.slope[c]
+    forward(level.cost.F, level.cost.ideal, d)
     return True
 
 

@@ -11,6 +11,9 @@ import math
 from himpc.compilation.compiled import inline_kernel
 from himpc.tick.kernel.arrays import Array
 
+_ENOUGH = 0.5
+"""A second round of `split` removes what rounding left, unless this share of ‖row‖² is left."""
+
 
 @inline_kernel
 def dot(a: Array, b: Array, n: int) -> float:
@@ -97,16 +100,13 @@ def backward(F: Array, x: Array, d: int) -> None:
 
 
 @inline_kernel
-def split(
-    row: Array, orthonormal_basis: Array, count: int, n: int, share: Array, rest: Array, enough: float
-) -> float:
+def split(row: Array, orthonormal_basis: Array, count: int, n: int, share: Array, rest: Array) -> float:
     """A row (n,) as a combination of the first `count` orthonormal ones of `orthonormal_basis`, and a rest.
 
     Args:
         row, orthonormal_basis, count, n: see there.
         share: the coefficients, (count,).
         rest: what is left, (n,).
-        enough: a second round takes out what rounding left of them, unless this share of ‖row‖² is left.
 
     Returns:
         ‖rest‖².
@@ -121,7 +121,7 @@ def split(
             share[q] += along
             subtract(along, orthonormal_basis[q], rest, n)
         after = dot(rest, rest, n)
-        if after > enough * before:
+        if after > _ENOUGH * before:
             break
     return after
 

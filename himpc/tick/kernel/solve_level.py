@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from himpc.compilation.compiled import INDICES, NUMBER, VECTOR, WHOLE, always_inline_kernel, kernel
-from himpc.tick.kernel.active_set import ActiveSet
+from himpc.tick.kernel.active_set import ActiveSet, Quadratic
 from himpc.tick.kernel.arrays import DIRECTED, TickArrays, Whole
 from himpc.tick.kernel.arrays_of import arrays_of
 from himpc.tick.kernel.bounds import LevelBounds
@@ -18,8 +19,8 @@ from himpc.tick.kernel.cascade import (
     own_directions,
     widen,
 )
-from himpc.tick.kernel.goldfarb_idnani import FAILED, optimum, warm_start
 from himpc.tick.kernel.level import LevelQP, prepare
+from himpc.tick.kernel.optimum import FAILED, optimum, warm_start
 
 _SHARE = 0.75
 """What one attempt at a level may take of what is left, so that levels below it get theirs; the last one may
@@ -37,11 +38,12 @@ def active_set_of(t: TickArrays) -> ActiveSet:
 
 @always_inline_kernel
 def level_of(t: TickArrays, i: int) -> LevelQP:
-    """Level i with its scratch."""
+    """Level i with its scratch, after `count_coordinates`."""
+    cost = Quadratic(t.H, t.ideal, 1.0 / math.sqrt(t.rho[i]), t.offset[-1], t.rest[-1])
     return LevelQP(
         *(t.level[i, FIRST], t.level[i, LAST], t.rho[i], t.accuracy[i], t.C, t.S, t.row_knots),
         *(t.B, t.free, t.root_Q, t.projected_jacobian, t.e_0, t.e_1, t.pushed, t.start, t.offset),
-        *(t.rest, t.fixed, t.Q, t.metric[i], t.H, t.ideal, t.x, t.z, t.slope, t.size),
+        *(t.rest, t.fixed, t.Q, t.metric[i], cost, t.x, t.z, t.slope, t.size),
     )
 
 
@@ -54,12 +56,13 @@ def solve_level(data: Any, where: Whole, whole: Whole, whole_where: Whole, i: in
         more: its directions stand from the first attempt and would else count as those of a level above.
     """
     t = arrays_of(data, where, whole, whole_where)
-    levels, level, active = t.level, level_of(t, i), active_set_of(t)
+    levels = t.level
     plain = len(t.L) - t.sizes[DIRECTED] * len(t.start)
     bounds = LevelBounds(t.L, t.low, t.high, t.reached, t.length, t.direction, plain)
     if not room > 0.0:
         own_directions(i, levels, t.B, t.metric[i], t.reflector, t.Q, t.projected_jacobian, t.end, t.start)
         t.left[i] = count_coordinates(levels[i, KNOTS], t.q.size, t.end, t.start, t.offset, t.rest)
+    level, active = level_of(t, i), active_set_of(t)
     granted = t.budget[0]
     spared = 0.0 if i == len(levels) - 1 or levels[i, ALONE] else (1.0 - _SHARE) * granted
     t.budget[0] = granted - spared
