@@ -57,10 +57,9 @@ _MOVED = """new Promise((done) => {
   look();
 })"""
 _REPLAY = """async ([pack, robot, step, ticks]) => {
-  const scenes = await HIMPC.unwrapped(pack);
-  const given = HIMPC.unpacked(await HIMPC.unwrapped(`robot/${robot}`)).told;
-  await engine.ask({ kind: "open", scenes, robot: given, step, assignments: [] }, "opened", [scenes]);
-  const { tau, claims, prediction } = await engine.ask({ kind: "replay", ticks }, "replayed");
+  const { told: given } = await HIMPC.unpacked(HIMPC.packed(`robot/${robot}`));
+  await engine.call("open", { scenes: HIMPC.packed(pack), robot: given, step, assignments: [] });
+  const { tau, claims, prediction } = await engine.call("replay", ticks);
   const bytes = new Uint8Array(tau.buffer);
   let text = "";
   for (let k = 0; k < bytes.length; k += 32768) text += String.fromCharCode(...bytes.subarray(k, k + 32768));
