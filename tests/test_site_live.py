@@ -50,7 +50,7 @@ STEPS = [
     for place in range(len(load_lesson(name).steps))
     if why_not(name, place) is None
 ]
-_LOAD = "(async () => { window.engine = await new HIMPC.Engine().load(); })()"
+_LOAD = "(async () => { await (window.engine = new HIMPC.Engine()).load(); })()"
 _MOVED = """new Promise((done) => {
   const look = () => (HIMPC.shown?.frame?.t > 0.1 ? drawn() : setTimeout(look, 50));
   const drawn = () => requestAnimationFrame(() => setTimeout(done));

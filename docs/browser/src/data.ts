@@ -60,14 +60,15 @@ export interface Pack<T> { told: T; piece(at: Piece): Uint8Array }
 export interface Scenes { scene?: SceneData; steps?: Record<string, StepData> }
 
 /** What a script of the site holds, decompressed by the browser itself. */
-export async function unwrapped(text: string): Promise<Response> {
-  const { body } = await fetch(`data:;base64,${text}`);
-  const headers = { "Content-Type": "application/wasm" };
-  return new Response(body!.pipeThrough(new DecompressionStream("gzip")), { headers });
+export function unwrapped(text: string): Response {
+  const letters = atob(text), bytes = new Uint8Array(letters.length);
+  for (let k = 0; k < letters.length; k++) bytes[k] = letters.charCodeAt(k);
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+  return new Response(stream, { headers: { "Content-Type": "application/wasm" } });
 }
 
 export async function unpacked<T>(text: string): Promise<Pack<T>> {
-  const bytes = await (await unwrapped(text)).arrayBuffer(), length = Number(new BigUint64Array(bytes, 0, 1)[0]);
+  const bytes = await unwrapped(text).arrayBuffer(), length = Number(new BigUint64Array(bytes, 0, 1)[0]);
   const told = JSON.parse(new TextDecoder().decode(new Uint8Array(bytes, 8, length))) as T;
   return { told, piece: ([offset, size]) => new Uint8Array(bytes, 8 + length + offset, size) };
 }

@@ -35,9 +35,8 @@ export class Engine {
     };
   }
 
-  async load(): Promise<this> {
+  async load(): Promise<void> {
     this.mujoco = await this.call("load", packed("mujoco"), packed("kernel"));
-    return this;
   }
 
   /** Calls a function of the simulation and waits for its answer; throws an Error with the sentence of a refusal. */

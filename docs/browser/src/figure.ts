@@ -27,6 +27,7 @@ export class Figure {
   private scene!: SceneData;
   private step: StepData | null = null;
   private tasks = new Map<string, TaskData>();
+  private colours = new Map<string, string>();
   private changes = new Map<string, unknown>();
   private raw = new Map<string, number[]>();
   private running = false;
@@ -43,29 +44,29 @@ export class Figure {
   constructor(private root: HTMLElement, private engine: Engine, private asked: Asked) {}
 
   async open(): Promise<this> {
-    const { asked, engine } = this, pack = await unpacked<RobotData>(packed(`robot/${asked.robot}`));
-    const robot = this.robot = pack.told, { scene, step, tasks } = await this.opened(asked.assignments);
-    [this.scene, this.step] = [scene, step];
-    for (const each of asked.assignments) this.known(...split(each));
-    const colours = new Map<string, string>(), balls = new Map<string, string>();
-    scene.levels.forEach((level, k) => level.tasks.forEach((task) => {
-      this.tasks.set(task.name, task);
-      colours.set(task.name, LEVELS[k % 6]);
-      if (task.frame) balls.set(task.name, LEVELS[k % 6]);
-    }));
-    const draggable = tasks.filter(({ name, target }) => balls.has(name) && target === "position")
-      .map(({ name }) => ({ task: name, axes: this.tasks.get(name)!.axes }));
+    // The page prepares the picture while the thread compiles MuJoCo.
+    const { asked, engine } = this, loaded = engine.load(), pack = await unpacked<RobotData>(packed(`robot/${asked.robot}`));
+    const robot = this.robot = pack.told, opened = this.opened(asked.assignments);
     const drag = (task: string, place: number[]): void => {
       this.raw.set(task, place);
       this.panel.aimed(task, place);
       engine.tell("target", task, place);
     };
     try {
-      this.view = new View(pack, balls, new Set(draggable.map((each) => each.task)), drag);
+      this.view = new View(pack, drag);
     } catch {
       this.say("This browser has no WebGL, which the 3D view needs: plots and controls work without it.");
     }
-    this.plots = new Plots(tasks.map((task) => ({ ...task, colour: colours.get(task.name)! })), robot.joints.length);
+    const [{ scene, step, tasks }] = await Promise.all([opened, loaded]);
+    [this.scene, this.step] = [scene, step];
+    for (const each of asked.assignments) this.known(...split(each));
+    scene.levels.forEach((level, k) => level.tasks.forEach((task) => {
+      this.tasks.set(task.name, task);
+      this.colours.set(task.name, LEVELS[k % 6]);
+    }));
+    const draggable = tasks.filter(({ name, target }) => this.tasks.get(name)!.frame && target === "position")
+      .map(({ name }) => ({ task: name, axes: this.tasks.get(name)!.axes }));
+    this.plots = new Plots(tasks.map((task) => ({ ...task, colour: this.colours.get(task.name)! })), robot.joints.length);
     this.panel = new Panel(scene, robot, { set: (path, value) => this.set(path, value), target: drag,
       push: (joint, force) => engine.tell("push", joint, force, 0.1) }, draggable, asked.wide);
     engine.onFrame = (frame) => this.show(frame);
@@ -217,7 +218,7 @@ export class Figure {
       const filtered = here.map((own, a) => (place[a] < 0 ? own : value[place[a]]));
       const raw = this.raw.get(task)?.map((own, a) => (place[a] < 0 ? here[a] : own)) ?? filtered;
       if (!this.raw.has(task) && frame.restarted) this.panel.aimed(task, filtered);
-      this.view?.place(task, filtered, raw);
+      this.view?.place(task, this.colours.get(task)!, filtered, raw);
     }
     const slow = frame.running && frame.speed < 0.97 ? ` · time runs at ${frame.speed.toFixed(2)} × here` : "";
     this.status.textContent = `t = ${frame.t.toFixed(2)} s${frame.running ? "" : " · paused"}${slow}` +

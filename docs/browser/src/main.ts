@@ -11,7 +11,7 @@ let engine: Engine | null = null, shown: Figure | null = null;
 /** Opens a figure in an element; an earlier one on the page ends. */
 async function open(root: HTMLElement, asked: Asked): Promise<Figure> {
   engine?.end();
-  engine = await new Engine().load();
+  engine = new Engine();
   shown = await new Figure(root, engine, asked).open();
   return shown;
 }

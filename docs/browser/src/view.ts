@@ -35,8 +35,7 @@ export class View {
   private fitted = false;
 
   /** onMove is called with the place (m) to which the target of a task is moved. */
-  constructor(robot: Pack<RobotData>, colours: Map<string, string>, private draggable: Set<string>,
-    private onMove: (task: string, place: number[]) => void) {
+  constructor(robot: Pack<RobotData>, private onMove: (task: string, place: number[]) => void) {
     const { canvas, scene, camera } = this, { bodies } = robot.told;
     const planar = this.planar = bodies.every((body) => Math.abs(body.pos[2]) < 1e-6);
     const size = this.size = bodies.reduce((total, body) => total + Math.hypot(...body.pos), 0);
@@ -48,7 +47,6 @@ export class View {
     this.links = this.built(robot, null);
     this.ghosts = this.built(robot, GHOST);
     for (const each of this.ghosts) each.visible = false;
-    colours.forEach((colour, task) => this.balls.set(task, this.ball(task, colour)));
     camera.up.set(0, 0, 1);
     const controls = this.controls = new OrbitControls(camera, canvas);
     controls.target.copy(planar ? new Vector3(0.35 * size, 0, 0) : new Vector3(0.12 * size, 0, 0.4 * size));
@@ -90,7 +88,12 @@ export class View {
     const radius = 0.035 * Math.max(0.6, this.size), reach = matchMedia("(pointer: coarse)").matches ? 3 : 1.8;
     const raw = new Mesh(new SphereGeometry(reach * radius), new MeshBasicMaterial({ visible: false }));
     raw.add(new Mesh(new SphereGeometry(radius, 24, 16), new MeshStandardMaterial({ color: colour, transparent: true, opacity: 0.75 })));
-    return { task, raw, filtered: new Mesh(new SphereGeometry(0.45 * radius, 16, 12), new MeshBasicMaterial({ color: colour })) };
+    const filtered = new Mesh(new SphereGeometry(0.45 * radius, 16, 12), new MeshBasicMaterial({ color: colour }));
+    const ball = { task, raw, filtered };
+    this.scene.add(raw, filtered);
+    this.dragged.objects.push(raw);
+    this.balls.set(task, ball);
+    return ball;
   }
 
   show(frame: Frame): void {
@@ -106,13 +109,8 @@ export class View {
   }
 
   /** Where a target is, and where it was dragged to, m. */
-  place(task: string, filtered: number[], raw: number[]): void {
-    const ball = this.balls.get(task);
-    if (!ball) return;
-    if (!ball.raw.parent) {
-      this.scene.add(ball.raw, ball.filtered);
-      if (this.draggable.has(task)) this.dragged.objects.push(ball.raw);
-    }
+  place(task: string, colour: string, filtered: number[], raw: number[]): void {
+    const ball = this.balls.get(task) ?? this.ball(task, colour);
     ball.raw.position.fromArray(raw);
     ball.filtered.position.fromArray(filtered);
     this.draw();

@@ -20,7 +20,7 @@ const simulation = {
   /** Loads MuJoCo, compiled while it is decompressed, and the kernel; returns the version of MuJoCo. */
   async load(mujoco: string, controller: string): Promise<string> {
     const compiled = WebAssembly.compileStreaming(unwrapped(mujoco));
-    const create = await unwrapped(controller).then((told) => told.arrayBuffer()).then(kernel), module = await compiled;
+    const create = await kernel(await unwrapped(controller).arrayBuffer()), module = await compiled;
     const instantiateWasm = async (imports: WebAssembly.Imports, done: (made: WebAssembly.Instance) => void): Promise<void> =>
       done(await WebAssembly.instantiate(module, imports));
     tools = { create, mj: await loadMujoco({ instantiateWasm }) };
