@@ -9,14 +9,18 @@ import re
 import subprocess
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cache
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 from playwright.sync_api import Browser, Page
 
 from browsing.browser_actions import SLOW, eventually
+from browsing.firefox import Tab, firefox, missing
 from docs.figures import front
 from docs.figures.pack import Pack
 from docs.figures.scene import scene_data
@@ -25,10 +29,11 @@ from docs.pages import lessons
 from lessons.course import COURSE, load_lesson
 from lessons.events import MoveLevel, MoveTarget, Push, Set
 from lessons.replay.state import State, decode, encode
-from lessons.scenes.catalog import load_scene
+from lessons.scenes.catalog import as_torque_scene, load_scene
 from lessons.scenes.run_spec import RunSpec
 from lessons.scenes.torque_scene import TorqueScene
 from lessons.session.torque import TorqueSession
+from lessons.teaching.lesson import Lesson, Step
 
 pytestmark = [
     pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::PendingDeprecationWarning"),
@@ -45,11 +50,16 @@ STEPS = [
     for place in range(len(load_lesson(name).steps))
     if why_not(name, place) is None
 ]
+_LOAD = "(async () => { await (window.engine = new HIMPC.Engine()).load(); })()"
+_MOVED = """new Promise((done) => {
+  const look = () => (HIMPC.shown?.frame?.t > 0.1 ? drawn() : setTimeout(look, 50));
+  const drawn = () => requestAnimationFrame(() => setTimeout(done));
+  look();
+})"""
 _REPLAY = """async ([pack, robot, step, ticks]) => {
-  const scenes = await HIMPC.unwrapped(pack);
-  const given = HIMPC.unpacked(await HIMPC.unwrapped(`robot/${robot}`)).told;
-  await engine.ask({ kind: "open", scenes, robot: given, step, assignments: [] }, "opened", [scenes]);
-  const { tau, claims, prediction } = await engine.ask({ kind: "replay", ticks }, "replayed");
+  const { told: given } = await HIMPC.unpacked(HIMPC.packed(`robot/${robot}`));
+  await engine.call("open", { scenes: HIMPC.packed(pack), robot: given, step, assignments: [] });
+  const { tau, claims, prediction } = await engine.call("replay", ticks);
   const bytes = new Uint8Array(tau.buffer);
   let text = "";
   for (let k = 0; k < bytes.length; k += 32768) text += String.fromCharCode(...bytes.subarray(k, k + 32768));
@@ -58,20 +68,43 @@ _REPLAY = """async ([pack, robot, step, ticks]) => {
 
 
 @pytest.fixture(scope="module")
-def simulated(site: Path, browser: Browser) -> Iterator[Page]:
-    """A page from a file with all scripts of the live figures, and a thread that simulates."""
+def everything(site: Path) -> Iterator[str]:
+    """The address of a page on the disk with all scripts of the live figures."""
     scripts = "".join(
         f'<script src="live/{path.name}"></script>' for path in sorted((site / "live").glob("*.js"))
     )
     page = site / "everything.html"
     page.write_text(f"<!doctype html><meta charset=utf-8><body>{scripts}</body>", encoding="utf-8")
+    yield page.as_uri()
+    page.unlink()
+
+
+@pytest.fixture(scope="module")
+def simulated(everything: str, browser: Browser) -> Iterator[Page]:
+    """That page in Chromium, and a thread that simulates."""
     opened = browser.new_page()
     opened.set_default_timeout(SLOW)
-    opened.goto(page.as_uri())
-    opened.evaluate("async () => { window.engine = await new HIMPC.Engine().load(); }")
+    opened.goto(everything)
+    opened.evaluate(_LOAD)
     yield opened
     opened.close()
-    page.unlink()
+
+
+@pytest.fixture(scope="module")
+def in_firefox() -> Iterator[Tab]:
+    if (reason := missing()) is not None:
+        if os.environ.get("CI") == "true":
+            pytest.fail(reason)
+        pytest.skip(reason)
+    with firefox() as tab:
+        yield tab
+
+
+@pytest.fixture(scope="module")
+def simulated_in_firefox(everything: str, in_firefox: Tab) -> Tab:
+    in_firefox.goto(everything)
+    in_firefox.evaluate(_LOAD)
+    return in_firefox
 
 
 def torques(scene: TorqueScene, seconds: float) -> np.ndarray:
@@ -81,33 +114,51 @@ def torques(scene: TorqueScene, seconds: float) -> np.ndarray:
     return np.array([session.tick()[where].copy() for _ in range(round(seconds / scene.settings.T_s))])
 
 
-def replayed(page: Page, pack: str, robot: str, step: str | None, ticks: int) -> dict[str, Any]:
-    found: dict[str, Any] = page.evaluate(_REPLAY, [pack, robot, step, ticks])
+def parts_of(name: str) -> tuple[Lesson, Step]:
+    lesson = load_lesson(name.split("/")[0])
+    return lesson, lesson.steps[int(name.split("/")[1]) - 1]
+
+
+@cache
+def wanted(name: str) -> np.ndarray:
+    """The torques of two seconds of a live figure, `SCENE` or `LESSON/STEP`, computed once for both
+    browsers."""
+    if "/" not in name:
+        return torques(as_torque_scene(load_scene(name), "a test's"), SECONDS)
+    lesson, step = parts_of(name)
+    scene = as_torque_scene(scene_of_step(lesson, step), "a test's")
+    return torques(scene, min(SECONDS, step.duration) if name != UNSTABLE else 0.05)
+
+
+def replayed(page: Page | Tab, pack: str, robot: str, step: str | None, ticks: int) -> dict[str, Any]:
+    found: dict[str, Any] = page.evaluate(f"({_REPLAY})({json.dumps([pack, robot, step, ticks])})")
     tau = np.frombuffer(base64.b64decode(found["tau"])).reshape(ticks, -1)
     return {**found, "tau": tau, "claims": [float(each.replace("NaN", "nan")) for each in found["claims"]]}
+
+
+def figure(page: Page | Tab, name: str, ticks: int) -> dict[str, Any]:
+    """Returns what a browser computes of a live figure, `SCENE` or `LESSON/STEP`."""
+    if "/" not in name:
+        scene = as_torque_scene(load_scene(name), "a test's")
+        return replayed(page, f"scene/{name}", scene.robot.name, None, ticks)
+    lesson, step = parts_of(name)
+    return replayed(page, f"lesson/{lesson.name}", robot_of(lesson, step), name.split("/")[1], ticks)
 
 
 @pytest.mark.parametrize("name", front.TRIED)
 def test_the_page_computes_what_the_lab_computes(simulated: Page, name: str) -> None:
     """The torques of the scenes of Try it equal Python's in closed loop, also while the robot is pushed."""
-    scene = load_scene(name)
-    assert isinstance(scene, TorqueScene)
-    wanted = torques(scene, SECONDS)
-    found = replayed(simulated, f"scene/{name}", scene.robot.name, None, len(wanted))
-    assert np.abs(found["tau"] - wanted).max() < 1e-8
+    found = figure(simulated, name, len(wanted(name)))
+    assert np.abs(found["tau"] - wanted(name)).max() < 1e-8
 
 
 @pytest.mark.parametrize("name", STEPS)
 def test_a_live_step_is_the_step_of_the_lesson(simulated: Page, name: str) -> None:
     """The torques of two seconds equal Python's, and the claims that a browser judges hold in it."""
-    lesson, place = load_lesson(name.split("/")[0]), int(name.split("/")[1]) - 1
-    step = lesson.steps[place]
+    lesson, step = parts_of(name)
     scene = scene_of_step(lesson, step)
-    assert isinstance(scene, TorqueScene)
-    wanted = torques(scene, min(SECONDS, step.duration) if name != UNSTABLE else 0.05)
-    ticks = round(step.duration / scene.settings.T_s)
-    found = replayed(simulated, f"lesson/{lesson.name}", robot_of(lesson, step), str(place + 1), ticks)
-    assert np.abs(found["tau"][: len(wanted)] - wanted).max() < 1e-8
+    found = figure(simulated, name, round(step.duration / scene.settings.T_s))
+    assert np.abs(found["tau"][: len(wanted(name))] - wanted(name)).max() < 1e-8
     with_ghost = step.ghost is not None and not re.search("controller=(hqp|osf)", " ".join(step.ghost.set))
     seen = 0
     for claim, value in zip(step.claims, found["claims"], strict=True):
@@ -117,6 +168,23 @@ def test_a_live_step_is_the_step_of_the_lesson(simulated: Page, name: str) -> No
         else:
             assert np.isnan(value), claim.text
     assert seen
+
+
+@pytest.mark.parametrize("name", [*front.TRIED, *STEPS])
+def test_firefox_computes_what_the_lab_computes(simulated_in_firefox: Tab, name: str) -> None:
+    """The torques of two seconds of every live figure equal Python's."""
+    found = figure(simulated_in_firefox, name, len(wanted(name)))
+    assert np.abs(found["tau"] - wanted(name)).max() < 1e-8
+
+
+def test_firefox_draws_the_robot(site: Path, in_firefox: Tab) -> None:
+    """The page simulates in Firefox, and the ball of the first level is orange at the place that it has."""
+    in_firefox.goto((site / "try.html").as_uri() + "#planar3-hold")
+    in_firefox.evaluate(_MOVED)
+    picture = np.asarray(Image.open(BytesIO(in_firefox.screenshot())).convert("RGB"), float)
+    x, y = in_firefox.evaluate("HIMPC.shown.pixel('position')")
+    red, green, blue = picture[round(y), round(x)]
+    assert red > green + 30 > blue + 60
 
 
 def test_few_claims_are_left_to_the_lab() -> None:

@@ -18,20 +18,21 @@ export async function decode(code: string): Promise<State | null> {
   try {
     const text = atob(code.slice(PREFIX.length).replace(/-/g, "+").replace(/_/g, "/"));
     const bytes = await through(Uint8Array.from(text, (each) => each.charCodeAt(0)), new DecompressionStream("deflate"));
-    const given = JSON.parse(new TextDecoder().decode(bytes)) as State;
-    const list = given.a ?? [];
-    const fine = typeof given.s === "string" && Array.isArray(list) && list.length <= 500 && list.every((each) => typeof each === "string" && each.includes("="));
-    return fine ? given : null;
+    const given = JSON.parse(new TextDecoder().decode(bytes)) as State, list = given.a ?? [];
+    const short = typeof given.s === "string" && Array.isArray(list) && list.length <= 500;
+    return short && list.every((each) => typeof each === "string" && each.includes("=")) ? given : null;
   } catch {
     return null;
   }
 }
 
-export function parsed(value: string): unknown {
+/** Path and value of "PATH=VALUE". */
+export function split(assignment: string): [path: string, value: unknown] {
+  const at = assignment.indexOf("="), text = assignment.slice(at + 1);
   try {
-    return JSON.parse(value);
+    return [assignment.slice(0, at), JSON.parse(text)];
   } catch {
-    return value;
+    return [assignment.slice(0, at), text];
   }
 }
 

@@ -37,7 +37,7 @@ export interface SceneData {
   plant: PlantSettings; world: Floor[]; events: SceneEvent[]; images: Record<string, ImageData>;
 }
 
-export interface SignalData { name: string; unit: string; column: number | null; factor: number; words: string }
+export interface SignalData { name: string; column: number | null; factor: number }
 export interface MeasureData {
   signal: SignalData; statistic: string; after: number; until: number | null; over_ghost: boolean; unit: string;
 }
@@ -50,31 +50,27 @@ export interface PredictionData {
   low?: number; high?: number; factor?: number;
 }
 export interface StepData {
-  title: string; lesson: string; scene_name: string; robot_name: string | null; set: string[];
-  scene: SceneData; ghost: SceneData | null; ghost_words: string | null; ghost_set: string[]; ghost_missing: string | null;
-  claims: ClaimData[]; prediction: PredictionData | null; do: string;
+  lesson: string; scene_name: string; robot_name: string | null; set: string[]; scene: SceneData;
+  ghost: SceneData | null; ghost_words: string | null; ghost_set: string[]; ghost_missing: string | null;
+  claims: ClaimData[]; prediction: PredictionData | null;
 }
 
 /** A description with the pieces that it refers to. */
-export interface Pack<T> { told: T; piece(at: Piece): Uint8Array; bytes: ArrayBuffer }
+export interface Pack<T> { told: T; piece(at: Piece): Uint8Array }
+export interface Scenes { scene?: SceneData; steps?: Record<string, StepData> }
 
-declare global {
-  interface Window { HIMPC_PACKS?: Record<string, string> }
-}
-
-/** The bytes that a script gave to the page under a name. */
-export async function unwrapped(name: string): Promise<ArrayBuffer> {
-  const text = window.HIMPC_PACKS?.[name];
-  if (text === undefined) throw new Error(`the file with ${name} was not loaded`);
+/** What a script of the site holds, decompressed by the browser itself. */
+export function unwrapped(text: string): Response {
   const letters = atob(text), bytes = new Uint8Array(letters.length);
   for (let k = 0; k < letters.length; k++) bytes[k] = letters.charCodeAt(k);
-  return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+  return new Response(stream, { headers: { "Content-Type": "application/wasm" } });
 }
 
-export function unpacked<T>(bytes: ArrayBuffer): Pack<T> {
-  const length = Number(new BigUint64Array(bytes, 0, 1)[0]);
+export async function unpacked<T>(text: string): Promise<Pack<T>> {
+  const bytes = await unwrapped(text).arrayBuffer(), length = Number(new BigUint64Array(bytes, 0, 1)[0]);
   const told = JSON.parse(new TextDecoder().decode(new Uint8Array(bytes, 8, length))) as T;
-  return { told, bytes, piece: ([offset, size]) => new Uint8Array(bytes, 8 + length + offset, size) };
+  return { told, piece: ([offset, size]) => new Uint8Array(bytes, 8 + length + offset, size) };
 }
 
 export const each = (values: Numbers, n: number): number[] =>

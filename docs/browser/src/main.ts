@@ -1,8 +1,9 @@
 /** What pages call: a live figure in a lesson, and the page Try it. */
 import uPlotStyle from "uplot/dist/uPlot.min.css";
 import { decode, encode } from "./code";
-import { unpacked, unwrapped } from "./data";
-import { Engine, Figure, type Asked } from "./figure";
+import { unpacked } from "./data";
+import { Engine, packed } from "./engine";
+import { Figure, type Asked } from "./figure";
 import style from "./style.css";
 
 let engine: Engine | null = null, shown: Figure | null = null;
@@ -10,17 +11,15 @@ let engine: Engine | null = null, shown: Figure | null = null;
 /** Opens a figure in an element; an earlier one on the page ends. */
 async function open(root: HTMLElement, asked: Asked): Promise<Figure> {
   engine?.end();
-  engine = await new Engine().load();
+  engine = new Engine();
   shown = await new Figure(root, engine, asked).open();
   return shown;
 }
 
-const sheet = document.createElement("style");
-sheet.textContent = uPlotStyle + style;
-document.head.append(sheet);
+document.head.append(Object.assign(document.createElement("style"), { textContent: uPlotStyle + style }));
 
-const HIMPC = { open, decode, encode, unpacked, unwrapped, Engine, calm: () => matchMedia("(prefers-reduced-motion: reduce)").matches,
-  get shown() { return shown; } };
+const calm = (): boolean => matchMedia("(prefers-reduced-motion: reduce)").matches;
+const HIMPC = { open, decode, encode, unpacked, packed, Engine, calm, get shown() { return shown; } };
 declare global {
   interface Window { HIMPC: typeof HIMPC }
 }

@@ -1,59 +1,63 @@
 /** The controls: native inputs, so that every one works with keys. */
+import type { LevelData, Numbers, RobotData, SceneData } from "./data";
 import type { Frame } from "./messages";
-import type { LevelData, RobotData, SceneData } from "./data";
 
 export const LEVELS = ["#e27000", "#3079f0", "#258964", "#e700c6", "#ff2172", "#027d99"];
+const AXES = ["x", "y", "z"];
 
-export function element<K extends keyof HTMLElementTagNameMap>(tag: K, options: Partial<HTMLElementTagNameMap[K]> & { class?: string } = {},
+export function element<K extends keyof HTMLElementTagNameMap>(tag: K,
+  { class: className = "", ...given }: Partial<HTMLElementTagNameMap[K]> & { class?: string } = {},
   ...children: (Node | string)[]): HTMLElementTagNameMap[K] {
-  const { class: name, ...given } = options, made = document.createElement(tag);
-  Object.assign(made, given);
-  if (name) made.className = name;
+  const made = Object.assign(document.createElement(tag), { className }, given);
   made.append(...children);
   return made;
 }
 
-export const button = (words: string, act: () => void, title = words): HTMLButtonElement => {
-  const made = element("button", { type: "button", title, onclick: act }, words);
-  if (title !== words) made.setAttribute("aria-label", title);
-  return made;
+export const button = (words: string, onclick: () => void, title = words): HTMLButtonElement =>
+  element("button", { type: "button", title, onclick, ariaLabel: title === words ? null : title }, words);
+const group = (title: string, open: boolean, ...children: Node[]): HTMLElement =>
+  element("details", { open }, element("summary", {}, title), ...children);
+const boxed = (title: string, ...children: (Node | string)[]): HTMLElement =>
+  element("fieldset", {}, element("legend", {}, title), ...children);
+const small = (words: string): HTMLElement => element("p", { class: "hl-small" }, words);
+const choice = (ariaLabel: string, options: [value: string, words: string][], value: string): HTMLSelectElement => {
+  const made = element("select", { ariaLabel }, ...options.map(([value, words]) => element("option", { value }, words)));
+  return Object.assign(made, { value });
 };
 
-export interface Slider { root: HTMLElement; put(value: number): void }
-
 /** A slider; on a logarithmic scale if `log`. */
-export function slider(words: string, unit: string, low: number, high: number, value: number, log: boolean,
-  act: (value: number) => void): Slider {
-  const to = (each: number): number => (log ? Math.log10(each) : each), from = (each: number): number => (log ? 10 ** each : each);
-  const round = (each: number): number => Number(each.toPrecision(3));
-  const input = element("input", { type: "range", min: String(to(low)), max: String(to(high)), step: "any" });
-  input.step = String((to(high) - to(low)) / 200);
-  const shown = element("output"), root = element("label", { class: "hl-slider" }, element("span", {}, words), input, shown);
-  const tell = (each: number): void => {
-    shown.textContent = `${round(each)} ${unit}`.trim();
-    input.setAttribute("aria-valuetext", shown.textContent);
-  };
-  const put = (each: number): void => {
-    input.value = String(to(Math.min(Math.max(each, low), high)));
-    tell(each);
-  };
-  input.oninput = () => {
-    tell(from(Number(input.value)));
-    act(round(from(Number(input.value))));
-  };
-  put(value);
-  return { root, put };
+class Slider {
+  readonly root: HTMLElement;
+  private input = element("input", { type: "range" });
+  private shown = element("output");
+
+  constructor(words: string, private unit: string, private low: number, private high: number, value: Numbers,
+    private log: boolean, act: (value: number) => void = () => {}) {
+    const [min, max] = [this.to(low), this.to(high)].map(String), step = String((this.to(high) - this.to(low)) / 200);
+    Object.assign(this.input, { min, max, step, oninput: () => {
+      this.tell();
+      act(this.value);
+    } });
+    this.root = element("label", { class: "hl-slider" }, element("span", {}, words), this.input, this.shown);
+    this.put([value].flat()[0]);
+  }
+
+  get value(): number { return Number((this.log ? 10 ** Number(this.input.value) : Number(this.input.value)).toPrecision(3)); }
+  private to(value: number): number { return this.log ? Math.log10(value) : value; }
+  private tell(value = this.value): void {
+    this.shown.textContent = this.input.ariaValueText = `${Number(value.toPrecision(3))} ${this.unit}`.trim();
+  }
+
+  put(value: number): void {
+    this.input.value = String(this.to(Math.min(Math.max(value, this.low), this.high)));
+    this.tell(value);
+  }
 }
 
-export function checkbox(words: string, on: boolean, act: (on: boolean) => void): HTMLElement {
-  const input = element("input", { type: "checkbox", checked: on });
-  input.onchange = () => act(input.checked);
+function checkbox(words: string, on: boolean, act: (on: boolean) => void): HTMLElement {
+  const input = element("input", { type: "checkbox", checked: on, onchange: () => act(input.checked) });
   return element("label", { class: "hl-check" }, input, words);
 }
-
-const group = (title: string, open: boolean, ...children: Node[]): HTMLDetailsElement =>
-  element("details", { open }, element("summary", {}, title), ...children);
-const first = (value: number | number[]): number => (typeof value === "number" ? value : value[0]);
 
 export interface Acts {
   set(path: string, value: unknown): void;
@@ -64,95 +68,80 @@ export interface Acts {
 export class Panel {
   readonly root = element("div", { class: "hl-panel" });
   private list = element("ol", { class: "hl-levels" });
-  private horizon = element("select");
-  private sliders = new Map<string, Slider[]>();
+  private horizon: HTMLSelectElement;
+  private strict: boolean;
+  private targets = new Map<string, Map<string, Slider>>();
   private order: string[] = [];
-  private axes: Map<string, string>;
 
   constructor(private scene: SceneData, robot: RobotData, private acts: Acts, draggable: { task: string; axes: string }[], wide: boolean) {
-    const strict = scene.controller !== "weighted", { limits, plant } = scene, keys = Object.keys(scene.images);
+    const { limits, plant } = scene, keys = Object.keys(scene.images), strict = this.strict = scene.controller !== "weighted";
     const horizons = [...new Set(keys.map((key) => Number(key.split("|")[0])))].sort((a, b) => a - b);
-    const set = acts.set;
     const reach = robot.bodies.reduce((total, body) => total + Math.hypot(...body.pos), 0);
+    const number = (path: string, words: string, unit: string, low: number, high: number, value: Numbers, log = false): HTMLElement =>
+      new Slider(words, unit, low, high, value, log, (value) => acts.set(path, value)).root;
+    const on = (path: string, words: string, value: boolean): HTMLElement => checkbox(words, value, (on) => acts.set(path, on));
     const targets = draggable.map(({ task, axes }) => {
-      const made = [...axes].map((axis) => slider(`${axis}`, "m", -reach, reach, 0, false, () => this.aim(task)));
-      this.sliders.set(task, made);
-      return element("fieldset", {}, element("legend", {}, `Target of ${task}`), ...made.map((each) => each.root));
+      const aim = (): void => acts.target(task, AXES.map((axis) => made.get(axis)?.value ?? 0));
+      const made = new Map([...axes].map((axis) => [axis, new Slider(axis, "m", -reach, reach, 0, false, aim)]));
+      this.targets.set(task, made);
+      return boxed(`Target of ${task}`, ...[...made.values()].map((each) => each.root));
     });
-    this.axes = new Map(draggable.map(({ task, axes }) => [task, axes]));
-    const weights = (level: LevelData): HTMLElement => element("fieldset", {}, element("legend", {}, level.name),
-      slider("Q", "", 1, 2000, first(level.Q), true, (value) => set(`levels.${level.name}.Q`, value)).root,
-      ...(strict ? [slider("R", "", 0.1, 1000, first(level.R), true, (value) => set(`levels.${level.name}.R`, value)).root] : []),
-      ...level.tasks.flatMap((task) => task.unit ? [
-        slider("K_P", "1/s²", 0, 400, first(task.K_p), false, (value) => set(`tasks.${task.name}.K_p`, value)).root,
-        slider("K_V", "1/s", 0, 60, first(task.K_v), false, (value) => set(`tasks.${task.name}.K_v`, value)).root] : []));
-    horizons.forEach((N) => this.horizon.append(element("option", { value: String(N) }, String(N))));
-    this.horizon.value = String(scene.horizon);
-    this.horizon.setAttribute("aria-label", "N");
-    this.horizon.onchange = () => set("horizon", Number(this.horizon.value));
-    const orders = keys.length > horizons.length;
-    const joint = element("select"), force = slider("Force", "N", -200, 200, 60, false, () => {});
-    robot.joints.forEach((name, k) => joint.append(element("option", { value: String(k + 1), selected: k === robot.joints.length - 1 }, `link ${k + 1} (${name})`)));
-    joint.setAttribute("aria-label", "Pushed link");
-    const along = element("select", {}, ...["x", "y", "z"].map((axis) => element("option", { value: axis }, axis)));
-    along.setAttribute("aria-label", "Direction of the push");
-    const shove = (): void => {
-      const size = Number(force.root.querySelector("input")!.value);
-      acts.push(Number(joint.value), ["x", "y", "z"].map((axis) => (axis === along.value ? size : 0)));
-    };
+    const weights = ({ name, Q, R, tasks }: LevelData): HTMLElement => boxed(name,
+      number(`levels.${name}.Q`, "Q", "", 1, 2000, Q, true),
+      ...(strict ? [number(`levels.${name}.R`, "R", "", 0.1, 1000, R, true)] : []),
+      ...tasks.filter((task) => task.unit).flatMap((task) => [
+        number(`tasks.${task.name}.K_p`, "K_P", "1/s²", 0, 400, task.K_p),
+        number(`tasks.${task.name}.K_v`, "K_V", "1/s", 0, 60, task.K_v)]));
+    this.horizon = choice("N", horizons.map((N) => [String(N), String(N)]), String(scene.horizon));
+    this.horizon.onchange = () => acts.set("horizon", Number(this.horizon.value));
+    const joint = choice("Pushed link", robot.joints.map((name, k) => [String(k + 1), `link ${k + 1} (${name})`]), String(robot.joints.length));
+    const along = choice("Direction of the push", AXES.map((axis) => [axis, axis]), "x");
+    const force = new Slider("Force", "N", -200, 200, 60, false);
+    const push = (): void => acts.push(Number(joint.value), AXES.map((axis) => (axis === along.value ? force.value : 0)));
     this.root.append(
-      group("Levels, highest priority first", true, this.list, element("p", { class: "hl-small" }, !strict ?
-        "This controller weighs all levels: none can be switched or moved." : orders ? "" : "This figure has one order of its levels only.")),
+      group("Levels, highest priority first", true, this.list, small(!strict ?
+        "This controller weighs all levels: none can be switched or moved." : keys.length > horizons.length ? "" :
+        "This figure has one order of its levels only.")),
       ...(targets.length ? [group("Target", wide, ...targets)] : []),
       group("Controller", wide, element("label", { class: "hl-check" }, "N ", this.horizon),
-        element("span", { class: "hl-small" }, horizons.length > 1 ? " other N: in himpc-lab" : " one N only in this figure"),
-        slider("M̄ scale", "×", 0.1, 8, scene.M_bar_scale, true, (value) => set("M_bar_scale", value)).root),
+        small(horizons.length > 1 ? "other N: in himpc-lab" : "one N only in this figure"),
+        number("M_bar_scale", "M̄ scale", "×", 0.1, 8, scene.M_bar_scale, true)),
       group("Weights and gains", false, ...scene.levels.map(weights)),
-      group("Limits", false, checkbox("torque", limits.torque, (on) => set("limits.torque", on)),
-        slider("scale", "×", 0.05, 2, limits.torque_scale, true, (value) => set("limits.torque_scale", value)).root,
-        checkbox("velocity", limits.velocity, (on) => set("limits.velocity", on)),
-        slider("scale", "×", 0.05, 2, limits.velocity_scale, true, (value) => set("limits.velocity_scale", value)).root),
-      group("Robot", wide, slider("Payload", "kg", 0, 10, plant.payload_kg, false, (value) => set("plant.payload_kg", value)).root,
-        slider("Friction", "N·m", 0, 10, first(plant.friction), false, (value) => set("plant.friction", value)).root,
-        checkbox("gravity", plant.gravity, (on) => set("plant.gravity", on)),
-        element("fieldset", {}, element("legend", {}, "Push for 0.1 s"), "at ", joint, " along ", along,
-          force.root, button("Push", shove))),
+      group("Limits", false, on("limits.torque", "torque", limits.torque),
+        number("limits.torque_scale", "scale", "×", 0.05, 2, limits.torque_scale, true),
+        on("limits.velocity", "velocity", limits.velocity),
+        number("limits.velocity_scale", "scale", "×", 0.05, 2, limits.velocity_scale, true)),
+      group("Robot", wide, number("plant.payload_kg", "Payload", "kg", 0, 10, plant.payload_kg),
+        number("plant.friction", "Friction", "N·m", 0, 10, plant.friction), on("plant.gravity", "gravity", plant.gravity),
+        boxed("Push for 0.1 s", "at ", joint, " along ", along, force.root, button("Push", push))),
     );
-  }
-
-  private aim(task: string): void {
-    const values = this.sliders.get(task)!.map((each) => Number(each.root.querySelector("input")!.value)), axes = this.axes.get(task)!;
-    this.acts.target(task, ["x", "y", "z"].map((axis) => values[axes.indexOf(axis)] ?? 0));
   }
 
   /** Where a target was dragged to. */
   aimed(task: string, place: number[]): void {
-    const axes = this.axes.get(task) ?? "";
-    this.sliders.get(task)?.forEach((each, k) => each.put(place["xyz".indexOf(axes[k])]));
+    this.targets.get(task)?.forEach((slider, axis) => slider.put(place[AXES.indexOf(axis)]));
   }
 
-  show(frame: Frame): void {
-    if (this.horizon.value !== String(frame.horizon)) this.horizon.value = String(frame.horizon);
-    if (this.order.join() === frame.order.join()) return;
-    this.order = frame.order;
-    const strict = this.scene.controller !== "weighted", names = this.scene.levels.map((level) => level.name);
-    const here = document.activeElement?.getAttribute("aria-label");
-    this.list.replaceChildren(...frame.order.map((name, place) => {
-      const level = this.scene.levels[names.indexOf(name)], box = checkbox(name, level.enabled, (on) => {
-        level.enabled = on;
-        this.acts.set(`levels.${name}.enabled`, on);
-      });
-      (box.querySelector("input") as HTMLInputElement).disabled = !strict;
-      box.prepend(element("i", { class: "hl-mark", style: `background:${LEVELS[names.indexOf(name) % 6]}` } as never));
-      const move = (by: number): HTMLButtonElement => {
-        const to = [...frame.order];
-        to.splice(place + by, 0, ...to.splice(place, 1));
-        const made = button(by < 0 ? "▲" : "▼", () => this.acts.set("order", to.join(",")), `${name} ${by < 0 ? "up" : "down"}`);
-        made.disabled = !strict || !to.every(Boolean) || place + by < 0 || place + by >= to.length || !(`${frame.horizon}|${to.join(",")}` in this.scene.images);
+  show({ horizon, order }: Frame): void {
+    if (this.horizon.value !== String(horizon)) this.horizon.value = String(horizon);
+    if (this.order.join() === order.join()) return;
+    this.order = order;
+    const { levels, images } = this.scene, here = document.activeElement?.ariaLabel;
+    this.list.replaceChildren(...order.map((name, place) => {
+      const index = levels.findIndex((each) => each.name === name), mark = element("i", { class: "hl-mark" });
+      const box = checkbox(name, levels[index].enabled, (on) => this.acts.set(`levels.${name}.enabled`, on));
+      box.querySelector("input")!.disabled = !this.strict;
+      mark.style.background = LEVELS[index % 6];
+      box.prepend(mark);
+      const move = (by: number, sign: string, words: string): HTMLButtonElement => {
+        const to = order.with(place, order[place + by]);
+        to[place + by] = name;
+        const made = button(sign, () => this.acts.set("order", to.join(",")), `${name} ${words}`);
+        made.disabled = !this.strict || !(place + by in order) || !(`${horizon}|${to.join(",")}` in images);
         return made;
       };
-      return element("li", {}, box, move(-1), move(1));
+      return element("li", {}, box, move(-1, "▲", "up"), move(1, "▼", "down"));
     }));
-    if (here) (this.list.querySelector(`[aria-label="${here}"]`) as HTMLElement | null)?.focus();
+    if (here) this.list.querySelector<HTMLElement>(`[aria-label="${here}"]`)?.focus();
   }
 }

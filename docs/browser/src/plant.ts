@@ -1,6 +1,6 @@
 /** The robot in MuJoCo under torque control: robots/plant.py and robots/signals.py, without an altered diagonal. */
 import type { MainModule, MjData, MjModel } from "@mujoco/mujoco";
-import { each, limit, type Floor, type PlantSettings, type RobotData } from "./data";
+import { limit, type Floor, type PlantSettings, type RobotData } from "./data";
 import { mjcf } from "./model";
 
 const TIMESTEP = 1e-3, MEMORY_S = 1.5, SAMPLES_S = 0.3, BROKEN = 1e6;
@@ -52,25 +52,32 @@ export class Plant {
     this.samples = [[0, this.start.q]];
   }
 
-  /** The torque that keeps the robot where it is. */
-  private holding(): Vector {
+  /** What a copy of the state gives, of which positions have been computed. */
+  private probed<T>(act: (probe: MjData) => T): T {
     const probe = new this.mj.MjData(this.model);
     probe.qpos.set(this.data.qpos as Vector);
     this.mj.mj_fwdPosition(this.model, probe);
-    this.mj.mj_fwdVelocity(this.model, probe);
-    const found = Float64Array.from(probe.qfrc_bias.subarray(0, this.n) as Vector);
+    const found = act(probe);
     probe.delete();
     return found;
   }
 
+  /** The torque that keeps the robot where it is. */
+  private holding(): Vector {
+    return this.probed((probe) => {
+      this.mj.mj_fwdVelocity(this.model, probe);
+      return Float64Array.from(probe.qfrc_bias.subarray(0, this.n) as Vector);
+    });
+  }
+
   configure(settings: PlantSettings): void {
     this.settings = settings;
-    const kept = { t: this.t, q: this.q, v: this.v, a: Float64Array.from(this.data.qacc_warmstart as Vector) };
+    const { t, q, v } = this, warm = Float64Array.from(this.data.qacc_warmstart as Vector);
     this.build();
-    this.data.time = kept.t;
-    this.data.qpos.set(kept.q);
-    this.data.qvel.set(kept.v);
-    this.data.qacc_warmstart.set(kept.a);
+    this.data.time = t;
+    this.data.qpos.set(q);
+    this.data.qvel.set(v);
+    this.data.qacc_warmstart.set(warm);
     this.commands = this.commands.map(([t, tau]) => [t, this.clipped(tau)]);
     this.tau = this.clipped(this.tau);
     if (this.wrench) this.push(this.wrench.joint, this.wrench.values);
@@ -87,7 +94,7 @@ export class Plant {
   measure(period: number): [q: Vector, v: Vector] {
     const step = (this.settings.encoder_resolution_deg * Math.PI) / 180;
     if (!(step > 0)) return [this.q, this.v];
-    const [now, q] = this.samples[this.samples.length - 1], [then, before] = this.sampled(now - period), v = this.v;
+    const [now, q] = this.samples.at(-1)!, [then, before] = this.sampled(now - period), v = this.v;
     const rounded = q.map((value, a) => (this.robot.bodies[a].prismatic ? value : even(value / step) * step));
     return [rounded, v.map((value, a) => this.robot.bodies[a].prismatic ? value :
       (rounded[a] - even(before[a] / step) * step) / Math.max(now - then, 1e-9))];
@@ -95,13 +102,9 @@ export class Plant {
 
   private sampled(stamp: number): Stamped {
     if (stamp < -1e-9) return [stamp, this.start.q.map((value, a) => value + this.start.v[a] * stamp)];
-    let later = this.samples[this.samples.length - 1];
-    for (let k = this.samples.length - 1; k >= 0; k--) {
-      const sample = this.samples[k];
-      if (sample[0] <= stamp) return stamp - sample[0] <= later[0] - stamp ? sample : later;
-      later = sample;
-    }
-    return later;
+    const k = this.samples.findLastIndex(([t]) => t <= stamp), last = this.samples.length - 1;
+    const before = this.samples[Math.max(k, 0)], later = this.samples[Math.min(k + 1, last)];
+    return stamp - before[0] <= later[0] - stamp ? before : later;
   }
 
   step(tau: Vector, period: number): void {
@@ -111,13 +114,13 @@ export class Plant {
     const count = Math.max(1, Math.ceil(period / TIMESTEP - 1e-9)), h = period / count;
     this.model.opt.timestep = h;
     for (let k = 0; k < count; k++) {
-      const t = this.t, wanted = delay_ms > 0 ? this.delayed(t - 1e-3 * delay_ms + 0.5 * h) : this.commands[this.commands.length - 1][1];
+      const t = this.t, wanted = delay_ms > 0 ? this.delayed(t - 1e-3 * delay_ms + 0.5 * h) : this.commands.at(-1)![1];
       const share = torque_lag_ms > 0 ? 1 - Math.exp(-h / (1e-3 * torque_lag_ms)) : 1;
       this.tau = share === 1 ? wanted : this.tau.map((value, a) => value + share * (wanted[a] - value));
       this.data.ctrl.set(this.tau);
       const before = this.q;
       this.mj.mj_step(this.model, this.data);
-      if (!(this.v.reduce((most, value) => Math.max(most, Math.abs(value)), 0) < BROKEN) || !this.v.every(isFinite)) {
+      if (!this.v.every((value) => Math.abs(value) < BROKEN)) {
         this.data.qpos.set(before);
         this.data.qvel.fill(0);
         this.data.qacc_warmstart.fill(0);
@@ -131,20 +134,21 @@ export class Plant {
   }
 
   private delayed(stamp: number): Vector {
-    for (let k = this.commands.length - 1; k >= 0; k--) if (this.commands[k][0] <= stamp) return this.commands[k][1];
-    return this.commands[0][1];
+    return (this.commands.findLast(([t]) => t <= stamp) ?? this.commands[0])[1];
   }
 
-  /** M(q), row by row. */
-  massMatrix(): Vector {
-    const probe = new this.mj.MjData(this.model), M = new this.mj.DoubleBuffer(this.n * this.n);
-    probe.qpos.set(this.data.qpos as Vector);
-    this.mj.mj_fwdPosition(this.model, probe);
-    this.mj.mj_fullM(this.model, probe, M);
-    const found = Float64Array.from(M.GetView() as Vector);
-    M.delete();
-    probe.delete();
-    return found;
+  /** ‖I − M⁻¹M̄‖₂ and the spectral radius of I − M⁻¹M̄: robots/inertia.py. */
+  gauge(M_bar: number[]): [norm: number, radius: number] {
+    const { n, mj } = this, solved = new mj.DoubleBuffer(n * n), unit = (at: number): number => Number(at % (n + 1) === 0);
+    const diagonal = Array.from({ length: n * n }, (_, at) => unit(at) * M_bar[at % n]);
+    const ratio = this.probed((probe) => {
+      mj.mj_solveM(this.model, probe, solved, diagonal);
+      return Float64Array.from(solved.GetView() as Vector);
+    });
+    solved.delete();
+    // Row j of the ratio is column j of M⁻¹M̄; the symmetric M̄^½M⁻¹M̄^½ has its eigenvalues.
+    const root = (at: number): number => Math.sqrt(M_bar[at % n] / M_bar[Math.floor(at / n)]);
+    return [norm(ratio.map((value, at) => unit(at) - value), n), norm(ratio.map((value, at) => unit(at) - root(at) * value), n)];
   }
 
   /** Position and quaternion w x y z of the body of each joint at the last stage of the last step, (n, 7). */
@@ -171,4 +175,17 @@ function even(value: number): number {
   return value - down === 0.5 ? 2 * Math.round(down / 2) : Math.round(value);
 }
 
-export const perJoint = each;
+/** The largest singular value of an n × n matrix A: high powers of AᵀA keep its direction only. */
+function norm(A: Vector, n: number): number {
+  const gram = (B: Vector): Vector => B.map((_, at) => {
+    let total = 0;
+    for (let k = 0; k < n; k++) total += B[k * n + Math.floor(at / n)] * B[k * n + (at % n)];
+    return total;
+  });
+  const trace = (B: Vector): number => B.reduce((total, value, at) => total + (at % (n + 1) ? 0 : value), 0);
+  const squared = gram(A);
+  let power = squared;
+  for (let k = 0; k < 30 && trace(power) > 0; k++) power = gram(power.map((value) => value / trace(power)));
+  const along = power.reduce((total, value, at) => total + value * squared[at], 0);
+  return trace(power) > 0 ? Math.sqrt(along / trace(power)) : 0;
+}

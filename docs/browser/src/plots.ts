@@ -1,76 +1,63 @@
 /** Errors of the tasks, and torques and velocities within their bounds, over the last seconds. */
 import uPlot from "uplot";
 import type { Frame } from "./messages";
+import { element } from "./panel";
 
 const WINDOW_S = 8;
 const JOINTS = ["#d72626", "#e27000", "#258964", "#027d99", "#3079f0", "#e700c6", "#ff2172"];
 
-interface Drawn { plot: uPlot; data: number[][]; first: number; count: number; factors: number[] }
+interface Line { words: string; colour: string; factor: number }
 
 export class Plots {
-  readonly root = document.createElement("div");
-  private drawn: Drawn[] = [];
-  private stale = 0;
+  readonly root = element("div", { class: "hl-plots" });
+  private drawn: { plot: uPlot; data: number[][]; first: number; lines: Line[] }[] = [];
+  private frames = 0;
 
   constructor(tasks: { name: string; unit: string; colour: string }[], joints: number) {
-    this.root.className = "hl-plots";
-    const factor = (unit: string): number => (unit === "m" ? 1e3 : 180 / Math.PI);
-    const names = Array.from({ length: joints }, (_, k) => `joint ${k + 1}`), colours = names.map((_, k) => JOINTS[k % 7]);
-    this.add("Errors of the tasks, mm and °", tasks.map((each) => `${each.name}, ${each.unit === "m" ? "mm" : "°"}`),
-      tasks.map((each) => each.colour), 1, tasks.map((each) => factor(each.unit)), false);
-    this.add("Torques, % of their bounds", names, colours, 1 + tasks.length, names.map(() => 100), true);
-    this.add("Velocities, % of their bounds", names, colours, 1 + tasks.length + joints, names.map(() => 100), true);
+    const errors = tasks.map(({ name, unit, colour }) => unit === "m" ? { words: `${name}, mm`, colour, factor: 1e3 } :
+      { words: `${name}, °`, colour, factor: 180 / Math.PI });
+    const shares = Array.from({ length: joints }, (_, k) => ({ words: `joint ${k + 1}`, colour: JOINTS[k % 7], factor: 100 }));
+    this.add("Errors of the tasks, mm and °", 1, errors, (_, __, high) => [0, Math.max(1e-3, 1.1 * high)]);
+    for (const [k, what] of ["Torques", "Velocities"].entries()) this.add(`${what}, % of their bounds`, 1 + tasks.length + k * joints,
+      shares, (_, low, high) => [Math.min(-110, low), Math.max(110, high)], [100, -100]);
     new ResizeObserver(() => this.resize()).observe(this.root);
   }
 
-  private add(title: string, names: string[], colours: string[], first: number, factors: number[], bounded: boolean): void {
-    const box = document.createElement("figure"), words = document.createElement("figcaption");
-    words.textContent = title;
-    box.setAttribute("role", "group");
-    box.setAttribute("aria-label", title);
-    const legend = document.createElement("p");
-    legend.className = "hl-legend";
-    legend.append(...names.flatMap((name, k) => {
-      const mark = document.createElement("i"), text = document.createElement("span");
-      mark.style.background = colours[k];
-      text.append(mark, name);
-      return [text, " "];
+  private add(title: string, first: number, lines: Line[], range: uPlot.Range.Function, bounds: number[] = []): void {
+    const legend = element("p", { class: "hl-legend" }, ...lines.flatMap(({ words, colour }) => {
+      const mark = element("i");
+      mark.style.background = colour;
+      return [element("span", {}, mark, words), " "];
     }));
-    const style = getComputedStyle(document.body), ink = style.color, grid = { stroke: "rgba(128,128,128,.25)", width: 1 };
-    const axis = { stroke: ink, grid, ticks: grid, font: "11px sans-serif" };
-    const lines = bounded ? [100, -100] : [];
+    const box = element("figure", { role: "group", ariaLabel: title }, element("figcaption", {}, title));
+    const grid = { stroke: "rgba(128,128,128,.25)", width: 1 };
+    const axis = { stroke: getComputedStyle(document.body).color, grid, ticks: grid, font: "11px sans-serif" };
+    const curves = [...lines.map(({ colour }) => ({ stroke: colour, dash: [] as number[] })),
+      ...bounds.map(() => ({ stroke: "#8b95a1", dash: [6, 4] }))];
+    const data: number[][] = [[], ...curves.map(() => [])];
     const plot = new uPlot({
       width: 320, height: 150, legend: { show: false }, cursor: { show: false }, padding: [6, 6, 0, 0],
-      scales: { x: { time: false }, y: bounded ? { range: (_, low, high) => [Math.min(-110, low), Math.max(110, high)] } :
-        { range: (_, __, high) => [0, Math.max(1e-3, 1.1 * high)] } },
-      axes: [{ ...axis, size: 26 }, { ...axis, size: 46 }],
-      series: [{}, ...names.map((name, k) => ({ label: name, stroke: colours[k], width: 1.5, points: { show: false } })),
-        ...lines.map((value) => ({ label: `${value} %`, stroke: "#8b95a1", width: 1.5, dash: [6, 4], points: { show: false } }))],
-    }, [[], ...names.map(() => []), ...lines.map(() => [])] as unknown as uPlot.AlignedData, box);
-    box.prepend(words);
+      scales: { x: { time: false }, y: { range } }, axes: [{ ...axis, size: 26 }, { ...axis, size: 46 }],
+      series: [{}, ...curves.map((each) => ({ ...each, width: 1.5, points: { show: false } }))],
+    }, data as uPlot.AlignedData, box);
     box.append(legend);
     this.root.append(box);
-    this.drawn.push({ plot, data: [[], ...names.map((): number[] => []), ...lines.map((): number[] => [])], first, count: names.length, factors });
+    this.drawn.push({ plot, data, first, lines });
   }
 
-  clear(): void {
-    for (const each of this.drawn) for (const column of each.data) column.length = 0;
-  }
-
-  take(frame: Frame): void {
-    if (frame.restarted) this.clear();
-    const { curves, width } = frame;
-    for (const { data, first, count, factors } of this.drawn) {
-      for (let at = 0; at < curves.length; at += width) {
-        data[0].push(curves[at]);
-        for (let k = 0; k < count; k++) data[1 + k].push(factors[k] * curves[at + first + k]);
-        for (let k = 1 + count; k < data.length; k++) data[k].push(k === 1 + count ? 100 : -100);
-      }
-      const old = data[0].findIndex((t) => t >= frame.t - WINDOW_S);
-      if (old > 0) for (const column of data) column.splice(0, old);
-    }
+  take({ curves, width, restarted, running, t }: Frame): void {
     // A plot is drawn at every third frame: the eye sees no more of a curve that moves.
-    if (this.stale++ % 3 === 0 || !frame.running) for (const { plot, data } of this.drawn) plot.setData(data as unknown as uPlot.AlignedData);
+    const redrawn = this.frames++ % 3 === 0 || !running;
+    for (const { plot, data, first, lines } of this.drawn) {
+      if (restarted) for (const column of data) column.length = 0;
+      for (let at = 0; at < curves.length; at += width) {
+        const shown = lines.map(({ factor }, k) => factor * curves[at + first + k]);
+        [curves[at], ...shown, 100, -100].slice(0, data.length).forEach((value, k) => data[k].push(value));
+      }
+      const old = data[0].findIndex((each) => each >= t - WINDOW_S);
+      for (const column of data) column.splice(0, Math.max(old, 0));
+      if (redrawn) plot.setData(data as uPlot.AlignedData);
+    }
   }
 
   private resize(): void {

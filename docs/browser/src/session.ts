@@ -3,10 +3,11 @@ import type { MainModule } from "@mujoco/mujoco";
 import { ENABLED, FALLBACKS, GAINS, LIMITS, M_BAR, Q, R, TARGET, type Controller, type Manifest } from "../../../himpc/export/files/himpc.mjs";
 import { each, limit, type LevelData, type PlantSettings, type RobotData, type SceneData, type SceneEvent, type TaskData } from "./data";
 import { Plant } from "./plant";
-import { Rows, gauge } from "./rows";
+import { Rows } from "./rows";
 
 const TRUTH_TICKS = 20, LOST_SPEED = 20;
 const LIMIT_FIELDS: [string, number][] = [["tau_lower", 0], ["tau_upper", 1], ["v_limit", 2], ["q_lower", 6], ["q_upper", 7]];
+const LEVEL_FIELDS: Record<string, number> = { enabled: ENABLED, Q, R };
 
 export interface Tools {
   mj: MainModule;
@@ -48,17 +49,15 @@ export class Session {
   get order(): string[] { return this.key.split("|")[1].split(","); }
   level(name: string): LevelData { return named(this.scene.levels, name, "level"); }
   task(name: string): TaskData { return named(this.scene.levels.flatMap((level) => level.tasks), name, "task"); }
-  has(horizon: number, order: string[]): boolean { return `${horizon}|${order.join(",")}` in this.scene.images; }
 
   private controllerFor(key: string): [Controller, Manifest] {
-    const known = this.made.get(key);
-    if (known) return known;
-    const { manifest } = this.scene.images[key];
-    const arrays = manifest.arrays.map(([name, type, shape, offset]) => ({ name, type, shape, offset }));
-    const whole = { ...manifest, arrays };
-    const made: [Controller, Manifest] = [this.tools.create(this.tools.image(this.scene, key), whole), whole];
-    this.made.set(key, made);
-    return made;
+    if (!this.made.has(key)) {
+      const { manifest } = this.scene.images[key];
+      const arrays = manifest.arrays.map(([name, type, shape, offset]) => ({ name, type, shape, offset }));
+      const whole = { ...manifest, arrays };
+      this.made.set(key, [this.tools.create(this.tools.image(this.scene, key), whole), whole]);
+    }
+    return this.made.get(key)!;
   }
 
   private raw(task: number): Float64Array {
@@ -67,11 +66,12 @@ export class Session {
   }
 
   private layout(): [string, number][] {
-    const n = this.plant.n, one = ["t", "priority_leak", "gauge_norm", "gauge_radius", "unsolved", "late"];
-    const joint = ["q", "v", "tau", "tau_demand", "at_bound", "delta_tau", "tau_0", ...LIMIT_FIELDS.map(([name]) => name)];
-    return [...one.map((name): [string, number] => [name, 1]), ...joint.map((name): [string, number] => [name, n]),
-      ...this.manifest.tasks.flatMap((task): [string, number][] => [[`error/${task.name}`, task.rows], [`x/${task.name}`, task.rows]]),
-      ...this.manifest.levels.map((level): [string, number] => [`active/${level.name}`, 1])];
+    const wide = (names: string[], width: number): [string, number][] => names.map((name) => [name, width]);
+    return [...wide(["t", "priority_leak", "gauge_norm", "gauge_radius", "unsolved", "late"], 1),
+      ...wide(["q", "v", "tau", "tau_demand", "at_bound", "delta_tau", "tau_0"], this.plant.n),
+      ...wide(LIMIT_FIELDS.map(([name]) => name), this.plant.n),
+      ...this.manifest.tasks.flatMap((task) => wide([`error/${task.name}`, `x/${task.name}`], task.rows)),
+      ...wide(this.manifest.levels.map((level) => `active/${level.name}`), 1)];
   }
 
   reset(): void {
@@ -96,37 +96,29 @@ export class Session {
       this.plant.push(0, []);
       this.pushUntil = Infinity;
     }
-    const { plant, scene } = this, n = plant.n, T_s = scene.period, row = this.rows.next(), at = this.rows.count - 1;
-    const put = (name: string, values: ArrayLike<number>): void => row.set(values, this.rows.fields.get(name)![0]);
+    const { plant, scene, rows, controller } = this, n = plant.n, T_s = scene.period;
     const q = plant.q, v = plant.v, [q_measured, v_measured] = plant.measure(T_s), before = plant.tau;
-    const [found, fallback] = this.controller.tick(q_measured, v_measured, before), tau = Float64Array.from(found);
+    const [found, fallback] = controller.tick(q_measured, v_measured, before), tau = Float64Array.from(found);
     this.fallback = fallback;
-    const f = (name: string): Float64Array => this.controller.view(name);
-    if (this.ticks++ % TRUTH_TICKS === 0) this.truth = gauge(plant.massMatrix(), this.M_bar());
+    if (this.ticks++ % TRUTH_TICKS === 0) this.truth = plant.gauge(this.M_bar());
     const late = scene.deadline_ms > 0 && scene.deadline_ms < scene.solve_ms_per_knot * this.horizon - 1e-9;
-    put("t", [plant.t]);
-    put("q", q);
-    put("v", v);
-    put("tau_demand", tau);
-    put("tau_0", before);
-    put("at_bound", f("at_bound"));
-    put("delta_tau", f("delta_tau"));
-    put("priority_leak", f("priority_leak"));
-    put("gauge_norm", [this.truth[0]]);
-    put("gauge_radius", [this.truth[1]]);
-    put("late", [late ? 1 : 0]);
-    const limits = f("limits"), error = f("error"), value = f("value"), places = f("task"), rung = f("rung"), active = f("active");
-    for (const [name, place] of LIMIT_FIELDS) put(name, limits.subarray(place * n, (place + 1) * n));
-    for (const task of this.manifest.tasks) {
-      const first = Number(places[4 * task.index + 2]);
-      put(`error/${task.name}`, error.subarray(first, first + task.rows));
-      put(`x/${task.name}`, value.subarray(first, first + task.rows));
+    rows.next();
+    const put = (values: Record<string, ArrayLike<number>>): void => {
+      for (const name in values) rows.at(-1, name).set(values[name]);
+    };
+    const f = (name: string): Float64Array => controller.view(name), limits = f("limits"), rung = f("rung");
+    put({ t: [plant.t], q, v, tau_demand: tau, tau_0: before, at_bound: f("at_bound"), delta_tau: f("delta_tau"),
+      priority_leak: f("priority_leak"), gauge_norm: [this.truth[0]], gauge_radius: [this.truth[1]], late: [Number(late)] });
+    for (const [name, place] of LIMIT_FIELDS) put({ [name]: limits.subarray(place * n, (place + 1) * n) });
+    for (const { name, index, rows: wide } of this.manifest.tasks) {
+      const first = Number(f("task")[4 * index + 2]), of = (field: string) => f(field).subarray(first, first + wide);
+      put({ [`error/${name}`]: of("error"), [`x/${name}`]: of("value") });
     }
     const solved = this.solved();
-    solved.forEach((name, place) => put(`active/${name}`, [active[place]]));
-    put("unsolved", [FALLBACKS[fallback] === "hold" ? 1 : solved.filter((_, place) => rung[place] !== 0).length]);
+    solved.forEach((name, place) => put({ [`active/${name}`]: [f("active")[place]] }));
+    put({ unsolved: [FALLBACKS[fallback] === "hold" ? 1 : solved.filter((_, place) => rung[place] !== 0).length] });
     plant.step(this.applied(tau, late, before), T_s);
-    this.rows.at(at, "tau").set(plant.tau);
+    put({ tau: plant.tau });
     const wild = v.some((each, a) => !(Math.abs(each) <= LOST_SPEED * limit(this.robot.v_limit[a])));
     this.lost ||= plant.broken || wild;
   }
@@ -194,13 +186,9 @@ export class Session {
     } else if (head === "tasks" && (key === "K_p" || key === "K_v")) {
       this.task(name)[key] = value as number;
       this.sendGains(name);
-    } else if (head === "levels" && key === "enabled") {
-      this.level(name).enabled = value as boolean;
-      this.controller.set(ENABLED, named(this.manifest.levels, name, "level").index, [value ? 1 : 0]);
-    } else if (head === "levels" && (key === "Q" || key === "R")) {
-      this.level(name)[key] = value as number;
-      if (key === "Q") this.sendQ(name);
-      else this.sendR(name);
+    } else if (head === "levels" && key in LEVEL_FIELDS) {
+      Object.assign(this.level(name), { [key]: value });
+      this.sendLevel(LEVEL_FIELDS[key], name);
     } else throw new Error(`${path} cannot be changed here; himpc-lab can`);
   }
 
@@ -212,25 +200,23 @@ export class Session {
       this.controller.set(R, index, now.map((value, a) => weights[index * now.length + a] * (value / before[a]) ** 2));
   }
   private sendLimits(): void {
-    const { robot, scene: { limits } } = this, position = limits.position !== "off";
-    const rows = [robot.tau_limit.map((each) => (limits.torque ? limit(each) * limits.torque_scale : Infinity)),
-      robot.v_limit.map((each) => (limits.velocity ? limit(each) * limits.velocity_scale : Infinity)),
-      robot.q_lower.map((each) => (position ? limit(each, -1) : -Infinity)),
-      robot.q_upper.map((each) => (position ? limit(each) : Infinity))];
-    this.controller.set(LIMITS, 0, rows.flat());
+    const { robot, scene: { limits } } = this, ends = limits.position !== "off";
+    const scaled = (bounds: (number | null)[], on: boolean, scale: number, sign = 1): number[] =>
+      bounds.map((each) => (on ? limit(each, sign) * scale : sign * Infinity));
+    this.controller.set(LIMITS, 0, [...scaled(robot.tau_limit, limits.torque, limits.torque_scale),
+      ...scaled(robot.v_limit, limits.velocity, limits.velocity_scale),
+      ...scaled(robot.q_lower, ends, 1, -1), ...scaled(robot.q_upper, ends, 1)]);
   }
   private sendGains(name: string): void {
     const { index, rows } = named(this.manifest.tasks, name, "task"), { K_p, K_v } = this.task(name);
     this.controller.set(GAINS, index, [...each(K_p, rows), ...each(K_v, rows)]);
   }
-  private sendQ(name: string): void {
-    const { index, rows } = named(this.manifest.levels, name, "level");
-    this.controller.set(Q, index, each(this.level(name).Q, rows));
-  }
-  private sendR(name: string): void {
-    const M_bar = this.M_bar(), squared = this.scene.R_on === "acceleration";
-    const weights = each(this.level(name).R, M_bar.length).map((each, a) => each * (squared ? M_bar[a] ** 2 : 1));
-    this.controller.set(R, named(this.manifest.levels, name, "level").index, weights);
+  /** Sends Q or R of a level, or whether it is on. */
+  private sendLevel(what: number, name: string): void {
+    const { index, rows } = named(this.manifest.levels, name, "level"), level = this.level(name), M_bar = this.M_bar();
+    const squared = (a: number): number => (this.scene.R_on === "acceleration" ? M_bar[a] ** 2 : 1);
+    this.controller.set(what, index, what === ENABLED ? [Number(level.enabled)] : what === Q ? each(level.Q, rows) :
+      each(level.R, M_bar.length).map((value, a) => value * squared(a)));
   }
 
   /** Goes on with a controller of another order or N: himpc/tick/tick.py, `recall`. */
@@ -245,44 +231,39 @@ export class Session {
     this.sendM_bar(this.M_bar());
     this.sendLimits();
     for (const level of this.scene.levels) {
-      this.sendQ(level.name);
-      if (this.scene.controller !== "weighted") {
-        now.set(ENABLED, named(this.manifest.levels, level.name, "level").index, [level.enabled ? 1 : 0]);
-        this.sendR(level.name);
-      }
+      this.sendLevel(Q, level.name);
+      if (this.scene.controller !== "weighted") for (const what of [ENABLED, R]) this.sendLevel(what, level.name);
       for (const task of level.tasks) this.sendGains(task.name);
     }
     now.reset(this.plant.tau);
     for (const name of ["q_was", "v_was", "limits", "scalars", "state"]) f(name)[1].set(f(name)[0]);
-    const [was, path] = f("path"), [q_was] = f("q_was");
+    const [was, path] = f("path"), [q_was] = f("q_was"), [v_was] = f("v_was");
     for (let j = 0; j <= horizon; j++) for (let a = 0; a < n; a++) {
       if (N === horizon) path[j * n + a] = was[j * n + a];
       else if (j) {
-        const beyond = Math.max(0, j - N), step = N > 1 ? was[N * n + a] - was[(N - 1) * n + a] : this.scene.period * f("v_was")[0][a];
-        path[j * n + a] = was[Math.min(j, N) * n + a] + q_was[a] - was[n + a] + beyond * step;
+        const step = N > 1 ? was[N * n + a] - was[(N - 1) * n + a] : this.scene.period * v_was[a];
+        path[j * n + a] = was[Math.min(j, N) * n + a] + q_was[a] - was[n + a] + Math.max(0, j - N) * step;
       }
     }
-    const [, known] = f("known") as unknown as [BigInt64Array, BigInt64Array];
+    const known = now.view("known") as unknown as BigInt64Array, [U, U_was] = f("U_was"), size = N * n;
     known[0] = known[1] = 0n;
     (now.view("warm_count") as unknown as BigInt64Array).fill(0n);
-    const [U, U_was] = f("U_was"), size = N * n;
     if (N === horizon) this.solved().forEach((name, place) => {
       const from = solved.indexOf(name);
       if (from < 0) return;
       U_was.set(U.subarray(from * size, (from + 1) * size), place * size);
       known[1] = 1n;
     });
-    for (const task of this.manifest.tasks) {
-      const from = named(then.tasks, task.name, "task").index;
-      for (const name of ["raw", "target", "samples"]) {
-        const [a, b] = f(name), [wide, narrow] = [a.length / then.tasks.length, b.length / then.tasks.length];
-        b.set(a.subarray(from * wide, from * wide + Math.min(wide, narrow)), task.index * narrow);
+    for (const { name, index, rows } of this.manifest.tasks) {
+      const from = named(then.tasks, name, "task").index;
+      for (const array of ["raw", "target", "samples"]) {
+        const [a, b] = f(array), [wide, narrow] = [a.length / then.tasks.length, b.length / then.tasks.length];
+        b.set(a.subarray(from * wide, from * wide + Math.min(wide, narrow)), index * narrow);
       }
-      const target = now.view("target");
-      target[4 * task.index + 3] = Math.min(target[4 * task.index + 3], horizon + 1);
-      const [a, b] = f("weight"), [first, second] = f("task");
+      const target = now.view("target"), [a, b] = f("weight"), [first, second] = f("task");
+      target[4 * index + 3] = Math.min(target[4 * index + 3], horizon + 1);
       const start = Number(first[4 * from + 2]);
-      b.set(a.subarray(start, start + task.rows), Number(second[4 * task.index + 2]));
+      b.set(a.subarray(start, start + rows), Number(second[4 * index + 2]));
     }
   }
 

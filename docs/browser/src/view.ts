@@ -1,64 +1,69 @@
 /** The 3D view: the robot, its ghost, and targets that are dragged with mouse, touch or keys. */
 import {
   AmbientLight, BufferAttribute, BufferGeometry, Color, DirectionalLight, GridHelper, Group, HemisphereLight, Mesh,
-  MeshBasicMaterial, MeshStandardMaterial, PerspectiveCamera, Plane, Quaternion, Raycaster, Scene, SphereGeometry, Vector2,
-  Vector3, WebGLRenderer,
+  MeshBasicMaterial, MeshStandardMaterial, PerspectiveCamera, Scene, SphereGeometry, Vector3, WebGLRenderer,
 } from "three";
+import { DragControls } from "three/addons/controls/DragControls.js";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import type { Pack, RobotData } from "./data";
 import type { Frame } from "./messages";
+import { element } from "./panel";
 
 const GHOST = 0x7c5ce6, STEP = 0.02;
+type Moves = Record<string, [number, number, number]>;
+const MOVES: Moves = { ArrowLeft: [0, -1, 0], ArrowRight: [0, 1, 0], ArrowUp: [-1, 0, 0], ArrowDown: [1, 0, 0],
+  PageUp: [0, 0, 1], PageDown: [0, 0, -1] };
+const FLAT: Moves = { ArrowLeft: [-1, 0, 0], ArrowRight: [1, 0, 0], ArrowUp: [0, 1, 0], ArrowDown: [0, -1, 0] };
 
-interface Ball { task: string; raw: Mesh; filtered: Mesh; planar: boolean }
+/** The ball of a task: where its target is, and in what cannot be seen but grasped, where it was dragged to. */
+interface Ball { task: string; raw: Mesh; filtered: Mesh }
 
 export class View {
-  readonly canvas = document.createElement("canvas");
+  readonly canvas = element("canvas", { tabIndex: 0, role: "application", ariaLabel: "The robot. Arrow keys and Page Up, " +
+    "Page Down move the target by 2 cm; with Shift the arrow keys turn the camera; plus and minus move it closer or away." });
   private scene = new Scene();
   private camera = new PerspectiveCamera(42, 1, 0.02, 60);
-  private renderer: WebGLRenderer;
+  private renderer = new WebGLRenderer({ canvas: this.canvas, antialias: true, alpha: true });
   private controls: OrbitControls;
-  private links: Group[] = [];
-  private ghosts: Group[] = [];
+  private dragged = new DragControls([], this.camera, this.canvas);
+  private links: Group[];
+  private ghosts: Group[];
   private balls = new Map<string, Ball>();
-  private dragged: { ball: Ball; plane: Plane; offset: Vector3; id: number } | null = null;
-  private size = 1;
+  private planar: boolean;
+  private size: number;
   private planned = 0;
   private fitted = false;
-  /** Called with the place (m) to which the target of a task is moved. */
-  onMove: (task: string, place: number[]) => void = () => {};
 
-  constructor(robot: Pack<RobotData>, colours: Record<string, string>, private planar: boolean, private draggable: Set<string>) {
-    this.renderer = new WebGLRenderer({ canvas: this.canvas, antialias: true, alpha: true });
-    this.camera.up.set(0, 0, 1);
-    this.canvas.tabIndex = 0;
-    this.canvas.setAttribute("role", "application");
-    this.canvas.setAttribute("aria-label", "The robot. Arrow keys and Page Up, Page Down move the target by 2 cm; with Shift " +
-      "the arrow keys turn the camera; plus and minus move it closer or away.");
-    this.scene.add(new HemisphereLight(0xffffff, 0x8899aa, 1.6), new AmbientLight(0xffffff, 0.35));
-    const sun = new DirectionalLight(0xffffff, 1.8);
+  /** onMove is called with the place (m) to which the target of a task is moved. */
+  constructor(robot: Pack<RobotData>, private onMove: (task: string, place: number[]) => void) {
+    const { canvas, scene, camera } = this, { bodies } = robot.told;
+    const planar = this.planar = bodies.every((body) => Math.abs(body.pos[2]) < 1e-6);
+    const size = this.size = bodies.reduce((total, body) => total + Math.hypot(...body.pos), 0);
+    const sun = new DirectionalLight(0xffffff, 1.8), grid = new GridHelper(4, 16, 0x9aa4b0, 0xc9d0d8);
     sun.position.set(2, 1, 4);
-    const grid = new GridHelper(4, 16, 0x9aa4b0, 0xc9d0d8);
     grid.rotation.x = Math.PI / 2;
     grid.position.z = -0.002;
-    this.scene.add(sun, grid);
+    scene.add(new HemisphereLight(0xffffff, 0x8899aa, 1.6), new AmbientLight(0xffffff, 0.35), sun, grid);
     this.links = this.built(robot, null);
     this.ghosts = this.built(robot, GHOST);
     for (const each of this.ghosts) each.visible = false;
-    this.size = robot.told.bodies.reduce((total, body) => total + Math.hypot(...body.pos), 0);
-    this.controls = new OrbitControls(this.camera, this.canvas);
-    const middle = planar ? new Vector3(0.35 * this.size, 0, 0) : new Vector3(0.12 * this.size, 0, 0.4 * this.size);
+    camera.up.set(0, 0, 1);
+    const controls = this.controls = new OrbitControls(camera, canvas);
+    controls.target.copy(planar ? new Vector3(0.35 * size, 0, 0) : new Vector3(0.12 * size, 0, 0.4 * size));
     const from = planar ? new Vector3(0.1, -0.5, 1.5) : new Vector3(1.25, 0.95, 0.6);
-    this.controls.target.copy(middle);
-    this.camera.position.copy(middle).addScaledVector(from, (planar ? 1.1 : 0.8) * this.size);
-    this.controls.addEventListener("change", () => this.draw());
-    this.controls.update();
-    for (const [task, colour] of Object.entries(colours)) this.balls.set(task, this.ball(task, colour));
-    this.canvas.addEventListener("pointerdown", (event) => this.grab(event), { capture: true });
-    this.canvas.addEventListener("pointermove", (event) => this.drag(event));
-    for (const name of ["pointerup", "pointercancel"] as const) this.canvas.addEventListener(name, (event) => this.release(event));
-    this.canvas.addEventListener("keydown", (event) => this.key(event));
-    new ResizeObserver(() => this.fit()).observe(this.canvas);
+    camera.position.copy(controls.target).addScaledVector(from, (planar ? 1.1 : 0.8) * size);
+    controls.addEventListener("change", () => this.draw());
+    controls.update();
+    this.dragged.recursive = false;
+    this.dragged.addEventListener("dragstart", () => {
+      controls.enabled = false;
+      canvas.focus({ preventScroll: true });
+    });
+    this.dragged.addEventListener("drag", ({ object }) => this.drag(object as Mesh));
+    this.dragged.addEventListener("dragend", () => { controls.enabled = true; });
+    canvas.addEventListener("pointerdown", (event) => canvas.setPointerCapture(event.pointerId));
+    canvas.addEventListener("keydown", (event) => this.key(event));
+    new ResizeObserver(() => this.fit()).observe(canvas);
   }
 
   private built(robot: Pack<RobotData>, colour: number | null): Group[] {
@@ -80,19 +85,22 @@ export class View {
   }
 
   private ball(task: string, colour: string): Ball {
-    const radius = 0.035 * Math.max(0.6, this.size);
-    const raw = new Mesh(new SphereGeometry(radius, 24, 16), new MeshStandardMaterial({ color: colour, transparent: true, opacity: 0.75 }));
+    const radius = 0.035 * Math.max(0.6, this.size), reach = matchMedia("(pointer: coarse)").matches ? 3 : 1.8;
+    const raw = new Mesh(new SphereGeometry(reach * radius), new MeshBasicMaterial({ visible: false }));
+    raw.add(new Mesh(new SphereGeometry(radius, 24, 16), new MeshStandardMaterial({ color: colour, transparent: true, opacity: 0.75 })));
     const filtered = new Mesh(new SphereGeometry(0.45 * radius, 16, 12), new MeshBasicMaterial({ color: colour }));
-    raw.visible = filtered.visible = false;
+    const ball = { task, raw, filtered };
     this.scene.add(raw, filtered);
-    return { task, raw, filtered, planar: this.planar };
+    this.dragged.objects.push(raw);
+    this.balls.set(task, ball);
+    return ball;
   }
 
   show(frame: Frame): void {
     const place = (groups: Group[], poses: Float32Array): void => groups.forEach((group, k) => {
       const [x, y, z, w, i, j, l] = poses.subarray(7 * k, 7 * k + 7);
       group.position.set(x, y, z);
-      group.quaternion.copy(new Quaternion(i, j, l, w));
+      group.quaternion.set(i, j, l, w);
     });
     place(this.links, frame.poses);
     for (const each of this.ghosts) each.visible = frame.ghost !== null;
@@ -101,12 +109,10 @@ export class View {
   }
 
   /** Where a target is, and where it was dragged to, m. */
-  place(task: string, filtered: number[], raw: number[]): void {
-    const ball = this.balls.get(task);
-    if (!ball) return;
-    ball.raw.visible = ball.filtered.visible = true;
-    ball.raw.position.set(raw[0], raw[1], raw[2]);
-    ball.filtered.position.set(filtered[0], filtered[1], filtered[2]);
+  place(task: string, colour: string, filtered: number[], raw: number[]): void {
+    const ball = this.balls.get(task) ?? this.ball(task, colour);
+    ball.raw.position.fromArray(raw);
+    ball.filtered.position.fromArray(filtered);
     this.draw();
   }
 
@@ -130,63 +136,31 @@ export class View {
     this.draw();
   }
 
-  private ray(event: PointerEvent): Raycaster {
-    const box = this.canvas.getBoundingClientRect(), ray = new Raycaster();
-    const at = new Vector2((2 * (event.clientX - box.left)) / box.width - 1, 1 - (2 * (event.clientY - box.top)) / box.height);
-    ray.setFromCamera(at, this.camera);
-    return ray;
-  }
-
   pixel(task: string): [number, number] {
     const at = this.balls.get(task)!.raw.position.clone().project(this.camera), box = this.canvas.getBoundingClientRect();
     return [box.left + (0.5 + 0.5 * at.x) * box.width, box.top + (0.5 - 0.5 * at.y) * box.height];
   }
 
-  private grab(event: PointerEvent): void {
-    const ray = this.ray(event), reach = event.pointerType === "touch" ? 3 : 1.8;
-    const near = [...this.balls.values()].filter((ball) => ball.raw.visible && this.draggable.has(ball.task) &&
-      ray.ray.distanceToPoint(ball.raw.position) < reach * (ball.raw.geometry as SphereGeometry).parameters.radius);
-    if (!near.length) return;
-    const ball = near[0], normal = ball.planar ? new Vector3(0, 0, 1) : this.camera.getWorldDirection(new Vector3());
-    const plane = new Plane().setFromNormalAndCoplanarPoint(normal, ball.raw.position);
-    const hit = ray.ray.intersectPlane(plane, new Vector3()) ?? ball.raw.position;
-    this.dragged = { ball, plane, offset: ball.raw.position.clone().sub(hit), id: event.pointerId };
-    this.controls.enabled = false;
-    this.canvas.setPointerCapture(event.pointerId);
-    this.canvas.focus({ preventScroll: true });
-    event.stopImmediatePropagation();
-    event.preventDefault();
-  }
-
-  private drag(event: PointerEvent): void {
-    if (!this.dragged || event.pointerId !== this.dragged.id) return;
-    const hit = this.ray(event).ray.intersectPlane(this.dragged.plane, new Vector3());
-    if (hit) this.onMove(this.dragged.ball.task, hit.add(this.dragged.offset).toArray());
-  }
-
-  private release(event: PointerEvent): void {
-    if (event.pointerId !== this.dragged?.id) return;
-    this.dragged = null;
-    this.controls.enabled = true;
+  /** A ball was moved in a plane before the camera; that of a planar arm goes on along the camera's ray to its own plane. */
+  private drag({ position }: Mesh): void {
+    const { task, filtered } = [...this.balls.values()].find((each) => each.raw.position === position)!;
+    const eye = this.camera.position, ray = position.clone().sub(eye);
+    if (this.planar) position.copy(eye).addScaledVector(ray, (filtered.position.z - eye.z) / ray.z);
+    this.onMove(task, position.toArray());
   }
 
   private key(event: KeyboardEvent): void {
-    const moves: Record<string, [number, number, number]> = { ArrowLeft: [0, -1, 0], ArrowRight: [0, 1, 0], ArrowUp: [-1, 0, 0],
-      ArrowDown: [1, 0, 0], PageUp: [0, 0, 1], PageDown: [0, 0, -1] };
-    const flat: Record<string, [number, number, number]> = { ArrowLeft: [-1, 0, 0], ArrowRight: [1, 0, 0], ArrowUp: [0, 1, 0], ArrowDown: [0, -1, 0] };
-    const move = (this.planar ? flat : moves)[event.key], ball = [...this.balls.values()].find((each) => each.raw.visible && this.draggable.has(each.task));
-    const offset = this.camera.position.clone().sub(this.controls.target);
-    if (event.shiftKey && event.key.startsWith("Arrow")) {
-      const across = event.key === "ArrowLeft" ? -0.15 : event.key === "ArrowRight" ? 0.15 : 0;
-      const axis = across ? new Vector3(0, 0, 1) : new Vector3(0, 0, 1).cross(offset).normalize();
-      offset.applyAxisAngle(axis, across || (event.key === "ArrowUp" ? -0.1 : 0.1));
-      this.camera.position.copy(this.controls.target).add(offset);
-    } else if (event.key === "+" || event.key === "-") {
-      this.camera.position.copy(this.controls.target).addScaledVector(offset, event.key === "+" ? 0.9 : 1.1);
-    } else if (move && ball) {
-      this.onMove(ball.task, ball.raw.position.toArray().map((value, a) => value + STEP * move[a]));
-    } else return;
-    this.controls.update();
+    const { controls, planar } = this, [grasped] = this.dragged.objects;
+    const ball = [...this.balls.values()].find(({ raw }) => raw === grasped);
+    const move = (planar ? FLAT : MOVES)[event.key], arrow = move && event.key.startsWith("Arrow");
+    if (event.shiftKey && arrow) {
+      if (MOVES[event.key][1]) controls.rotateLeft(-0.15 * MOVES[event.key][1]);
+      else controls.rotateUp(-0.1 * MOVES[event.key][0]);
+    } else if (event.key === "+") controls.dollyIn(0.9);
+    else if (event.key === "-") controls.dollyOut(0.9);
+    else if (move && ball) this.onMove(ball.task, ball.raw.position.toArray().map((value, a) => value + STEP * move[a]));
+    else return;
+    controls.update();
     event.preventDefault();
   }
 }

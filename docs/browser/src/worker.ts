@@ -1,50 +1,82 @@
 /** The simulation, in a thread of its own: it keeps pace with the clock, or says how much slower it is. */
 import loadMujoco from "@mujoco/mujoco";
 import { FALLBACKS, kernel } from "../../../himpc/export/files/himpc.mjs";
-import { limit, unpacked, type Pack, type SceneData, type StepData } from "./data";
-import type { Frame, Open, ToPage, ToWorker } from "./messages";
+import { split } from "./code";
+import { limit, unpacked, unwrapped, type Scenes, type StepData } from "./data";
+import type { Call, Open, Opened, Told, Verdict } from "./messages";
 import { measured } from "./rows";
 import { Session, type Tools } from "./session";
 
 const FRAME_MS = 1000 / 60, BUSY_MS = 14, CURVE_S = 0.008;
 const NAMES = ["torque", "velocity", "position"];
-const post = (message: ToPage, moved: Transferable[] = []): void => (self as unknown as Worker).postMessage(message, moved);
+const post = (told: Told, moved: Transferable[] = []): void => (self as unknown as Worker).postMessage(told, moved);
 
 let tools: Omit<Tools, "image">;
-let session: Session | null = null, ghost: Session | null = null, step: StepData | null = null;
+let session: Session, ghost: Session | null = null, step: StepData | null = null;
 let running = false, judged = false, due = 0, last = 0, speed = 1, us = 0, drawn = 0, restarted = true, timer = 0;
 
-function open({ scenes, robot, step: number, assignments }: Open): void {
-  session?.delete();
-  ghost?.delete();
-  const pack = unpacked<{ scene?: SceneData; steps?: Record<string, StepData> }>(scenes) as Pack<{ scene?: SceneData; steps?: Record<string, StepData> }>;
-  const whole: Tools = { ...tools, image: (scene, key) => pack.piece(scene.images[key].memory) };
-  step = number === null ? null : pack.told.steps![number];
-  session = new Session(whole, step ? step.scene : pack.told.scene!, robot);
-  ghost = step?.ghost ? new Session(whole, step.ghost, robot) : null;
-  for (const each of assignments) {
-    const [path, value] = [each.slice(0, each.indexOf("=")), each.slice(each.indexOf("=") + 1)];
-    change(path, parsed(value));
-  }
-  running = judged = false;
-  restart();
-  const units = new Map(session.scene.levels.flatMap((level) => level.tasks).map((task) => [task.name, task.unit]));
-  post({ kind: "opened", tasks: session.manifest.tasks.filter((task) => units.has(task.name)).map((task) =>
-    ({ name: task.name, unit: units.get(task.name)!, target: task.target })) });
-  show();
-}
+/** What a page may call; each call ends before the next begins. */
+const simulation = {
+  /** Loads MuJoCo, compiled while it is decompressed, and the kernel; returns the version of MuJoCo. */
+  async load(mujoco: string, controller: string): Promise<string> {
+    const compiled = WebAssembly.compileStreaming(unwrapped(mujoco));
+    const create = await kernel(await unwrapped(controller).arrayBuffer()), module = await compiled;
+    const instantiateWasm = async (imports: WebAssembly.Imports, done: (made: WebAssembly.Instance) => void): Promise<void> =>
+      done(await WebAssembly.instantiate(module, imports));
+    tools = { create, mj: await loadMujoco({ instantiateWasm }) };
+    return tools.mj.mj_versionString();
+  },
 
-function parsed(value: string): unknown {
-  try {
-    return JSON.parse(value);
-  } catch {
-    return value;
-  }
-}
+  async open({ scenes, robot, step: number, assignments }: Open): Promise<Opened> {
+    const pack = await unpacked<Scenes>(scenes);
+    const whole: Tools = { ...tools, image: (scene, key) => pack.piece(scene.images[key].memory) };
+    session?.delete();
+    ghost?.delete();
+    step = number === null ? null : pack.told.steps![number];
+    const scene = step ? step.scene : pack.told.scene!;
+    session = new Session(whole, scene, robot);
+    ghost = step?.ghost ? new Session(whole, step.ghost, robot) : null;
+    for (const each of assignments) change(...split(each));
+    running = false;
+    restart();
+    const units = new Map(scene.levels.flatMap((level) => level.tasks).map((task) => [task.name, task.unit]));
+    const tasks = session.manifest.tasks.filter((task) => units.has(task.name));
+    return { scene, step, tasks: tasks.map(({ name, target }) => ({ name, target, unit: units.get(name)! })) };
+  },
+
+  run(): void {
+    clearTimeout(timer);
+    running = !session.lost;
+    pace();
+    loop();
+  },
+  pause(): void { running = false; },
+  reset(): void { restart(); },
+  set(path: string, value: unknown): void { change(path, value); },
+  target(task: string, value: number[]): void {
+    for (const each of both()) each.move(task, value);
+  },
+  push(joint: number, force: number[], seconds: number): void {
+    for (const each of both()) each.happen({ t: 0, event: "Push", joint, force, torque: [0, 0, 0], seconds });
+  },
+
+  /** The torques of so many periods from the start, row by row, and what they are judged to be. */
+  replay(ticks: number): { tau: Float64Array } & Verdict {
+    restart();
+    const n = session.plant.n, tau = new Float64Array(ticks * n);
+    for (let k = 0; k < ticks; k++) {
+      advance();
+      tau.set(session.rows.at(-1, "tau_demand"), k * n);
+    }
+    return { tau, ...verdict() };
+  },
+};
+export type Simulation = typeof simulation;
+
+const both = (): Session[] => (ghost ? [session, ghost] : [session]);
 
 function restart(): void {
-  session!.reset();
-  ghost?.reset();
+  for (const each of both()) each.reset();
   judged = false;
   drawn = 0;
   restarted = true;
@@ -57,117 +89,78 @@ function pace(): void {
 
 /** A setting of the run and of its ghost, unless it is one by which they differ. */
 function change(path: string, value: unknown): void {
-  session!.set(path, value);
+  session.set(path, value);
   if (ghost && !step!.ghost_set.includes(path)) ghost.set(path, value);
 }
 
-function tick(): void {
-  session!.tick();
-  while (ghost && ghost.t + ghost.scene.period <= session!.t + 1e-6) ghost.tick();
-  if (step && !judged && session!.t >= step.scene.duration - 1e-9) {
-    judged = true;
-    running = false;
-    post({ kind: "judged", ...verdict() });
-  }
+function advance(): void {
+  session.tick();
+  while (ghost && ghost.t + ghost.scene.period <= session.t + 1e-6) ghost.tick();
 }
 
-function verdict(): { claims: number[]; prediction: number } {
-  const of = (measure: StepData["claims"][0]["measure"]): number => measured(measure, session!.rows, ghost?.rows ?? null);
+function verdict(): Verdict {
+  const of = (measure: StepData["claims"][0]["measure"]): number => measured(measure, session.rows, ghost?.rows ?? null);
   return { claims: step ? step.claims.map((claim) => (claim.live ? of(claim.measure) : NaN)) : [],
     prediction: step?.prediction ? of(step.prediction.measure) : NaN };
 }
 
 /** Simulates up to the present, for a bounded time; what is not reached is left out, and time runs slower. */
 function loop(): void {
-  if (!session || !running) return;
-  const begun = performance.now();
+  if (!running) return;
+  const begun = performance.now(), { period } = session.scene;
   due += (begun - last) / 1000;
   last = begun;
   const wanted = due;
-  let done = 0, count = 0;
+  let count = 0;
   try {
     while (running && due > 0 && !session.lost && performance.now() - begun < BUSY_MS) {
-      tick();
-      due -= session.scene.period;
-      done += session.scene.period;
+      advance();
+      due -= period;
       count++;
+      if (!step || judged || session.t < step.scene.duration - 1e-9) continue;
+      judged = true;
+      running = false;
+      post({ verdict: verdict() });
     }
   } catch (error) {
     running = false;
-    post({ kind: "failed", words: String(error) });
+    post({ error: String(error) });
   }
   if (session.lost) running = false;
-  if (due > session.scene.period) due = 0;
-  if (wanted > 0) speed += 0.05 * (Math.min(1, done / wanted) - speed);
+  if (due > period) due = 0;
+  if (wanted > 0) speed += 0.05 * (Math.min(1, (count * period) / wanted) - speed);
   if (count) us += 0.1 * ((1e3 * (performance.now() - begun)) / count - us);
   show();
   if (running) timer = setTimeout(loop, Math.max(0, FRAME_MS - (performance.now() - begun))) as unknown as number;
 }
 
 function show(): void {
-  const { rows, plant, scene } = session!, n = plant.n, tasks = session!.manifest.tasks.filter((task) => rows.fields.has(`error/${task.name}`));
-  const every = Math.max(1, Math.round(CURVE_S / scene.period)), width = 1 + tasks.length + 2 * n;
-  const total = rows.count + rows.gone, first = Math.max(drawn, rows.gone), curves: number[] = [];
-  for (let k = Math.ceil(first / every) * every; k < total; k += every) {
-    const row = k - rows.gone, tau = rows.at(row, "tau"), v = rows.at(row, "v");
-    curves.push(rows.at(row, "t")[0], ...tasks.map((task) => Math.hypot(...rows.at(row, `error/${task.name}`))));
-    for (let a = 0; a < n; a++) curves.push(tau[a] / limit(session!.robot.tau_limit[a]));
-    for (let a = 0; a < n; a++) curves.push(v[a] / limit(session!.robot.v_limit[a]));
+  const { rows, plant, scene, robot, manifest } = session, n = plant.n;
+  const tasks = manifest.tasks.filter((task) => rows.has(`error/${task.name}`));
+  const every = Math.max(1, Math.round(CURVE_S / scene.period)), total = rows.count + rows.gone, curves: number[] = [];
+  for (let k = Math.ceil(Math.max(drawn, rows.gone) / every) * every; k < total; k += every) {
+    const at = (name: string): number[] => [...rows.at(k - rows.gone, name)];
+    curves.push(...at("t"), ...tasks.map((task) => Math.hypot(...at(`error/${task.name}`))),
+      ...at("tau").map((value, a) => value / limit(robot.tau_limit[a])),
+      ...at("v").map((value, a) => value / limit(robot.v_limit[a])));
   }
   drawn = total;
-  const at = rows.count ? rows.at(rows.count - 1, "at_bound") : new Float64Array(n);
-  const binding = [...at].flatMap((bits, a) => NAMES.filter((_, k) => bits > 0 && (bits & (1 << k))).map((name) => `joint ${a + 1}: ${name}`));
-  const targets = session!.manifest.tasks.flatMap((task) => {
-    const value = session!.target(task.name);
-    return value ? [{ task: task.name, kind: task.target, value: [...value] }] : [];
+  const binding = (rows.count ? [...rows.at(-1, "at_bound")] : []).flatMap((bits, a) =>
+    NAMES.filter((_, k) => bits > 0 && bits & (1 << k)).map((name) => `joint ${a + 1}: ${name}`));
+  const targets = manifest.tasks.flatMap(({ name: task, target: kind }) => {
+    const value = session.target(task);
+    return value ? [{ task, kind, value: [...value] }] : [];
   });
-  const frame: Frame = { kind: "frame", t: session!.t, running, poses: plant.poses(), ghost: ghost?.plant.poses() ?? null,
-    targets, curves: Float32Array.from(curves), width, binding, fallback: FALLBACKS[session!.fallback], speed, us,
-    order: session!.order, horizon: session!.horizon, lost: session!.lost, over: judged, restarted };
+  post({ frame: { t: session.t, running, poses: plant.poses(), ghost: ghost?.plant.poses() ?? null, targets, binding,
+    curves: Float32Array.from(curves), width: 1 + tasks.length + 2 * n, fallback: FALLBACKS[session.fallback], speed, us,
+    order: session.order, horizon: session.horizon, lost: session.lost, restarted } });
   restarted = false;
-  post(frame, [frame.poses.buffer, frame.curves.buffer]);
-}
-
-function replay(ticks: number): void {
-  restart();
-  const n = session!.plant.n, tau = new Float64Array(ticks * n), begun = performance.now();
-  for (let k = 0; k < ticks; k++) {
-    session!.tick();
-    while (ghost && ghost.t + ghost.scene.period <= session!.t + 1e-6) ghost.tick();
-    tau.set(session!.rows.at(session!.rows.count - 1, "tau_demand"), k * n);
-  }
-  post({ kind: "replayed", tau, ms: performance.now() - begun, ...verdict() }, [tau.buffer]);
-}
-
-async function take(message: ToWorker): Promise<void> {
-  switch (message.kind) {
-    case "load": {
-      const mj = await loadMujoco({ wasmBinary: message.mujoco, locateFile: () => "mujoco.wasm" });
-      tools = { mj, create: await kernel(message.kernel) };
-      return post({ kind: "ready", mujoco: mj.mj_versionString() });
-    }
-    case "open": return open(message);
-    case "replay": return replay(message.ticks);
-    case "run":
-      clearTimeout(timer);
-      running = !session!.lost;
-      pace();
-      return loop();
-    case "pause": running = false; break;
-    case "reset": restart(); break;
-    case "set": change(message.path, message.value); break;
-    case "target":
-      session!.move(message.task, message.value);
-      ghost?.move(message.task, message.value);
-      break;
-    case "push":
-      for (const each of ghost ? [session!, ghost] : [session!])
-        each.happen({ t: 0, event: "Push", joint: message.joint, force: message.force, torque: [0, 0, 0], seconds: message.seconds });
-  }
-  if (!running) show();
 }
 
 let turn = Promise.resolve();
-self.onmessage = (event: MessageEvent<ToWorker>) => {
-  turn = turn.then(() => take(event.data)).catch((error: Error) => post({ kind: "refused", words: error.message ?? String(error) }));
+self.onmessage = ({ data: { id, name, given } }: MessageEvent<Call>) => {
+  turn = turn.then(() => (simulation[name] as (...given: unknown[]) => unknown)(...given)).then((value) => {
+    post({ id, value });
+    if (!running && name !== "load") show();
+  }).catch((error: Error) => post({ id, error: error.message ?? String(error) }));
 };
