@@ -63,10 +63,12 @@ class ReportedObstacles:
                 wireframe=True,
                 cast_shadow=False,
             )
-        where = {f"{told.name}, as reported": told, true.name: true}
+        # The reported one is named at its foot, the true one at its top, and they do not hide each other.
         names = [
-            scene.add_label(f"{node}_name/{k}", text, position=_top(each), anchor="bottom-center")
-            for k, (text, each) in enumerate(where.items())
+            scene.add_label(
+                f"{node}_name/told", f"{told.name}, as reported", position=_end(told, -1), anchor="top-center"
+            ),
+            scene.add_label(f"{node}_name/true", true.name, position=_end(true, 1), anchor="bottom-center"),
         ]
         return [root, *names]
 
@@ -78,7 +80,8 @@ def _edges(box: Box) -> np.ndarray:
     return corners[np.array(pairs)].astype(np.float32)
 
 
-def _top(obstacle: Ball | Box) -> tuple[float, float, float]:
+def _end(obstacle: Ball | Box, side: int) -> tuple[float, float, float]:
+    """A point of the vertical through the centre, m: the lowest one (side −1), or one above the top (1)."""
     x, y, z = obstacle.centre
     half = 0.5 * obstacle.size[2] if isinstance(obstacle, Box) else obstacle.radius
-    return x, y, z + half + _ABOVE
+    return x, y, z + side * half + max(side, 0) * _ABOVE

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,6 +21,7 @@ from lessons.settings.obstacle_missions import CRATE
 from robots import InputError
 from robots.collision import Box
 
+ROOT = Path(__file__).parents[2]
 NAME = "ridgeback-ur10-perception"
 ON_THE_WAY = ("obstacles.crate=[1.9,0.3,0.25]", "report_offset=[0,1.1,0]")
 KEPT = 0.05 - 0.01
@@ -125,3 +128,26 @@ def test_wrong_settings_of_the_report_are_refused() -> None:
     with pytest.raises(InputError, match="report_start"):
         settings.changed("report_start", -1.0)
     assert settings.changed("report_offset.2", 0.5).value_at("report_offset") == (0.0, 0.5, 0.0)
+
+
+def test_the_results_page_has_what_is_measured() -> None:
+    """Each row of its table is a run."""
+    runs = {
+        "HTMPC": told(),
+        "HTMPC, base first": told("order=base,ee"),
+        "single task: the hand": told(controller="stmpc"),
+        "HTIDKC": told(controller="htidkc"),
+        "crate on the way": told(*ON_THE_WAY),
+        "crate on the way, corrected at 5 s": told(*ON_THE_WAY, "report_end=5"),
+        "crate on the way, corrected at 5.4 s": told(*ON_THE_WAY, "report_end=5.4"),
+    }
+    page = (ROOT / "docs/results.md").read_text(encoding="utf-8")
+    for name, found in runs.items():
+        base, hand = found["report"]["base"], found["report"]["ee"]
+        spans = [base[f"max_{span}_m"] for span in ("before", "wrong", "after")] + [base["end_m"]]
+        distances = [found["clearance_min_m"], found["clearance_reported_min_m"]]
+        lost = 1e3 * max(hand[f"max_{span}_m"] for span in ("before", "wrong", "after"))
+        (row,) = re.findall(rf"^\| {re.escape(name)} \| (.+) \|$", page, re.MULTILINE)
+        *metres, millimetres = (float(cell.replace("−", "-")) for cell in row.split(" | "))
+        assert metres == pytest.approx([*distances, *spans], rel=0.01, abs=2e-3), name
+        assert millimetres == pytest.approx(lost, rel=0.02, abs=0.2), name
