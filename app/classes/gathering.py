@@ -120,9 +120,10 @@ class Gathering:
 
     # ---------------------------------------------------------------- the members
 
-    def entered(self, who: str, kind: Kind, now: float) -> Gathering:
-        """The class with one more member, or with one who came back. Raises InputError if it is full; a phone
-        that left without a vote makes room."""
+    def entered(self, who: str, kind: Kind, now: float, account: str = "") -> Gathering:
+        """The class with one more member, or with one who came back. account: with which they signed in,
+        their name unless the class goes without names. Raises InputError if the class is full; a phone that
+        left without a vote makes room."""
         known = self.members.get(who)
         if known is not None:
             return self if known.here else self._with(who, replace(known, here=True))
@@ -136,17 +137,23 @@ class Gathering:
                 raise InputError(f"this class has {MEMBERS} people, and takes no more")
             members = {one: each for one, each in members.items() if one != gone}
         number = 1 + max((each.number for each in members.values()), default=0)
-        return replace(self, members={**members, who: Member(number, kind, now)})
+        account = account if self.named else ""
+        member = Member(number, kind, now, account=account).named(account)
+        return replace(self, members={**members, who: member})
 
     def left(self, who: str) -> Gathering:
         """The class after a page was closed. Votes and progress stay."""
         known = self.members.get(who)
         return self if known is None or not known.here else self._with(who, replace(known, here=False))
 
-    def succeeded(self, who: str, before: Sequence[str]) -> Gathering:
-        """The class after a learner who had left came back under another identity."""
-        old = next((one for one in reversed(before) if one in self.members), who)
-        if old == who or self.members[old].here or who in self.members:
+    def succeeded(self, who: str, before: Sequence[str], account: str = "") -> Gathering:
+        """The class after a learner who had left came back under another identity: a browser that they had
+        before, or any browser with their account."""
+        members, account = self.members, account if self.named else ""
+        theirs = [one for one, each in members.items() if account and each.account == account]
+        known = [*theirs, *(one for one in before if one in members and members[one].account == account)]
+        old = next((one for one in reversed(known) if not members[one].here), who)
+        if old == who or who in members:
             return self
         members = {who if one == old else one: each for one, each in self.members.items()}
         past = tuple(replace(held, poll=_handed_on(held.poll, old, who)) for held in self.past)
@@ -154,9 +161,12 @@ class Gathering:
         return replace(self, members=members, past=past, poll=poll)
 
     def called(self, who: str, name: str) -> Gathering:
-        """The class after a member typed a name, which is ignored if the class goes without names."""
+        """The class after a member typed a name, which is ignored if the class goes without names, or if they
+        signed in under another one."""
         known = self.members.get(who)
-        return self if known is None or not self.named else self._with(who, known.named(name))
+        if known is None or known.account or not self.named:
+            return self
+        return self._with(who, known.named(name))
 
     def voted(self, who: str, answer: object, now: float) -> Gathering:
         """The class after a vote. Raises InputError if it cannot be counted."""

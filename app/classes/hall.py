@@ -165,11 +165,11 @@ class Hall:
         with self._lock:
             self._state = self._state.called(who, name)
 
-    def recognise(self, who: str, before: Sequence[str]) -> None:
+    def recognise(self, who: str, before: Sequence[str], account: str = "") -> None:
         """Gives a learner who comes back with another robot their votes and progress. before: the identities
-        that their browser had."""
+        that their browser had; account: with which they signed in."""
         with self._lock:
-            self._state = self._state.succeeded(who, before)
+            self._state = self._state.succeeded(who, before, account)
 
     def name_of(self, who: str) -> str:
         """The name that a member typed; "" if there is none."""
@@ -238,7 +238,7 @@ class Hall:
             if not learner.attached:
                 return
             try:
-                self._state = self._state.entered(learner.token, "robot", now)
+                self._state = self._state.entered(learner.token, "robot", now, learner.account)
             except InputError:
                 return
             lecture, here = self._lecture_of(learner), learner.choice.exercise

@@ -49,6 +49,8 @@ class SimulationClient(Simulation):
         self.choice = self._start_choice = choice
         self.attached = False
         self.left_at = time.monotonic()
+        self.account = ""
+        """The name with which the learner signed in at the proxy; "" if there is none."""
         self.ghost: GhostClient | None = None
         self.lecture: Lecture | None = None
         self.kept_at: LessonPlace | None = None

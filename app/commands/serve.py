@@ -88,10 +88,10 @@ def serve(
         raise InputError("--own-files DIR and --no-own-files contradict each other: leave one out")
     if no_names and not class_:
         raise InputError("--no-names is for a class: add --class, or leave it out")
-    if class_ and proxy_only:
+    if class_ and proxy_only and not trusted_origin:
         raise InputError(
-            "--class and --proxy-only contradict each other: the pages of a class have addresses of their "
-            "own, for which no proxy vouches; leave one out"
+            "--class with --proxy-only needs the address of the proxy, where teacher and phones open their "
+            "pages: add it, e.g. --trusted-origin https://lab.example.org"
         )
     if not 0.0 <= drain <= 3600.0:
         raise InputError(f"--drain {drain}: give a time from 0 to 3600 s")

@@ -70,7 +70,7 @@ class Classroom:
         """Whether this is the instructor's token, compared in constant time."""
         return secrets.compare_digest(token.encode(errors="replace"), self.token.encode())
 
-    def enter(self, tokens: Sequence[str], refuse: Refuse) -> SimulationClient:
+    def enter(self, tokens: Sequence[str], refuse: Refuse, account: str = "") -> SimulationClient:
         """Returns the session itself to a visitor with the token, otherwise a `Watcher`."""
         if self._all_steer or any(map(self.is_right, tokens)):
             return self._learner

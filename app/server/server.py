@@ -80,6 +80,7 @@ class PageServer:
         local = host in _LOOPBACK
         self.public = not local or bool(trusted)
         """Whether other people than the users of this machine can reach the page."""
+        self.proxy_only = proxy_only
         self.guard = ConnectionGuard(Door())
         self.sessions = Classroom(choice, all_steer) if classroom else Sessions(choice, max_sessions, grace)
         self._own_files, self._key, self._refers = own_files, key, refers
@@ -125,7 +126,7 @@ class PageServer:
     def link(self) -> str:
         """The link for the person who started the server, with the owner's secret; without a secret,
         `guest_link`."""
-        return self.passes.link(self.url, "owner")
+        return self.passes.link(self._entrance, "owner")
 
     @property
     def guest_link(self) -> str:
@@ -135,7 +136,12 @@ class PageServer:
     @property
     def first_link(self) -> str:
         """The page that opens at the start: the teacher's of a class, else that of a robot."""
-        return self.passes.link(self.url, "owner", "" if self.hall is None else TEACHER)
+        return self.passes.link(self._entrance, "owner", "" if self.hall is None else TEACHER)
+
+    @property
+    def _entrance(self) -> str:
+        """The address that the person who started the server can open."""
+        return self.outside if self.proxy_only else self.url
 
     @property
     def teachers_link(self) -> str:

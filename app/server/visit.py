@@ -29,7 +29,7 @@ from app.server import place
 from app.server.budget import UPLOADS
 from app.server.classroom import Classroom, Watcher
 from app.server.guard import GuardedConnection
-from app.server.sessions import Sessions
+from app.server.sessions import Sessions, tokens_of
 from app.server.uploads import Uploads
 from app.server.workers import Workers
 from lessons.own.folder import Folder
@@ -91,7 +91,9 @@ class Visit:
         self._teaches = isinstance(connection, GuardedConnection) and connection.teaches
         self._account = connection.account if isinstance(connection, GuardedConnection) else ""
         # Pages of all accounts of a hub have one origin, so that a browser stores their values in one place.
-        self._progress_key = f"{_PROGRESS}-{self._account}" if self._account else _PROGRESS
+        self._progress_key, self._tokens_key = (
+            f"{key}-{self._account}" if self._account else key for key in (_PROGRESS, _TOKENS)
+        )
         if isinstance(connection, GuardedConnection):
             connection.refuse = partial(inlet.say, "Not taken")
             connection.uploads = Uploads(
@@ -107,7 +109,7 @@ class Visit:
         size = f"{here}-window"
         private.run_script(self._client, place.asking(here))
         private.run_script(self._client, ASK_WINDOW % (STORED, size))
-        keys = (_TOKENS, _DARK, self._progress_key, MOTION, here, size)
+        keys = (self._tokens_key, _DARK, self._progress_key, MOTION, here, size)
         self._asking = asyncio.ensure_future(private.read_storage(self._client, keys, STORAGE))
         try:
             found = await self._asking
@@ -126,7 +128,7 @@ class Visit:
             self._key,
             self._account,
         )
-        self._then(_tokens(tokens), kept)
+        self._then(tokens_of(tokens), kept)
         self._watch()
 
     def leave(self) -> None:
@@ -158,19 +160,22 @@ class Visit:
             watching.close()
         hall = self._hall
         leads = hall is not None and self._teaches
-        learner = hall.robot if hall is not None and leads else self._sessions.enter(tokens, self._refuse)
+        if hall is not None and leads:
+            learner = hall.robot
+        else:
+            learner = self._sessions.enter(tokens, self._refuse, self._account)
         if learner is None:
             self._turn_away(tokens, kept)
             return
         if hall is not None and not leads and not isinstance(learner, Watcher):
-            hall.recognise(learner.token, tokens)
+            hall.recognise(learner.token, tokens, self._account)
         if isinstance(self._sessions, Sessions) and not leads and learner.token not in tokens:
             before = place.read(kept, self._sessions.start)
             if before is not None:
                 learner.load(before)
                 self._client.add_notification(*_GOES_ON, color="green", auto_close_seconds=8.0)
         others = [token for token in tokens if token != learner.token][-7:]
-        self._keep(_TOKENS, json.dumps([*others, learner.token] if learner.token else others))
+        self._keep(self._tokens_key, json.dumps([*others, learner.token] if learner.token else others))
         self._page = Page(
             self._client,
             learner,
@@ -230,8 +235,10 @@ class Visit:
         hall = self._hall
         if hall is not None and not leads:
             watches = isinstance(learner, Watcher)
-            call = None if watches or not hall.state.named else partial(hall.call, learner.token)
-            card = ClassCard(gui, hall.name_of(learner.token), call, partial(hall.fetch, learner.token))
+            name = (self._account if hall.state.named else "") or hall.name_of(learner.token)
+            asked = hall.state.named and not watches and not self._account
+            call = partial(hall.call, learner.token) if asked else None
+            card = ClassCard(gui, name, call, partial(hall.fetch, learner.token))
             self._seat = f"watcher {id(self)}" if watches else learner.token
             hall.seats.sit(self._seat, card.show)
         if isinstance(learner, Watcher):
@@ -285,12 +292,3 @@ class Visit:
         connection = private.connection_of(self._server, self._client)
         if self._page is None and connection is not None:
             connection.transport.abort()
-
-
-def _tokens(stored: str | None) -> list[str]:
-    """Reads tokens from the browser's storage, whose content is not trusted."""
-    try:
-        found = json.loads(stored or "[]")
-    except (ValueError, RecursionError):
-        return []
-    return [token for token in found if isinstance(token, str)][-8:] if isinstance(found, list) else []

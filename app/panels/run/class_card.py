@@ -28,12 +28,14 @@ class ClassCard:
     def __init__(
         self, gui: viser.GuiApi, name: str, call: Callable[[str], object] | None, fetch: Callable[[], object]
     ) -> None:
-        """name: what the learner typed before; call: takes a new name, None if nobody is asked; fetch:
-        brings this page to the step of the class."""
+        """name: with which the learner signed in, or what they typed before; call: takes a new name, None if
+        nobody is asked; fetch: brings this page to the step of the class."""
         self._text = gui.add_html(block("<b>Class.</b> Wait for your teacher."))
         self._back = gui.add_button("Go to the class's step", visible=False)
         on_click(self._back, fetch)
-        if call is not None:
+        if call is None and name:
+            gui.add_html(block(f"Your teacher sees your account, <b>{esc(name)}</b>."))
+        elif call is not None:
             typed = gui.add_text(_NAME, name, hint="Only your teacher sees it; you can leave it out.")
 
             @typed.on_update
