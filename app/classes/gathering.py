@@ -43,6 +43,7 @@ class Gathering:
         everywhere: whether the step runs on all pages; otherwise on the teacher's robot alone.
         members: by an identity that only their page and the server know.
         past: earlier votes.
+        visits: how often the class has gone to a step; runs: how often it has run the present one since.
     """
 
     named: bool = True
@@ -54,6 +55,8 @@ class Gathering:
     everywhere: bool = True
     members: Mapping[str, Member] = field(default_factory=dict)
     past: tuple[Held, ...] = ()
+    visits: int = 0
+    runs: int = 0
 
     @property
     def stage(self) -> Stage:
@@ -76,7 +79,8 @@ class Gathering:
 
     def going_to(self, place: LessonPlace) -> Gathering:
         """The class at another step, or at the same one from its beginning."""
-        return replace(self, place=place, poll=None, truth=math.nan, running=False, past=self.votes)
+        fresh = replace(self, place=place, poll=None, truth=math.nan, running=False, past=self.votes)
+        return replace(fresh, visits=self.visits + 1, runs=0)
 
     def opened(self) -> Gathering:
         """The class with an open vote, its first or its second. Raises InputError if there is nothing to vote
@@ -96,9 +100,8 @@ class Gathering:
         """The class while its step runs; this closes the vote. Raises InputError without a step."""
         if self.place is None:
             raise InputError("choose a step first")
-        return replace(
-            self, running=True, truth=math.nan, poll=None if self.poll is None else self.poll.closed()
-        )
+        poll = None if self.poll is None else self.poll.closed()
+        return replace(self, running=True, truth=math.nan, poll=poll, runs=self.runs + 1)
 
     def measured(self, truth: float) -> Gathering:
         """The class after the run. truth: the measured number; NaN if the step measures none."""
@@ -124,9 +127,12 @@ class Gathering:
         """The class with one more member, or with one who came back. account: with which they signed in,
         their name unless the class goes without names. Raises InputError if the class is full; a phone that
         left without a vote makes room."""
-        known = self.members.get(who)
+        known, account = self.members.get(who), account if self.named else ""
+        if known is not None and (known.here, known.account) == (True, account):
+            return self
         if known is not None:
-            return self if known.here else self._with(who, replace(known, here=True))
+            known = known if known.account == account else replace(known, account=account).named(account)
+            return self._with(who, replace(known, here=True))
         members = self.members
         if len(members) >= MEMBERS:
             voted = {voter for held in self.votes for votes in held.poll.rounds for voter in votes}
@@ -137,7 +143,6 @@ class Gathering:
                 raise InputError(f"this class has {MEMBERS} people, and takes no more")
             members = {one: each for one, each in members.items() if one != gone}
         number = 1 + max((each.number for each in members.values()), default=0)
-        account = account if self.named else ""
         member = Member(number, kind, now, account=account).named(account)
         return replace(self, members={**members, who: member})
 
@@ -184,12 +189,34 @@ class Gathering:
             return self
         member = known.seen(at, lecture, now)
         after = self if member is known else self._with(who, member)
-        if lecture is None or lecture.exercise != self.place or self.poll is None or not self.poll.is_open:
-            return after
+        return (
+            after
+            if lecture is None or lecture.exercise != self.place
+            else after._expecting(who, lecture.answer, now)
+        )
+
+    def told(
+        self,
+        who: str,
+        at: LessonPlace | None,
+        done: Mapping[LessonPlace, tuple[int, int]],
+        answer: object,
+        since: float,
+    ) -> Gathering:
+        """The class after another server told of a learner; as `seen`. answer: their prediction; since: when
+        they last did anything, s."""
+        known = self.members[who]
+        member = replace(known, at=at, done={**known.done, **done}, since=since)
+        return self._with(who, member)._expecting(who, answer, since)
+
+    def _expecting(self, who: str, answer: object, now: float) -> Gathering:
+        """The class after a look at a prediction, which is a vote while one is open."""
+        if answer is None or self.poll is None or not self.poll.is_open:
+            return self
         try:
-            return after if lecture.answer is None else after.voted(who, lecture.answer, now)
+            return self.voted(who, answer, now)
         except InputError:
-            return after  # there are too many voters, which their page need not know
+            return self  # there are too many voters, which their page need not know
 
     def _with(self, who: str, member: Member) -> Gathering:
         return replace(self, members={**self.members, who: member})

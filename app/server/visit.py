@@ -37,7 +37,7 @@ from lessons.replay.progress import LearnerProgress
 from lessons.replay.progress import found as found_progress
 
 if TYPE_CHECKING:  # a class computes: the server listens before that is loaded
-    from app.classes.hall import Hall
+    from app.classes.room import Room
 
 STORAGE = 5.0
 """Time, s, within which a browser must send the values that it has stored."""
@@ -61,16 +61,16 @@ class Visit:
         sessions: Sessions | Classroom,
         own_files: Folder | None,
         key: bytes | None = None,
-        hall: Hall | None = None,
+        room: Room | None = None,
         refers: bool = False,
     ) -> None:
         """own_files: folder of the files that the owner's page may name; key: signs the learners' progress;
-        hall: the class, if there is one; refers: a page for which there is no place connects again, perhaps
+        room: the class, if there is one; refers: a page for which there is no place connects again, perhaps
         with another server."""
         self._server = server
         self._client = client
         self._sessions = sessions
-        self._own_files, self._key, self._hall, self._refers = own_files, key, hall, refers
+        self._own_files, self._key, self._room, self._refers = own_files, key, room, refers
         self._page: Page | None = None
         self._left = False
         self._seat = ""
@@ -158,17 +158,15 @@ class Visit:
         watching, self._page = self._page, None
         if watching is not None:  # the page has only watched so far
             watching.close()
-        hall = self._hall
-        leads = hall is not None and self._teaches
-        if hall is not None and leads:
-            learner = hall.robot
-        else:
-            learner = self._sessions.enter(tokens, self._refuse, self._account)
+        room = self._room
+        guide = room.guide if room is not None and self._teaches else None
+        leads = guide is not None
+        learner = guide or self._sessions.enter(tokens, self._refuse, self._account)
         if learner is None:
             self._turn_away(tokens, kept)
             return
-        if hall is not None and not leads and not isinstance(learner, Watcher):
-            hall.recognise(learner.token, tokens, self._account)
+        if room is not None and not leads and not isinstance(learner, Watcher):
+            room.recognise(learner.token, tokens, self._account)
         if isinstance(self._sessions, Sessions) and not leads and learner.token not in tokens:
             before = place.read(kept, self._sessions.start)
             if before is not None:
@@ -194,8 +192,8 @@ class Visit:
         if page is not None:
             page.close()
             self._sessions.leave(page.learner)
-        if self._hall is not None:
-            self._hall.seats.rise(self._seat)
+        if self._room is not None:
+            self._room.seats.rise(self._seat)
         self._workers.shutdown(wait=False, cancel_futures=True)
 
     # ---------------------------------------------------------------- where the page is
@@ -232,15 +230,16 @@ class Visit:
 
     def _greet(self, learner: SimulationClient, leads: bool, gui: viser.GuiApi) -> None:
         """Adds the input for the instructor's token to a page that only watches, and what a class says."""
-        hall = self._hall
-        if hall is not None and not leads:
+        room = self._room
+        if room is not None and not leads:
             watches = isinstance(learner, Watcher)
-            name = (self._account if hall.state.named else "") or hall.name_of(learner.token)
-            asked = hall.state.named and not watches and not self._account
-            call = partial(hall.call, learner.token) if asked else None
-            card = ClassCard(gui, name, call, partial(hall.fetch, learner.token))
+            named = room.state.named
+            name = (self._account if named else "") or room.name_of(learner.token)
+            asked = named and not watches and not self._account
+            call = partial(room.call, learner.token) if asked else None
+            card = ClassCard(gui, name, call, partial(room.fetch, learner.token))
             self._seat = f"watcher {id(self)}" if watches else learner.token
-            hall.seats.sit(self._seat, card.show)
+            room.seats.sit(self._seat, card.show)
         if isinstance(learner, Watcher):
             add_watching(gui, self._take_token)
 
