@@ -105,9 +105,9 @@ class Branch(Room):
         )
 
     def code_of(self, who: str) -> str:
-        """The code of a learner's state; "" if there is none. It waits for the learner's robot."""
+        """The code of a learner's state; "" if there is none."""
         learner = next((each for each in self._learners() if each.token == who), None)
-        told = None if learner is None else learner.ask()
+        told = None if learner is None else learner.latest()
         try:
             return "" if told is None else code_of(told)
         except InputError:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection
 
 PATIENCE = 10.0
 """Time, s, after which a robot that is not ready no longer keeps the next one waiting."""
@@ -15,7 +15,7 @@ class BuildQueue:
         """at_once: the number of robots that are built at the same time."""
         self._at_once = at_once
         self._waiting: list[str] = []
-        self._building: dict[str, tuple[int, float]] = {}  # scenes loaded before, and when it began
+        self._building: dict[str, float] = {}  # when it began, s
 
     def clear(self) -> None:
         """Nobody waits any more. Robots that are being built still count until they are ready."""
@@ -36,17 +36,14 @@ class BuildQueue:
         """Whether somebody waits for a robot, or for its being ready."""
         return who in self._building or who in self._waiting
 
-    def next(self, loaded: Mapping[str, int], now: float) -> list[str]:
-        """Whose robots are to be built now. loaded: by learner, the scenes loaded so far; now: s."""
+    def next(self, ready: Collection[str], now: float) -> list[str]:
+        """Whose robots are to be built now. ready: those whose robots are at the class's step; now: s."""
         self._building = {
-            who: (before, since)
-            for who, (before, since) in self._building.items()
-            if loaded.get(who) == before and now - since < PATIENCE
+            who: since for who, since in self._building.items() if who not in ready and now - since < PATIENCE
         }
-        self._waiting = [who for who in self._waiting if who in loaded]
         room = max(0, self._at_once - len(self._building))
         chosen, self._waiting = self._waiting[:room], self._waiting[room:]
-        self._building |= {who: (loaded[who], now) for who in chosen}
+        self._building |= dict.fromkeys(chosen, now)
         return chosen
 
     def before(self) -> dict[str, int]:

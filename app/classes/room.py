@@ -18,8 +18,9 @@ from robots import InputError
 
 RATE = 5.0
 """Looks at the learners, Hz."""
-BUILDS = os.cpu_count() or 1
-"""Robots that are built at once when the class goes to another step: more would keep everybody waiting."""
+BUILDS = 2 * (os.cpu_count() or 1)
+"""Robots that are built at once when the class goes to another step; the others wait for their turn."""
+_TURN = 0.05  # s between two checks whose turn it is
 _LOADING = 30.0  # s after which a step that was not loaded is loaded again
 
 
@@ -129,10 +130,12 @@ class Room(ABC):
 
     def _follow(self) -> None:
         due = time.monotonic()
-        while not self._closed.wait(max(0.02, due - time.monotonic())):
-            due = max(due, time.monotonic() - 1 / RATE) + 1 / RATE
-            self._look()
-            self._hear()
+        while not self._closed.wait(min(_TURN, max(0.02, due - time.monotonic()))):
+            self._build()
+            if time.monotonic() >= due:
+                due = max(due, time.monotonic() - 1 / RATE) + 1 / RATE
+                self._look()
+                self._hear()
 
     def _look(self) -> None:
         learners, now = self._learners(), time.monotonic()
@@ -143,17 +146,29 @@ class Room(ABC):
             for who, member in self._state.members.items():
                 if member.kind == "robot" and member.here and who not in here:
                     self._state = self._state.left(who)
-            next_ones = self._builds.next({each.token: each.changed for each in learners}, now)
-            place, before = self._state.place, self._builds.before()
-        for learner in learners:
-            if learner.token in next_ones and place is not None:
-                with self._lock:
-                    self._led[learner.token] = learner.lecture, now
-                learner.load_for_class(learner.choice.at(place))
+            before = self._builds.before()
+        self._build()
         self.seats.show(self.state, before, self._cut_off)
+
+    def _build(self) -> None:
+        """Brings the next learners to the class's step."""
+        if not self._builds.before():
+            return
+        learners, now = self._learners(), time.monotonic()
+        with self._lock:
+            for who in set(self._builds.before()) - {each.token for each in learners}:
+                self._builds.leave(who)
+            chosen = self._builds.next({each.token for each in learners if self._arrived(each)}, now)
+            place = self._state.place
+            coming = [] if place is None else [each for each in learners if each.token in chosen]
+            self._led |= {each.token: (each.lecture, now) for each in coming}
+        for learner in coming:
+            assert place is not None
+            learner.load_for_class(learner.choice.at(place))
 
     def _look_at(self, learner: SimulationClient, now: float) -> None:
         with self._lock:
+            learner.give_way()
             if not learner.attached:
                 self._builds.leave(learner.token)
                 return
@@ -175,6 +190,13 @@ class Room(ABC):
             self._led[learner.token] = None, now
             if here != place or (lecture is not None and lecture.attempt > 0):
                 self._builds.enter(learner.token)
+
+    def _arrived(self, learner: SimulationClient) -> bool:
+        """Whether a robot that was led has reached the class's step, and has not run it."""
+        lecture, led = learner.lecture, self._led.get(learner.token)
+        if lecture is None or led is None or lecture is led[0]:
+            return False
+        return (lecture.exercise, lecture.attempt) == (self._state.place, 0)
 
     def _lecture_of(self, learner: SimulationClient) -> Lecture | None:
         """The run of a learner's step; None while the step that the class chose is being loaded."""

@@ -37,7 +37,19 @@ def _of_the_session(name: str) -> property:
 
 for _name in (
     *("ready", "status", "settings", "failure", "changed", "tape", "score", "record", "choice", "lecture"),
-    *("ghost", "pid", "quiet", "trouble", "settings_of", "choice_of", "lecture_of", "read", "look", "ask"),
+    *(
+        "ghost",
+        "pid",
+        "quiet",
+        "trouble",
+        "settings_of",
+        "choice_of",
+        "lecture_of",
+        "read",
+        "look",
+        "ask",
+        "latest",
+    ),
 ):
     setattr(Watcher, _name, _of_the_session(_name))
 for _name in ("send", "start_ghost", "stop_ghost", "reset_all", "load", "restart"):
