@@ -43,6 +43,7 @@ class Gathering:
         everywhere: whether the step runs on all pages; otherwise on the teacher's robot alone.
         members: by an identity that only their page and the server know.
         past: earlier votes.
+        visits: how often the class has gone to a step; runs: how often it has run the present one since.
     """
 
     named: bool = True
@@ -54,6 +55,8 @@ class Gathering:
     everywhere: bool = True
     members: Mapping[str, Member] = field(default_factory=dict)
     past: tuple[Held, ...] = ()
+    visits: int = 0
+    runs: int = 0
 
     @property
     def stage(self) -> Stage:
@@ -76,7 +79,8 @@ class Gathering:
 
     def going_to(self, place: LessonPlace) -> Gathering:
         """The class at another step, or at the same one from its beginning."""
-        return replace(self, place=place, poll=None, truth=math.nan, running=False, past=self.votes)
+        fresh = replace(self, place=place, poll=None, truth=math.nan, running=False, past=self.votes)
+        return replace(fresh, visits=self.visits + 1, runs=0)
 
     def opened(self) -> Gathering:
         """The class with an open vote, its first or its second. Raises InputError if there is nothing to vote
@@ -96,9 +100,8 @@ class Gathering:
         """The class while its step runs; this closes the vote. Raises InputError without a step."""
         if self.place is None:
             raise InputError("choose a step first")
-        return replace(
-            self, running=True, truth=math.nan, poll=None if self.poll is None else self.poll.closed()
-        )
+        poll = None if self.poll is None else self.poll.closed()
+        return replace(self, running=True, truth=math.nan, poll=poll, runs=self.runs + 1)
 
     def measured(self, truth: float) -> Gathering:
         """The class after the run. truth: the measured number; NaN if the step measures none."""
@@ -120,12 +123,16 @@ class Gathering:
 
     # ---------------------------------------------------------------- the members
 
-    def entered(self, who: str, kind: Kind, now: float) -> Gathering:
-        """The class with one more member, or with one who came back. Raises InputError if it is full; a phone
-        that left without a vote makes room."""
-        known = self.members.get(who)
+    def entered(self, who: str, kind: Kind, now: float, account: str = "") -> Gathering:
+        """The class with one more member, or with one who came back. account: with which they signed in,
+        their name unless the class goes without names. Raises InputError if the class is full; a phone that
+        left without a vote makes room."""
+        known, account = self.members.get(who), account if self.named else ""
+        if known is not None and (known.here, known.account) == (True, account):
+            return self
         if known is not None:
-            return self if known.here else self._with(who, replace(known, here=True))
+            known = known if known.account == account else replace(known, account=account).named(account)
+            return self._with(who, replace(known, here=True))
         members = self.members
         if len(members) >= MEMBERS:
             voted = {voter for held in self.votes for votes in held.poll.rounds for voter in votes}
@@ -136,17 +143,22 @@ class Gathering:
                 raise InputError(f"this class has {MEMBERS} people, and takes no more")
             members = {one: each for one, each in members.items() if one != gone}
         number = 1 + max((each.number for each in members.values()), default=0)
-        return replace(self, members={**members, who: Member(number, kind, now)})
+        member = Member(number, kind, now, account=account).named(account)
+        return replace(self, members={**members, who: member})
 
     def left(self, who: str) -> Gathering:
         """The class after a page was closed. Votes and progress stay."""
         known = self.members.get(who)
         return self if known is None or not known.here else self._with(who, replace(known, here=False))
 
-    def succeeded(self, who: str, before: Sequence[str]) -> Gathering:
-        """The class after a learner who had left came back under another identity."""
-        old = next((one for one in reversed(before) if one in self.members), who)
-        if old == who or self.members[old].here or who in self.members:
+    def succeeded(self, who: str, before: Sequence[str], account: str = "") -> Gathering:
+        """The class after a learner who had left came back under another identity: a browser that they had
+        before, or any browser with their account."""
+        members, account = self.members, account if self.named else ""
+        theirs = [one for one, each in members.items() if account and each.account == account]
+        known = [*theirs, *(one for one in before if one in members and members[one].account == account)]
+        old = next((one for one in reversed(known) if not members[one].here), who)
+        if old == who or who in members:
             return self
         members = {who if one == old else one: each for one, each in self.members.items()}
         past = tuple(replace(held, poll=_handed_on(held.poll, old, who)) for held in self.past)
@@ -154,9 +166,12 @@ class Gathering:
         return replace(self, members=members, past=past, poll=poll)
 
     def called(self, who: str, name: str) -> Gathering:
-        """The class after a member typed a name, which is ignored if the class goes without names."""
+        """The class after a member typed a name, which is ignored if the class goes without names, or if they
+        signed in under another one."""
         known = self.members.get(who)
-        return self if known is None or not self.named else self._with(who, known.named(name))
+        if known is None or known.account or not self.named:
+            return self
+        return self._with(who, known.named(name))
 
     def voted(self, who: str, answer: object, now: float) -> Gathering:
         """The class after a vote. Raises InputError if it cannot be counted."""
@@ -174,12 +189,34 @@ class Gathering:
             return self
         member = known.seen(at, lecture, now)
         after = self if member is known else self._with(who, member)
-        if lecture is None or lecture.exercise != self.place or self.poll is None or not self.poll.is_open:
-            return after
+        return (
+            after
+            if lecture is None or lecture.exercise != self.place
+            else after._expecting(who, lecture.answer, now)
+        )
+
+    def told(
+        self,
+        who: str,
+        at: LessonPlace | None,
+        done: Mapping[LessonPlace, tuple[int, int]],
+        answer: object,
+        since: float,
+    ) -> Gathering:
+        """The class after another server told of a learner; as `seen`. answer: their prediction; since: when
+        they last did anything, s."""
+        known = self.members[who]
+        member = replace(known, at=at, done={**known.done, **done}, since=since)
+        return self._with(who, member)._expecting(who, answer, since)
+
+    def _expecting(self, who: str, answer: object, now: float) -> Gathering:
+        """The class after a look at a prediction, which is a vote while one is open."""
+        if answer is None or self.poll is None or not self.poll.is_open:
+            return self
         try:
-            return after if lecture.answer is None else after.voted(who, lecture.answer, now)
+            return self.voted(who, answer, now)
         except InputError:
-            return after  # there are too many voters, which their page need not know
+            return self  # there are too many voters, which their page need not know
 
     def _with(self, who: str, member: Member) -> Gathering:
         return replace(self, members={**self.members, who: member})

@@ -1,41 +1,32 @@
-"""A running class: it leads the learners' robots through the teacher's steps and collects the votes."""
+"""A running class: its step, its votes and its members, also those on other servers."""
 
 from __future__ import annotations
 
 import secrets
-import threading
 import time
-from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Protocol
 
 import numpy as np
 
-from app.classes.gathering import Gathering
 from app.classes.picture import Shape, pose_of, shape_of
-from app.classes.seats import Seats
+from app.classes.relayed import ClassNow, LearnerNow, class_now, read_done, read_place
+from app.classes.room import Learners, Room, begin
 from app.classes.views import View, course, for_all, for_teacher
 from app.client.simulation_client import SimulationClient
-from app.link.exercise import Lecture, LessonPlace, Predict
+from app.client.state_code import code_of
+from app.link.choice import SceneChoice
+from app.link.exercise import LessonPlace
+from lessons.replay.state import decode
 from robots import InputError
 
-RATE = 5.0
-"""Pictures and looks at the learners, Hz."""
+SERVERS = 20
+"""Largest number of other servers of a class."""
 _LETTERS = "abcdefghjkmnpqrstuvwxyz23456789"  # that are not taken for one another
 _CODE = 6
-_LOADING = 30.0  # s after which a step that was not loaded is loaded again
 
 
-class Learners(Protocol):
-    """The sessions of a server: the learners with robots of their own."""
-
-    @property
-    def learners(self) -> Sequence[SimulationClient]: ...
-
-
-class Hall:
-    """Follows the class on a thread of its own, `RATE` times a second. What people send may arrive on any
-    thread."""
+class Hall(Room):
+    """The class on the server that has the teacher's page."""
 
     def __init__(self, sessions: Learners | None, robot: SimulationClient, named: bool = True) -> None:
         """sessions: the learners with robots of their own; None if all watch the teacher's. robot: the
@@ -43,38 +34,18 @@ class Hall:
         self.robot = robot
         self.code = "".join(secrets.choice(_LETTERS) for _ in range(_CODE))
         """Gives the right to vote and to watch, as a part of the phones' address."""
+        super().__init__(sessions, named, "" if sessions is not None else f"v/{self.code}")
         start = robot.choice.exercise
         self.course = course(None if start is None else start.lesson)
         """The lessons of the teacher's list."""
-        self._sessions = sessions
-        self._state = Gathering(named)
-        self._lock = threading.RLock()
-        self._led: dict[str, tuple[Lecture | None, float]] = {}
-        """By learner: the run that was reported before the class brought them to its step, None if they were
-        there already, and when."""
         self._runs = 0  # of the teacher's robot before the present run
         self._shape: tuple[object, Shape | None] = (None, None)
-        self.seats = Seats("" if sessions is not None else f"v/{self.code}")
-        self._hear: Callable[[], object] = _nothing
-        self._closed = threading.Event()
-        self._thread = threading.Thread(target=self._follow, daemon=True, name="class")
-
-    def start(self, hear: Callable[[], object]) -> None:
-        """Begins to follow the class. hear: called after every look."""
-        self._hear = hear
-        self._thread.start()
-
-    def close(self) -> None:
-        """Ends the thread. The robots end with their sessions."""
-        self._closed.set()
-        if self._thread.ident is not None:
-            self._thread.join()
+        self._far: dict[str, str] = {}  # the other server on which a learner is
+        self._servers: set[str] = set()  # the other servers that are connected
 
     @property
-    def state(self) -> Gathering:
-        """The class now."""
-        with self._lock:
-            return self._state
+    def guide(self) -> SimulationClient:
+        return self.robot
 
     # ---------------------------------------------------------------- the teacher
 
@@ -82,16 +53,14 @@ class Hall:
         """Brings every learner and the teacher's robot to a step."""
         with self._lock:
             self._state = self._state.going_to(place)
-            self._led = {self.robot.token: (self.robot.lecture, time.monotonic())}
-            self._keep()
+            self._lead()
+            self._led[self.robot.token] = self.robot.lecture, time.monotonic()
         self.robot.load(self.robot.choice.at(place))
 
     def place(self, lesson: str, place: int) -> LessonPlace:
         """A step of the course, or of the lesson that the class was started with. Raises InputError for any
         other one."""
-        if lesson not in (each["name"] for each in self.course):
-            raise InputError("there is no such lesson in this class")
-        return LessonPlace.at(lesson, place + 1)
+        return read_place((lesson, place), self.course)
 
     def show_step(self) -> None:
         """Brings the teacher's robot back to the step of the class. Raises InputError without a step."""
@@ -119,10 +88,7 @@ class Hall:
             lecture = self._lecture_of(self.robot)
             self._runs = 0 if lecture is None else lecture.attempt
         begin(self.robot, lecture, state)
-        for learner in self._learners() if state.everywhere else ():
-            lecture = self._lecture_of(learner)
-            if lecture is not None and lecture.exercise == state.place and lecture.attempt == 0:
-                begin(learner, lecture, state)
+        self._let_run()
 
     def set(self, stays: bool, everywhere: bool) -> None:
         """stays: learners stay with the class; everywhere: steps run on all pages."""
@@ -130,14 +96,29 @@ class Hall:
             self._state = replace(self._state, stays=stays, everywhere=everywhere)
             self._keep()
 
-    def learner(self, number: int) -> SimulationClient:
-        """The robot of the member with this number. Raises InputError if they have none, or have left."""
-        with self._lock:
-            who = next((one for one, each in self._state.members.items() if each.number == number), None)
-        found = next((each for each in self._learners() if each.token == who), None)
-        if found is None:
+    def who(self, number: int) -> str:
+        """The identity of the member with this number. Raises InputError if they have no robot, or left."""
+        found = ((one, each) for one, each in self.state.members.items() if each.number == number)
+        who, member = next(found, ("", None))
+        if member is None or member.kind != "robot" or not member.here:
             raise InputError("this learner has left, and the robot with them")
-        return found
+        return who
+
+    def server_of(self, who: str) -> str | None:
+        """The other server on which a learner is; None if it is this one."""
+        return self._far.get(who)
+
+    def code_of(self, who: str) -> str:
+        """The code of a learner's state on this server. Raises InputError if there is none."""
+        learner = next((each for each in self._learners() if each.token == who), None)
+        told = None if learner is None else learner.latest()
+        if told is None:
+            raise InputError("the robot of this learner does not answer")
+        return code_of(told)
+
+    def show_state(self, code: str) -> None:
+        """Loads a learner's state into the teacher's robot. Raises InputError if the code is not one."""
+        self.robot.load(SceneChoice.of_state(decode(code)))
 
     # ---------------------------------------------------------------- the members
 
@@ -160,31 +141,61 @@ class Hall:
         with self._lock:
             self._state = self._state.voted(who, answer, time.monotonic())
 
-    def call(self, who: str, name: str) -> None:
-        """Stores the name that a member typed."""
-        with self._lock:
-            self._state = self._state.called(who, name)
-
-    def recognise(self, who: str, before: Sequence[str]) -> None:
-        """Gives a learner who comes back with another robot their votes and progress. before: the identities
-        that their browser had."""
-        with self._lock:
-            self._state = self._state.succeeded(who, before)
-
-    def name_of(self, who: str) -> str:
-        """The name that a member typed; "" if there is none."""
-        member = self.state.members.get(who)
-        return "" if member is None else member.name
-
-    def fetch(self, who: str) -> None:
-        """Brings one learner to the step of the class again, on their wish."""
-        with self._lock:
-            self._led.pop(who, None)
-
     def mine(self, who: str) -> float | None:
         """The vote of a member in the present round."""
         poll = self.state.poll
         return None if poll is None else poll.latest.get(who)
+
+    # ---------------------------------------------------------------- other servers
+
+    def link(self, server: str) -> None:
+        """Called when another server of the class has connected. Raises InputError if there are too many."""
+        with self._lock:
+            if len(self._servers - {server}) >= SERVERS:
+                raise InputError(f"a class has at most {SERVERS} other servers")
+            self._servers.add(server)
+
+    def unlink(self, server: str) -> None:
+        """Called when the connection to another server was lost. Votes and progress stay."""
+        with self._lock:
+            self._servers.discard(server)
+            for who, at in self._far.items():
+                if at == server:
+                    self._state = self._state.left(who)
+
+    def hear(self, server: str, told: LearnerNow) -> None:
+        """Takes what another server tells of a learner. A learner of this server, or of a third one that is
+        connected, is not changed. Raises InputError for a step that this class does not have."""
+        at = None if told.at is None else read_place(told.at, self.course)
+        done = read_done(told.done, self.course)
+        now = time.monotonic()
+        with self._lock:
+            known, home = self._state.members.get(told.who), self._far.get(told.who)
+            taken = home is None or (home != server and home in self._servers)
+            if known is not None and taken:
+                return
+            state = self._state.succeeded(told.who, told.before, told.account)
+            try:
+                state = state.entered(told.who, "robot", now, told.account)
+            except InputError:
+                return  # the class is full
+            if told.name is not None:
+                state = state.called(told.who, told.name)
+            answer = told.answer if told.visit == state.visits else None
+            state = state.told(told.who, at, done, answer, now - told.quiet)
+            self._state = state if told.here else state.left(told.who)
+            self._far[told.who] = server
+
+    def news(self) -> ClassNow:
+        """What the other servers of the class need to know."""
+        return class_now(self.state)
+
+    def _elsewhere(self) -> set[str]:
+        return {who for who, server in self._far.items() if server in self._servers}
+
+    def _lost(self) -> int:
+        """The other servers with learners to which there is no connection."""
+        return len(set(self._far.values()) - self._servers)
 
     # ---------------------------------------------------------------- looking
 
@@ -194,14 +205,17 @@ class Hall:
 
     def teachers(self) -> View:
         """What the teacher's page shows in addition."""
-        lecture = self._lecture_of(self.robot)
-        over = lecture is not None and lecture.exercise == self._state.place and lecture.phase == "done"
-        held = lecture.holds if lecture is not None and over else ()
-        return {
-            **for_teacher(self.state, time.monotonic()),
-            "shown": [sum(each is True for each in held), len(held)],
-            "busy": self.robot.trouble() is not None,
-        }
+        with self._lock:
+            lecture = self._lecture_of(self.robot)
+            over = lecture is not None and lecture.exercise == self._state.place and lecture.phase == "done"
+            held = lecture.holds if lecture is not None and over else ()
+            return {
+                **for_teacher(self._state, time.monotonic()),
+                "shown": [sum(each is True for each in held), len(held)],
+                "busy": self.robot.trouble() is not None,
+                "servers": len(self._servers),
+                "lost": self._lost(),
+            }
 
     def pose(self) -> View | None:
         """The teacher's robot at this instant; None while there is none."""
@@ -211,78 +225,17 @@ class Hall:
             return None
         return pose_of(*moment)
 
-    def _follow(self) -> None:
-        due = time.monotonic()
-        while not self._closed.wait(max(0.02, due - time.monotonic())):
-            due = max(due, time.monotonic() - 1 / RATE) + 1 / RATE
-            self._look()
-            self._hear()
-
     def _look(self) -> None:
         ready = self.robot.ready
         if ready is not None and ready is not self._shape[0]:
             self._shape = ready, shape_of(ready.robot)
-        learners, now = self._learners(), time.monotonic()
-        for learner in learners:
-            self._look_at(learner, now)
+        super()._look()
         with self._lock:
-            tokens = {each.token for each in learners if each.attached}
-            for who, member in self._state.members.items():
-                if member.kind == "robot" and member.here and who not in tokens:
-                    self._state = self._state.left(who)
+            self._far = {who: server for who, server in self._far.items() if who in self._state.members}
             self._measure()
-        self.seats.show(self.state)
-
-    def _look_at(self, learner: SimulationClient, now: float) -> None:
-        with self._lock:
-            if not learner.attached:
-                return
-            try:
-                self._state = self._state.entered(learner.token, "robot", now)
-            except InputError:
-                return
-            lecture, here = self._lecture_of(learner), learner.choice.exercise
-            self._state = self._state.seen(learner.token, here, lecture, now)
-            place, stays = self._state.place, self._state.stays
-            if place is None:
-                return
-            led = self._led.get(learner.token)
-            away = stays and here != place and learner.ready is not None
-            if led is not None and not (away and now - led[1] > _LOADING):
-                return
-            moves = here != place or (lecture is not None and lecture.attempt > 0)
-            self._led[learner.token] = (learner.lecture if moves else None, now)
-            learner.kept_at = place if stays else None
-        if moves:
-            learner.load_for_class(learner.choice.at(place))
 
     def _measure(self) -> None:
         lecture = self._lecture_of(self.robot)
         over = lecture is not None and lecture.exercise == self._state.place and lecture.phase == "done"
         if self._state.running and lecture is not None and over and lecture.attempt > self._runs:
             self._state = self._state.measured(lecture.truth)
-
-    def _lecture_of(self, learner: SimulationClient) -> Lecture | None:
-        """The run of a learner's step; None while the step that the class chose is being loaded."""
-        led = self._led.get(learner.token)
-        lecture = learner.lecture
-        return None if led is not None and lecture is led[0] else lecture
-
-    def _keep(self) -> None:
-        for learner in self._learners():
-            learner.kept_at = self._state.place if self._state.stays else None
-
-    def _learners(self) -> Sequence[SimulationClient]:
-        return () if self._sessions is None else self._sessions.learners
-
-
-def begin(learner: SimulationClient, lecture: Lecture | None, state: Gathering) -> None:
-    """Runs the step, with the class's prediction if the learner made none."""
-    guess = state.guess()
-    if guess is not None and (lecture is None or lecture.answer is None):
-        learner.send(Predict(guess))
-    learner.run_with_class()
-
-
-def _nothing() -> None:
-    """Used until somebody wants to hear."""

@@ -21,7 +21,8 @@ class Member:
         number: 1 for the first who came.
         kind: whether they have a robot of their own or only a phone.
         since: when they last did anything in the lesson, s on the clock of the server.
-        name: what they typed.
+        name: what they typed, or their account.
+        account: with which they signed in at the proxy; "" if there is none.
         here: whether their page is open.
         at: the step on their page.
         done: claims that held, and claims in all, of every step whose run ended.
@@ -32,13 +33,14 @@ class Member:
     kind: Kind
     since: float
     name: str = ""
+    account: str = ""
     here: bool = True
     at: LessonPlace | None = None
     done: Mapping[LessonPlace, tuple[int, int]] = field(default_factory=dict)
     trace: Hashable = None
 
     def named(self, name: str) -> Member:
-        """The member under the name that they typed; what cannot be printed becomes a blank."""
+        """The member under a name; what cannot be printed becomes a blank."""
         plain = "".join(sign if sign.isprintable() else " " for sign in name[:NAME])
         return replace(self, name=" ".join(plain.split()))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from app.classes.gathering import Gathering
 from app.classes.views import View, for_all
@@ -28,15 +28,17 @@ class Seats:
         with self._lock:
             self._seats.pop(who, None)
 
-    def show(self, state: Gathering) -> None:
-        """Shows the class on all pages on which it has changed."""
+    def show(self, state: Gathering, before: Mapping[str, int], cut_off: bool) -> None:
+        """Shows the class on all pages on which it has changed. before: by learner who waits for a robot at
+        the class's step, how many come first; cut_off: whether the class's server cannot be reached."""
         with self._lock:
             seats = list(self._seats.items())
         everybody = for_all(state)
         for who, (show, shown) in seats:
             member = state.members.get(who)
-            away = member is not None and state.place not in (None, member.at)
-            view = {**everybody, "voted": 0, "away": away, "vote": self._vote}
+            away = member is not None and state.place not in (None, member.at) and who not in before
+            more = {"vote": self._vote, "before": before.get(who), "cut_off": cut_off}
+            view = {**everybody, "voted": 0, "away": away, **more}
             if view == shown:
                 continue
             try:

@@ -12,6 +12,11 @@ LONGEST = 2000
 TEACHER = "class"
 """The name of the teacher's page in an address."""
 
+BRANCH = f"{TEACHER}/servers"
+"""The address at which other servers of the class connect."""
+CLASS_KEY = "X-Himpc-Lab-Class-Key"
+"""The header in which they send the key of the class."""
+
 Short = Annotated[str, Meta(max_length=100)]
 Number = Annotated[float, Meta(ge=-1e12, le=1e12)]
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections import deque
+from contextlib import suppress
 from queue import Empty, Queue
 from typing import TYPE_CHECKING, final
 
@@ -34,6 +36,8 @@ from app.link.spares import Spares
 if TYPE_CHECKING:
     from lessons.teaching import lesson
 
+BEHIND = 5
+"""How much lower than the server's the priority of a robot is that gives way."""
 STAYING = "Your teacher keeps the class at this step: wait for the next one."
 WAITING = "Your teacher runs this step for everybody: say what you expect, and wait."
 
@@ -49,10 +53,13 @@ class SimulationClient(Simulation):
         self.choice = self._start_choice = choice
         self.attached = False
         self.left_at = time.monotonic()
+        self.account = ""
+        """The name with which the learner signed in at the proxy; "" if there is none."""
         self.ghost: GhostClient | None = None
         self.lecture: Lecture | None = None
         self.kept_at: LessonPlace | None = None
         """The step at which a teacher keeps this learner; None: the learner may go anywhere."""
+        self._behind: int | None = None  # the process that gives way
         self._asking: deque[Queue[Told | None]] = deque()
         self._unheard: tuple[SceneChoice | None, int] | None = None
         """The scene that was requested and not yet reported (None: the present scene), and the number of
@@ -181,7 +188,22 @@ class SimulationClient(Simulation):
                 case _:
                     pass
 
+    def give_way(self) -> None:
+        """Lets the pages of this server go first where there are more robots than cores. Returns at once, and
+        changes a process only once."""
+        pid = self.pid
+        if pid is not None and pid != self._behind:
+            self._behind = pid
+            with suppress(OSError):  # it has ended, or may not be changed
+                os.setpriority(os.PRIO_PROCESS, pid, os.getpriority(os.PRIO_PROCESS, 0) + BEHIND)
+
     # ---------------------------------------------------------------- questions
+
+    def latest(self) -> Told | None:
+        """The run as it was last reported, without its events; None before the first scene. Unlike `ask`, it
+        does not wait for the simulation."""
+        ready = self.ready
+        return None if ready is None else Told(self.choice_of(ready), self.settings_of(ready), (), 0.0)
 
     def ask(self, timeout: float = 10.0) -> Told | None:
         """The run so far; None if the simulation does not answer within `timeout` seconds. This call blocks:

@@ -22,6 +22,8 @@ def serve(
     max_sessions: int = 4,
     classroom: bool = False,
     class_: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(name="class")] = False,
+    class_of: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS")] = None,
+    class_key: Annotated[str | None, tyro.conf.arg(metavar="FILE")] = None,
     no_names: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     host: str = "127.0.0.1",
     port: int = 8080,
@@ -54,6 +56,10 @@ def serve(
         classroom: one robot for all pages; only a page with the printed token can control it.
         class_: a teacher's page, from which a class is led through a lesson, and a page for phones that vote;
             docs/instructors.md describes a lecture. With --classroom, all watch the teacher's robot.
+        class_of: address of another server with --class, e.g. http://lab-1.example.org:8080: the learners of
+            this server take part in its class. Both need the same --class-key.
+        class_key: file with a key by which the servers of one class know each other; the environment
+            variable HIMPC_LAB_CLASS_KEY does the same.
         no_names: nobody in a class is asked for a name.
         host: address to listen on; only this machine can reach the default. The page asks for the token of
             the address that is printed.
@@ -78,7 +84,7 @@ def serve(
         key: file with a key of yours, 16 characters or more, which signs the progress that learners hand in.
     """
     from app.link.choice import SceneChoice
-    from app.server.passes import given_token
+    from app.server.passes import CLASS_VARIABLE, given_token
     from app.server.server import FIRST
     from app.server.serving import serve as serve_page
     from lessons.own.folder import Folder
@@ -88,10 +94,21 @@ def serve(
         raise InputError("--own-files DIR and --no-own-files contradict each other: leave one out")
     if no_names and not class_:
         raise InputError("--no-names is for a class: add --class, or leave it out")
-    if class_ and proxy_only:
+    of_class = given_token(class_key, os.environ, "--class-key", CLASS_VARIABLE)
+    if class_of is not None and (class_ or classroom):
         raise InputError(
-            "--class and --proxy-only contradict each other: the pages of a class have addresses of their "
-            "own, for which no proxy vouches; leave one out"
+            "--class-of ADDRESS is for a server without a teacher's page: leave out --class and --classroom"
+        )
+    if class_of is not None and of_class is None:
+        raise InputError(
+            "--class-of ADDRESS needs the key of the class: add --class-key FILE, with the same key as there"
+        )
+    if class_key is not None and class_of is None and not class_:
+        raise InputError("--class-key is for a class: add --class or --class-of ADDRESS, or leave it out")
+    if class_ and proxy_only and not trusted_origin:
+        raise InputError(
+            "--class with --proxy-only needs the address of the proxy, where teacher and phones open their "
+            "pages: add it, e.g. --trusted-origin https://lab.example.org"
         )
     if not 0.0 <= drain <= 3600.0:
         raise InputError(f"--drain {drain}: give a time from 0 to 3600 s")
@@ -127,4 +144,6 @@ def serve(
         proxy_only=proxy_only,
         drain=drain,
         embed_in=embed_in,
+        class_key=of_class,
+        class_of=class_of,
     )

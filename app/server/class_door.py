@@ -1,26 +1,28 @@
-"""Who may open the pages of a class: the owner's secret opens the teacher's page, and the class's code gives
-only the right to vote and to watch."""
+"""Who may open the pages of a class: the owner's secret opens the teacher's page, the class's code gives only
+the right to vote and to watch, and the key of the class lets other servers take part."""
 
 from __future__ import annotations
 
 import secrets
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from http import HTTPStatus
 from typing import Any
 from urllib.parse import urlsplit
 
 from websockets.http11 import Request
 
+from app.classes import relayed, words
 from app.classes.hall import Hall
 from app.classes.pages import PageName, page, policy
 from app.classes.sockets import Sockets
 from app.classes.table import table
-from app.classes.words import TEACHER
+from app.classes.words import BRANCH, CLASS_KEY, TEACHER
 from app.server.door import Answer, Door, is_upgrade
 from app.server.passes import QUERY
 
 _TEACHER, TABLE, PHONES = f"/{TEACHER}", f"/{TEACHER}.csv", "/v/"
+_SERVERS = f"/{BRANCH}"
 _NOT_KEPT = ("Cache-Control", "no-store")
 
 
@@ -31,6 +33,7 @@ class Served:
     Attributes:
         kind: of `text`.
         serve: serves the connection, if the request is an upgrade.
+        longest: the largest message on it, B.
     """
 
     status: HTTPStatus
@@ -38,24 +41,31 @@ class Served:
     text: str
     headers: tuple[tuple[str, str], ...]
     serve: Callable[[Any], Awaitable[None]]
+    longest: int = words.LONGEST
 
 
 @dataclass(frozen=True)
 class ClassDoor:
-    """The pages of a class and who may open them."""
+    """The pages of a class and who may open them. key: of the class; None: no other server takes part."""
 
     hall: Hall
     sockets: Sockets
+    key: str | None = field(default=None, repr=False)
 
     def has(self, path: str) -> bool:
         """Whether an address is one of the class's."""
         plain = urlsplit(path).path
-        return plain in (_TEACHER, TABLE) or plain.startswith(PHONES)
+        return plain in (_TEACHER, TABLE, _SERVERS) or plain.startswith(PHONES)
 
     def answer(self, door: Door, request: Request, who: str) -> Answer | Served:
         """The response to a request that names this server and comes from one of its pages. who: identifies
         the sender, see `app.server.peers`."""
         plain, host = urlsplit(request.path).path, request.headers["Host"]
+        if plain == _SERVERS:
+            return self._to_server(request)
+        past = door.not_by_the_proxy(request)
+        if past is not None:
+            return past
         if plain.startswith(PHONES):
             given = plain.removeprefix(PHONES).encode(errors="replace")
             if not secrets.compare_digest(given, self.hall.code.encode()):
@@ -71,6 +81,14 @@ class ClassDoor:
         text = table(self.hall.state)
         return Served(HTTPStatus.OK, "text/csv; charset=utf-8", text, kept, self.sockets.teacher)
 
+    def _to_server(self, request: Request) -> Answer | Served:
+        given = request.headers.get_all(CLASS_KEY)
+        right = self.key is not None and len(given) == 1
+        known = right and secrets.compare_digest(given[0].encode(errors="replace"), str(self.key).encode())
+        if not known or not is_upgrade(request):
+            return _NO_SERVER
+        return Served(HTTPStatus.OK, "text/plain", "", (), self.sockets.server, relayed.LONGEST)
+
 
 def _page(name: PageName, host: str, serve: Callable[[Any], Awaitable[None]]) -> Served:
     headers = (("Content-Security-Policy", policy(name, host)),)
@@ -81,6 +99,12 @@ _NO_CLASS = Answer(
     HTTPStatus.FORBIDDEN,
     "There is no such class",
     "<p>Each start of a class has a new address: scan the code on the projector again.</p>",
+    (_NOT_KEPT,),
+)
+_NO_SERVER = Answer(
+    HTTPStatus.FORBIDDEN,
+    "For servers of this class only",
+    "<p>Start both servers with the same key, see <i>--class-key</i>.</p>",
     (_NOT_KEPT,),
 )
 _NOT_THE_TEACHER = Answer(

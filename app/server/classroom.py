@@ -37,7 +37,19 @@ def _of_the_session(name: str) -> property:
 
 for _name in (
     *("ready", "status", "settings", "failure", "changed", "tape", "score", "record", "choice", "lecture"),
-    *("ghost", "pid", "quiet", "trouble", "settings_of", "choice_of", "lecture_of", "read", "look", "ask"),
+    *(
+        "ghost",
+        "pid",
+        "quiet",
+        "trouble",
+        "settings_of",
+        "choice_of",
+        "lecture_of",
+        "read",
+        "look",
+        "ask",
+        "latest",
+    ),
 ):
     setattr(Watcher, _name, _of_the_session(_name))
 for _name in ("send", "start_ghost", "stop_ghost", "reset_all", "load", "restart"):
@@ -70,7 +82,7 @@ class Classroom:
         """Whether this is the instructor's token, compared in constant time."""
         return secrets.compare_digest(token.encode(errors="replace"), self.token.encode())
 
-    def enter(self, tokens: Sequence[str], refuse: Refuse) -> SimulationClient:
+    def enter(self, tokens: Sequence[str], refuse: Refuse, account: str = "") -> SimulationClient:
         """Returns the session itself to a visitor with the token, otherwise a `Watcher`."""
         if self._all_steer or any(map(self.is_right, tokens)):
             return self._learner

@@ -105,6 +105,12 @@ class Door:
             if name not in headers:
                 headers[name] = value
 
+    def not_by_the_proxy(self, request: Request) -> Answer | None:
+        """The response to a request that came past the only proxy that is let in, else None."""
+        if not self.proxy_only or self.passes.in_header(request.headers):
+            return None
+        return Answer(HTTPStatus.FORBIDDEN, "Not by this way", _ELSEHOW, _NOT_KEPT)
+
     def account(self, request: Request) -> str:
         """The name with which the sender of an admitted request has signed in at the proxy; "" if there is no
         proxy that nobody can pass by."""
@@ -131,11 +137,11 @@ class Door:
     # ---------------------------------------------------------------- token
 
     def _ask_token(self, request: Request, host: str, who: str) -> Answer | None:
-        if self.proxy_only:
-            by_proxy = self.passes.in_header(request.headers)
-            return None if by_proxy else Answer(HTTPStatus.FORBIDDEN, "Not by this way", _ELSEHOW, _NOT_KEPT)
+        past = self.not_by_the_proxy(request)
+        if past is not None:
+            return past
         role = self.passes.in_address(request.path)
-        if role is not None:
+        if role == "owner" or (role is not None and not self.proxy_only):
             return None if is_upgrade(request) else self._keep(request, host, role, who)
         if self.passes.in_header(request.headers):
             return None

@@ -25,6 +25,8 @@ def greeting(server: PageServer, host: str, origins: Sequence[str]) -> Iterator[
     if server.hall is not None:
         yield f"  {'teacher:':{_WIDTH}}{server.teachers_link}"
         yield f"  {'phones:':{_WIDTH}}{server.outside}/v/{server.hall.code}"
+    if server.follows:
+        yield f"  {'takes part in:':{_WIDTH}}{server.follows}"
     if server.passes.token is None:
         yield "  --no-token: " + (_ALL if server.public else _ALL_HERE)
     if shared and server.passes.owner is not None:
@@ -34,8 +36,10 @@ def greeting(server: PageServer, host: str, origins: Sequence[str]) -> Iterator[
 def _for_others(server: PageServer, host: str, origins: Sequence[str]) -> Iterator[str]:
     port = urlsplit(server.url).port
     here = f"http://{socket.gethostname()}:{port}" if host in ("0.0.0.0", "::") else server.url
-    for what, address in (("for others:", here), *(("through the proxy:", each) for each in origins)):
-        yield f"  {what:{_WIDTH}}{server.passes.link(address, 'guest')}"
+    by_proxy = [("through the proxy:", each) for each in origins]
+    for what, address in by_proxy if server.proxy_only else (("for others:", here), *by_proxy):
+        link = address if server.proxy_only else server.passes.link(address, "guest")
+        yield f"  {what:{_WIDTH}}{link}"
     if isinstance(server.sessions, Classroom):
         yield f"  {_INSTRUCTOR:{_WIDTH}}{server.sessions.token}"
 

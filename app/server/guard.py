@@ -14,7 +14,6 @@ from websockets.exceptions import ConnectionClosedError
 from websockets.frames import CloseCode, Frame, Opcode
 from websockets.http11 import Request, Response
 
-from app.classes.words import LONGEST
 from app.server import budget
 from app.server.answers import CROWDED, FULL, NOT_OPEN, as_response, plain
 from app.server.budget import Budget
@@ -132,7 +131,7 @@ class ConnectionGuard:
             return plain(found.status, found.kind, found.text, found.headers)
         if isinstance(connection, GuardedConnection):
             connection.serves = found.serve
-            connection.accept_short()
+            connection.accept_short(found.longest)
             connection.expect_word(FIRST_WORD)
         return None
 
@@ -242,9 +241,9 @@ class GuardedConnection(ServerConnection):
             self._guard.taken += 1
             return raw
 
-    def accept_short(self) -> None:
-        """Ends the connection, with a reason, when a message is longer than pages of a class send."""
-        self.protocol.max_message_size = LONGEST
+    def accept_short(self, longest: int) -> None:
+        """Ends the connection, with a reason, when a message is longer than this, B."""
+        self.protocol.max_message_size = longest
 
     async def recv_short(self) -> str | bytes:
         """The next message of a page of a class."""

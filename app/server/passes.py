@@ -24,6 +24,8 @@ USER_HEADER = "X-Himpc-Lab-User"
 """The header in which a proxy that asks for passwords sends its visitor's name, percent-encoded UTF-8."""
 VARIABLE = "HIMPC_LAB_TOKEN"
 """The environment variable with a token of the user's own."""
+CLASS_VARIABLE = "HIMPC_LAB_CLASS_KEY"
+"""The environment variable with the key of a class."""
 LONGEST_ACCOUNT = 80  # characters
 SHORTEST = 16  # characters of a token of the user's own
 Role = Literal["guest", "owner"]
@@ -35,13 +37,15 @@ def new_token() -> str:
     return secrets.token_urlsafe(16)
 
 
-def given_token(file: str | None, environment: Mapping[str, str]) -> str | None:
+def given_token(
+    file: str | None, environment: Mapping[str, str], option: str = "--token-file", variable: str = VARIABLE
+) -> str | None:
     """The token that the user gives, so that several servers have the same one: the first line of a file, or
-    the environment variable `VARIABLE`; None if neither is given. Raises InputError for a token that is too
-    short or not in letters, digits, - and _."""
-    text, place = environment.get(VARIABLE), VARIABLE
+    the environment variable; None if neither is given. Raises InputError for a token that is too short or not
+    in letters, digits, - and _, naming the option or the variable."""
+    text, place = environment.get(variable), variable
     if file is not None:
-        place = f"--token-file {file}"
+        place = f"{option} {file}"
         try:
             text = Path(file).read_text(encoding="utf-8").partition("\n")[0]
         except (OSError, UnicodeDecodeError):

@@ -31,6 +31,7 @@ from robots import InputError
 
 if TYPE_CHECKING:  # a class computes: the server listens before that is loaded
     from app.classes.hall import Hall
+    from app.classes.room import Room
     from app.classes.sockets import Sockets
 
 _LOOPBACK = ("127.0.0.1", "localhost", "::1")
@@ -59,6 +60,8 @@ class PageServer:
         proxy_only: bool = False,
         embed_in: Sequence[str] = (),
         all_steer: bool = False,
+        class_key: str | None = None,
+        class_of: str | None = None,
     ) -> None:
         """Arguments as for `serving.serve`; grace: time, s, that a session outlives its tab; all_steer: every
         page of a classroom controls the robot."""
@@ -71,6 +74,8 @@ class PageServer:
             )
         trusted = frozenset(map(as_origin, trusted_origins))
         framing = frozenset(each if each == SELF else as_origin(each, "--embed-in") for each in embed_in)
+        self.follows = "" if class_of is None else as_origin(class_of, "--class-of")
+        """The address of the server whose class this one takes part in; "" if there is none."""
         _check_choice(choice)
         _check_address(host, port)
         few_arenas()
@@ -80,6 +85,7 @@ class PageServer:
         local = host in _LOOPBACK
         self.public = not local or bool(trusted)
         """Whether other people than the users of this machine can reach the page."""
+        self.proxy_only = proxy_only
         self.guard = ConnectionGuard(Door())
         self.sessions = Classroom(choice, all_steer) if classroom else Sessions(choice, max_sessions, grace)
         self._own_files, self._key, self._refers = own_files, key, refers
@@ -102,6 +108,9 @@ class PageServer:
         self._viser.on_client_connect(self._connect)
         self._viser.on_client_disconnect(self._disconnect)
         self.hall = None if class_names is None else self._new_hall(class_names)
+        self._class_key, self._link, self._room = class_key, None, self.hall
+        if self.follows and class_key is not None and isinstance(self.sessions, Sessions):
+            self._room = self._follow(self.follows, class_key, self.sessions)
         owner = None if own_files is None and self.hall is None else new_token()
         if ask_token and token is not None:
             self.passes = shared(token, owner)
@@ -125,7 +134,7 @@ class PageServer:
     def link(self) -> str:
         """The link for the person who started the server, with the owner's secret; without a secret,
         `guest_link`."""
-        return self.passes.link(self.url, "owner")
+        return self.passes.link(self._entrance, "owner")
 
     @property
     def guest_link(self) -> str:
@@ -135,7 +144,12 @@ class PageServer:
     @property
     def first_link(self) -> str:
         """The page that opens at the start: the teacher's of a class, else that of a robot."""
-        return self.passes.link(self.url, "owner", "" if self.hall is None else TEACHER)
+        return self.passes.link(self._entrance, "owner", "" if self.hall is None else TEACHER)
+
+    @property
+    def _entrance(self) -> str:
+        """The address that the person who started the server can open."""
+        return self.outside if self.proxy_only else self.url
 
     @property
     def teachers_link(self) -> str:
@@ -148,6 +162,16 @@ class PageServer:
         alone = isinstance(self.sessions, Classroom)
         return Hall(None if alone else self.sessions, self.sessions.guide(), named)
 
+    def _follow(self, address: str, key: str, sessions: Sessions) -> Room:
+        from app.classes.branch import Branch
+        from app.classes.link import Link
+
+        start = sessions.start.exercise
+        branch = Branch(sessions, None if start is None else start.lesson)
+        self._link = Link(branch, address, key)
+        self._link.start(self._viser.get_event_loop())
+        return branch
+
     def _open_class(self, door: Door, refers: bool, hall: Hall) -> None:
         from app.classes.sockets import Sockets
         from app.server.class_door import ClassDoor
@@ -155,7 +179,7 @@ class PageServer:
         self._sockets = Sockets(hall, lambda: self.outside)
         self._sockets.start(self._viser.get_event_loop())
         self.guard.crowd = ConnectionLimits(*OF_A_CLASS)
-        self.guard.open(door, self.sessions, refers, ClassDoor(hall, self._sockets))
+        self.guard.open(door, self.sessions, refers, ClassDoor(hall, self._sockets, self._class_key))
 
     # ---------------------------------------------------------------- clients, on viser's loop
 
@@ -166,7 +190,7 @@ class PageServer:
             self.sessions,
             self._own_files,
             self._key,
-            hall=self.hall,
+            room=self._room,
             refers=self._refers,
         )
         with self._lock:
@@ -194,8 +218,9 @@ class PageServer:
     def close(self) -> None:
         """Closes the pages, ends the processes and stops the server."""
         self.guard.close()
-        if self._sockets is not None:
-            self._sockets.close()
+        for each in (self._sockets, self._link):
+            if each is not None:
+                each.close()
         with self._lock:
             visits, self._visits = list(self._visits.values()), {}
         for visit in visits:

@@ -35,6 +35,8 @@ def serve(
     proxy_only: bool = False,
     drain: float = 0.0,
     embed_in: Sequence[str] = (),
+    class_key: str | None = None,
+    class_of: str | None = None,
 ) -> int:
     """Serves the page until Ctrl-C or SIGTERM. Raises InputError for a scene, robot, host, port or origin
     that cannot be used.
@@ -44,6 +46,7 @@ def serve(
     secret may open and run files below `own_files` by path; with None no page may. `key` signs the
     learners' progress. `token` replaces the random one; with `refers` a full server answers 503, so that a
     proxy tries the next one. `class_names`: whether a class is asked for names; None: there is no class.
+    `class_of` is the server of a class that this one follows; both have the same `class_key`.
     With `proxy_only` only a proxy that sends the token in its header is let in. After SIGTERM the pages that
     are open have `drain` seconds. Pages of the origins `embed_in` may show the page in a frame.
     """
@@ -62,6 +65,8 @@ def serve(
         class_names=class_names,
         proxy_only=proxy_only,
         embed_in=embed_in,
+        class_key=class_key,
+        class_of=class_of,
     )
     stop, now = threading.Event(), threading.Event()
     try:

@@ -4,6 +4,7 @@ seconds after its tab closed."""
 from __future__ import annotations
 
 import contextlib
+import json
 import secrets
 import threading
 import time
@@ -56,22 +57,24 @@ class Sessions:
                 self._guide = SimulationClient(secrets.token_urlsafe(16), self.start, self._spares)
             return self._guide
 
-    def enter(self, tokens: Sequence[str], refuse: Refuse | None = None) -> SimulationClient | None:
+    def enter(
+        self, tokens: Sequence[str], refuse: Refuse | None = None, account: str = ""
+    ) -> SimulationClient | None:
         """Returns the learner that this browser left, or a new one; None if all places are taken. A place
         that was left a moment ago is reserved for the browser with its token. tokens: of the browser, latest
-        last."""
+        last; account: with which its user signed in, whose learners alone it gets."""
         with self._lock:
             if self._closed.is_set():
                 return None
             for token in reversed(tokens):
                 known = self._learners.get(token)
-                if known is not None and not known.attached:
+                if known is not None and not known.attached and known.account == account:
                     known.attached = True
                     return known
             if len(self._learners) >= self.max_sessions:
                 return None
             learner = SimulationClient(secrets.token_urlsafe(16), self.start, self._spares)
-            learner.attached = True
+            learner.attached, learner.account = True, account
             self._learners[learner.token] = learner
         return learner
 
@@ -117,3 +120,12 @@ class Sessions:
             with contextlib.suppress(RuntimeError):
                 thread.join()
         self._spares.close()
+
+
+def tokens_of(stored: str | None) -> list[str]:
+    """Reads tokens from the browser's storage, whose content is not trusted."""
+    try:
+        found = json.loads(stored or "[]")
+    except (ValueError, RecursionError):
+        return []
+    return [token for token in found if isinstance(token, str)][-8:] if isinstance(found, list) else []

@@ -29,14 +29,14 @@ from app.server import place
 from app.server.budget import UPLOADS
 from app.server.classroom import Classroom, Watcher
 from app.server.guard import GuardedConnection
-from app.server.sessions import Sessions
+from app.server.sessions import Sessions, tokens_of
 from app.server.uploads import Uploads
 from app.server.workers import Workers
 from lessons.own.folder import Folder
 from lessons.replay.progress import LearnerProgress, load_progress
 
 if TYPE_CHECKING:  # a class computes: the server listens before that is loaded
-    from app.classes.hall import Hall
+    from app.classes.room import Room
 
 STORAGE = 5.0
 """Time, s, within which a browser must send the values that it has stored."""
@@ -60,16 +60,16 @@ class Visit:
         sessions: Sessions | Classroom,
         own_files: Folder | None,
         key: bytes | None = None,
-        hall: Hall | None = None,
+        room: Room | None = None,
         refers: bool = False,
     ) -> None:
         """own_files: folder of the files that the owner's page may name; key: signs the learners' progress;
-        hall: the class, if there is one; refers: a page for which there is no place connects again, perhaps
+        room: the class, if there is one; refers: a page for which there is no place connects again, perhaps
         with another server."""
         self._server = server
         self._client = client
         self._sessions = sessions
-        self._own_files, self._key, self._hall, self._refers = own_files, key, hall, refers
+        self._own_files, self._key, self._room, self._refers = own_files, key, room, refers
         self._page: Page | None = None
         self._left = False
         self._seat = ""
@@ -90,7 +90,9 @@ class Visit:
         self._teaches = isinstance(connection, GuardedConnection) and connection.teaches
         self._account = connection.account if isinstance(connection, GuardedConnection) else ""
         # Pages of all accounts of a hub have one origin, so that a browser stores their values in one place.
-        self._progress_key = f"{_PROGRESS}-{self._account}" if self._account else _PROGRESS
+        self._progress_key, self._tokens_key = (
+            f"{key}-{self._account}" if self._account else key for key in (_PROGRESS, _TOKENS)
+        )
         if isinstance(connection, GuardedConnection):
             connection.refuse = partial(inlet.say, "Not taken")
             connection.uploads = Uploads(
@@ -106,7 +108,7 @@ class Visit:
         size = f"{here}-window"
         private.run_script(self._client, place.asking(here))
         private.run_script(self._client, ASK_WINDOW % (STORED, size))
-        keys = (_TOKENS, _DARK, self._progress_key, MOTION, here, size)
+        keys = (self._tokens_key, _DARK, self._progress_key, MOTION, here, size)
         self._asking = asyncio.ensure_future(private.read_storage(self._client, keys, STORAGE))
         try:
             found = await self._asking
@@ -125,7 +127,7 @@ class Visit:
             self._key,
             self._account,
         )
-        self._then(_tokens(tokens), kept)
+        self._then(tokens_of(tokens), kept)
         self._watch()
 
     def leave(self) -> None:
@@ -155,21 +157,22 @@ class Visit:
         watching, self._page = self._page, None
         if watching is not None:  # the page has only watched so far
             watching.close()
-        hall = self._hall
-        leads = hall is not None and self._teaches
-        learner = hall.robot if hall is not None and leads else self._sessions.enter(tokens, self._refuse)
+        room = self._room
+        guide = room.guide if room is not None and self._teaches else None
+        leads = guide is not None
+        learner = guide or self._sessions.enter(tokens, self._refuse, self._account)
         if learner is None:
             self._turn_away(tokens, kept)
             return
-        if hall is not None and not leads and not isinstance(learner, Watcher):
-            hall.recognise(learner.token, tokens)
+        if room is not None and not leads and not isinstance(learner, Watcher):
+            room.recognise(learner.token, tokens, self._account)
         if isinstance(self._sessions, Sessions) and not leads and learner.token not in tokens:
             before = place.read(kept, self._sessions.start)
             if before is not None:
                 learner.load(before)
                 self._client.add_notification(*_GOES_ON, color="green", auto_close_seconds=8.0)
         others = [token for token in tokens if token != learner.token][-7:]
-        self._keep(_TOKENS, json.dumps([*others, learner.token] if learner.token else others))
+        self._keep(self._tokens_key, json.dumps([*others, learner.token] if learner.token else others))
         self._page = Page(
             self._client,
             learner,
@@ -188,8 +191,8 @@ class Visit:
         if page is not None:
             page.close()
             self._sessions.leave(page.learner)
-        if self._hall is not None:
-            self._hall.seats.rise(self._seat)
+        if self._room is not None:
+            self._room.seats.rise(self._seat)
         self._workers.shutdown(wait=False, cancel_futures=True)
 
     # ---------------------------------------------------------------- where the page is
@@ -226,13 +229,16 @@ class Visit:
 
     def _greet(self, learner: SimulationClient, leads: bool, gui: viser.GuiApi) -> None:
         """Adds the input for the instructor's token to a page that only watches, and what a class says."""
-        hall = self._hall
-        if hall is not None and not leads:
+        room = self._room
+        if room is not None and not leads:
             watches = isinstance(learner, Watcher)
-            call = None if watches or not hall.state.named else partial(hall.call, learner.token)
-            card = ClassCard(gui, hall.name_of(learner.token), call, partial(hall.fetch, learner.token))
+            named = room.state.named
+            name = (self._account if named else "") or room.name_of(learner.token)
+            asked = named and not watches and not self._account
+            call = partial(room.call, learner.token) if asked else None
+            card = ClassCard(gui, name, call, partial(room.fetch, learner.token))
             self._seat = f"watcher {id(self)}" if watches else learner.token
-            hall.seats.sit(self._seat, card.show)
+            room.seats.sit(self._seat, card.show)
         if isinstance(learner, Watcher):
             add_watching(gui, self._take_token)
 
@@ -284,12 +290,3 @@ class Visit:
         connection = private.connection_of(self._server, self._client)
         if self._page is None and connection is not None:
             connection.transport.abort()
-
-
-def _tokens(stored: str | None) -> list[str]:
-    """Reads tokens from the browser's storage, whose content is not trusted."""
-    try:
-        found = json.loads(stored or "[]")
-    except (ValueError, RecursionError):
-        return []
-    return [token for token in found if isinstance(token, str)][-8:] if isinstance(found, list) else []

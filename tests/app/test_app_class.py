@@ -114,13 +114,13 @@ def test_the_address_decides_who_is_the_teacher(server: PageServer) -> None:
         assert refused.value.response.status_code == 403
 
 
-def cookie_of(link: str) -> str:
+def cookie_of(link: str, **headers: str) -> str:
     """The cookie that a link sets before it leads to its page without the secret."""
     import http.client
 
     parts = urlsplit(link)
     line = http.client.HTTPConnection(parts.hostname or "", parts.port, timeout=30)
-    line.request("GET", f"{parts.path}?{parts.query}")
+    line.request("GET", f"{parts.path}?{parts.query}", headers=headers)
     answer = line.getresponse()
     assert (answer.status, answer.headers["Location"]) == (303, "./class")
     line.close()

@@ -20,6 +20,10 @@ _SAYS = {
     "decided": "",
 }
 _NAME = "Your name"
+_CUT_OFF = (
+    "<b>Class.</b> The link to your teacher's computer is interrupted. Go on: what you do is told to your "
+    "teacher when the link is back."
+)
 
 
 class ClassCard:
@@ -28,12 +32,14 @@ class ClassCard:
     def __init__(
         self, gui: viser.GuiApi, name: str, call: Callable[[str], object] | None, fetch: Callable[[], object]
     ) -> None:
-        """name: what the learner typed before; call: takes a new name, None if nobody is asked; fetch:
-        brings this page to the step of the class."""
+        """name: with which the learner signed in, or what they typed before; call: takes a new name, None if
+        nobody is asked; fetch: brings this page to the step of the class."""
         self._text = gui.add_html(block("<b>Class.</b> Wait for your teacher."))
         self._back = gui.add_button("Go to the class's step", visible=False)
         on_click(self._back, fetch)
-        if call is not None:
+        if call is None and name:
+            gui.add_html(block(f"Your teacher sees your account, <b>{esc(name)}</b>."))
+        elif call is not None:
             typed = gui.add_text(_NAME, name, hint="Only your teacher sees it; you can leave it out.")
 
             @typed.on_update
@@ -42,8 +48,10 @@ class ClassCard:
 
     def show(self, view: Mapping[str, Any]) -> None:
         """view: what `app.classes.views.for_all` gives; `away`: whether this page is at another step;
-        `vote`: a page to vote on, for pages without a robot of their own."""
-        self._text.content = _html(view)
+        `vote`: a page to vote on, for pages without a robot of their own; `before`: how many others get their
+        robot at the class's step first, None if this page has its robot; `cut_off`: whether the server of
+        the class cannot be reached."""
+        self._text.content = (block(_CUT_OFF) if view["cut_off"] else "") + _html(view)
         if self._back.visible != view["away"]:
             self._back.visible = view["away"]
 
@@ -56,9 +64,21 @@ def _html(view: Mapping[str, Any]) -> str:
     if view["vote"] and stage in ("open", "again"):
         link = f'<a href="{esc(view["vote"])}" target="_blank" rel="noopener">on the page for phones</a>'
         says = f"<b>Vote</b> {link}."
-    lines = [f"<b>Class:</b> {esc(view['title'])}", says, _bars(view["rounds"][-1:]), esc(view["result"])]
+    lines = [
+        f"<b>Class:</b> {esc(view['title'])}",
+        _coming(view["before"]),
+        says,
+        _bars(view["rounds"][-1:]),
+        esc(view["result"]),
+    ]
     html = "".join(f"<div>{line}</div>" for line in lines if line)
     return block(html, f"border-left:3px solid {css(LEVELS[1])};margin:0.3em 0")
+
+
+def _coming(before: int | None) -> str:
+    if not before:
+        return "" if before is None else "Your robot comes to this step."
+    return f"Your robot comes to this step: {before} before you."
 
 
 def _bars(rounds: list[list[Mapping[str, Any]]]) -> str:

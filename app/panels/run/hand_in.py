@@ -25,7 +25,7 @@ def add_hand_in(gui: viser.GuiApi, learner: SimulationClient, notebook: Notebook
 
     @make.on_click
     def _(_: object) -> None:
-        told = learner.ask()
+        told = learner.latest()
         try:
             code = "" if told is None else code_of(told)
         except InputError:

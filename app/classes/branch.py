@@ -1,0 +1,127 @@
+"""A server that follows a class on another one: it leads its own learners and tells about them."""
+
+from __future__ import annotations
+
+import secrets
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import msgspec
+
+from app.classes.relayed import PORTION, ClassNow, LearnerNow, LearnersNow, read_class
+from app.classes.room import Learners, Room
+from app.classes.views import course
+from app.client.state_code import code_of
+from robots import InputError
+
+
+class Branch(Room):
+    """The learners of one server of a class whose teacher's page is on another server."""
+
+    def __init__(self, sessions: Learners, own: str | None = None) -> None:
+        """own: the lesson that this server was started with."""
+        super().__init__(sessions, named=False)  # nobody is asked before the class says so
+        self.server = secrets.token_urlsafe(16)
+        """Identifies this server when its connection comes back."""
+        self.course = course(own)
+        """The lessons that this server has."""
+        self._linked = False
+        self._before: dict[str, tuple[str, ...]] = {}
+        self._names: dict[str, str] = {}  # as they were typed on this server
+        self._told: dict[str, tuple[LearnerNow, float]] = {}  # what the class has heard
+
+    @property
+    def guide(self) -> None:
+        return None
+
+    @property
+    def _cut_off(self) -> bool:
+        return not self._linked
+
+    # ---------------------------------------------------------------- the link
+
+    def linked(self) -> None:
+        """Called when the class's server has let this one in: everything will be told again."""
+        with self._lock:
+            self._told = {}
+
+    def cut_off(self) -> None:
+        """Called when the connection was lost: learners may go on without the class."""
+        with self._lock:
+            self._linked = False
+            self._state = replace(self._state, stays=False)
+            self._keep()
+
+    def hear(self, now: ClassNow) -> None:
+        """Takes the state of the class, and leads the learners there. Raises InputError if it cannot be."""
+        if now.place is not None and now.place[0] not in (each["name"] for each in self.course):
+            nowhere = {"place": None, "is_open": None, "rounds": [], "running": False, "truth": None}
+            now = msgspec.structs.replace(now, **nowhere)  # a lesson of the teacher's own
+        with self._lock:
+            before = self._state
+            self._state = read_class(now, self.course, before.members)
+            self._linked = True
+            elsewhere = (now.visits, self._state.place) != (before.visits, before.place)
+            if elsewhere:
+                self._lead()
+            else:
+                self._keep()
+        if now.running if elsewhere else now.runs > before.runs:
+            self._let_run()
+
+    def news(self) -> Iterator[bytes]:
+        """Messages about the learners of whom the class has not heard what they do now."""
+        with self._lock:
+            state, now = self._state, time.monotonic()
+            fresh = {who: (self._of(who), each.since) for who, each in state.members.items()}
+            changed = [who for who, told in fresh.items() if self._told.get(who) != told]
+            self._told = fresh
+        portion: list[LearnerNow] = []
+        size = 0
+        for who in changed:
+            told, since = fresh[who]
+            portion.append(msgspec.structs.replace(told, quiet=max(0.0, now - since)))
+            size += len(msgspec.json.encode(told))
+            if size > PORTION:
+                yield msgspec.json.encode(LearnersNow(portion))
+                portion, size = [], 0
+        if portion:
+            yield msgspec.json.encode(LearnersNow(portion))
+
+    def _of(self, who: str) -> LearnerNow:
+        state = self._state
+        member, poll = state.members[who], state.poll
+        return LearnerNow(
+            who,
+            self._before.get(who, ()),
+            self._names.get(who),
+            member.account,
+            member.here,
+            None if member.at is None else (member.at.lesson, member.at.place),
+            tuple((at.lesson, at.place, met, claims) for at, (met, claims) in member.done.items()),
+            None if poll is None or not poll.is_open else poll.latest.get(who),
+            state.visits,
+        )
+
+    def code_of(self, who: str) -> str:
+        """The code of a learner's state; "" if there is none."""
+        learner = next((each for each in self._learners() if each.token == who), None)
+        told = None if learner is None else learner.latest()
+        try:
+            return "" if told is None else code_of(told)
+        except InputError:
+            return ""  # e.g. an uploaded robot
+
+    # ---------------------------------------------------------------- the learners
+
+    def recognise(self, who: str, before: Sequence[str], account: str = "") -> None:
+        with self._lock:
+            self._before[who] = tuple(each for each in before if each != who and len(each) <= 100)[-8:]
+        super().recognise(who, before, account)
+
+    def call(self, who: str, name: str) -> None:
+        super().call(who, name)
+        with self._lock:
+            if who in self._state.members:
+                self._names[who] = self._state.members[who].name

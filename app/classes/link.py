@@ -1,0 +1,130 @@
+"""The connection of a server to the class that it follows. It runs on the server's loop."""
+
+from __future__ import annotations
+
+import asyncio
+import random
+from contextlib import suppress
+
+import msgspec
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import InvalidHandshake, WebSocketException
+
+from app.classes.branch import Branch
+from app.classes.relayed import LONGEST, AskState, ClassNow, Join, StateTold, of_class
+from app.classes.words import BRANCH, CLASS_KEY
+from robots import InputError
+
+FIRST, LAST = 1.0, 15.0
+"""Time, s, until the first new attempt to connect, and the longest one between two."""
+PERIOD = 0.2
+"""Time, s, between two messages of this server, and the shortest between two that it reads."""
+_QUESTIONS = 4  # that are answered at once
+
+
+class _Direct(connect):
+    """A connection that follows no redirect: another server would get the key."""
+
+    def process_redirect(self, exc: Exception) -> Exception | str:
+        return exc
+
+
+class Link:
+    """Connects to the class, again and again, and passes on what both sides tell."""
+
+    def __init__(self, branch: Branch, address: str, key: str) -> None:
+        """address: of the class's server, as `as_origin` returns it; key: the key of the class."""
+        self._branch = branch
+        self._address = f"{address.replace('http', 'ws', 1)}/{BRANCH}"
+        self._key = key
+        self._task: asyncio.Task[None] | None = None
+        self._asked: set[asyncio.Task[None]] = set()
+        self.refused = ""
+        """Why the class's server did not let this one in the last time; "" if it did, or did not answer."""
+
+    def start(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Begins to connect, on the server's loop."""
+        self._branch.start(lambda: None)
+
+        async def begin() -> None:
+            self._task = asyncio.ensure_future(self._stay())
+
+        asyncio.run_coroutine_threadsafe(begin(), loop)
+
+    def close(self) -> None:
+        """Ends the connection and the branch."""
+        task = self._task
+        if task is not None:
+            with suppress(RuntimeError):  # the loop has ended
+                task.get_loop().call_soon_threadsafe(task.cancel)
+        self._branch.close()
+
+    async def _stay(self) -> None:
+        pause = FIRST
+        while True:
+            try:
+                async with self._connection() as line:
+                    self.refused, pause = "", FIRST
+                    await self._talk(line)
+            except InvalidHandshake as error:
+                self.refused = str(error)
+            except (OSError, TimeoutError, WebSocketException, InputError):
+                pass
+            finally:
+                self._branch.cut_off()
+            await asyncio.sleep(pause * random.uniform(0.5, 1.0))
+            pause = min(LAST, 2 * pause)
+
+    def _connection(self) -> connect:
+        return _Direct(
+            self._address,
+            additional_headers={CLASS_KEY: self._key},
+            max_size=LONGEST,
+            max_queue=4,
+            proxy=None,
+            open_timeout=LAST,
+            close_timeout=1.0,
+            user_agent_header=None,
+        )
+
+    async def _talk(self, line: ClientConnection) -> None:
+        """Tells and hears until the connection ends. Raises an error when it does."""
+        await line.send(msgspec.json.encode(Join(self._branch.server)), text=True)
+        self._branch.linked()
+        telling = asyncio.ensure_future(self._tell(line))
+        try:
+            await self._hear(line)
+        finally:
+            telling.cancel()
+            for each in self._asked:
+                each.cancel()
+
+    async def _tell(self, line: ClientConnection) -> None:
+        with suppress(WebSocketException):  # the other task ends with the connection
+            while True:
+                for message in self._branch.news():
+                    await line.send(message, text=True)
+                    await asyncio.sleep(PERIOD)
+                await asyncio.sleep(PERIOD)
+
+    async def _hear(self, line: ClientConnection) -> None:
+        while True:
+            try:
+                told = of_class.decode(await line.recv())
+            except (msgspec.MsgspecError, UnicodeError, RecursionError):
+                raise InputError("the class's server sent something that cannot be understood") from None
+            match told:
+                case ClassNow():
+                    await asyncio.to_thread(self._branch.hear, told)
+                case AskState(who) if len(self._asked) < _QUESTIONS:
+                    answer = asyncio.ensure_future(self._answer(line, who))
+                    self._asked.add(answer)
+                    answer.add_done_callback(self._asked.discard)
+                case AskState():
+                    pass
+            await asyncio.sleep(PERIOD / 4)
+
+    async def _answer(self, line: ClientConnection, who: str) -> None:
+        code = await asyncio.to_thread(self._branch.code_of, who)
+        with suppress(WebSocketException):
+            await line.send(msgspec.json.encode(StateTold(who, code)), text=True)

@@ -1,0 +1,54 @@
+"""The order in which the robots of a class are built for its next step."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+PATIENCE = 10.0
+"""Time, s, after which a robot that is not ready no longer keeps the next one waiting."""
+
+
+class BuildQueue:
+    """Who waits for a robot at the class's step, and whose robot is being built."""
+
+    def __init__(self, at_once: int) -> None:
+        """at_once: the number of robots that are built at the same time."""
+        self._at_once = at_once
+        self._waiting: list[str] = []
+        self._building: dict[str, float] = {}  # when it began, s
+
+    def clear(self) -> None:
+        """Nobody waits any more. Robots that are being built still count until they are ready."""
+        self._waiting = []
+
+    def enter(self, who: str) -> None:
+        """Lets somebody wait, behind all others."""
+        self._building.pop(who, None)
+        self._waiting.append(who)
+
+    def leave(self, who: str) -> None:
+        """Called when somebody has left."""
+        self._building.pop(who, None)
+        if who in self._waiting:
+            self._waiting.remove(who)
+
+    def has(self, who: str) -> bool:
+        """Whether somebody waits for a robot, or for its being ready."""
+        return who in self._building or who in self._waiting
+
+    def next(self, ready: Collection[str], now: float) -> list[str]:
+        """Whose robots are to be built now. ready: those whose robots are at the class's step; now: s."""
+        self._building = {
+            who: since for who, since in self._building.items() if who not in ready and now - since < PATIENCE
+        }
+        room = max(0, self._at_once - len(self._building))
+        chosen, self._waiting = self._waiting[:room], self._waiting[room:]
+        self._building |= dict.fromkeys(chosen, now)
+        return chosen
+
+    def before(self) -> dict[str, int]:
+        """By learner, how many others come first; 0 for those whose robot is being built."""
+        return {
+            **dict.fromkeys(self._building, 0),
+            **{who: len(self._building) + k for k, who in enumerate(self._waiting)},
+        }

@@ -1,0 +1,176 @@
+"""What the servers of one class tell each other: data with bounds, of which nothing is run or shown as HTML.
+The server with the teacher's page tells the state of the class; the others tell about their learners."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
+
+from app.classes.gathering import Gathering, question_of
+from app.classes.member import Member
+from app.classes.views import View
+from app.classes.words import Number, Short
+from app.link.exercise import LessonPlace
+from lessons.replay.state import MAX_CODE
+from lessons.teaching.poll import ROUNDS, VOTERS, Poll, valid
+from robots import InputError
+
+LONGEST = 200_000
+"""Largest message between two servers, B."""
+PORTION = 50_000
+"""Size, B, from which further learners are told in the next message; one learner has less than the rest."""
+
+Secret = Annotated[str, Meta(pattern=r"^[A-Za-z0-9_-]{16,64}$")]
+Count = Annotated[int, Meta(ge=0, le=100_000)]
+Place = tuple[Short, Annotated[int, Meta(ge=0, le=1000)]]
+Ran = tuple[Short, Annotated[int, Meta(ge=0, le=1000)], Count, Count]
+"""Lesson and step, claims met and claims."""
+Answered = int | Number
+Votes = Annotated[list[tuple[Answered, Count]], Meta(max_length=VOTERS)]
+
+
+class Join(msgspec.Struct, forbid_unknown_fields=True, tag_field="do", tag="join"):
+    """The first message of another server. server: identifies it when it comes back."""
+
+    server: Secret
+
+
+class LearnerNow(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A learner on another server.
+
+    Attributes:
+        who: their identity.
+        before: the identities that their browser had.
+        name: what they typed, None if nothing; account: with which they signed in.
+        here: whether their page is open.
+        at: the step on their page.
+        done: every step whose run ended.
+        answer: their prediction at the class's step.
+        visit: how often the class had gone to a step when this was so.
+        quiet: time since they last did anything, s.
+    """
+
+    who: Secret
+    before: Annotated[tuple[Short, ...], Meta(max_length=8)] = ()
+    name: Short | None = None
+    account: Short = ""
+    here: bool = True
+    at: Place | None = None
+    done: Annotated[tuple[Ran, ...], Meta(max_length=300)] = ()
+    answer: Answered | None = None
+    visit: Count = 0
+    quiet: Annotated[float, Meta(ge=0.0, le=1e9)] = 0.0
+
+
+class LearnersNow(msgspec.Struct, forbid_unknown_fields=True, tag_field="do", tag="learners"):
+    """The learners about whom there is something new."""
+
+    learners: Annotated[list[LearnerNow], Meta(max_length=500)]
+
+
+class StateTold(msgspec.Struct, forbid_unknown_fields=True, tag_field="do", tag="state"):
+    """The code of a learner's state; "" if there is none."""
+
+    who: Secret
+    code: Annotated[str, Meta(max_length=MAX_CODE)]
+
+
+class ClassNow(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="class"):
+    """The state of the class, see `app.classes.gathering.Gathering`.
+
+    Attributes:
+        rounds: the votes of each round that is over, each answer with its number of voters; the round that
+            is open is empty.
+        is_open: whether a vote is open; None if there is none.
+        truth: None if nothing was measured.
+    """
+
+    named: bool
+    place: Place | None
+    visits: Count
+    runs: Count
+    stays: bool
+    everywhere: bool
+    running: bool
+    is_open: bool | None
+    rounds: Annotated[list[Votes], Meta(max_length=ROUNDS)]
+    truth: Number | None
+
+
+class AskState(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="ask"):
+    """The teacher opens a learner's state."""
+
+    who: Secret
+
+
+OfServer = Join | LearnersNow | StateTold
+OfClass = ClassNow | AskState
+
+of_server = msgspec.json.Decoder(OfServer)
+of_class = msgspec.json.Decoder(OfClass)
+
+
+def read_place(told: Place, course: Sequence[View]) -> LessonPlace:
+    """A step of one of the lessons of a class. Raises InputError for any other one: no file is read."""
+    lesson, place = told
+    if lesson not in (each["name"] for each in course):
+        raise InputError("there is no such lesson in this class")
+    return LessonPlace.at(lesson, place + 1)
+
+
+def read_done(told: Sequence[Ran], course: Sequence[View]) -> dict[LessonPlace, tuple[int, int]]:
+    """Claims met and claims of each step. Raises InputError for a step that the class does not have."""
+    return {
+        read_place((lesson, place), course): (min(met, claims), claims) for lesson, place, met, claims in told
+    }
+
+
+def class_now(state: Gathering) -> ClassNow:
+    """The state of a class without its members."""
+    place, poll = state.place, state.poll
+    rounds = [] if poll is None else [sorted(Counter(votes.values()).items()) for votes in poll.rounds]
+    if poll is not None and poll.is_open:
+        rounds[-1] = []
+    return ClassNow(
+        state.named,
+        None if place is None else (place.lesson, place.place),
+        state.visits,
+        state.runs,
+        state.stays,
+        state.everywhere,
+        state.running,
+        None if poll is None else poll.is_open,
+        rounds,
+        None if math.isnan(state.truth) else state.truth,
+    )
+
+
+def read_class(now: ClassNow, course: Sequence[View], members: Mapping[str, Member]) -> Gathering:
+    """The state of a class with the members of another server. Raises InputError for a step or an answer that
+    it does not have."""
+    place = None if now.place is None else read_place(now.place, course)
+    return Gathering(
+        now.named,
+        place,
+        None if now.is_open is None else _poll(now.rounds, now.is_open, place),
+        math.nan if now.truth is None else now.truth,
+        now.running,
+        now.stays,
+        now.everywhere,
+        members,
+        visits=now.visits,
+        runs=now.runs,
+    )
+
+
+def _poll(rounds: Sequence[Votes], is_open: bool, place: LessonPlace | None) -> Poll:
+    asked = question_of(place)
+    if not rounds or any(sum(count for _, count in votes) > VOTERS for votes in rounds):
+        raise InputError("the votes of this class cannot be counted")
+    voters = [[valid(asked, answer) for answer, count in votes for _ in range(count)] for votes in rounds]
+    return Poll(asked, tuple({f"voter {k}": vote for k, vote in enumerate(each)} for each in voters), is_open)

@@ -1,0 +1,231 @@
+"""The learners with robots of their own on one server, who follow a class."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+from app.classes.gathering import Gathering
+from app.classes.queue import BuildQueue
+from app.classes.seats import Seats
+from app.client.simulation_client import SimulationClient
+from app.link.exercise import Lecture, Predict
+from robots import InputError
+
+RATE = 5.0
+"""Looks at the learners, Hz."""
+BUILDS = 2 * (os.cpu_count() or 1)
+"""Robots that are built at once when the class goes to another step; the others wait for their turn."""
+_TURN = 0.05  # s between two checks whose turn it is
+_LOADING = 30.0  # s after which a step that was not loaded is loaded again
+
+
+class Learners(Protocol):
+    """The sessions of a server: the learners with robots of their own."""
+
+    @property
+    def learners(self) -> Sequence[SimulationClient]: ...
+
+
+class Room(ABC):
+    """Leads the learners of this server through the class's steps, on a thread of its own that looks at them
+    `RATE` times a second. What people send may arrive on any thread."""
+
+    def __init__(self, sessions: Learners | None, named: bool, vote: str = "") -> None:
+        """sessions: the learners with robots of their own; None if all watch the teacher's. named: whether
+        people are asked for names. vote: the page on which watchers vote."""
+        self._sessions = sessions
+        self._state = Gathering(named)
+        self._lock = threading.RLock()
+        self._led: dict[str, tuple[Lecture | None, float]] = {}
+        """By learner: the run that was reported before the class brought them to its step, None if they were
+        there already, and when."""
+        self._builds = BuildQueue(BUILDS)
+        self._due: set[str] = set()
+        """The learners whose robots run the step as soon as it is loaded."""
+        self.seats = Seats(vote)
+        self._hear: Callable[[], object] = _nothing
+        self._closed = threading.Event()
+        self._thread = threading.Thread(target=self._follow, daemon=True, name="class")
+
+    def start(self, hear: Callable[[], object]) -> None:
+        """Begins to follow the class. hear: called after every look."""
+        self._hear = hear
+        self._thread.start()
+
+    def close(self) -> None:
+        """Ends the thread. The robots end with their sessions."""
+        self._closed.set()
+        if self._thread.ident is not None:
+            self._thread.join()
+
+    @property
+    def state(self) -> Gathering:
+        """The class now."""
+        with self._lock:
+            return self._state
+
+    @property
+    @abstractmethod
+    def guide(self) -> SimulationClient | None:
+        """The teacher's robot; None if another server has it."""
+
+    # ---------------------------------------------------------------- the learners
+
+    def recognise(self, who: str, before: Sequence[str], account: str = "") -> None:
+        """Gives a learner who comes back with another robot their votes and progress. before: the identities
+        that their browser had; account: with which they signed in."""
+        with self._lock:
+            self._state = self._state.succeeded(who, before, account)
+
+    def call(self, who: str, name: str) -> None:
+        """Stores the name that a member typed."""
+        with self._lock:
+            self._state = self._state.called(who, name)
+
+    def name_of(self, who: str) -> str:
+        """The name that a member typed; "" if there is none."""
+        member = self.state.members.get(who)
+        return "" if member is None else member.name
+
+    def fetch(self, who: str) -> None:
+        """Brings one learner to the step of the class again, on their wish."""
+        with self._lock:
+            self._led.pop(who, None)
+
+    # ---------------------------------------------------------------- leading them
+
+    def _lead(self) -> None:
+        """Brings all learners to the step of the class, a few at a time."""
+        with self._lock:
+            self._led, self._due = {}, set()
+            self._builds.clear()
+            self._keep()
+
+    def _keep(self) -> None:
+        for learner in self._learners():
+            learner.kept_at = self._state.place if self._state.stays else None
+
+    def _let_run(self) -> None:
+        """Runs the step on the robots of all learners who are at it and have not run it; those that are still
+        being built run it afterwards."""
+        with self._lock:
+            learners = self._learners() if self._state.everywhere else ()
+            self._due = {each.token for each in learners if each.attached}
+            for learner in learners:
+                self._run_if_due(learner)
+
+    def _run_if_due(self, learner: SimulationClient) -> None:
+        who, place, lecture = learner.token, self._state.place, self._lecture_of(learner)
+        coming = who not in self._led or self._builds.has(who)
+        if who not in self._due or coming or (lecture is None and learner.choice.exercise == place):
+            return  # a step that is still being loaded runs afterwards
+        self._due.discard(who)
+        if lecture is not None and lecture.exercise == place and lecture.attempt == 0:
+            begin(learner, lecture, self._state)
+
+    def _follow(self) -> None:
+        due = time.monotonic()
+        while not self._closed.wait(min(_TURN, max(0.02, due - time.monotonic()))):
+            self._build()
+            if time.monotonic() >= due:
+                due = max(due, time.monotonic() - 1 / RATE) + 1 / RATE
+                self._look()
+                self._hear()
+
+    def _look(self) -> None:
+        learners, now = self._learners(), time.monotonic()
+        for learner in learners:
+            self._look_at(learner, now)
+        with self._lock:
+            here = {each.token for each in learners if each.attached} | self._elsewhere()
+            for who, member in self._state.members.items():
+                if member.kind == "robot" and member.here and who not in here:
+                    self._state = self._state.left(who)
+            before = self._builds.before()
+        self._build()
+        self.seats.show(self.state, before, self._cut_off)
+
+    def _build(self) -> None:
+        """Brings the next learners to the class's step."""
+        if not self._builds.before():
+            return
+        learners, now = self._learners(), time.monotonic()
+        with self._lock:
+            for who in set(self._builds.before()) - {each.token for each in learners}:
+                self._builds.leave(who)
+            chosen = self._builds.next({each.token for each in learners if self._arrived(each)}, now)
+            place = self._state.place
+            coming = [] if place is None else [each for each in learners if each.token in chosen]
+            self._led |= {each.token: (each.lecture, now) for each in coming}
+        for learner in coming:
+            assert place is not None
+            learner.load_for_class(learner.choice.at(place))
+
+    def _look_at(self, learner: SimulationClient, now: float) -> None:
+        with self._lock:
+            learner.give_way()
+            if not learner.attached:
+                self._builds.leave(learner.token)
+                return
+            try:
+                self._state = self._state.entered(learner.token, "robot", now, learner.account)
+            except InputError:
+                return
+            lecture, here = self._lecture_of(learner), learner.choice.exercise
+            self._state = self._state.seen(learner.token, here, lecture, now)
+            self._run_if_due(learner)
+            place, stays = self._state.place, self._state.stays
+            if place is None or self._builds.has(learner.token):
+                return
+            led = self._led.get(learner.token)
+            away = stays and here != place and learner.ready is not None
+            if led is not None and not (away and now - led[1] > _LOADING):
+                return
+            learner.kept_at = place if stays else None
+            self._led[learner.token] = None, now
+            if here != place or (lecture is not None and lecture.attempt > 0):
+                self._builds.enter(learner.token)
+
+    def _arrived(self, learner: SimulationClient) -> bool:
+        """Whether a robot that was led has reached the class's step, and has not run it."""
+        lecture, led = learner.lecture, self._led.get(learner.token)
+        if lecture is None or led is None or lecture is led[0]:
+            return False
+        return (lecture.exercise, lecture.attempt) == (self._state.place, 0)
+
+    def _lecture_of(self, learner: SimulationClient) -> Lecture | None:
+        """The run of a learner's step; None while the step that the class chose is being loaded."""
+        if self._builds.has(learner.token):
+            return None
+        led = self._led.get(learner.token)
+        lecture = learner.lecture
+        return None if led is not None and lecture is led[0] else lecture
+
+    def _learners(self) -> Sequence[SimulationClient]:
+        return () if self._sessions is None else self._sessions.learners
+
+    def _elsewhere(self) -> set[str]:
+        """The members who are here without a robot on this server."""
+        return set()
+
+    @property
+    def _cut_off(self) -> bool:
+        """Whether the server of the class cannot be reached."""
+        return False
+
+
+def begin(learner: SimulationClient, lecture: Lecture | None, state: Gathering) -> None:
+    """Runs the step, with the class's prediction if the learner made none."""
+    guess = state.guess()
+    if guess is not None and (lecture is None or lecture.answer is None):
+        learner.send(Predict(guess))
+    learner.run_with_class()
+
+
+def _nothing() -> None:
+    """Used until somebody wants to hear."""

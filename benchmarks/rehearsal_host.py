@@ -1,0 +1,121 @@
+"""A server of the rehearsal in a process of its own, see `benchmarks.rehearsal`."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+from app.link.choice import SceneChoice
+from app.link.exercise import LessonPlace
+from app.server.server import PageServer
+from lessons.replay.progress import read_key
+
+KEY, CLASS_KEY = "a key of a rehearsal", "the-class-of-a-rehearsal"
+
+
+def be_a_server(learners: int, lesson: str, follows: str | None) -> None:
+    """Serves a class, or follows the one at an address; tells its own addresses, and for each line on stdin
+    how long the run of each learner took and the processor time used so far, s."""
+    with tempfile.TemporaryDirectory() as folder:
+        key = Path(folder) / "key.txt"
+        key.write_text(KEY)
+        choice = SceneChoice.opening(lesson)  # a robot that waits for its step needs no processor
+        server = PageServer(
+            choice,
+            port=0,
+            max_sessions=learners,
+            key=read_key(str(key)),
+            class_names=True if follows is None else None,
+            class_key=CLASS_KEY,
+            class_of=follows,
+            grace=60.0,
+        )
+        try:
+            links = {"learners": server.guest_link, "server": server.url}
+            if server.hall is not None:
+                links["teacher"] = server.teachers_link
+                links["phones"] = f"{server.url.replace('http', 'ws')}/v/{server.hall.code}"
+            _tell(links)
+            runs: dict[tuple[str, LessonPlace], list[float]] = {}
+            over = threading.Event()
+            threading.Thread(target=_follow, args=(server, runs, over), daemon=True).start()
+            while sys.stdin.readline():
+                ended = {each: times for each, times in runs.items() if len(times) == 3}
+                factors = [duration / (end - begin) for begin, end, duration in ended.values()]
+                _tell({"factors": [round(each, 3) for each in factors], "busy": time.process_time()})
+            over.set()
+        finally:
+            server.close()
+
+
+def _follow(
+    server: PageServer, runs: dict[tuple[str, LessonPlace], list[float]], over: threading.Event
+) -> None:
+    """Notes when the run of each learner begins and ends, to 0.02 s, and how long it is in simulated time."""
+    while not over.wait(0.02):
+        for learner in server.sessions.learners:
+            lecture = learner.lecture
+            if lecture is None:
+                continue
+            times = runs.setdefault((learner.token, lecture.exercise), [])
+            if lecture.phase == "running" and not times:
+                # A report is up to 0.1 s old, and tells how far the run was then.
+                times.append(time.monotonic() - lecture.t)
+            elif lecture.phase == "done" and len(times) == 1:
+                times += [time.monotonic(), lecture.t]
+
+
+def _tell(found: dict[str, Any]) -> None:
+    sys.stdout.write(json.dumps(found) + "\n")
+    sys.stdout.flush()
+
+
+class Host:
+    """One server in a process of its own."""
+
+    def __init__(self, learners: int, lesson: str, follows: str | None = None) -> None:
+        """follows: the address of the server whose class it follows; None if it has the class."""
+        more = [] if follows is None else ["--class-of", follows]
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "benchmarks.rehearsal_host", str(learners), lesson, *more],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        self.links: dict[str, str] = self._hear()
+
+    def _hear(self) -> Any:
+        assert self._process.stdout is not None
+        return json.loads(self._process.stdout.readline())
+
+    def report(self) -> dict[str, Any]:
+        """What the server tells now, see `be_a_server`."""
+        assert self._process.stdin is not None
+        self._process.stdin.write("now\n")
+        self._process.stdin.flush()
+        return self._hear()
+
+    def close(self) -> None:
+        """Ends the server."""
+        assert self._process.stdin is not None
+        self._process.stdin.close()
+        try:
+            self._process.wait(30.0)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser()
+    parser.add_argument("learners", type=int)
+    parser.add_argument("lesson")
+    parser.add_argument("--class-of", default=None)
+    given = parser.parse_args()
+    be_a_server(given.learners, given.lesson, given.class_of)

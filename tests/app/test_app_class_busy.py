@@ -1,0 +1,77 @@
+"""A class on a machine that is too slow for all its robots: pages are answered, robots come one by one."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Iterator
+
+import pytest
+from test_app_class import LONG
+
+from app.classes.queue import PATIENCE, BuildQueue
+from app.client.simulation_client import BEHIND
+from app.link.choice import SceneChoice
+from app.server.server import PageServer
+from browsing.wire import Wire, eventually
+from lessons.replay.progress import read_handed_in
+from lessons.scenes.run_spec import RunSpec
+
+pytestmark = pytest.mark.usefixtures("one_fork_server")
+
+
+@pytest.fixture
+def server() -> Iterator[PageServer]:
+    running = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1, class_names=True)
+    yield running
+    running.close()
+
+
+def test_pages_do_not_wait_for_robots(server: PageServer, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a class the robots have a lower priority than the pages, and a text to hand in and a learner's state
+    come also while the robot gets no time at all."""
+    hall = server.hall
+    assert hall is not None
+    given: list[tuple[int, int]] = []  # not read back: others may change priorities on this machine
+    monkeypatch.setattr(os, "getpriority", lambda *_: 3)
+    monkeypatch.setattr(os, "setpriority", lambda _, pid, priority: given.append((pid, priority)))
+    with Wire(server.guest_link) as page:
+        assert eventually(lambda: len(server.sessions.learners) == 1, LONG)
+        (learner,) = server.sessions.learners
+        assert eventually(lambda: learner.pid is not None, LONG)
+        pid = learner.pid
+        assert pid is not None and eventually(lambda: page.find("Write the text") is not None, LONG)
+        assert eventually(lambda: bool(given), LONG) and given == [(pid, 3 + BEHIND)]
+        os.kill(pid, signal.SIGSTOP)
+        try:
+            assert hall.code_of(learner.token).startswith("hl1-")
+            button = page.find("Write the text")
+            assert button is not None
+            page.write(button, value=True)
+            assert eventually(lambda: text_of(page).startswith("hp1"), LONG)
+            assert read_handed_in(text_of(page), None)[0].code.startswith("hl1-")
+        finally:
+            os.kill(pid, signal.SIGCONT)
+
+
+def text_of(page: Wire) -> str:
+    control = page.controls.get(page.find("To hand in") or "")
+    return "" if control is None else str(control.get("value", ""))
+
+
+def test_robots_are_built_a_few_at_a_time() -> None:
+    queue = BuildQueue(2)
+    for who in "abcd":
+        queue.enter(who)
+    assert queue.next("", 0.0) == ["a", "b"]
+    assert queue.before() == {"a": 0, "b": 0, "c": 2, "d": 3}
+    assert queue.next("", 1.0) == [] and queue.has("c") and queue.has("a")
+    assert queue.next("b", 2.0) == ["c"] and not queue.has("b")
+    queue.leave("d")
+    assert queue.before() == {"a": 0, "c": 0}
+    queue.enter("d")
+    assert queue.next("", PATIENCE + 0.5) == ["d"], "one that never comes keeps nobody waiting"
+    queue.enter("b")
+    queue.clear()
+    assert not queue.has("b") and queue.has("c")
+    assert queue.next("cd", PATIENCE + 1.0) == [] and queue.before() == {}

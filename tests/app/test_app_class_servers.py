@@ -1,0 +1,271 @@
+"""One class over two servers: the second one's learners take part in the class of the first."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+from test_app_class import LONG, STEP, Line, teacher
+from test_app_load import get
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+
+from app.__main__ import main
+from app.classes.branch import Branch
+from app.classes.gathering import Gathering
+from app.classes.relayed import LONGEST, ClassNow, LearnerNow, class_now, of_class, of_server, read_class
+from app.classes.views import course, for_all
+from app.classes.words import BRANCH, CLASS_KEY
+from app.link.choice import SceneChoice
+from app.link.exercise import LessonPlace, Predict, RunStep
+from app.server.server import PageServer
+from browsing.wire import Wire, eventually
+from lessons.scenes.run_spec import RunSpec
+from robots import InputError
+
+pytestmark = pytest.mark.usefixtures("one_fork_server")
+KEY = "the-key-of-the-class"
+START = SceneChoice(RunSpec("planar3-hold"))
+
+
+def leading(port: int = 0) -> PageServer:
+    return PageServer(START, port=port, max_sessions=1, class_names=True, class_key=KEY)
+
+
+@pytest.fixture(scope="module")
+def first() -> Iterator[PageServer]:
+    running = leading()
+    yield running
+    running.close()
+
+
+@pytest.fixture(scope="module")
+def second(first: PageServer) -> Iterator[PageServer]:
+    running = PageServer(START, port=0, max_sessions=2, class_key=KEY, class_of=first.url)
+    yield running
+    running.close()
+
+
+def other_server(server: PageServer, key: str = KEY) -> Line:
+    return Line(f"{server.url}/{BRANCH}", **{CLASS_KEY: key})
+
+
+def test_a_learner_on_another_server_takes_part_from_the_step_to_the_table(
+    first: PageServer, second: PageServer
+) -> None:
+    with teacher(first) as lead, Wire(second.guest_link) as page:
+        lead.until("class", "servers", 1)
+        assert eventually(lambda: len(second.sessions.learners) == 1, LONG)
+        (learner,) = second.sessions.learners
+        lead.send(do="set", stays=True, everywhere=True)
+        lead.send(do="go", lesson=STEP.lesson, place=STEP.place)
+        assert eventually(lambda: learner.choice.exercise == STEP and learner.lecture is not None, LONG)
+        assert eventually(lambda: learner.kept_at == STEP, LONG)
+        assert eventually(lambda: page.shows("The vote is not open yet"), LONG)
+
+        def named() -> bool:
+            asking = [each["uuid"] for each in page.made if "Only your teacher" in str(each)]
+            page.write(asking[-1], value="Zoë")  # the page may have been built anew meanwhile
+            return first.hall is not None and first.hall.name_of(learner.token) == "Zoë"
+
+        assert eventually(named, LONG)
+
+        lead.send(do="press", button="open")
+        assert eventually(lambda: page.shows("enter below what you expect"), LONG)
+        buttons = page.find("I expect")
+        assert buttons is not None
+        page.write(buttons, value="B")
+        lead.until("all", "voted", 1)
+        assert lead.told["all"]["rounds"] == []
+        lead.send(do="press", button="close")
+        assert eventually(lambda: page.shows("The vote is closed") and page.shows(": 1"), LONG)
+        lead.send(do="press", button="run")
+        lead.until("all", "stage", "decided")
+        assert eventually(lambda: page.shows("The run gave"), LONG)
+        while not lead.hear("class")["class"]["rows"][0]["done"]:
+            pass
+        (row,) = lead.told["class"]["rows"]
+        assert (row["name"], row["vote"], row["done"], row["here"]) == ("Zoë", "B", 1, True)
+
+        lead.send(do="state", number=row["number"])
+        assert lead.hear("code")["code"].startswith("hl1-")
+        lead.send(do="set", stays=False, everywhere=True)
+        assert eventually(lambda: learner.kept_at is None, LONG)
+        assert first.hall is not None and first.hall.server_of(learner.token) is not None
+    while lead_rows(first)[0]["here"]:
+        pass
+
+
+def lead_rows(server: PageServer) -> list[dict[str, Any]]:
+    assert server.hall is not None
+    return server.hall.teachers()["rows"]
+
+
+def test_another_server_that_sends_rubbish_is_sent_away_alone(first: PageServer, second: PageServer) -> None:
+    """It gets one answer; a server without the key gets none, and the right one stays connected."""
+    for key in ("", f"{KEY}x"):
+        with pytest.raises(InvalidStatus) as refused:
+            other_server(first, key)
+        assert refused.value.response.status_code == 403
+    assert get(f"{first.url}/{BRANCH}", **{CLASS_KEY: KEY})[0] == 403
+    join = json.dumps({"do": "join", "server": "s" * 20})
+    nowhere = {"who": "w" * 20, "at": ["/etc/passwd", 0]}
+    rubbish: tuple[tuple[str | bytes, ...], ...] = (
+        ("x" * (LONGEST + 1),),
+        ("[" * 10_000,),
+        (b"\xff\xfe",),
+        ('{"do":"learners","learners":[]}',),
+        (join, join),
+        (join, '{"do":"learners","learners":[{"who":"short"}]}'),
+        (join, json.dumps({"do": "learners", "learners": [nowhere]})),
+        (join, json.dumps({"do": "learners", "learners": [{**nowhere, "at": [STEP.lesson, 1000]}]})),
+    )
+    for messages in rubbish:
+        with other_server(first) as bad:
+            for each in messages:
+                bad.socket.send(each)
+            with pytest.raises(ConnectionClosed) as ended:
+                while True:
+                    bad.socket.recv(timeout=LONG)
+            assert ended.value.rcvd is not None and ended.value.rcvd.code in (1008, 1009)
+    with teacher(first) as lead:
+        while lead.hear("class")["class"]["servers"] != 1:
+            pass
+        assert not any(row["name"] == "" and row["here"] for row in lead.told["class"]["rows"])
+
+
+def test_learners_go_on_without_the_class_and_nothing_is_lost_when_it_is_back() -> None:
+    """The class's server ends; the learner is told, is kept no longer and runs a step; the next server at the
+    same address, which knows nothing, hears all of it."""
+    lead = leading()
+    follower = PageServer(START, port=0, max_sessions=1, class_key=KEY, class_of=lead.url)
+    try:
+        with Wire(follower.guest_link) as page:
+            assert lead.hall is not None
+            told = lead.hall
+            assert eventually(lambda: len(told.state.members) == 1, LONG)
+            (learner,) = follower.sessions.learners
+            lead.hall.set(stays=True, everywhere=True)
+            lead.hall.go(STEP)
+            assert eventually(lambda: learner.kept_at == STEP and learner.lecture is not None, LONG)
+            port = int(lead.url.rpartition(":")[2])
+            lead.close()
+            assert eventually(lambda: page.shows("is interrupted. Go on"), LONG)
+            assert learner.kept_at is None
+            learner.send(Predict(0))
+            learner.send(RunStep())
+            assert eventually(lambda: learner.lecture is not None and learner.lecture.phase == "done", LONG)
+            lead = leading(port)
+            assert lead.hall is not None
+            hall = lead.hall
+            assert eventually(
+                lambda: [row["done"] for row in hall.teachers()["rows"] if row["here"]] == [1], LONG
+            )
+            assert eventually(lambda: not page.shows("is interrupted"), LONG)
+    finally:
+        follower.close()
+        lead.close()
+
+
+class NoLearners:
+    """The sessions of a server on which nobody is."""
+
+    learners = ()
+
+
+def test_the_class_travels_as_numbers_and_is_shown_the_same() -> None:
+    """No text of another server is shown, and votes that are still open are not told."""
+    state = Gathering().entered("zoe", "robot", 0.0).going_to(STEP).opened().voted("zoe", 1, 0.0)
+    assert class_now(state).rounds == [[]] and "zoe" not in str(class_now(state))
+    for each in (state, state.closed(), state.closed().opened().started().measured(0.3)):
+        told = of_class.decode(msgspec.json.encode(class_now(each)))
+        assert isinstance(told, ClassNow)
+        read = read_class(told, course(), {})
+        assert {**for_all(read), "voted": 0} == {**for_all(each), "voted": 0}
+        assert (read.visits, read.runs) == (each.visits, each.runs)
+        assert each is state or read.guess() == each.guess()
+    good = class_now(state.closed())
+    branch = Branch(NoLearners())
+    branch.hear(good)
+    for wrong in (
+        {"place": (STEP.lesson, 999)},
+        {"rounds": [[(77, 1)]]},
+        {"rounds": [[(1, 100_000)]]},
+        {"rounds": []},
+        {"place": None},
+    ):
+        with pytest.raises(InputError):
+            branch.hear(msgspec.structs.replace(good, **wrong))
+        assert branch.state.place == STEP, "what cannot be understood changes nothing"
+    branch.hear(msgspec.structs.replace(good, place=("mine.py", 0)))
+    assert branch.state.place is None, "a file that only another server has"
+
+
+def test_a_message_about_learners_has_bounds() -> None:
+    told = LearnerNow("w" * 20, name="Zoë", done=((STEP.lesson, 0, 2, 3),), answer=1, visit=1)
+    good = json.loads(msgspec.json.encode(told))
+    assert of_server.decode(json.dumps({"do": "learners", "learners": [good]})).learners == [told]
+    for name, value in (
+        ("who", "<script>xxxxxxxxxxxxxxx"),
+        ("name", "x" * 101),
+        ("done", [[STEP.lesson, -1, 0, 0]]),
+        ("quiet", -1.0),
+        ("answer", "B"),
+        ("answer", 1e300),
+        ("more", 1),
+    ):
+        with pytest.raises(msgspec.ValidationError):
+            of_server.decode(json.dumps({"do": "learners", "learners": [{**good, name: value}]}))
+
+
+def test_another_server_changes_its_own_learners_alone(first: PageServer) -> None:
+    """A late answer to an earlier question is no vote, and no other server's learner is touched."""
+    hall = first.hall
+    assert hall is not None
+    seat = hall.enter("")
+    hall.go(STEP)
+    hall.open_vote()
+    who, here, there = "w" * 20, "one server of two", "the other one of two"
+    hall.link(here)
+    hall.link(there)
+    old = LearnerNow(who, answer=0, visit=hall.state.visits - 1, at=(STEP.lesson, 0))
+    hall.hear(here, old)
+    assert hall.mine(who) is None and hall.name_of(who) == ""
+    hall.hear(here, msgspec.structs.replace(old, visit=hall.state.visits))
+    assert hall.mine(who) == 0
+    hall.hear(there, msgspec.structs.replace(old, visit=hall.state.visits, answer=1))
+    hall.hear(here, msgspec.structs.replace(old, who=seat, name="a phone"))
+    assert hall.mine(who) == 0 and hall.name_of(seat) == ""
+    hall.unlink(here)
+    assert not hall.state.members[who].here and hall.mine(who) == 0
+    hall.hear(there, msgspec.structs.replace(old, name="Max"))
+    assert hall.state.members[who].here and hall.name_of(who) == "Max", "its server has gone"
+    hall.unlink(there)
+    hall.close_vote()
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        (["--class-of", "http://a:1"], "--class-key FILE"),
+        (["--class-of", "nonsense", "--class-key"], "--class-of 'nonsense' is not an origin"),
+        (["--class", "--class-of", "http://a:1", "--class-key"], "leave out --class"),
+        (["--class-key"], "add --class"),
+    ],
+)
+def test_the_command_says_what_does_not_fit(
+    given: list[str], says: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "class.txt"
+    file.write_text(KEY)
+    assert main(["--no-browser", *given, *([str(file)] if given[-1] == "--class-key" else [])]) == 2
+    assert says in capsys.readouterr().err
+
+
+def test_truth_that_is_not_there_is_not_a_number() -> None:
+    now = class_now(Gathering().going_to(LessonPlace(STEP.lesson, 1)))
+    assert now.truth is None and math.isnan(read_class(now, course(), {}).truth)
