@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import random
+import sys
 from contextlib import suppress
+from http import HTTPStatus
 
 import msgspec
 from websockets.asyncio.client import ClientConnection, connect
-from websockets.exceptions import InvalidHandshake, WebSocketException
+from websockets.exceptions import InvalidStatus, WebSocketException
 
 from app.classes.branch import Branch
 from app.classes.relayed import LONGEST, AskState, ClassNow, Join, StateTold, of_class
@@ -19,6 +21,11 @@ FIRST, LAST = 1.0, 15.0
 """Time, s, until the first new attempt to connect, and the longest one between two."""
 PERIOD = 0.2
 """Time, s, between two messages of this server, and the shortest between two that it reads."""
+_AGAIN = "this server tries again, and its learners go on"
+_REFUSED = (
+    f"the class's server does not let this one in: start it with --class, and both with the same --class-key "
+    f"FILE; {_AGAIN}"
+)
 _QUESTIONS = 4  # that are answered at once
 
 
@@ -39,8 +46,7 @@ class Link:
         self._key = key
         self._task: asyncio.Task[None] | None = None
         self._asked: set[asyncio.Task[None]] = set()
-        self.refused = ""
-        """Why the class's server did not let this one in the last time; "" if it did, or did not answer."""
+        self._reported = ""
 
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
         """Begins to connect, on the server's loop."""
@@ -64,16 +70,24 @@ class Link:
         while True:
             try:
                 async with self._connection() as line:
-                    self.refused, pause = "", FIRST
+                    pause = FIRST
+                    self._report(f"this server takes part in the class of {self._address}")
                     await self._talk(line)
-            except InvalidHandshake as error:
-                self.refused = str(error)
+            except InvalidStatus as error:
+                known = error.response.status_code != HTTPStatus.FORBIDDEN
+                self._report(f"{self._address} cannot be reached; {_AGAIN}" if known else _REFUSED)
             except (OSError, TimeoutError, WebSocketException, InputError):
-                pass
+                self._report(f"{self._address} cannot be reached; {_AGAIN}")
             finally:
                 self._branch.cut_off()
             await asyncio.sleep(pause * random.uniform(0.5, 1.0))
             pause = min(LAST, 2 * pause)
+
+    def _report(self, sentence: str) -> None:
+        """Tells the person who started this server how the connection stands, whenever that changes."""
+        if sentence != self._reported:
+            self._reported = sentence
+            print(f"himpc-lab: {sentence}", file=sys.stderr, flush=True)
 
     def _connection(self) -> connect:
         return _Direct(

@@ -138,6 +138,17 @@ def test_another_server_that_sends_rubbish_is_sent_away_alone(first: PageServer,
         assert not any(row["name"] == "" and row["here"] for row in lead.told["class"]["rows"])
 
 
+def test_a_server_with_another_key_says_what_to_do(
+    first: PageServer, capfd: pytest.CaptureFixture[str]
+) -> None:
+    wrong = PageServer(START, port=0, max_sessions=1, class_key=f"{KEY}x", class_of=first.url)
+    said: list[str] = []
+    try:
+        assert eventually(lambda: said.append(capfd.readouterr().err) or "--class-key" in "".join(said), LONG)
+    finally:
+        wrong.close()
+
+
 def test_learners_go_on_without_the_class_and_nothing_is_lost_when_it_is_back() -> None:
     """The class's server ends; the learner is told, is kept no longer and runs a step; the next server at the
     same address, which knows nothing, hears all of it."""
