@@ -40,7 +40,7 @@ PAST = _run(events=((0.0, PAST_THE_POST), (0.45, BACK)), duration=0.7)
 def checks(seed: int) -> tuple[GradeCheck, ...]:
     return (
         GradeCheck(
-            "If the hand is sent into the table, no distance falls below 5 mm.",
+            "If the hand is sent into the table, the arm keeps clear of everything.",
             "the row does not bound how fast d may shrink, or does so too late",
             INTO,
             5.0,
@@ -102,7 +102,7 @@ def _rows(
         "linear": room / t,
     }[v_stop]
     share = 1.0 if at_once else min(1.0, now.bounds.approach * T or 1.0)
-    lower = share * (near.moving - stop - speed * slopes @ now.q_dot) - q_ddot * T * slopes @ now.q_ddot
+    lower = share * (-stop - speed * slopes @ now.q_dot) - q_ddot * T * slopes @ now.q_ddot
     rows = D * (T if T_s else 1.0) * (slopes / now.M_bar if M_bar else slopes)
     chosen = {
         "all": slice(None),
@@ -139,15 +139,14 @@ MISTAKES: tuple[Mistake, ...] = (
 EXERCISE = Exercise(
     name="distance-row",
     card=card_of(__doc__),
-    equation=r"\nabla d^\top \left(\dot q + T_s (\ddot q_0 + \bar M^{-1} \Delta\tau)\right) \ge "
-    r"-v_\mathrm{stop}(d - d_\mathrm{safe}), \quad "
-    r"v_\mathrm{stop}(s) = a \left(\sqrt{t^2 + 2 s/a} - t\right)",
+    equation=r"\nabla d^\top (\dot q + T_s (\ddot q_0 + \bar M^{-1} \Delta\tau)) \ge "
+    r"-v_\mathrm{stop}(d - d_\mathrm{safe})",
     plain="∇dᵀ(q̇ + T_s (q̈₀ + M̄⁻¹Δτ)) ≥ −v_stop(d − d_safe), v_stop(s) = a (√(t² + 2s/a) − t)",
     hints=(
         "`now.near.gradient @ now.q_dot` is how fast each distance grows. The next velocity is "
         "q̇ + T_s (q̈₀ + M̄⁻¹Δτ).",
         "What stands before Δτ is D = T_s ∇dᵀM̄⁻¹, a row for each pair; the rest goes to the right.",
-        "The room is s = max(d − d_safe, 0); below d_safe, v_stop is 0.",
+        "The speed of a stop is v_stop(s) = a (√(t² + 2s/a) − t), with the room s = max(d − d_safe, 0).",
         "As a bound of a joint, in one period it may use at most min(1, approach · T_s) of what is left: "
         "share · (−v_stop − ∇dᵀq̇) is the least change of ∇dᵀq̇.",
     ),

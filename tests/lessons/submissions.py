@@ -140,14 +140,14 @@ MISTAKES: dict[str, dict[str, Mistake]] = {
             "    D, slopes, v_stop, speed = D[:0], slopes[:0], 0, 0\n    return D, share",
             4,
             "no pair has a row",
-            "no distance falls below",
+            "the arm keeps clear",
         ),
         "sign of ∇d": Mistake(
             "near.gradient, near.d, near", "-near.gradient, near.d, -near", 2, "∇d has the wrong sign: "
         ),
         "no M̄": Mistake("slopes / now.M_bar", "slopes", 5, "M̄ is missing in D", "as near"),
         "no d_safe": Mistake(
-            "distance - near.d_safe", "distance", 4, "d_safe is missing", "no distance falls"
+            "distance - near.d_safe", "distance", 4, "d_safe is missing", "the arm keeps clear"
         ),
         "constant bound": Mistake(
             "-v_stop - speed", "-speed", 3, "the bound is constant", "reaches a target that is free"
