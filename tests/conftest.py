@@ -58,6 +58,8 @@ _LONG = (
     "tests/lessons/test_lessons_grade.py",
     "tests/app/test_app_rough.py",
     "tests/lessons/test_lessons_every_controller.py",
+    "tests/lessons/test_lessons_cluster.py",
+    "tests/lessons/test_lessons_every_task.py",
     "tests/test_site.py",
     "tests/test_site_live.py",
     "tests/lessons/test_lessons_course.py",

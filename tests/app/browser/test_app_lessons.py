@@ -25,6 +25,8 @@ from lessons.teaching.challenge import Challenge
 from lessons.teaching.lesson import Lesson
 
 pytestmark = pytest.mark.usefixtures("one_fork_server")
+UNSEEN = 1500
+"""Time between two pictures, ms: these tests read the panel and never look at the 3D view."""
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +38,7 @@ def school() -> Iterator[PageServer]:
 
 @pytest.fixture(scope="module")
 def learner_page(browser: Browser, school: PageServer) -> Iterator[Page]:
-    opened = open_page(browser, school.link, 1000, 700)
+    opened = open_page(browser, school.link, 1000, 700, rest=UNSEEN)
     yield opened
     opened.context.close()
 
