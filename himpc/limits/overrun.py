@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 _SECONDS = 0.02
 """Time constant of the mean velocity, whose distance from the velocity is a smooth acceleration."""
 _LEAD = 0.067
-"""s: by so much later the velocity that an acceleration leads to must be within its limit."""
+"""s: the velocity is extrapolated over this time, and that velocity must be within its limit."""
 _LEAST = 0.7
 """Share of its velocity limit that a joint keeps."""
 
