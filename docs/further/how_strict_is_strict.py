@@ -65,8 +65,10 @@ FURTHER = Further(
             _allowed,
         ),
         Line(
-            r"and nothing at all for $\delta = 0$. For (11) there is a second trouble. Where level 1 is "
-            r"at its best with $e^* = 0$, its cost has no slope that could tell harmless from harmful:",
+            r"and nothing at all for $\delta = 0$. For (11) one might suspect a missing slope as well. "
+            r"It does not explain the short steps (third step of the lesson: where level 1 pays for its "
+            r"effort, the cost has a slope, and the steps are as short). Where level 1 is at its best with "
+            r"$e^* = 0$, its cost has none:",
             r"\nabla \mathcal J_1 = J^\top Q\, e^* = 0",
             _flat,
         ),

@@ -16,8 +16,8 @@ def viability_bounds(
     """Bounds on q̇_{k+1} that keep a stop with a_max before the position limit possible.
 
     q̇_{k+1} ≤ min(q̇_max, a(−t + √(t² + 2 max(0, q_max − q_k)/a))) and its mirror: the speed whose stop,
-    with t of reaction and then a, ends at the limit. t = T_s is enough for an exact model; time-delay
-    estimation brakes some tens of milliseconds late. Beyond a limit the joint must return: the bound
+    with t of reaction and then a, ends at the limit. t = T_s is enough for a joint that may brake at once;
+    velocity rows that bound the change of the speed delay it. Beyond a limit the joint must return: the bound
     turns into −RETURN_RATE times the excess. Printed position rows
     (32d) cannot do this: an N·T_s of 5 ms is far shorter than the time a joint needs to stop.
 

@@ -89,9 +89,10 @@ BOUND = Step(
     do="Halve K_P, and let it run on. Does the arm press less, or only later?",
     why=r"""
     The torque grows until joints 2 and 4 are at their bounds, and so does the force. Stiffness does not
-    limit it: with half of $K_p$ the bound is reached almost a second later, at the same force. With all its
-    torque the arm comes to almost 700 N. A bound of the torque is no cheap bound of a force: it also
-    limits what the arm may carry, and how fast it may stop.
+    limit it: with half of $K_p$ both bounds are reached, too, up to 0.9 s later and at the same force. With
+    all its torque the arm presses with 650 N after 4 s, and joint 2 is at its bound again. A bound of
+    the torque is no cheap bound of a force: it also limits what the arm may carry, and how fast it may
+    stop.
     """,
     prediction=Value(
         "With a quarter of the torque: how hard does the arm press at the end, in N?",

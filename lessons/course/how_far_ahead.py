@@ -86,10 +86,11 @@ REASON = Step(
     Twenty steps make about half the error of one step, with smoother torques, which is the paper's
     trend. But what the longer horizon changes is the price of torque. A change of torque stays in force
     at all later knots. With $N = 20$ it is paid for once and counts at twenty knots, so $R$ weighs
-    less: $R = 10$ acts like 1.7 with $N = 1$. A smaller $R$ does the same: with a hundredth of it, $R =
-    0.1$, one step ahead errs less than twenty steps with $R = 10$, and its torque is as smooth. At $R =
-    0.1$ the two horizons err alike. Even here the longer horizon gives nothing that another weight does
-    not give.
+    less: $R = 10$ acts like 1.7 with $N = 1$. It does not act like $10/20$: the plan's later changes
+    remove a part of $e$ as well, so the first one counts for fewer than twenty knots. A smaller $R$
+    does the same: with a hundredth of it, $R = 0.1$, one step ahead errs less than twenty steps with $R
+    = 10$, and its torque is as smooth. At $R = 0.1$ the two horizons err alike. Even here the longer
+    horizon gives nothing that another weight does not give.
     """,
     prediction=Value(
         "R on accelerations: the RMS error with N = 20 is how many times that with N = 1?",

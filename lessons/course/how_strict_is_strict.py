@@ -88,14 +88,17 @@ LITTLE = Step(
     do="Watch the hand while δ goes from 1 mm to 5 cm. Does the base thank you for it?",
     why=r"""
     The hand uses less than a tenth of $\delta$. It is the *plan* that $\delta$ bounds at every knot,
-    not what the robot does. How much of it is used depends on how often a new plan is made. Here ten
-    plans a second are made, one for every knot. With one plan a second the hand is off by 6.7 mm, with
-    five by 2.2 mm, with twenty by 3.5 mm and with fifty by 4.3 mm. One plan for every knot is best at
-    other spacings, too: with a knot every 0.2 s the hand is off by 0.9 mm with five plans a second and
-    by 9 mm with ten; with a knot every 0.05 s by 0.6 mm with twenty and by 2.8 mm with ten. In a
-    footnote the paper warns that the robot may also exceed $\delta$. With $\delta = 1$ mm and twenty
-    plans a second the hand is off by 3.9 mm. The paper's own low $\delta$ was exceeded as well: the
-    hand was off by 3 mm instead of 1 mm (Table I).
+    not what the robot does. How much of it is used depends on how often a new plan is made. One plan for
+    every knot is best. The hand is off by
+
+    - 0.8 mm with ten plans a second and a knot every 0.1 s, as here; 6.7 mm with one plan a second,
+      2.2 mm with five, 3.5 mm with twenty, 4.3 mm with fifty;
+    - 0.9 mm with five plans a second and a knot every 0.2 s ($N = 5$); 9 mm with ten;
+    - 0.6 mm with twenty plans a second and a knot every 0.05 s ($N = 20$); 2.8 mm with ten.
+
+    In a footnote the paper warns that the robot may also exceed $\delta$. With $\delta = 1$ mm and
+    twenty plans a second the hand is off by 3.9 mm. The paper's own low $\delta$ was exceeded as well:
+    the hand was off by 3 mm instead of 1 mm (Table I).
     """,
     prediction=Choice(
         "The hand may be off by 1 cm. How far is it off at most?",
@@ -146,12 +149,12 @@ SUM = Step(
     why=r"""
     The looser rule makes the slower robot: the line search cuts the step to a fortieth. One would blame
     the flat cost: at its best the hand's error is nearly zero, and there $\mathcal J_1$, a sum of
-    squares, has hardly a gradient. That is not the reason: if level 1 also pays for its effort, with
-    the same $Q = 10$ (`formulation=paper` and `Q=10`), its best leaves an error, and the steps stay as
-    short. A smaller $Q$ makes them longer: with $Q = 1$ they are 2.3 times as long, still far shorter
-    than with (12). What makes them so short we do not know. The paper finds the same, (12) "permitting
-    larger step sizes", and for the hand 3.07 and 3.42 mm at low and high $\delta$ against 3.24 and 6.25
-    mm.
+    squares, has hardly a slope. We tested that. If level 1 also pays for its effort, with the same
+    $Q = 10$ (`formulation=paper` and `Q=10`), its best leaves an error and the cost has a slope, but the
+    steps are as short as before. So the missing slope is not the reason. A smaller $Q$ makes them
+    longer: with $Q = 1$ they are 2.3 times as long, still far shorter than with (12). What makes them
+    so short we do not know. The paper finds the same, (12) "permitting larger step sizes", and for the
+    hand 3.07 and 3.42 mm at low and high $\delta$ against 3.24 and 6.25 mm.
 
     In the formulation as printed (`formulation=paper`, which brings our $Q = 1$) it depends on $Q$ which
     of the two is better for the hand, and the paper does not print $Q$. With our $Q = 1$ the hand is
@@ -209,7 +212,10 @@ EFFORT = Step(
     why=r"""
     The hand is off by more than $\delta$. The arm must move to hold the hand while the base drives, and
     that now costs level 1 something: its own best plan lets the hand slip a little. (12) allows level 2
-    the same slip, $\delta$ comes on top, and the next plan starts from there. A hierarchy protects what
+    the same slip, $\delta$ comes on top, and the next plan starts from there. It is mostly the charge
+    for speed: with a thousandth of it 6 mm remain. A very large $Q$ does not protect the hand either:
+    with $Q = 1000$ it is off by 40 mm. There it is the bounds on speed: without them 5.4 mm remain.
+    A hierarchy protects what
     a level *asks for*. If it asks for a compromise, that is what is protected.
     """,
     prediction=Choice(

@@ -192,8 +192,9 @@ BEHIND = Step(
     The filter is as safe: nothing is touched. But it does not know who comes first. Orientation and
     posture pull the elbow towards the post, the filter takes the sum of all pulls and changes it as
     little as it can, and the hand goes without: it stops 27 cm before its target. That is the lower
-    levels' doing: with both of them switched off the hand is 5 cm away by then, and comes closer. Without
-    the posture alone 23 cm are left. An order that is decided before the bounds are known does not hold.
+    levels' doing: with both of them switched off the hand is 5 cm away by then, and comes closer. One of
+    them is enough to hold it back: without the posture alone 23 cm are left, without the orientation
+    alone 19 cm. An order that is decided before the bounds are known does not hold.
     """,
     prediction=Choice(
         "The same rows, but behind the levels. At the end the hand …",

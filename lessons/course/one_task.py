@@ -164,8 +164,10 @@ FREE = Step(
     Which way it moves is decided by a bound. The push drives joint 2 to its speed limit, and the
     torques change to hold it there. When the push ends, the part of the torques along the free motion
     stays as it is, and it turns joint 2 round. 0.2 s later joint 2 does 80°/s the other way. Without
-    speed limits joint 2 goes on the way it was pushed, with more than 300°/s. A last level that wants
-    $\ddot q + K_V \dot q = 0$ brings it to rest; the hand hardly notices.
+    speed limits joint 2 goes on the way it was pushed, with more than 300°/s. It turns round only
+    0.75 s after the push, where the held hand lets it go no further: the last link then lies on the
+    line from joint 1 to the hand. A last level that wants $\ddot q + K_V \dot q = 0$ brings it to rest;
+    the hand hardly notices.
     """,
     prediction=Choice(
         "The hand is held. What does the elbow do after the push?",

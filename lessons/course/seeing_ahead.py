@@ -135,8 +135,9 @@ NO_PLAN = Step(
     long arrived. A velocity in proportion to the error is slow at the end, and with 0.3 1/s it is slow
     for long: without any limit on speed and acceleration it is hardly nearer home, with a gain of 2 1/s
     it arrives. A planner has weights instead of a gain. With our $Q = 10$ it is nearly as quick as the
-    limits let it be: it comes home later with half the speed or a third of the acceleration, where
-    HTIDKC comes home as late as before. With $Q = 1$ and the scene's own limits it is still 22 cm away
+    limits let it be: with half the speed limit, or a third of the acceleration, it comes home later.
+    HTIDKC does not: it never drives faster than half the limit, and comes home as late as before. With
+    $Q = 1$ and the scene's own limits it is still 22 cm away
     at the time when $Q = 10$ has brought it home. The paper, which tuned both to do equally well in
     Part 1, counts 42 % less error in Part 2 for HTMPC.
     """,
@@ -186,12 +187,14 @@ GAINS = Step(
     drifts. It drifts most at the edge of the arm's reach, 20 mm, where the arm's joints turn fastest.
     It drifts nearly as far on the way home, 16 mm, where the base is at full speed. With
     a peak that the arm can just reach the hand is off by 14 mm, with a near one by 4 mm. Asked for a
-    hundred times a second it drifts half as far. The hand's error is brought back in proportion to $K$:
-    with 5 1/s for the hand it is off by half, with 20 1/s by 3 mm, and the base is as quick as before.
-    The limits act both ways: without those on acceleration and its change the hand is off by 18.5 mm,
-    without those on speed by 28 mm, without any by 37 mm. A good pair exists, and has to be
-    found. The paper says (given, not tried here) that HTIDKC would need its parameters scheduled, where
-    one set of weights serves HTMPC in both parts.
+    hundred times a second it drifts half as far. At two hundred times the hand is off by 8 mm, not 5: on
+    the way home a part of the error is due to the limits on acceleration and its change, and does not
+    shrink with the period. Without these limits 4.5 mm are left. The hand's error is brought back in
+    proportion to $K$: with 5 1/s for the hand it is off by half, with 20 1/s by 3 mm, and the base is
+    as quick as before. The limits act both ways: without those on acceleration and its change the hand
+    is off by 18.5 mm, without those on speed by 28 mm, without any by 37 mm. A good pair exists, and
+    has to be found. The paper says (given, not tried here) that HTIDKC would need its parameters
+    scheduled, where one set of weights serves HTMPC in both parts.
     """,
     prediction=Choice(
         "Gains four and seven times as high. The largest error of the hand, in the first task, …",

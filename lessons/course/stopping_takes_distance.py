@@ -50,10 +50,10 @@ PRINTED = Step(
     solution, and a fallback takes over. The lack of torque explains most of the overrun: at 15°/s,
     where 26 rad/s² are enough, the joint overruns by 0.03° only. But QPs have no solution there either,
     because the rows on the position contradict those on how fast a speed may change: without the latter
-    (`limits.velocity_approach=0`) only seven are left. The rows on speed delay the braking, but only
-    for three ticks: without them it still overruns by 0.57°. With three times the torque, in the bounds
-    and in the motors, 0.2° is left. At that torque the rows on speed count: with the rows on speed off
-    as well only 0.1° is left. The row on the position is correct, but it comes too late.
+    (`limits.velocity_approach=0`) only seven are left. The rows on speed cost 0.07°: without them
+    it still overruns by 0.57°. With three times the torque, in the bounds and in the motors, 0.2° is
+    left, and the rows on speed cost half of that: without them 0.1° is left. The row on the position is
+    correct, but it comes too late.
     """,
     prediction=Choice(
         "The joint comes at 57°/s and the controller looks 5 ms ahead. How hard does it brake?",
@@ -135,19 +135,24 @@ VIABLE = Step(
 
     A joint at that speed that goes on for a time $t$ and then brakes with $a = 20$ rad/s² stops at
     $q_s$. Such a state is called viable: there is a future that keeps the limit. For an exact model $t
-    = T_s$ and $q_s = q_{\max}$ would do. Our model is estimated, and the joint brakes tens of steps
-    late. The rows on speed delay it, too: in a second the speed may change by at most 15 times its
-    distance from its bound. So $t = T_s + 5/15$ s $= 0.33$ s, and $q_s$ lies 0.4° before the limit;
-    beyond $q_s$ the joint must come back, at a speed of five times the excess per second. Again $N =
-    5$.
+    = T_s$ and $q_s = q_{\max}$ would do. Two things are not exact. The rows on speed delay the braking:
+    in a second the speed may change by at most 15 times its distance from its bound. So $t = T_s +
+    5/15$ s $= 0.33$ s. And our model is estimated, so that the joint brakes late and then harder than
+    with $a$. For that $q_s$ lies 0.4° before the limit; beyond $q_s$ the joint must come back, at a
+    speed of five times the excess per second. Again $N = 5$.
     """,
     do="Let it close in faster, at 60 and 200 1/s. What is won, and what does the torque say?",
     why=r"""
     Now the very next step already knows the whole braking distance. At 5° before the limit $t = T_s$
-    would allow 106°/s, $t = 0.33$ s only 13.5°/s; the arm does 18 and follows the falling bound a
-    little late. An even stop before the limit would never take more than 1.5 of the 20 rad/s², and
-    every QP has a solution. The price is time: the last degrees are crept. What a short horizon cannot
-    see must be put into its bounds. It is this lab's default and a deliberate departure from (32d).
+    would allow 106°/s, $t = 0.33$ s only 13.5°/s. The arm does 18: it follows the falling bound a little
+    late. The rows on speed are the reason, not the estimate: with twice the $\bar M$ the arm does 18 as
+    well. Without the rows on speed ($t = T_s$) the estimate's lateness shows: the joint brakes with 28
+    instead of 20 rad/s² and passes $q_s$ by 0.002°. With twice the $\bar M$ it brakes with 24 rad/s².
+    With 0.3 of the $\bar M$ it takes all the torque and passes $q_s$ by 0.03°. So 0.4° are more than
+    enough for the estimate. An even stop before the limit would never take more than 1.5 of the 20
+    rad/s², and every QP has a solution. The price is time: the last degrees are crept. What a short
+    horizon cannot see must be put into its bounds. It is this lab's default and a deliberate departure
+    from (32d).
     """,
     prediction=Choice(
         "A horizon of 5 ms again, but with the bound on speed. The largest torque is …",

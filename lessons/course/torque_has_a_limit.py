@@ -143,9 +143,9 @@ LESS = Step(
     The hand leaves its circle: bounds rank above level 1. Without dry friction the circle by itself
     would need 0.07 N·m, and the hand would stay on it. Level 2 does not make it worse, in either order:
     with joint 1 first the hand is off as far. In both orders joint 1's motor is at the same limit
-    nearly all the time. An order is kept in every single tick, not over the run. It cannot promise that
-    the hand stays as near as without a level 2: with a swing of −30° the hand gets further off than the
-    ghost, 16 mm instead of 10. With joint 1 first it is off by 9 mm there.
+    nearly all the time. The order holds at each tick. Over a run a second task may still lead the arm to
+    where the hand is worse off: with a swing of −30° the hand gets further off than the ghost's,
+    16 mm instead of 10. With joint 1 first it is off by 9 mm there.
     """,
     prediction=Choice(
         "Compared with the ghost, which has no second task: how much larger is the hand's error?",

@@ -140,15 +140,15 @@ EQUALITY = Step(
     Level 2 wants something it cannot have. It goes to the edge of what level 1 leaves, where links 2
     and 3 are in line, and does not come to rest there: from 2 s on joint 3 swings about the edge, to
     and fro with 94°/s, a little more than once a second, until joint 1 is called back. A strict order
-    does not make the arm calm. The strict order does not make it swing either: in a weighted sum with
-    $Q_2 = 0.01$ joint 3 swings as well, with up to 73°/s. With the strict order and $R_2 = 10^5$ it
-    slows down to 58°/s. Time-delay estimation is not what keeps it swinging: with twice the $\bar M$ it
-    swings as before. With our weights the horizon keeps it swinging: with $N = 1$ the swing dies away
-    to a tremble of 12°/s. With another weight it swings without a horizon, too: with $N = 1$ and $R_2 =
-    10^5$ joint 3 goes on swinging with 62°/s. But torque and speed stay within their bounds, and the
-    hand stays on its circle. The equality (34g) alone is not enough for that. The bounds are needed,
-    too: without those on speed and position every motor comes to its limit and the hand is off by 11
-    mm, and without any bound the arm is lost as with a projection.
+    does not make the arm calm. What keeps it swinging? It is not the strict order: in a weighted sum
+    with $Q_2 = 0.01$ joint 3 swings as well, with up to 73°/s. It is not the estimation: with twice the
+    $\bar M$ it swings as before. With our weights it is the horizon of level 2: with $N = 1$ at level 2
+    alone the swing dies away to a tremble of 12°/s, with $N = 1$ at level 1 alone it swings as before.
+    Another weight changes this. With $R_2 = 10^5$ the swing slows down to 58°/s and does not need the
+    horizon: with $N = 1$ and $R_2 = 10^5$ joint 3 goes on swinging with 62°/s. But torque and speed
+    stay within their bounds, and the hand stays on its circle. The equality (34g) alone is not enough
+    for that. The bounds are needed, too: without those on speed and position every motor comes to its
+    limit and the hand is off by 11 mm, and without any bound the arm is lost as with a projection.
     """,
     claims=(
         Claim(

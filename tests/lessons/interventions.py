@@ -4,7 +4,8 @@ Each row quotes a sentence, names a run that shows the effect, the assignments t
 the measured values with and without it. `interventions_all` has all of them: the course's are in
 `interventions_tasks`, `interventions_limits` and `interventions_mobile`, the documents' in
 `interventions_documents`, and those that replace refuted sentences in
-`interventions_reader`, `interventions_fourth_reader` and `interventions_fifth_reader`.
+`interventions_reader`, `interventions_fourth_reader`, `interventions_fifth_reader` and
+`interventions_sixth_reader`.
 """
 
 from __future__ import annotations

@@ -46,16 +46,17 @@ FIFTH_ROWS = (
         of=("limits.velocity_scale=0.15",), seconds=5.0,
     ),
     PLANS(
-        says="a knot every 0.2 s the hand is off by 0.9 mm with five plans a second and by 9 mm with ten",
+        says="0.9 mm with five plans a second and a knot every 0.2 s ($N = 5$); 9 mm with ten",
         there=(0.85, 0.95), without=("rate_hz=10",), gone=(8.5, 9.5), of=(*EVERY_FIFTH, "rate_hz=5"),
     ),
     PLANS(
-        says="with a knot every 0.05 s by 0.6 mm with twenty and by 2.8 mm with ten",
+        says="0.6 mm with twenty plans a second and a knot every 0.05 s ($N = 20$); 2.8 mm with ten",
         there=(0.55, 0.65), without=("rate_hz=10",), gone=(2.7, 2.85), of=(*EVERY_TWENTIETH, "rate_hz=20"),
     ),
     STEPS(
-        says="That is not the reason: if level 1 also pays for its effort, with the same $Q = 10$ "
-        "(`formulation=paper` and `Q=10`)",
+        says="If level 1 also pays for its effort, with the same $Q = 10$ (`formulation=paper` and `Q=10`), "
+        "its best leaves an error and the cost has a slope, but the steps are as short as before. So the "
+        "missing slope is not the reason.",
         without=("formulation=paper", "Q=10"), gone=(0.02, 0.025), stays=True,
     ),
     STEPS(says="with $Q = 1$ they are 2.3 times as long", without=("Q=1",), gone=(0.049, 0.054)),

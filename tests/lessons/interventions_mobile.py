@@ -68,19 +68,19 @@ MOBILE_ROWS = (
         of("error/base", "m", "mean", 15.9), (0.14, 0.17), ("gains=[2,2]",), (0, 0.01),
     ),
     Intervention(
-        "seeing-ahead/2", "nearly as quick as the limits let it be",
+        "seeing-ahead/2", "nearly as quick as the limits let it be: with half the speed limit",
         BASE_10, (0, 0.06), ("limits.velocity_scale=0.5",), (0.4, 0.6), of=("controller=htmpc_wpt",),
     ),
     Intervention(
-        "seeing-ahead/2", "later with half the speed or a third of the acceleration",
+        "seeing-ahead/2", "or a third of the acceleration, it comes home later",
         BASE_10, (0, 0.06), ("limits.acceleration_scale=0.33",), (0.15, 0.25), of=("controller=htmpc_wpt",),
     ),
     Intervention(
-        "seeing-ahead/2", "where HTIDKC comes home as late as before",
+        "seeing-ahead/2", "and comes home as late as before",
         BASE_10, (0.85, 0.95), ("limits.velocity_scale=0.5",), (0.85, 0.95), stays=True,
     ),
     Intervention(
-        "seeing-ahead/2", "where HTIDKC comes home as late as before",
+        "seeing-ahead/2", "and comes home as late as before",
         BASE_10, (0.85, 0.95), ("limits.acceleration_scale=0.33",), (0.85, 0.95), stays=True,
     ),
     Intervention(

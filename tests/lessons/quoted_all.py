@@ -40,6 +40,14 @@ QUOTED = (
         0.0,
         0.5,
     ),
+    Quoted(
+        "one-task/3",
+        "It turns round only 0.75 s after the push",
+        _of(Signal("v", "deg/s", column=1), "mean", 1.04, 1.06),
+        -5,
+        5,
+        ("limits.velocity=false",),
+    ),
     Quoted("one-task/2", "Almost nothing happens", _ratio(HAND), 0.98, 1.05),
     Quoted("no-model-needed/0", "dips by a few millimetres", _of(HAND), 1.5, 5.0),
     Quoted("no-model-needed/0", "to a hundredth of a millimetre", _of(HAND, "last"), 0.0, 0.015),
@@ -110,7 +118,7 @@ QUOTED = (
     Quoted("stopping-takes-distance/0", "it comes at 57°/s", _of(Signal("v", "deg/s", column=1)), 56.5, 57.5),
     Quoted(
         "stopping-takes-distance/2",
-        "the arm does 18",
+        "The arm does 18",
         _of(Signal("speed within 5° of an end", "deg/s")),
         17.5,
         18.5,

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from docs.further.how_far_ahead import effects, first_left
 from himpc.limits import Limits, in_force
 from himpc.limits.limits import POSITION_MARGIN
 from himpc.limits.velocity import REACTION
@@ -207,6 +208,37 @@ def test_a_direction_that_is_nobodys_keeps_its_torque(change: str, kept: bool) -
     largest = max(map(part, found["q"][pushed], found["delta_tau"][pushed]))
     assert np.abs(found["delta_tau"][pushed]).max() > 0.05
     assert largest < 1e-9 if kept else largest > 0.01
+
+
+def test_joint_2_turns_round_where_the_held_hand_lets_it_go_no_further() -> None:
+    """*One task*, fourth step, without speed limits: when joint 2 turns round, the last link lies on the line
+    from joint 1 to the hand. There the distance from joint 1 to joint 3, and with it |q₂|, is extreme."""
+    lesson = load_lesson("one-task")
+    scene = lesson.run_of(lesson.steps[3]).but("limits.velocity=false").prepared()
+    found = run(scene)
+    t, v = found["t"][:, 0], found["v"]
+    turned = int(np.argmax((t > 0.4) & (v[:, 1] > 0.0)))
+    assert t[turned] == pytest.approx(0.3 + 0.75, abs=0.02)
+    assert np.abs(v[turned, [0, 2]]).min() > 1.0  # rad/s: the elbow goes on
+    assert isinstance(scene, TorqueScene)
+    plant = Plant(scene.robot, scene.settings.plant)
+    plant.reset(found["q"][turned])
+    J = plant.jacobian(scene.robot.tip)[:2]
+    hand, last = (np.array([J[1, k], -J[0, k]]) for k in (0, 2))  # from joint 1 and from joint 3
+    across = hand[0] * last[1] - hand[1] * last[0]
+    assert abs(across) < 0.01 * np.linalg.norm(hand) * np.linalg.norm(last)
+
+
+def test_the_first_of_twenty_changes_is_not_alone() -> None:
+    """*How far ahead*, second step: in one coordinate the first of twenty changes acts as with N = 1 and 0.17
+    R or so; if it were the only one, as with R/20."""
+    assert "It does not act like $10/20$" in " ".join(load_lesson("how-far-ahead").steps[1].why.split())
+    c, g = 0.19 * effects(20)[:, 0], 0.19  # of R = Q = 1
+    alone = 1.0 - c[0] * c.sum() / (c @ c + 1.0)
+    share = [
+        g**2 * effects(1)[0, 0] ** 2 * left / (1.0 - left) for left in (first_left(20, 1.0, 1.0, g), alone)
+    ]
+    assert share == pytest.approx([0.17, 1 / 20], rel=0.06)
 
 
 def test_RT4_asks_joint_1_for_more_than_its_data_sheet_allows() -> None:

@@ -83,18 +83,18 @@ GIVEN: dict[str, tuple[str, ...]] = {
     "torque-has-a-limit/2": ("−30",),
     "stopping-takes-distance/0": ("57", "0.3", "100", "35", "38", "0"),
     "stopping-takes-distance/1": ("50",),
-    "stopping-takes-distance/2": ("5", "106", "13.5", "20"),
+    "stopping-takes-distance/2": ("5", "106", "13.5", "28", "20", "24", "20"),
     "inside-the-qp/3": ("10", "14", "half"),  # numbers of the first step
     # Counts of torques, or computed numbers.
     "deadlines/0": ("2",),
-    "deadlines/1": ("half", "half", "0.005", "1", "2", "1", "8"),  # and the paper's period and step time
+    "deadlines/1": ("half", "half", "0.005", "1", "1", "8"),  # and the paper's period and step time
     # Numbers of the papers, which are tested below.
     "how-far-ahead/0": ("17", "4", "third", "1.2"),
     "how-strict-is-strict/1": ("3", "1"),
     "how-strict-is-strict/2": ("3.07", "3.42", "3.24", "6.25"),
     # Numbers of several runs, which are tested in test_lessons_architectures; and the paper's 2.3.
     "deliveries/0": ("9", "31", "7", "11"),
-    "deliveries/1": ("11", "14", "80", "half", "tenth", "1.6", "1.2", "2.1", "half", "2.3"),
+    "deliveries/1": ("11", "14", "80", "half", "tenth", "1.6", "1.2", "22", "41", "half", "11", "14", "2.3"),
 }
 """Numbers in explanations that no run of the step gives, per step, in the order of the text."""
 
@@ -192,6 +192,18 @@ def test_a_late_stop_asks_for_more_than_the_motors_can_do() -> None:
     full = (tau[:-1] < -3.999) & (speed[1:] > 0.05) & (q[:-1] > math.radians(149.0))
     deceleration = -np.diff(speed)[full] / np.diff(found["t"][:, 0])[full]
     assert deceleration.min() > 35.0 and deceleration.max() < 38.0
+
+
+def test_an_estimated_joint_brakes_harder_than_planned() -> None:
+    """*Stopping takes distance*, third step: without the rows on speed the joint brakes with 28 instead of 20
+    rad/s², and with 24 if M̄ is twice as large."""
+    told = texts(step_of("stopping-takes-distance/2"))
+    assert "brakes with 28 instead of 20 rad/s²" in told and "it brakes with 24 rad/s²" in told
+    spec = load_lesson("stopping-takes-distance").run_of(step_of("stopping-takes-distance/2"))
+    for scale, wanted in ((1, 28.0), (2, 24.0)):
+        found = run(spec.but("limits.velocity_approach=0", f"M_bar_scale={scale}").prepared())
+        deceleration = -np.diff(found["v"][:, 1]) / np.diff(found["t"][:, 0])
+        assert deceleration.max() == pytest.approx(wanted, abs=0.5)
 
 
 @pytest.mark.parametrize(
