@@ -2,8 +2,9 @@
 
 python benchmarks/same_as.py COMMIT [--seconds S] runs every scene with every controller that fits, without a
 page, here and in a checkout of COMMIT, and compares the results of `himpc-lab run --json`, except the keys of
-`TIMING`. With --tolerance T, numbers may differ by that share of the larger one (and by 1e-9), and the keys
-of `_HOW` (the route and its residuals) are not compared. Exit code 1 if any result differs.
+`TIMING`. With --tolerance T, two numbers may differ by T times the larger of the two, or by 1e-9 if that is
+more, and the keys of `_HOW` (the route and its residuals) are not compared. The exit code is 1 if any result
+differs.
 """
 
 from __future__ import annotations

@@ -45,8 +45,12 @@ EVERY = 5.0  # s
 NEAR = 5  # samples over which a median is taken, at least
 BATCHES = 5  # of reloads
 REST = 5.0  # s
-GROWTH, PER_100, SPARE = 1.05, 5.0, 3
-"""Allowed growth of memory; MB; numbers of threads and handles that vary."""
+GROWTH = 1.05
+"""Factor by which memory may grow."""
+PER_100 = 5.0
+"""Memory, MB, that 100 reconnections may cost."""
+SPARE = 3
+"""Number by which the processes, the threads or the handles may increase."""
 
 
 @dataclass(frozen=True)

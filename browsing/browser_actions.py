@@ -279,7 +279,7 @@ def turn_target(page: Page, degrees: float) -> None:
 
 
 def _see(page: Page) -> None:
-    """Waits until the next pictures are drawn, however long that takes, and for at least a moment."""
+    """Waits, without a time limit, until the browser has drawn the next pictures, and then for 0.25 s."""
     page.evaluate(_PICTURES)
     page.wait_for_timeout(250)
 

@@ -17,9 +17,16 @@ _SLENDER = 0.05  # capsule radius divided by the length of the whole chain
 
 
 class Limb(NamedTuple):
-    """A straight part of a body: from the origin of its joint's frame to end (3,), m, with a radius, m.
-    joint: its Pinocchio index; 0 is the pedestal from the floor to the first joint. k: its number on that
-    body."""
+    """A straight part of a body.
+
+    Attributes:
+        joint: Pinocchio index of the joint that moves the body; 0 for the pedestal from the floor to the
+            first joint.
+        k: number of this part among the parts of the same body.
+        end: (3,), m; the part extends from the origin of the joint's frame to this point.
+        radius: m.
+        colour: red, green and blue, each from 0 to 255.
+    """
 
     joint: int
     k: int

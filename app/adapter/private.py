@@ -62,7 +62,8 @@ def open_server(host: str, port: int, guard: Guard) -> viser.ViserServer:
         for path in OF_A_SERVER:
             require(reaches(server, path), path)
         handlers = server._websock_server
-        # Any client could request a public tunnel to this machine, even without the button.
+        # Without this, any client could request a public tunnel to this machine, even where viser's button
+        # for it is not shown.
         for tunnel in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
             handlers.unregister_handler(tunnel)
         _keep_awake(server)

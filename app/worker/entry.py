@@ -1,5 +1,5 @@
-"""The entry module of simulation processes, given by name. It imports little itself, so that it can report
-the progress of the other imports."""
+"""The module with which simulation processes start. The server refers to it by its name. It imports little
+itself, so that it can report the progress of the other imports."""
 
 from __future__ import annotations
 

@@ -45,8 +45,9 @@ def _scaling(rng: np.random.Generator) -> tuple[float, float]:
 FURTHER = Further(
     derivation=(
         Line(
-            r"Position is read in digits of $\delta$, velocity and acceleration are differences (a digit "
-            r"more at the last reading, none before):",
+            r"Position is read in multiples of $\delta$ (one digit); velocity and acceleration are "
+            r"differences of readings. The second formula is the acceleration if the last reading is one "
+            r"digit larger and the readings before it are equal:",
             r"\ddot q_k = \frac{q_k - 2 q_{k-1} + q_{k-2}}{T_s^2}, \qquad "
             r"\text{one digit: } \frac{\delta}{T_s^2}",
             _differences,

@@ -92,9 +92,10 @@ FURTHER = Further(
         ),
         Question(
             r"A joint comes at 100°/s; $t = 0.33$ s, $a = 20$ rad/s². How far before $q_s$ does the bound "
-            r"on its speed begin to bite? And with $t = T_s$?",
-            r"At $v t + v^2/2a = ⟨far⟩$°, of which only ⟨brake⟩° are for braking: the reaction time is "
-            r"what costs. With $t = T_s$ at ⟨near⟩°.",
+            r"on its speed begin to act? And with $t = T_s$?",
+            r"The bound begins to act $v t + v^2/2a = ⟨far⟩$° before $q_s$. Only ⟨brake⟩° of these are for "
+            r"braking; the rest, $v t$, is the way during the reaction time. With $t = T_s$ the bound begins "
+            r"to act ⟨near⟩° before $q_s$.",
             {
                 "far": (
                     math.degrees(math.radians(100) * REACTION_TIME + math.radians(100) ** 2 / (2 * A)),

@@ -11,7 +11,7 @@ from lessons.scenes.catalog import torque_scene
 from robots import Plant
 
 PEAK = math.radians(15) * (2 * math.pi / 8) ** 2
-NEED = measured("torque-has-a-limit", "prediction: Which share of the reduced limit")
+NEED = measured("torque-has-a-limit", "prediction: What is the largest torque during the motion")
 
 
 def _inertia() -> float:
@@ -92,9 +92,8 @@ FURTHER = Further(
             r"$\tau_0 = 0.10$ N·m, the limit is 0.16 N·m, $N = 5$. How large may the first $\Delta\tau$ "
             r"be, and how "
             "large the sum of all five?",
-            r"⟨room⟩ N·m in both cases: (32f) bounds every partial sum. The first one may use up all the "
-            r"room; the "
-            "others then add nothing, or take back.",
+            r"⟨room⟩ N·m in both cases: (32f) bounds every partial sum. The first $\Delta\tau$ alone may "
+            r"reach the limit; each partial sum of the others is then zero or negative.",
             {"room": (0.16 - 0.10, ".2f")},
         ),
         Question(

@@ -27,11 +27,15 @@ def solve_cascade(
 ) -> list[LevelSolution]:
     """Solves the levels in order; each level satisfies the priority constraints (33) of the levels above.
 
-    The fallbacks, in the order in which they are tried: "solve" solves the printed problem; "soften" widens
-    the state rows by the least slack that makes them feasible, and passes the widened rows to the lower
-    levels (Theorem 2 needs this); level 1 then falls to the shifted "previous" plan of that level if that was
-    an optimum and meets all rows, or "brake"s as the rows allow; a lower level "inherit"s U_{i−1}, which
-    keeps every priority. So the increments meet all rows whenever any do.
+    Level 1 has four fallbacks, which are tried in this order. "solve" solves the printed problem. "soften"
+    widens the state rows by the least slack that makes them feasible; the lower levels get the widened rows
+    (Theorem 2 needs this). "previous" is last tick's plan of this level, shifted by one tick; it is used if
+    it was an optimum and meets all rows. "brake" brings the joints to rest as far as the rows allow.
+
+    A lower level has two: "solve", and "inherit", which takes over U_{i−1}, the increments of the level
+    above; this keeps every priority.
+
+    So the increments meet all rows whenever there are increments that do.
 
     Args:
         problems: the levels, highest priority first; at least one.

@@ -139,7 +139,8 @@ class Plan:
 
     @property
     def leak(self) -> float | None:
-        """The largest leak between levels, and of a filter into them; None with fewer than two levels."""
+        """The largest of all leaks: those between levels and, if a filter follows the levels, its leak into
+        them. None if there are fewer than two levels."""
         if len(self.levels) < 2:
             return None
         between = max(level.leak for level in self.levels)

@@ -1,4 +1,5 @@
-"""The cascade on an arena, with a fallback for every level that has no optimum within its budget."""
+"""Solves all levels of the cascade on an `Arena` (the numbers of one controller). A level for which no
+optimum is found within the arena's budget, which all levels share, gets a fallback."""
 
 from __future__ import annotations
 

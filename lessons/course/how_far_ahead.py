@@ -109,7 +109,7 @@ REASON = Step(
             because="then both robots have the same settings",
         ),
         Claim(
-            "The torque is smoother: its changes are at most 0.8 times as large.",
+            "The torque is smoother: its changes are at most 0.8 times those of one step ahead.",
             Measure(ROUGH, "rms", over_ghost=True),
             "at most",
             0.8,

@@ -38,7 +38,7 @@ ENOUGH = Step(
     bound that is not met does nothing: with all the torque the errors are the same.
     """,
     prediction=Value(
-        "Which share of the reduced limit does the motion need at most?",
+        "What is the largest torque during the motion, as a share of the reduced limit?",
         Measure(TORQUE),
         low=1.0,
         high=100.0,

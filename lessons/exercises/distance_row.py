@@ -146,7 +146,8 @@ EXERCISE = Exercise(
         "`now.near.gradient @ now.q_dot` is how fast each distance grows. The next velocity is "
         "q̇ + T_s (q̈₀ + M̄⁻¹Δτ).",
         "What stands before Δτ is D = T_s ∇dᵀM̄⁻¹, a row for each pair; the rest goes to the right.",
-        "The speed of a stop is v_stop(s) = a (√(t² + 2s/a) − t), with the room s = max(d − d_safe, 0).",
+        "The largest speed from which the arm can still stop within the distance s is "
+        "v_stop(s) = a (√(t² + 2s/a) − t); here s = max(d − d_safe, 0).",
         "As a bound of a joint, in one period it may use at most min(1, approach · T_s) of what is left: "
         "share · (−v_stop − ∇dᵀq̇) is the least change of ∇dᵀq̇.",
     ),

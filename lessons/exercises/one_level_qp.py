@@ -48,7 +48,7 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
         ),
         GradeCheck(
             "At the torque bound the torque is the optimum of the QP, not a clipped one.",
-            "it is not the optimum: the bounds must be constraints of the QP",
+            "the torque is not the optimum: the bounds must be constraints of the QP",
             WEAK,
             1e-6,
             beside="hiqp",

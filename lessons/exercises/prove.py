@@ -17,12 +17,13 @@ from lessons.parallel import FailedJob, Spread
 
 @dataclass(frozen=True)
 class Proof:
-    """The grades of a teacher's own files.
+    """The grades that belong to an exercise of a teacher's own.
 
     Attributes:
         exercise: the exercise.
-        solution, start: the grades of the solution and of the file with the missing lines.
-        mistakes: (what is wrong, its grade), in order.
+        solution: the grade of the solution.
+        start: the grade of the file that students begin with, in which lines are missing.
+        mistakes: for every known mistake, in order, the sentence that names it and its grade.
     """
 
     exercise: Exercise

@@ -42,7 +42,7 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
         ),
         GradeCheck(
             "If the torque is not enough for both levels, the error of level 2 grows.",
-            "it is not the optimum: the bounds must be constraints in the QP of both levels",
+            "the torque is not the optimum: the bounds must be constraints in the QPs of both levels",
             WEAK,
             1e-6,
             beside="hiqp",

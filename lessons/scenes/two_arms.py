@@ -21,11 +21,13 @@ from robots.world import standing_floor
 
 RIGHT, LEFT = "right_gripper", "left_gripper"
 SIDE = 0.12
-"""m, of the square along which the hands move."""
-START_S, EDGE_S = 0.3, 1.2
-"""s until it starts, and for each edge."""
+"""Length of each edge of the square along which the hands move, m."""
+START_S = 0.3
+"""Time until the motion along the square starts, s."""
+EDGE_S = 1.2
+"""Time for each edge of the square, s."""
 _SCRIPT_S = 0.05
-"""s between two targets of the tray in the script."""
+"""Time between two targets of the tray in the script, s."""
 PLANT = replace(TOUCHING, armature=0.1)
 """Geared motors: 0.1 kg·m² is what MuJoCo Menagerie gives arms of this size. Without armature, the inertia of
 an empty gripper is so small that no constant M̄ suits both the wrist and the shoulder.

@@ -119,12 +119,13 @@ class SceneSettings(ABC):
         return entry_at(self.entries, path)
 
     def special_differences(self, wanted: Any) -> list[tuple[str, Any]]:
-        """Paths and values in which other settings of the same scene differ, for paths that are not in
-        `places`."""
+        """The differences between these settings and `wanted`, as paths and values that turn these into
+        `wanted`. Only paths that are not in `places` are considered."""
         return []
 
     def recomposed(self, wanted: Any) -> list[tuple[str, Any]]:
-        """Paths and values after which other settings of the same scene have the same paths as these."""
+        """Paths and values that give these settings the same paths as `wanted`; [] if they already have
+        them."""
         return []
 
     def takes(self, event: Event) -> bool:

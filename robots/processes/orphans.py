@@ -34,8 +34,8 @@ def end_with(pipe: int, group: bool = False) -> None:
 
 
 def end_with_parent() -> None:
-    """Ends this process together with the one that spawned it through multiprocessing; does nothing in other
-    processes."""
+    """Makes this process end when the process that spawned it through multiprocessing ends. Does nothing in a
+    process that was not spawned through multiprocessing."""
     parent = mp.parent_process()
     if parent is not None:
         end_with(parent.sentinel)

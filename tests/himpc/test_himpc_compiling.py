@@ -171,7 +171,8 @@ def test_a_piece_from_another_folder_is_part_of_what_is_kept(tmp_path: Path) -> 
         f"@kernel{below}"
     )
     wrong = start(tmp_path)
-    # from LOAD: the compiled function returns half of the expected value
+    # The AssertionError is raised in the script LOAD: the compiled function returns half of the expected
+    # value.
     assert "AssertionError" in wrong.communicate(timeout=120)[1]
     constants.write_text("TWO = 2.0")
     assert [compiled_and_place(start(tmp_path))[0] for _ in range(2)] == [2, 0]

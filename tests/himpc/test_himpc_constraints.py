@@ -26,7 +26,7 @@ def _no_bounds(now: Moment) -> Block:
 COUPLED = Constraint(
     "coupled", summed_twice, first_knot=1, hard=False, is_on=lambda _: False, bounds=_no_bounds
 )
-"""Sums of what velocity rows bound, over several joints."""
+"""A constraint on sums over several joints of the quantity that a velocity row bounds for a single joint."""
 
 
 def coupled(seed: int, n: int, N: int, levels: int, room: float = 0.3) -> Hierarchy:

@@ -149,7 +149,7 @@ TEXTS = (
     Exempt("software", (
         "tests/app/test_app_opening.py::test_no_argument_list_holds_what_the_browser_is_opened_with"
     ), (
-        ("serving", "It first opens a file that only you can read, since"),
+        ("serving", "The address itself is not an argument of the browser, because"),
     )),
     Exempt("software", "tests/app/test_app_guard.py::test_cookies_of_two_servers_live_in_one_jar", (
         ("serving", "Browsers send cookies of one host to the servers at all its ports"),

@@ -65,11 +65,11 @@ DOCUMENT_ROWS = (
     ),
     # ---------------------------------------- RT4
     RT4(
-        "disagreements", "a lighter wrist in the authors' model would do part of it",
+        "disagreements", "a lighter wrist in the authors' model would explain a part",
         of("error/orientation", "deg", "rms", column=2), (0.8, 1.4), LIGHT, (0.15, 0.35),
     ),
     RT4(
-        "disagreements", "five times our M̄ of joints 5 to 7 leaves similar shares",
+        "disagreements", "with five times our M̄ of joints 5 to 7 the three errors fall",
         of("error/orientation", "deg", "rms", column=2), (0.8, 1.4), FIVE, (0.15, 0.35),
     ),
     RT4(

@@ -96,7 +96,7 @@ class StartPanel:
             vector = tuple(float(x) for x in force.value * direction)
             post(Push(str(body.value), vector, (0.0, 0.0, 0.0), PUSH_SECONDS))
 
-        add_command(gui, "Pull at links by hand, or not", "G", self._grab)
+        add_command(gui, "Turn pulling links by hand on or off", "G", self._grab)
 
         @self._load.on_click
         async def _(_: object) -> None:
