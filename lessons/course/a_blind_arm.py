@@ -177,14 +177,14 @@ SEEN = Step(
 CHALLENGE = Challenge(
     text=r"""
     Without being told of the table: press on it with 100 N at least at the end, and at no time with more
-    than 250 N.
+    than 300 N.
     """,
     goals=(
         Claim("At the end it presses with 100 N.", Measure(FORCE, "last"), "at least", 100.0),
-        Claim("It never presses with more than 250 N.", Measure(FORCE), "at most", 250.0),
+        Claim("It never presses with more than 300 N.", Measure(FORCE), "at most", 300.0),
     ),
     knobs=(SCALE, STIFFNESS),
-    score=Score(Measure(FORCE), worst=250.0, best=180.0),
+    score=Score(Measure(FORCE), worst=300.0, best=180.0),
     solutions=(("limits.torque_scale=0.18",), ("limits.torque_scale=0.2",)),
     events=INTO,
     duration=2.2,

@@ -92,7 +92,7 @@ LITTLE = Step(
     every knot is best. The hand is off by
 
     - 0.8 mm with ten plans a second and a knot every 0.1 s, as here; 6.7 mm with one plan a second,
-      2.2 mm with five, 3.5 mm with twenty, 4.3 mm with fifty;
+    2.2 mm with five, 3.5 mm with twenty, 4.3 mm with fifty;
     - 0.9 mm with five plans a second and a knot every 0.2 s ($N = 5$); 9 mm with ten;
     - 0.6 mm with twenty plans a second and a knot every 0.05 s ($N = 20$); 2.8 mm with ten.
 

@@ -436,6 +436,6 @@ def test_the_page_names_options_that_exist() -> None:
     from app.commands.serve import serve
 
     shown = set(re.findall(r"--([a-z][a-z-]*)", PAGE.read_text()))
-    names = {name.replace("_", "-") for name in serve.__code__.co_varnames[: serve.__code__.co_argcount]}
+    names = {name.replace("_", "-").strip("-") for name in serve.__code__.co_varnames[: serve.__code__.co_argcount]}
     assert {"host", "trusted-origin", "no-token"} <= shown
     assert shown <= names

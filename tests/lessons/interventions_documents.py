@@ -57,7 +57,7 @@ DOCUMENT_ROWS = (
     ),
     Intervention(
         "disagreements", "with N = 1 it dies away, and three quarters of the error remain",
-        HAND_RMS, (0.35, 0.365), ("horizon=1",), (0.27, 0.28), on="planar3-conflict",
+        HAND_RMS, (0.35, 0.365), ("horizon=1",), (0.26, 0.29), on="planar3-conflict",
     ),
     RT2(
         "disagreements", "RT1 has no such swing.", HAND_RMS, (0.25, 0.5), ("q1_amplitude_deg=20",),
