@@ -6,6 +6,7 @@ from http import HTTPStatus
 from pathlib import Path
 
 import pytest
+import viser
 from websockets.datastructures import Headers
 from websockets.http11 import Request
 
@@ -239,6 +240,22 @@ def test_a_door_for_one_proxy_lets_in_nobody_else() -> None:
     assert door.account(asked(**by_proxy)) == ""
     everybody = Door(passes=shared(TOKEN, OWNER))  # many people have this token
     assert everybody.account(asked(**by_proxy, **account)) == ""
+
+
+def test_a_door_for_one_proxy_takes_only_plain_addresses() -> None:
+    """nginx takes the first four for /v/x, where it may ask for no password, and passes them on as they
+    are."""
+    door = Door(passes=shared(TOKEN, OWNER), proxy_only=True)
+    by_proxy = {HEADER.replace("-", "_"): TOKEN}
+    for path in ("//v/x", "/%76/x", "/x/../v/x", "/./v/x", "/v/x#y", "http://lab/v/x", "/v\\x", "/é", "/x//"):
+        for upgrade in ({}, {"Upgrade": "websocket"}):
+            answer = judged(door, path, **by_proxy, **upgrade)
+            assert answer is not None and "unusual" in answer.text, path
+    for path in ("/", "/page", "/page?fixedDpr=1&a=%2F..//", "/class.csv", "/class/servers", "/v/x", "/v/"):
+        assert judged(door, path, **by_proxy) is None, path
+    folder = Path(viser.__file__).parent / "client" / "build"
+    files = [each.relative_to(folder).as_posix() for each in folder.rglob("*") if each.is_file()]
+    assert files and all(judged(door, f"/{each}", **by_proxy) is None for each in files)
 
 
 def test_servers_with_one_token_take_each_others_cookies_but_no_owner_is_made_of_it() -> None:
