@@ -9,7 +9,16 @@ from dataclasses import replace
 
 import msgspec
 
-from app.classes.relayed import PORTION, ClassNow, LearnerNow, LearnersNow, read_class
+from app.classes.relayed import (
+    BEFORE,
+    PORTION,
+    ClassNow,
+    LearnerNow,
+    LearnersNow,
+    can_be_told,
+    is_secret,
+    read_class,
+)
 from app.classes.room import Learners, Room
 from app.classes.views import course
 from app.client.state_code import code_of
@@ -92,14 +101,16 @@ class Branch(Room):
     def _of(self, who: str) -> LearnerNow:
         state = self._state
         member, poll = state.members[who], state.poll
+        at = None if member.at is None or not can_be_told(member.at) else (member.at.lesson, member.at.place)
+        done = ((place, *met) for place, met in member.done.items() if can_be_told(place))
         return LearnerNow(
             who,
             self._before.get(who, ()),
             self._names.get(who),
             member.account,
             member.here,
-            None if member.at is None else (member.at.lesson, member.at.place),
-            tuple((at.lesson, at.place, met, claims) for at, (met, claims) in member.done.items()),
+            at,
+            tuple((place.lesson, place.place, met, claims) for place, met, claims in done),
             None if poll is None or not poll.is_open else poll.latest.get(who),
             state.visits,
         )
@@ -117,7 +128,7 @@ class Branch(Room):
 
     def recognise(self, who: str, before: Sequence[str], account: str = "") -> None:
         with self._lock:
-            self._before[who] = tuple(each for each in before if each != who and len(each) <= 100)[-8:]
+            self._before[who] = tuple(each for each in before if each != who and is_secret(each))[-BEFORE:]
         super().recognise(who, before, account)
 
     def call(self, who: str, name: str) -> None:

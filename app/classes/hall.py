@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from app.classes.picture import Shape, pose_of, shape_of
-from app.classes.relayed import ClassNow, LearnerNow, class_now, read_done, read_place
+from app.classes.relayed import ClassNow, LearnerNow, class_now, known_place, read_done, read_place
 from app.classes.room import Learners, Room, begin
 from app.classes.views import View, course, for_all, for_teacher
 from app.client.simulation_client import SimulationClient
@@ -165,9 +165,8 @@ class Hall(Room):
 
     def hear(self, server: str, told: LearnerNow) -> None:
         """Takes what another server tells of a learner. A learner of this server, or of a third one that is
-        connected, is not changed. Raises InputError for a step that this class does not have."""
-        at = None if told.at is None else read_place(told.at, self.course)
-        done = read_done(told.done, self.course)
+        connected, is not changed. Steps that this class does not have are left out."""
+        at, done = known_place(told.at, self.course), read_done(told.done, self.course)
         now = time.monotonic()
         with self._lock:
             known, home = self._state.members.get(told.who), self._far.get(told.who)

@@ -78,6 +78,8 @@ class Link:
                 self._report(f"{self._address} cannot be reached; {_AGAIN}" if known else _REFUSED)
             except (OSError, TimeoutError, WebSocketException, InputError):
                 self._report(f"{self._address} cannot be reached; {_AGAIN}")
+            except Exception as error:  # without the link, nothing of this server would reach the class
+                self._report(f"the link to {self._address} failed ({type(error).__name__}); {_AGAIN}")
             finally:
                 self._branch.cut_off()
             await asyncio.sleep(pause * random.uniform(0.5, 1.0))
@@ -105,21 +107,22 @@ class Link:
         """Tells and hears until the connection ends. Raises an error when it does."""
         await line.send(msgspec.json.encode(Join(self._branch.server)), text=True)
         self._branch.linked()
-        telling = asyncio.ensure_future(self._tell(line))
+        both = [asyncio.ensure_future(each) for each in (self._tell(line), self._hear(line))]
         try:
-            await self._hear(line)
+            done, _ = await asyncio.wait(both, return_when=asyncio.FIRST_COMPLETED)
+            for each in done:
+                each.result()
         finally:
-            telling.cancel()
-            for each in self._asked:
+            for each in (*both, *self._asked):
                 each.cancel()
+            await asyncio.gather(*both, return_exceptions=True)
 
     async def _tell(self, line: ClientConnection) -> None:
-        with suppress(WebSocketException):  # the other task ends with the connection
-            while True:
-                for message in self._branch.news():
-                    await line.send(message, text=True)
-                    await asyncio.sleep(PERIOD)
+        while True:
+            for message in self._branch.news():
+                await line.send(message, text=True)
                 await asyncio.sleep(PERIOD)
+            await asyncio.sleep(PERIOD)
 
     async def _hear(self, line: ClientConnection) -> None:
         while True:

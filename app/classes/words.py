@@ -29,7 +29,9 @@ def is_of_a_class(path: str) -> bool:
     return plain in (f"/{TEACHER}", TABLE, f"/{BRANCH}") or plain.startswith(PHONES)
 
 
-Short = Annotated[str, Meta(max_length=100)]
+LONGEST_NAME = 100
+"""Longest name of a person or a lesson, characters."""
+Short = Annotated[str, Meta(max_length=LONGEST_NAME)]
 Number = Annotated[float, Meta(ge=-1e12, le=1e12)]
 
 

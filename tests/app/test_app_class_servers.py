@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import math
+import threading
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import msgspec
@@ -17,11 +21,14 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from app.__main__ import main
 from app.classes.branch import Branch
 from app.classes.gathering import Gathering
+from app.classes.link import Link
+from app.classes.queue import PATIENCE
 from app.classes.relayed import LONGEST, ClassNow, LearnerNow, class_now, of_class, of_server, read_class
 from app.classes.views import course, for_all
 from app.classes.words import BRANCH, CLASS_KEY
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace, Predict, RunStep
+from app.server.passes import new_token
 from app.server.server import PageServer
 from browsing.wire import Wire, eventually
 from lessons.scenes.run_spec import RunSpec
@@ -113,7 +120,6 @@ def test_another_server_that_sends_rubbish_is_sent_away_alone(first: PageServer,
         assert refused.value.response.status_code == 403
     assert get(f"{first.url}/{BRANCH}", **{CLASS_KEY: KEY})[0] == 403
     join = json.dumps({"do": "join", "server": "s" * 20})
-    nowhere = {"who": "w" * 20, "at": ["/etc/passwd", 0]}
     rubbish: tuple[tuple[str | bytes, ...], ...] = (
         ("x" * (LONGEST + 1),),
         ("[" * 10_000,),
@@ -121,8 +127,6 @@ def test_another_server_that_sends_rubbish_is_sent_away_alone(first: PageServer,
         ('{"do":"learners","learners":[]}',),
         (join, join),
         (join, '{"do":"learners","learners":[{"who":"short"}]}'),
-        (join, json.dumps({"do": "learners", "learners": [nowhere]})),
-        (join, json.dumps({"do": "learners", "learners": [{**nowhere, "at": [STEP.lesson, 1000]}]})),
     )
     for messages in rubbish:
         with other_server(first) as bad:
@@ -133,9 +137,38 @@ def test_another_server_that_sends_rubbish_is_sent_away_alone(first: PageServer,
                     bad.socket.recv(timeout=LONG)
             assert ended.value.rcvd is not None and ended.value.rcvd.code in (1008, 1009)
     with teacher(first) as lead:
-        while lead.hear("class")["class"]["servers"] != 1:
-            pass
+        lead.until("class", "servers", 1)
         assert not any(row["name"] == "" and row["here"] for row in lead.told["class"]["rows"])
+
+
+def test_steps_that_the_class_does_not_have_are_left_out(first: PageServer) -> None:
+    """A lesson of another server's own is not opened here, and the other learners of that server arrive."""
+    hall = first.hall
+    assert hall is not None
+    own, done = (
+        ["/etc/passwd", 0],
+        [["/etc/passwd", 0, 1, 1], [STEP.lesson, 99, 1, 1], [STEP.lesson, 1, 2, 3]],
+    )
+    told = [
+        *({"who": "w" * 20, "at": own, "done": done}, {"who": "v" * 20, "at": [STEP.lesson, 1000]}),
+        {"who": "u" * 20, "at": [STEP.lesson, 1]},
+    ]
+    with other_server(first) as other:
+        other.send(do="join", server="s" * 20)
+        other.send(do="learners", learners=told)
+        assert eventually(lambda: "u" * 20 in hall.state.members, LONG)
+        members = hall.state.members
+        places = [members[each["who"]].at for each in told]
+        assert places == [None, None, LessonPlace(STEP.lesson, 1)]
+        assert members["w" * 20].done == {LessonPlace(STEP.lesson, 1): (2, 3)}
+
+
+def test_a_lesson_with_a_long_path_is_not_told(first: PageServer) -> None:
+    sessions, hall = OneLearner(LessonPlace(f"{'x' * 100}.py")), first.hall
+    assert hall is not None
+    with following(Branch(sessions), first.url):
+        assert eventually(lambda: sessions.one.token in hall.state.members, 20.0)
+    assert hall.state.members[sessions.one.token].at is None
 
 
 def test_a_server_with_another_key_says_what_to_do(
@@ -186,6 +219,81 @@ class NoLearners:
     """The sessions of a server on which nobody is."""
 
     learners = ()
+
+
+class OneLearner:
+    """The sessions of a server with a learner whose page is open at a step, without a robot."""
+
+    def __init__(self, at: LessonPlace | None = None) -> None:
+        self.loaded: list[LessonPlace] = []
+        self.one: Any = SimpleNamespace(
+            token=new_token(),
+            attached=True,
+            account="",
+            choice=SimpleNamespace(exercise=at, at=lambda place: place),
+            lecture=None,
+            ready=None,
+            kept_at=None,
+            give_way=lambda: None,
+            load_for_class=self.loaded.append,
+        )
+        self.learners = (self.one,)
+
+
+@contextmanager
+def following(branch: Branch, at_class: str) -> Iterator[None]:
+    """Links a branch to a class until the context ends."""
+    loop = asyncio.new_event_loop()
+    thread = threading.Thread(target=loop.run_forever)
+    thread.start()
+    link = Link(branch, at_class, KEY)
+    link.start(loop)
+    try:
+        yield
+    finally:
+        link.close()
+        loop.call_soon_threadsafe(loop.call_later, 0.5, loop.stop)
+        thread.join()
+        loop.close()
+
+
+def test_what_a_browser_stores_and_an_unforeseen_error_end_no_link_for_good(
+    first: PageServer, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """A learner's browser brings text that cannot be sent, then telling fails once: the learner arrives all
+    the same."""
+    hall, sessions, failures = first.hall, OneLearner(), [RuntimeError()]
+    assert hall is not None
+
+    class Failing(Branch):
+        def news(self) -> Iterator[bytes]:
+            if failures:
+                raise failures.pop()
+            yield from super().news()
+
+    branch, who, said = Failing(sessions), sessions.one.token, list[str]()
+    branch.recognise(who, ["\ud800", "short", "t" * 22, "b" * 101, who])
+    with following(branch, first.url):
+        assert eventually(lambda: who in hall.state.members, 20.0)
+        assert eventually(lambda: said.append(capfd.readouterr().err) or "RuntimeError" in "".join(said), 5.0)
+
+
+def test_a_second_step_does_not_wait_until_the_first_is_built() -> None:
+    """The teacher goes on, and back at once: the robot is brought to each step, also to the one that its page
+    still shows, and on the learner's wish."""
+    there, sessions = LessonPlace(STEP.lesson, 1), OneLearner(STEP)
+    branch = Branch(sessions)
+    branch.start(lambda: None)
+    try:
+        state, wanted = Gathering(), list[LessonPlace]()
+        for place in (there, LessonPlace(STEP.lesson, 2), STEP, there):
+            state, wanted = state.going_to(place), [*wanted, place]
+            branch.hear(class_now(state))
+            assert eventually(lambda wanted=wanted: sessions.loaded == wanted, PATIENCE / 3)
+        branch.fetch(sessions.one.token)
+        assert eventually(lambda: sessions.loaded == [*wanted, there], PATIENCE / 3)
+    finally:
+        branch.close()
 
 
 def test_the_class_travels_as_numbers_and_is_shown_the_same() -> None:
