@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import secrets
 import time
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from app.classes.gathering import MEMBERS
 from app.classes.picture import Shape, pose_of, shape_of
 from app.classes.relayed import ClassNow, LearnerNow, class_now, known_place, read_done, read_place
 from app.classes.room import Learners, Room, begin
@@ -42,6 +44,7 @@ class Hall(Room):
         self._shape: tuple[object, Shape | None] = (None, None)
         self._far: dict[str, str] = {}  # the other server on which a learner is
         self._servers: set[str] = set()  # the other servers that are connected
+        self._replaced: dict[str, None] = {}  # identities of learners who go on under another one
 
     @property
     def guide(self) -> SimulationClient:
@@ -122,6 +125,17 @@ class Hall(Room):
 
     # ---------------------------------------------------------------- the members
 
+    def recognise(self, who: str, before: Sequence[str], account: str = "") -> None:
+        with self._lock:
+            known = self._state.members
+            super().recognise(who, before, account)
+            self._replace(known, self._state.members)
+
+    def _replace(self, known: Collection[str], now: Collection[str]) -> None:
+        gone = [who for who in known if who not in now]
+        if gone:
+            self._replaced = dict.fromkeys([*self._replaced, *gone][-4 * MEMBERS :])
+
     def enter(self, seat: str) -> str:
         """Lets a phone in; returns its seat, a new one unless it had one. Raises InputError if the class is
         full."""
@@ -173,7 +187,11 @@ class Hall(Room):
             taken = home is None or (home != server and home in self._servers)
             if known is not None and taken:
                 return
+            if told.who in self._replaced and not told.here:
+                return  # the server that this learner left still tells of them
             state = self._state.succeeded(told.who, told.before, told.account)
+            self._replace(self._state.members, state.members)
+            self._replaced.pop(told.who, None)
             try:
                 state = state.entered(told.who, "robot", now, told.account)
             except InputError:

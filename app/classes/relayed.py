@@ -15,7 +15,7 @@ from msgspec import Meta
 from app.classes.gathering import Gathering, question_of
 from app.classes.member import Member
 from app.classes.views import View
-from app.classes.words import LONGEST_NAME, Number, Short
+from app.classes.words import BOUND, LONGEST_NAME, Number, Short
 from app.link.exercise import LessonPlace
 from lessons.replay.state import MAX_CODE
 from lessons.teaching.poll import ROUNDS, VOTERS, Poll, valid
@@ -167,7 +167,7 @@ def class_now(state: Gathering) -> ClassNow:
         state.running,
         None if poll is None else poll.is_open,
         rounds,
-        None if math.isnan(state.truth) else state.truth,
+        state.truth if abs(state.truth) <= BOUND else None,
     )
 
 

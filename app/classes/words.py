@@ -32,7 +32,9 @@ def is_of_a_class(path: str) -> bool:
 LONGEST_NAME = 100
 """Longest name of a person or a lesson, characters."""
 Short = Annotated[str, Meta(max_length=LONGEST_NAME)]
-Number = Annotated[float, Meta(ge=-1e12, le=1e12)]
+BOUND = 1e12
+"""Largest number."""
+Number = Annotated[float, Meta(ge=-BOUND, le=BOUND)]
 
 
 class Hello(msgspec.Struct, forbid_unknown_fields=True, tag_field="do", tag="hello"):

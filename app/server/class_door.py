@@ -52,12 +52,16 @@ class ClassDoor:
     sockets: Sockets
     key: str | None = field(default=None, repr=False)
 
+    def is_for_servers(self, path: str) -> bool:
+        """Whether only other servers of the class, which have its key, may open an address."""
+        return urlsplit(path).path == _SERVERS
+
     def answer(self, door: Door, request: Request, who: str) -> Answer | Served:
-        """The response to a request that names this server and comes from one of its pages. who: identifies
-        the sender, see `app.server.peers`."""
-        plain, host = urlsplit(request.path).path, request.headers["Host"]
-        if plain == _SERVERS:
+        """The response to a request that names this server and comes from one of its pages, or is for other
+        servers. who: identifies the sender, see `app.server.peers`."""
+        if self.is_for_servers(request.path):
             return self._to_server(request)
+        plain, host = urlsplit(request.path).path, request.headers["Host"]
         past = door.not_by_the_proxy(request)
         if past is not None:
             return past

@@ -126,7 +126,9 @@ class ConnectionGuard:
 
     def _to_class(self, of: ClassDoor, connection: ServerConnection, request: Request) -> Response | None:
         """The answer to a request for a page of the class; None for an upgrade that is let in."""
-        answer = self._not_open(connection, request) or self._door.refuses(request)
+        # Another server of the class shows its key instead, and may know this one by any name.
+        refused = None if of.is_for_servers(request.path) else self._door.refuses(request)
+        answer = self._not_open(connection, request) or refused
         found = answer or of.answer(self._door, request, _user(connection))
         if isinstance(found, Answer):
             self.refused += found.status >= HTTPStatus.BAD_REQUEST

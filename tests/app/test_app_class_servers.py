@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import math
+import socket
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,6 +16,7 @@ from typing import Any
 import msgspec
 import pytest
 from test_app_class import LONG, STEP, Line, teacher
+from test_app_class_accounts import upgraded
 from test_app_load import get
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
@@ -28,6 +30,7 @@ from app.classes.views import course, for_all
 from app.classes.words import BRANCH, CLASS_KEY
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace, Predict, RunStep
+from app.server import server
 from app.server.passes import new_token
 from app.server.server import PageServer
 from browsing.wire import Wire, eventually
@@ -367,6 +370,103 @@ def test_another_server_changes_its_own_learners_alone(first: PageServer) -> Non
     hall.close_vote()
 
 
+def test_a_learner_who_moves_to_another_server_keeps_one_row(first: PageServer) -> None:
+    """The server that they left still tells of them; coming back, they have the row again."""
+    hall = first.hall
+    assert hall is not None
+    old, new, here, there = new_token(), new_token(), "one server of two", "the other one of two"
+    number = len(hall.state.members)
+    hall.link(here)
+    hall.link(there)
+    hall.hear(here, LearnerNow(old, name="Zoë"))
+    hall.hear(here, LearnerNow(old, here=False))
+    hall.hear(there, LearnerNow(new, before=(old,)))
+    hall.hear(here, LearnerNow(old, here=False, visit=5))
+    assert len(hall.state.members) == number + 1 and hall.name_of(new) == "Zoë"
+    hall.hear(there, LearnerNow(new, here=False, before=(old,)))
+    hall.hear(here, LearnerNow(old, before=(new,)))
+    hall.hear(there, LearnerNow(new, here=False, before=(old,), visit=6))
+    assert len(hall.state.members) == number + 1 and hall.name_of(old) == "Zoë"
+    own = new_token()
+    hall.hear(here, LearnerNow(old, here=False))
+    hall.recognise(own, [old])
+    hall.hear(here, LearnerNow(old, here=False, visit=7))
+    assert len(hall.state.members) == number + 1 and hall.name_of(own) == "Zoë"
+    hall.unlink(here)
+    hall.unlink(there)
+
+
+def told_by(branch: Branch) -> list[LearnerNow]:
+    return [each for message in branch.news() for each in of_server.decode(message).learners]
+
+
+def test_a_server_tells_of_its_learners_once_it_has_heard_the_class() -> None:
+    """Then once, and again when something has changed; a learner who has left is not told again because the
+    class goes on, and one who comes back under another identity has their name."""
+    sessions = OneLearner()
+    branch, old = Branch(sessions), sessions.one.token
+    branch.start(lambda: None)
+    try:
+        branch.recognise(old, ["x" * 22])
+        assert eventually(lambda: old in branch.state.members, LONG)
+        branch.linked()
+        assert told_by(branch) == [], "it does not know yet where the class is"
+        state = Gathering().going_to(STEP)
+        branch.hear(class_now(state))
+        branch.call(old, "Zoë")
+        (told,) = told_by(branch)
+        assert (told.who, told.before, told.name, told.visit) == (old, ("x" * 22,), "Zoë", 1)
+        sessions.one.attached = False
+        assert eventually(lambda: not branch.state.members[old].here, LONG)
+        assert [each.here for each in told_by(branch)] == [False]
+        branch.hear(class_now(state.going_to(STEP)))
+        assert told_by(branch) == []
+        branch.linked()
+        assert told_by(branch) == [], "after an interruption as well"
+        branch.hear(class_now(state))
+        assert len(told_by(branch)) == 1, "the class may have been started anew"
+        sessions.one.token, sessions.one.attached = new_token(), True
+        branch.recognise(sessions.one.token, [old])
+        (told,) = told_by(branch)
+        assert (told.who, told.before, told.name) == (sessions.one.token, (old,), "Zoë")
+    finally:
+        branch.close()
+
+
+def test_the_reason_for_which_a_class_ends_a_connection_is_shown(
+    first: PageServer, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hall, said = first.hall, list[str]()
+    assert hall is not None
+
+    def refuse(_: str) -> None:
+        raise InputError("a class has \x1b[31mat most 20 other servers")
+
+    monkeypatch.setattr(hall, "link", refuse)
+    with following(Branch(OneLearner()), first.url):
+        assert eventually(lambda: said.append(capfd.readouterr().err) or "20 other" in "".join(said), LONG)
+    text = "".join(said)
+    assert "ended the connection: A class has [31mat most 20 other servers; this server tries again" in text
+    assert "takes part" not in text
+
+
+def test_another_server_may_know_the_first_one_by_any_name(first: PageServer) -> None:
+    """Its key decides; a short host name does not equal the one in the example of the docs."""
+    for key, status in ((KEY, 101), (f"{KEY}x", 403)):
+        asking = {"Host": "lab-1.example.org:8080", CLASS_KEY: key}
+        assert upgraded(first.url, f"/{BRANCH}", **asking) == status
+    assert upgraded(first.url, "/v/x", Host="lab-1.example.org:8080") == 403
+
+
+def test_a_port_that_was_taken_meanwhile_gives_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        monkeypatch.setattr(server, "_check_address", lambda *_: None)
+        with pytest.raises(InputError, match="is in use"):
+            PageServer(START, port=taken.getsockname()[1], max_sessions=1)
+
+
 @pytest.mark.parametrize(
     ("given", "says"),
     [
@@ -388,3 +488,5 @@ def test_the_command_says_what_does_not_fit(
 def test_truth_that_is_not_there_is_not_a_number() -> None:
     now = class_now(Gathering().going_to(LessonPlace(STEP.lesson, 1)))
     assert now.truth is None and math.isnan(read_class(now, course(), {}).truth)
+    diverged = class_now(Gathering().going_to(STEP).measured(1e13))
+    assert diverged.truth is None and of_class.decode(msgspec.json.encode(diverged)) == diverged

@@ -11,7 +11,17 @@ from websockets.datastructures import Headers
 from websockets.http11 import Request
 
 from app.server.door import Answer, Door, as_origin
-from app.server.passes import HEADER, QUERY, USER_HEADER, VARIABLE, Passes, given_token, new_token, shared
+from app.server.passes import (
+    CLASS_VARIABLE,
+    HEADER,
+    QUERY,
+    USER_HEADER,
+    VARIABLE,
+    Passes,
+    given_token,
+    new_token,
+    shared,
+)
 from app.server.prefix import under_its_name
 from robots import InputError
 
@@ -280,6 +290,8 @@ def test_a_token_of_ones_own_comes_from_a_file_or_the_environment(tmp_path: Path
     for wrong in ("short", "with spaces and so on", "ä" * 20):
         with pytest.raises(InputError, match="16 characters"):
             given_token(None, {VARIABLE: wrong})
+    with pytest.raises(InputError, match="a key has 16 characters"):
+        given_token(None, {CLASS_VARIABLE: "short"}, "--class-key", CLASS_VARIABLE)
     with pytest.raises(InputError, match="cannot be read"):
         given_token(str(tmp_path / "none"), {})
 
