@@ -58,7 +58,7 @@ def open_server(host: str, port: int, guard: Guard) -> viser.ViserServer:
     with _silent(), _guarded(guard) as served:
         server = viser.ViserServer(host=host, port=port, label="himpc-lab", verbose=False)
     try:
-        require(served == [True], "how it serves")
+        require(bool(served) and all(served), "how it serves")  # several if viser tried further ports
         for path in OF_A_SERVER:
             require(reaches(server, path), path)
         handlers = server._websock_server
@@ -108,8 +108,8 @@ def self_test(guard: Guard) -> None:
 @contextlib.contextmanager
 def _guarded(guard: Guard) -> Iterator[list[bool]]:
     """Within this context viser starts servers that check every connection with `guard`. Yields a list with
-    one entry per server: False if `guard` could not be installed, so that the server refuses every
-    request."""
+    one entry per server and port that it tries: False if `guard` could not be installed, so that the server
+    refuses every request."""
     served: list[bool] = []
     plain = web.serve
 

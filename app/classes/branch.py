@@ -9,7 +9,16 @@ from dataclasses import replace
 
 import msgspec
 
-from app.classes.relayed import PORTION, ClassNow, LearnerNow, LearnersNow, read_class
+from app.classes.relayed import (
+    BEFORE,
+    PORTION,
+    ClassNow,
+    LearnerNow,
+    LearnersNow,
+    can_be_told,
+    is_secret,
+    read_class,
+)
 from app.classes.room import Learners, Room
 from app.classes.views import course
 from app.client.state_code import code_of
@@ -42,9 +51,10 @@ class Branch(Room):
     # ---------------------------------------------------------------- the link
 
     def linked(self) -> None:
-        """Called when the class's server has let this one in: everything will be told again."""
+        """Called when the class's server has let this one in: everything will be told again, as soon as that
+        server has told the state of the class."""
         with self._lock:
-            self._told = {}
+            self._told, self._linked = {}, False
 
     def cut_off(self) -> None:
         """Called when the connection was lost: learners may go on without the class."""
@@ -73,10 +83,13 @@ class Branch(Room):
     def news(self) -> Iterator[bytes]:
         """Messages about the learners of whom the class has not heard what they do now."""
         with self._lock:
+            if not self._linked:
+                return  # a vote may belong to another step than the class's
             state, now = self._state, time.monotonic()
             fresh = {who: (self._of(who), each.since) for who, each in state.members.items()}
-            changed = [who for who, told in fresh.items() if self._told.get(who) != told]
-            self._told = fresh
+            telling = {who: (_lasting(told), since) for who, (told, since) in fresh.items()}
+            changed = [who for who, told in telling.items() if self._told.get(who) != told]
+            self._told = telling
         portion: list[LearnerNow] = []
         size = 0
         for who in changed:
@@ -92,14 +105,16 @@ class Branch(Room):
     def _of(self, who: str) -> LearnerNow:
         state = self._state
         member, poll = state.members[who], state.poll
+        at = None if member.at is None or not can_be_told(member.at) else (member.at.lesson, member.at.place)
+        done = ((place, *met) for place, met in member.done.items() if can_be_told(place))
         return LearnerNow(
             who,
             self._before.get(who, ()),
             self._names.get(who),
             member.account,
             member.here,
-            None if member.at is None else (member.at.lesson, member.at.place),
-            tuple((at.lesson, at.place, met, claims) for at, (met, claims) in member.done.items()),
+            at,
+            tuple((place.lesson, place.place, met, claims) for place, met, claims in done),
             None if poll is None or not poll.is_open else poll.latest.get(who),
             state.visits,
         )
@@ -117,11 +132,23 @@ class Branch(Room):
 
     def recognise(self, who: str, before: Sequence[str], account: str = "") -> None:
         with self._lock:
-            self._before[who] = tuple(each for each in before if each != who and len(each) <= 100)[-8:]
-        super().recognise(who, before, account)
+            known = self._state.members
+            super().recognise(who, before, account)
+            for one in (known.keys() - self._state.members.keys()) & self._names.keys():
+                self._names[who] = self._names.pop(one)
+            self._before[who] = tuple(each for each in before if each != who and is_secret(each))[-BEFORE:]
+            there = {who, *self._state.members, *(each.token for each in self._learners())}
+            for kept in (self._names, self._before):
+                for one in kept.keys() - there:
+                    del kept[one]
 
     def call(self, who: str, name: str) -> None:
         super().call(who, name)
         with self._lock:
             if who in self._state.members:
                 self._names[who] = self._state.members[who].name
+
+
+def _lasting(told: LearnerNow) -> LearnerNow:
+    """What is told again whenever it changes; that the class goes on is no news of a learner who has left."""
+    return told if told.here else msgspec.structs.replace(told, visit=0, answer=None)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import secrets
 import time
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from app.classes.gathering import MEMBERS
 from app.classes.picture import Shape, pose_of, shape_of
-from app.classes.relayed import ClassNow, LearnerNow, class_now, read_done, read_place
+from app.classes.relayed import ClassNow, LearnerNow, class_now, known_place, read_done, read_place
 from app.classes.room import Learners, Room, begin
 from app.classes.views import View, course, for_all, for_teacher
 from app.client.simulation_client import SimulationClient
@@ -42,6 +44,7 @@ class Hall(Room):
         self._shape: tuple[object, Shape | None] = (None, None)
         self._far: dict[str, str] = {}  # the other server on which a learner is
         self._servers: set[str] = set()  # the other servers that are connected
+        self._replaced: dict[str, None] = {}  # identities of learners who go on under another one
 
     @property
     def guide(self) -> SimulationClient:
@@ -122,6 +125,17 @@ class Hall(Room):
 
     # ---------------------------------------------------------------- the members
 
+    def recognise(self, who: str, before: Sequence[str], account: str = "") -> None:
+        with self._lock:
+            known = self._state.members
+            super().recognise(who, before, account)
+            self._replace(known, self._state.members)
+
+    def _replace(self, known: Collection[str], now: Collection[str]) -> None:
+        gone = [who for who in known if who not in now]
+        if gone:
+            self._replaced = dict.fromkeys([*self._replaced, *gone][-4 * MEMBERS :])
+
     def enter(self, seat: str) -> str:
         """Lets a phone in; returns its seat, a new one unless it had one. Raises InputError if the class is
         full."""
@@ -165,16 +179,19 @@ class Hall(Room):
 
     def hear(self, server: str, told: LearnerNow) -> None:
         """Takes what another server tells of a learner. A learner of this server, or of a third one that is
-        connected, is not changed. Raises InputError for a step that this class does not have."""
-        at = None if told.at is None else read_place(told.at, self.course)
-        done = read_done(told.done, self.course)
+        connected, is not changed. Steps that this class does not have are left out."""
+        at, done = known_place(told.at, self.course), read_done(told.done, self.course)
         now = time.monotonic()
         with self._lock:
             known, home = self._state.members.get(told.who), self._far.get(told.who)
             taken = home is None or (home != server and home in self._servers)
             if known is not None and taken:
                 return
+            if told.who in self._replaced and not told.here:
+                return  # the server that this learner left still tells of them
             state = self._state.succeeded(told.who, told.before, told.account)
+            self._replace(self._state.members, state.members)
+            self._replaced.pop(told.who, None)
             try:
                 state = state.entered(told.who, "robot", now, told.account)
             except InputError:

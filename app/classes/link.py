@@ -10,7 +10,7 @@ from http import HTTPStatus
 
 import msgspec
 from websockets.asyncio.client import ClientConnection, connect
-from websockets.exceptions import InvalidStatus, WebSocketException
+from websockets.exceptions import ConnectionClosed, InvalidStatus, WebSocketException
 
 from app.classes.branch import Branch
 from app.classes.relayed import LONGEST, AskState, ClassNow, Join, StateTold, of_class
@@ -47,6 +47,7 @@ class Link:
         self._task: asyncio.Task[None] | None = None
         self._asked: set[asyncio.Task[None]] = set()
         self._reported = ""
+        self._pause = FIRST
 
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
         """Begins to connect, on the server's loop."""
@@ -66,22 +67,25 @@ class Link:
         self._branch.close()
 
     async def _stay(self) -> None:
-        pause = FIRST
         while True:
             try:
                 async with self._connection() as line:
-                    pause = FIRST
-                    self._report(f"this server takes part in the class of {self._address}")
                     await self._talk(line)
             except InvalidStatus as error:
                 known = error.response.status_code != HTTPStatus.FORBIDDEN
                 self._report(f"{self._address} cannot be reached; {_AGAIN}" if known else _REFUSED)
+            except ConnectionClosed as error:
+                reason = _plain("" if error.rcvd is None else error.rcvd.reason)
+                ended = f"ended the connection: {reason}" if reason else "cannot be reached"
+                self._report(f"{self._address} {ended}; {_AGAIN}")
             except (OSError, TimeoutError, WebSocketException, InputError):
                 self._report(f"{self._address} cannot be reached; {_AGAIN}")
+            except Exception as error:  # without the link, nothing of this server would reach the class
+                self._report(f"the link to {self._address} failed ({type(error).__name__}); {_AGAIN}")
             finally:
                 self._branch.cut_off()
-            await asyncio.sleep(pause * random.uniform(0.5, 1.0))
-            pause = min(LAST, 2 * pause)
+            await asyncio.sleep(self._pause * random.uniform(0.5, 1.0))
+            self._pause = min(LAST, 2 * self._pause)
 
     def _report(self, sentence: str) -> None:
         """Tells the person who started this server how the connection stands, whenever that changes."""
@@ -105,21 +109,22 @@ class Link:
         """Tells and hears until the connection ends. Raises an error when it does."""
         await line.send(msgspec.json.encode(Join(self._branch.server)), text=True)
         self._branch.linked()
-        telling = asyncio.ensure_future(self._tell(line))
+        both = [asyncio.ensure_future(each) for each in (self._tell(line), self._hear(line))]
         try:
-            await self._hear(line)
+            done, _ = await asyncio.wait(both, return_when=asyncio.FIRST_COMPLETED)
+            for each in done:
+                each.result()
         finally:
-            telling.cancel()
-            for each in self._asked:
+            for each in (*both, *self._asked):
                 each.cancel()
+            await asyncio.gather(*both, return_exceptions=True)
 
     async def _tell(self, line: ClientConnection) -> None:
-        with suppress(WebSocketException):  # the other task ends with the connection
-            while True:
-                for message in self._branch.news():
-                    await line.send(message, text=True)
-                    await asyncio.sleep(PERIOD)
+        while True:
+            for message in self._branch.news():
+                await line.send(message, text=True)
                 await asyncio.sleep(PERIOD)
+            await asyncio.sleep(PERIOD)
 
     async def _hear(self, line: ClientConnection) -> None:
         while True:
@@ -130,6 +135,8 @@ class Link:
             match told:
                 case ClassNow():
                     await asyncio.to_thread(self._branch.hear, told)
+                    self._pause = FIRST
+                    self._report(f"this server takes part in the class of {self._address}")
                 case AskState(who) if len(self._asked) < _QUESTIONS:
                     answer = asyncio.ensure_future(self._answer(line, who))
                     self._asked.add(answer)
@@ -142,3 +149,8 @@ class Link:
         code = await asyncio.to_thread(self._branch.code_of, who)
         with suppress(WebSocketException):
             await line.send(msgspec.json.encode(StateTold(who, code)), text=True)
+
+
+def _plain(reason: str) -> str:
+    """What can be printed of a reason, without the full stop."""
+    return "".join(each for each in reason if each.isprintable()).strip().rstrip(".")

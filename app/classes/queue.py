@@ -18,8 +18,9 @@ class BuildQueue:
         self._building: dict[str, float] = {}  # when it began, s
 
     def clear(self) -> None:
-        """Nobody waits any more. Robots that are being built still count until they are ready."""
-        self._waiting = []
+        """Nobody waits any more, except for those whose robots are being built for a step that is no longer
+        the class's: they come first."""
+        self._waiting, self._building = list(self._building), {}
 
     def enter(self, who: str) -> None:
         """Lets somebody wait, behind all others."""

@@ -4,6 +4,7 @@ The server with the teacher's page tells the state of the class; the others tell
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Annotated
@@ -14,7 +15,7 @@ from msgspec import Meta
 from app.classes.gathering import Gathering, question_of
 from app.classes.member import Member
 from app.classes.views import View
-from app.classes.words import Number, Short
+from app.classes.words import BOUND, LONGEST_NAME, Number, Short
 from app.link.exercise import LessonPlace
 from lessons.replay.state import MAX_CODE
 from lessons.teaching.poll import ROUNDS, VOTERS, Poll, valid
@@ -22,10 +23,13 @@ from robots import InputError
 
 LONGEST = 200_000
 """Largest message between two servers, B."""
+BEFORE = 8
+"""Largest number of earlier identities of a browser that are told."""
 PORTION = 50_000
 """Size, B, from which further learners are told in the next message; one learner has less than the rest."""
 
-Secret = Annotated[str, Meta(pattern=r"^[A-Za-z0-9_-]{16,64}$")]
+_SECRET = r"^[A-Za-z0-9_-]{16,64}\Z"
+Secret = Annotated[str, Meta(pattern=_SECRET)]
 Count = Annotated[int, Meta(ge=0, le=100_000)]
 Place = tuple[Short, Annotated[int, Meta(ge=0, le=1000)]]
 Ran = tuple[Short, Annotated[int, Meta(ge=0, le=1000)], Count, Count]
@@ -56,7 +60,7 @@ class LearnerNow(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """
 
     who: Secret
-    before: Annotated[tuple[Short, ...], Meta(max_length=8)] = ()
+    before: Annotated[tuple[Secret, ...], Meta(max_length=BEFORE)] = ()
     name: Short | None = None
     account: Short = ""
     here: bool = True
@@ -115,6 +119,11 @@ of_server = msgspec.json.Decoder(OfServer)
 of_class = msgspec.json.Decoder(OfClass)
 
 
+def is_secret(text: str) -> bool:
+    """Whether a text can be the identity of a learner; a browser may store anything in its place."""
+    return re.match(_SECRET, text) is not None
+
+
 def read_place(told: Place, course: Sequence[View]) -> LessonPlace:
     """A step of one of the lessons of a class. Raises InputError for any other one: no file is read."""
     lesson, place = told
@@ -123,11 +132,23 @@ def read_place(told: Place, course: Sequence[View]) -> LessonPlace:
     return LessonPlace.at(lesson, place + 1)
 
 
+def known_place(told: Place | None, course: Sequence[View]) -> LessonPlace | None:
+    """As `read_place`, but None for a step that the class does not have."""
+    try:
+        return None if told is None else read_place(told, course)
+    except InputError:
+        return None
+
+
 def read_done(told: Sequence[Ran], course: Sequence[View]) -> dict[LessonPlace, tuple[int, int]]:
-    """Claims met and claims of each step. Raises InputError for a step that the class does not have."""
-    return {
-        read_place((lesson, place), course): (min(met, claims), claims) for lesson, place, met, claims in told
-    }
+    """Claims met and claims of each step that the class has."""
+    found = ((known_place((lesson, k), course), met, claims) for lesson, k, met, claims in told)
+    return {place: (min(met, claims), claims) for place, met, claims in found if place is not None}
+
+
+def can_be_told(place: LessonPlace) -> bool:
+    """Whether a message can name a step: the path of a lesson of the teacher's own may be too long."""
+    return len(place.lesson) <= LONGEST_NAME and place.lesson.isprintable()
 
 
 def class_now(state: Gathering) -> ClassNow:
@@ -146,7 +167,7 @@ def class_now(state: Gathering) -> ClassNow:
         state.running,
         None if poll is None else poll.is_open,
         rounds,
-        None if math.isnan(state.truth) else state.truth,
+        state.truth if abs(state.truth) <= BOUND else None,
     )
 
 

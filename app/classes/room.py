@@ -96,6 +96,7 @@ class Room(ABC):
         """Brings one learner to the step of the class again, on their wish."""
         with self._lock:
             self._led.pop(who, None)
+            self._builds.leave(who)
 
     # ---------------------------------------------------------------- leading them
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from typing import Annotated
+from urllib.parse import urlsplit
 
 import msgspec
 from msgspec import Meta
@@ -12,13 +13,28 @@ LONGEST = 2000
 TEACHER = "class"
 """The name of the teacher's page in an address."""
 
+PHONES = "/v/"
+"""Phones vote at an address that begins so and ends with the code of the class."""
+TABLE = f"/{TEACHER}.csv"
+"""The address of the table."""
 BRANCH = f"{TEACHER}/servers"
 """The address at which other servers of the class connect."""
 CLASS_KEY = "X-Himpc-Lab-Class-Key"
 """The header in which they send the key of the class."""
 
-Short = Annotated[str, Meta(max_length=100)]
-Number = Annotated[float, Meta(ge=-1e12, le=1e12)]
+
+def is_of_a_class(path: str) -> bool:
+    """Whether an address is one of a class's."""
+    plain = urlsplit(path).path
+    return plain in (f"/{TEACHER}", TABLE, f"/{BRANCH}") or plain.startswith(PHONES)
+
+
+LONGEST_NAME = 100
+"""Longest name of a person or a lesson, characters."""
+Short = Annotated[str, Meta(max_length=LONGEST_NAME)]
+BOUND = 1e12
+"""Largest number."""
+Number = Annotated[float, Meta(ge=-BOUND, le=BOUND)]
 
 
 class Hello(msgspec.Struct, forbid_unknown_fields=True, tag_field="do", tag="hello"):

@@ -24,6 +24,12 @@ FULL = Answer(
     "<p>Every robot is in use. This page tries again by itself.</p>",
     (("Retry-After", "5"), ("Refresh", "5"), ("Cache-Control", "no-store")),
 )
+NO_CLASS = Answer(
+    HTTPStatus.FORBIDDEN,
+    "There is no such class",
+    "<p>Each start of a class has a new address: scan the code on the projector again.</p>",
+    (("Cache-Control", "no-store"),),
+)
 
 
 def plain(status: HTTPStatus, kind: str, text: str, more: tuple[tuple[str, str], ...] = ()) -> Response:

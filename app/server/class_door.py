@@ -17,12 +17,12 @@ from app.classes.hall import Hall
 from app.classes.pages import PageName, page, policy
 from app.classes.sockets import Sockets
 from app.classes.table import table
-from app.classes.words import BRANCH, CLASS_KEY, TEACHER
+from app.classes.words import BRANCH, CLASS_KEY, PHONES, TEACHER
+from app.server.answers import NO_CLASS
 from app.server.door import Answer, Door, is_upgrade
 from app.server.passes import QUERY
 
-_TEACHER, TABLE, PHONES = f"/{TEACHER}", f"/{TEACHER}.csv", "/v/"
-_SERVERS = f"/{BRANCH}"
+_TEACHER, _SERVERS = f"/{TEACHER}", f"/{BRANCH}"
 _NOT_KEPT = ("Cache-Control", "no-store")
 
 
@@ -52,24 +52,23 @@ class ClassDoor:
     sockets: Sockets
     key: str | None = field(default=None, repr=False)
 
-    def has(self, path: str) -> bool:
-        """Whether an address is one of the class's."""
-        plain = urlsplit(path).path
-        return plain in (_TEACHER, TABLE, _SERVERS) or plain.startswith(PHONES)
+    def is_for_servers(self, path: str) -> bool:
+        """Whether only other servers of the class, which have its key, may open an address."""
+        return urlsplit(path).path == _SERVERS
 
     def answer(self, door: Door, request: Request, who: str) -> Answer | Served:
-        """The response to a request that names this server and comes from one of its pages. who: identifies
-        the sender, see `app.server.peers`."""
-        plain, host = urlsplit(request.path).path, request.headers["Host"]
-        if plain == _SERVERS:
+        """The response to a request that names this server and comes from one of its pages, or is for other
+        servers. who: identifies the sender, see `app.server.peers`."""
+        if self.is_for_servers(request.path):
             return self._to_server(request)
+        plain, host = urlsplit(request.path).path, request.headers["Host"]
         past = door.not_by_the_proxy(request)
         if past is not None:
             return past
         if plain.startswith(PHONES):
             given = plain.removeprefix(PHONES).encode(errors="replace")
             if not secrets.compare_digest(given, self.hall.code.encode()):
-                return _NO_CLASS
+                return NO_CLASS
             return _page("phone", host, self.sockets.phone)
         if QUERY in request.path and not is_upgrade(request):
             return door.judge(request, who) or _NOT_THE_TEACHER  # it puts the secret into a cookie
@@ -95,12 +94,6 @@ def _page(name: PageName, host: str, serve: Callable[[Any], Awaitable[None]]) ->
     return Served(HTTPStatus.OK, "text/html; charset=utf-8", page(name), headers, serve)
 
 
-_NO_CLASS = Answer(
-    HTTPStatus.FORBIDDEN,
-    "There is no such class",
-    "<p>Each start of a class has a new address: scan the code on the projector again.</p>",
-    (_NOT_KEPT,),
-)
 _NO_SERVER = Answer(
     HTTPStatus.FORBIDDEN,
     "For servers of this class only",

@@ -17,6 +17,7 @@ from app.server.peers import came_through_a_proxy
 from robots import InputError
 
 _HOST = re.compile(r"(?P<name>\[[0-9a-fA-F:.]+\]|[A-Za-z0-9._-]+)(?::(?P<port>\d{1,5}))?")
+_PLAIN = re.compile(r"(/[A-Za-z0-9_~-][A-Za-z0-9._~@-]*)*/?")
 ELSEWHERE = frozenset({"websocket", "playbackPath"})
 NAME = "page"
 """The page's name below a path of another site, see `app.server.prefix`."""
@@ -82,6 +83,9 @@ class Door:
             return _foreign("It comes from a page of another site.")
         if not is_upgrade(request) and _is_embedded(headers, bool(self.embedders)):
             return _foreign("A page of another site embeds this page.")
+        if self.proxy_only and not _PLAIN.fullmatch(request.path.partition("?")[0]):
+            # The proxy may take //v/x for /v/x, where it asks for no password, and we would not.
+            return _foreign("Its address is written in an unusual way.")
         if _leads_away(request) and urlsplit(request.path).path != f"/{NAME}":
             return _foreign("Its address would connect the page to another server.")
         return None

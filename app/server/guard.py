@@ -14,8 +14,9 @@ from websockets.exceptions import ConnectionClosedError
 from websockets.frames import CloseCode, Frame, Opcode
 from websockets.http11 import Request, Response
 
+from app.classes.words import is_of_a_class
 from app.server import budget
-from app.server.answers import CROWDED, FULL, NOT_OPEN, as_response, plain
+from app.server.answers import CROWDED, FULL, NO_CLASS, NOT_OPEN, as_response, plain
 from app.server.budget import Budget
 from app.server.connection_limits import ConnectionLimits
 from app.server.door import Answer, Door, is_upgrade
@@ -81,9 +82,12 @@ class ConnectionGuard:
             told = None if is_upgrade(request) else report(request.path, self.load)
             if told is not None and self._door.refuses(request) is None:
                 return plain(*told)
-            if self._class is not None and self._class.has(request.path):
+            of_a_class = is_of_a_class(request.path)
+            if self._class is not None and of_a_class:
                 return self._to_class(self._class, connection, request)
             answer = self._judge(connection, request)
+            if answer is None and of_a_class and is_upgrade(request):
+                answer = NO_CLASS  # a proxy may ask for no password there
             if answer is not None:
                 self.refused += answer.status >= HTTPStatus.BAD_REQUEST
                 return as_response(answer)
@@ -122,7 +126,9 @@ class ConnectionGuard:
 
     def _to_class(self, of: ClassDoor, connection: ServerConnection, request: Request) -> Response | None:
         """The answer to a request for a page of the class; None for an upgrade that is let in."""
-        answer = self._not_open(connection, request) or self._door.refuses(request)
+        # Another server of the class shows its key instead, and may know this one by any name.
+        refused = None if of.is_for_servers(request.path) else self._door.refuses(request)
+        answer = self._not_open(connection, request) or refused
         found = answer or of.answer(self._door, request, _user(connection))
         if isinstance(found, Answer):
             self.refused += found.status >= HTTPStatus.BAD_REQUEST

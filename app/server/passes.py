@@ -44,17 +44,18 @@ def given_token(
     the environment variable; None if neither is given. Raises InputError for a token that is too short or not
     in letters, digits, - and _, naming the option or the variable."""
     text, place = environment.get(variable), variable
+    kind = "key" if variable == CLASS_VARIABLE else "token"
     if file is not None:
         place = f"{option} {file}"
         try:
             text = Path(file).read_text(encoding="utf-8").partition("\n")[0]
         except (OSError, UnicodeDecodeError):
-            raise InputError(f"{place}: cannot be read; give a text file with the token") from None
+            raise InputError(f"{place}: cannot be read; give a text file with the {kind}") from None
     if text is None:
         return None
     if not re.fullmatch(rf"[A-Za-z0-9_-]{{{SHORTEST},200}}", text.strip()):
         raise InputError(
-            f"{place}: a token has {SHORTEST} characters or more, letters, digits, - and _: make one with "
+            f"{place}: a {kind} has {SHORTEST} characters or more, letters, digits, - and _: make one with "
             "python -c 'import secrets; print(secrets.token_urlsafe())'"
         )
     return text.strip()

@@ -31,6 +31,7 @@ from robots import InputError
 
 if TYPE_CHECKING:  # a class computes: the server listens before that is loaded
     from app.classes.hall import Hall
+    from app.classes.link import Link
     from app.classes.room import Room
     from app.classes.sockets import Sockets
 
@@ -91,6 +92,8 @@ class PageServer:
         self._own_files, self._key, self._refers = own_files, key, refers
         self._visits: dict[int, Visit] = {}
         self._lock = threading.Lock()
+        self._sockets: Sockets | None = None
+        self._link: Link | None = None
         try:
             self._viser = private.open_server(host, port, self.guard)
         except BaseException:
@@ -108,7 +111,7 @@ class PageServer:
         self._viser.on_client_connect(self._connect)
         self._viser.on_client_disconnect(self._disconnect)
         self.hall = None if class_names is None else self._new_hall(class_names)
-        self._class_key, self._link, self._room = class_key, None, self.hall
+        self._class_key, self._room = class_key, self.hall
         if self.follows and class_key is not None and isinstance(self.sessions, Sessions):
             self._room = self._follow(self.follows, class_key, self.sessions)
         owner = None if own_files is None and self.hall is None else new_token()
@@ -117,7 +120,6 @@ class PageServer:
         else:
             self.passes = Passes(new_token() if ask_token else None, owner, f"himpc-lab-{found}")
         door = Door(local, trusted, self.passes, names_of_this_machine(), proxy_only, framing)
-        self._sockets: Sockets | None = None
         if self.hall is None:
             self.guard.open(door, self.sessions, refers)
         else:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import socket
 from collections.abc import Iterator
-from urllib.parse import quote
+from urllib.parse import quote, urlsplit
 
 import pytest
 from test_app_class import LONG, Line, cookie_of
 from test_app_load import get
+from viser import __version__
 from websockets.exceptions import InvalidStatus
 
 from app.__main__ import main
@@ -22,13 +24,14 @@ from browsing.wire import Wire, eventually
 from lessons.scenes.run_spec import RunSpec
 
 pytestmark = pytest.mark.usefixtures("one_fork_server")
+START = SceneChoice(RunSpec("planar3-hold"))
 TOKEN, ORIGIN = "the-token-of-the-proxy", "https://lab.example.org"
 
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[PageServer]:
     running = PageServer(
-        *(SceneChoice(RunSpec("planar3-hold")), "127.0.0.1", 0),
+        *(START, "127.0.0.1", 0),
         max_sessions=2,
         token=TOKEN,
         class_names=True,
@@ -82,6 +85,37 @@ def test_the_account_is_the_name_of_the_row(server: PageServer) -> None:
     other = enter([learner.token], print, "max")
     assert other is not None and other is not learner
     assert enter([learner.token], print, "zoë") is learner
+
+
+def test_where_the_proxy_asks_for_no_password_nobody_gets_a_robot(server: PageServer) -> None:
+    """It takes these addresses for one below /v/, and passes on an account that it did not check; the last
+    ones reach a server without a class."""
+    assert server.hall is not None
+    alone = PageServer(START, port=0, max_sessions=1, token=TOKEN, proxy_only=True, trusted_origins=[ORIGIN])
+    try:
+        for url, path in (
+            *((server.url, path) for path in ("//v/x", "/%76/x", "/x/../v/x", "/v/x")),
+            *(
+                (alone.url, path)
+                for path in ("//v/x", "/%76/x", "/x/../v/x", "/v/x", "/class", "/class/servers")
+            ),
+        ):
+            assert upgraded(url, path, **by_proxy("prof")) == 403, path
+        assert upgraded(alone.url, "/", **by_proxy("prof")) == 101
+    finally:
+        alone.close()
+
+
+def upgraded(url: str, path: str, **headers: str) -> int:
+    """The status of the response to an upgrade of an address that is sent as it is written."""
+    where = urlsplit(url)
+    asking = {"Host": where.netloc, "Connection": "Upgrade", "Upgrade": "websocket", **headers}
+    asking |= {"Sec-WebSocket-Version": "13", "Sec-WebSocket-Key": "x" * 22 + "=="}
+    asking |= {"Sec-WebSocket-Protocol": f"viser-v{__version__}"}
+    lines = [f"GET {path} HTTP/1.1", *(f"{name}: {value}" for name, value in asking.items()), "", ""]
+    with socket.create_connection((where.hostname, where.port), timeout=LONG) as line:
+        line.sendall("\r\n".join(lines).encode())
+        return int(line.makefile("rb").readline().split()[1])
 
 
 def test_an_account_keeps_its_row_and_names_may_be_left_out() -> None:

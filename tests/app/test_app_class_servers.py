@@ -2,26 +2,36 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import math
+import socket
+import threading
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import msgspec
 import pytest
 from test_app_class import LONG, STEP, Line, teacher
+from test_app_class_accounts import upgraded
 from test_app_load import get
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from app.__main__ import main
 from app.classes.branch import Branch
 from app.classes.gathering import Gathering
+from app.classes.link import Link
+from app.classes.queue import PATIENCE
 from app.classes.relayed import LONGEST, ClassNow, LearnerNow, class_now, of_class, of_server, read_class
 from app.classes.views import course, for_all
 from app.classes.words import BRANCH, CLASS_KEY
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace, Predict, RunStep
+from app.server import server
+from app.server.passes import new_token
 from app.server.server import PageServer
 from browsing.wire import Wire, eventually
 from lessons.scenes.run_spec import RunSpec
@@ -113,7 +123,6 @@ def test_another_server_that_sends_rubbish_is_sent_away_alone(first: PageServer,
         assert refused.value.response.status_code == 403
     assert get(f"{first.url}/{BRANCH}", **{CLASS_KEY: KEY})[0] == 403
     join = json.dumps({"do": "join", "server": "s" * 20})
-    nowhere = {"who": "w" * 20, "at": ["/etc/passwd", 0]}
     rubbish: tuple[tuple[str | bytes, ...], ...] = (
         ("x" * (LONGEST + 1),),
         ("[" * 10_000,),
@@ -121,8 +130,6 @@ def test_another_server_that_sends_rubbish_is_sent_away_alone(first: PageServer,
         ('{"do":"learners","learners":[]}',),
         (join, join),
         (join, '{"do":"learners","learners":[{"who":"short"}]}'),
-        (join, json.dumps({"do": "learners", "learners": [nowhere]})),
-        (join, json.dumps({"do": "learners", "learners": [{**nowhere, "at": [STEP.lesson, 1000]}]})),
     )
     for messages in rubbish:
         with other_server(first) as bad:
@@ -133,9 +140,38 @@ def test_another_server_that_sends_rubbish_is_sent_away_alone(first: PageServer,
                     bad.socket.recv(timeout=LONG)
             assert ended.value.rcvd is not None and ended.value.rcvd.code in (1008, 1009)
     with teacher(first) as lead:
-        while lead.hear("class")["class"]["servers"] != 1:
-            pass
+        lead.until("class", "servers", 1)
         assert not any(row["name"] == "" and row["here"] for row in lead.told["class"]["rows"])
+
+
+def test_steps_that_the_class_does_not_have_are_left_out(first: PageServer) -> None:
+    """A lesson of another server's own is not opened here, and the other learners of that server arrive."""
+    hall = first.hall
+    assert hall is not None
+    own, done = (
+        ["/etc/passwd", 0],
+        [["/etc/passwd", 0, 1, 1], [STEP.lesson, 99, 1, 1], [STEP.lesson, 1, 2, 3]],
+    )
+    told = [
+        *({"who": "w" * 20, "at": own, "done": done}, {"who": "v" * 20, "at": [STEP.lesson, 1000]}),
+        {"who": "u" * 20, "at": [STEP.lesson, 1]},
+    ]
+    with other_server(first) as other:
+        other.send(do="join", server="s" * 20)
+        other.send(do="learners", learners=told)
+        assert eventually(lambda: "u" * 20 in hall.state.members, LONG)
+        members = hall.state.members
+        places = [members[each["who"]].at for each in told]
+        assert places == [None, None, LessonPlace(STEP.lesson, 1)]
+        assert members["w" * 20].done == {LessonPlace(STEP.lesson, 1): (2, 3)}
+
+
+def test_a_lesson_with_a_long_path_is_not_told(first: PageServer) -> None:
+    sessions, hall = OneLearner(LessonPlace(f"{'x' * 100}.py")), first.hall
+    assert hall is not None
+    with following(Branch(sessions), first.url):
+        assert eventually(lambda: sessions.one.token in hall.state.members, 20.0)
+    assert hall.state.members[sessions.one.token].at is None
 
 
 def test_a_server_with_another_key_says_what_to_do(
@@ -186,6 +222,81 @@ class NoLearners:
     """The sessions of a server on which nobody is."""
 
     learners = ()
+
+
+class OneLearner:
+    """The sessions of a server with a learner whose page is open at a step, without a robot."""
+
+    def __init__(self, at: LessonPlace | None = None) -> None:
+        self.loaded: list[LessonPlace] = []
+        self.one: Any = SimpleNamespace(
+            token=new_token(),
+            attached=True,
+            account="",
+            choice=SimpleNamespace(exercise=at, at=lambda place: place),
+            lecture=None,
+            ready=None,
+            kept_at=None,
+            give_way=lambda: None,
+            load_for_class=self.loaded.append,
+        )
+        self.learners = (self.one,)
+
+
+@contextmanager
+def following(branch: Branch, at_class: str) -> Iterator[None]:
+    """Links a branch to a class until the context ends."""
+    loop = asyncio.new_event_loop()
+    thread = threading.Thread(target=loop.run_forever)
+    thread.start()
+    link = Link(branch, at_class, KEY)
+    link.start(loop)
+    try:
+        yield
+    finally:
+        link.close()
+        loop.call_soon_threadsafe(loop.call_later, 0.5, loop.stop)
+        thread.join()
+        loop.close()
+
+
+def test_what_a_browser_stores_and_an_unforeseen_error_end_no_link_for_good(
+    first: PageServer, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """A learner's browser brings text that cannot be sent, then telling fails once: the learner arrives all
+    the same."""
+    hall, sessions, failures = first.hall, OneLearner(), [RuntimeError()]
+    assert hall is not None
+
+    class Failing(Branch):
+        def news(self) -> Iterator[bytes]:
+            if failures:
+                raise failures.pop()
+            yield from super().news()
+
+    branch, who, said = Failing(sessions), sessions.one.token, list[str]()
+    branch.recognise(who, ["\ud800", "short", "t" * 22, "b" * 101, who])
+    with following(branch, first.url):
+        assert eventually(lambda: who in hall.state.members, 20.0)
+        assert eventually(lambda: said.append(capfd.readouterr().err) or "RuntimeError" in "".join(said), 5.0)
+
+
+def test_a_second_step_does_not_wait_until_the_first_is_built() -> None:
+    """The teacher goes on, and back at once: the robot is brought to each step, also to the one that its page
+    still shows, and on the learner's wish."""
+    there, sessions = LessonPlace(STEP.lesson, 1), OneLearner(STEP)
+    branch = Branch(sessions)
+    branch.start(lambda: None)
+    try:
+        state, wanted = Gathering(), list[LessonPlace]()
+        for place in (there, LessonPlace(STEP.lesson, 2), STEP, there):
+            state, wanted = state.going_to(place), [*wanted, place]
+            branch.hear(class_now(state))
+            assert eventually(lambda wanted=wanted: sessions.loaded == wanted, PATIENCE / 3)
+        branch.fetch(sessions.one.token)
+        assert eventually(lambda: sessions.loaded == [*wanted, there], PATIENCE / 3)
+    finally:
+        branch.close()
 
 
 def test_the_class_travels_as_numbers_and_is_shown_the_same() -> None:
@@ -259,6 +370,103 @@ def test_another_server_changes_its_own_learners_alone(first: PageServer) -> Non
     hall.close_vote()
 
 
+def test_a_learner_who_moves_to_another_server_keeps_one_row(first: PageServer) -> None:
+    """The server that they left still tells of them; coming back, they have the row again."""
+    hall = first.hall
+    assert hall is not None
+    old, new, here, there = new_token(), new_token(), "one server of two", "the other one of two"
+    number = len(hall.state.members)
+    hall.link(here)
+    hall.link(there)
+    hall.hear(here, LearnerNow(old, name="Zoë"))
+    hall.hear(here, LearnerNow(old, here=False))
+    hall.hear(there, LearnerNow(new, before=(old,)))
+    hall.hear(here, LearnerNow(old, here=False, visit=5))
+    assert len(hall.state.members) == number + 1 and hall.name_of(new) == "Zoë"
+    hall.hear(there, LearnerNow(new, here=False, before=(old,)))
+    hall.hear(here, LearnerNow(old, before=(new,)))
+    hall.hear(there, LearnerNow(new, here=False, before=(old,), visit=6))
+    assert len(hall.state.members) == number + 1 and hall.name_of(old) == "Zoë"
+    own = new_token()
+    hall.hear(here, LearnerNow(old, here=False))
+    hall.recognise(own, [old])
+    hall.hear(here, LearnerNow(old, here=False, visit=7))
+    assert len(hall.state.members) == number + 1 and hall.name_of(own) == "Zoë"
+    hall.unlink(here)
+    hall.unlink(there)
+
+
+def told_by(branch: Branch) -> list[LearnerNow]:
+    return [each for message in branch.news() for each in of_server.decode(message).learners]
+
+
+def test_a_server_tells_of_its_learners_once_it_has_heard_the_class() -> None:
+    """Then once, and again when something has changed; a learner who has left is not told again because the
+    class goes on, and one who comes back under another identity has their name."""
+    sessions = OneLearner()
+    branch, old = Branch(sessions), sessions.one.token
+    branch.start(lambda: None)
+    try:
+        branch.recognise(old, ["x" * 22])
+        assert eventually(lambda: old in branch.state.members, LONG)
+        branch.linked()
+        assert told_by(branch) == [], "it does not know yet where the class is"
+        state = Gathering().going_to(STEP)
+        branch.hear(class_now(state))
+        branch.call(old, "Zoë")
+        (told,) = told_by(branch)
+        assert (told.who, told.before, told.name, told.visit) == (old, ("x" * 22,), "Zoë", 1)
+        sessions.one.attached = False
+        assert eventually(lambda: not branch.state.members[old].here, LONG)
+        assert [each.here for each in told_by(branch)] == [False]
+        branch.hear(class_now(state.going_to(STEP)))
+        assert told_by(branch) == []
+        branch.linked()
+        assert told_by(branch) == [], "after an interruption as well"
+        branch.hear(class_now(state))
+        assert len(told_by(branch)) == 1, "the class may have been started anew"
+        sessions.one.token, sessions.one.attached = new_token(), True
+        branch.recognise(sessions.one.token, [old])
+        (told,) = told_by(branch)
+        assert (told.who, told.before, told.name) == (sessions.one.token, (old,), "Zoë")
+    finally:
+        branch.close()
+
+
+def test_the_reason_for_which_a_class_ends_a_connection_is_shown(
+    first: PageServer, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hall, said = first.hall, list[str]()
+    assert hall is not None
+
+    def refuse(_: str) -> None:
+        raise InputError("a class has \x1b[31mat most 20 other servers")
+
+    monkeypatch.setattr(hall, "link", refuse)
+    with following(Branch(OneLearner()), first.url):
+        assert eventually(lambda: said.append(capfd.readouterr().err) or "20 other" in "".join(said), LONG)
+    text = "".join(said)
+    assert "ended the connection: A class has [31mat most 20 other servers; this server tries again" in text
+    assert "takes part" not in text
+
+
+def test_another_server_may_know_the_first_one_by_any_name(first: PageServer) -> None:
+    """Its key decides; a short host name does not equal the one in the example of the docs."""
+    for key, status in ((KEY, 101), (f"{KEY}x", 403)):
+        asking = {"Host": "lab-1.example.org:8080", CLASS_KEY: key}
+        assert upgraded(first.url, f"/{BRANCH}", **asking) == status
+    assert upgraded(first.url, "/v/x", Host="lab-1.example.org:8080") == 403
+
+
+def test_a_port_that_was_taken_meanwhile_gives_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        monkeypatch.setattr(server, "_check_address", lambda *_: None)
+        with pytest.raises(InputError, match="is in use"):
+            PageServer(START, port=taken.getsockname()[1], max_sessions=1)
+
+
 @pytest.mark.parametrize(
     ("given", "says"),
     [
@@ -280,3 +488,5 @@ def test_the_command_says_what_does_not_fit(
 def test_truth_that_is_not_there_is_not_a_number() -> None:
     now = class_now(Gathering().going_to(LessonPlace(STEP.lesson, 1)))
     assert now.truth is None and math.isnan(read_class(now, course(), {}).truth)
+    diverged = class_now(Gathering().going_to(STEP).measured(1e13))
+    assert diverged.truth is None and of_class.decode(msgspec.json.encode(diverged)) == diverged

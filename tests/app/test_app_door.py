@@ -6,11 +6,22 @@ from http import HTTPStatus
 from pathlib import Path
 
 import pytest
+import viser
 from websockets.datastructures import Headers
 from websockets.http11 import Request
 
 from app.server.door import Answer, Door, as_origin
-from app.server.passes import HEADER, QUERY, USER_HEADER, VARIABLE, Passes, given_token, new_token, shared
+from app.server.passes import (
+    CLASS_VARIABLE,
+    HEADER,
+    QUERY,
+    USER_HEADER,
+    VARIABLE,
+    Passes,
+    given_token,
+    new_token,
+    shared,
+)
 from app.server.prefix import under_its_name
 from robots import InputError
 
@@ -241,6 +252,22 @@ def test_a_door_for_one_proxy_lets_in_nobody_else() -> None:
     assert everybody.account(asked(**by_proxy, **account)) == ""
 
 
+def test_a_door_for_one_proxy_takes_only_plain_addresses() -> None:
+    """nginx takes the first four for /v/x, where it may ask for no password, and passes them on as they
+    are."""
+    door = Door(passes=shared(TOKEN, OWNER), proxy_only=True)
+    by_proxy = {HEADER.replace("-", "_"): TOKEN}
+    for path in ("//v/x", "/%76/x", "/x/../v/x", "/./v/x", "/v/x#y", "http://lab/v/x", "/v\\x", "/é", "/x//"):
+        for upgrade in ({}, {"Upgrade": "websocket"}):
+            answer = judged(door, path, **by_proxy, **upgrade)
+            assert answer is not None and "unusual" in answer.text, path
+    for path in ("/", "/page", "/page?fixedDpr=1&a=%2F..//", "/class.csv", "/class/servers", "/v/x", "/v/"):
+        assert judged(door, path, **by_proxy) is None, path
+    folder = Path(viser.__file__).parent / "client" / "build"
+    files = [each.relative_to(folder).as_posix() for each in folder.rglob("*") if each.is_file()]
+    assert files and all(judged(door, f"/{each}", **by_proxy) is None for each in files)
+
+
 def test_servers_with_one_token_take_each_others_cookies_but_no_owner_is_made_of_it() -> None:
     """Who has the token can compute the key, but the owner's cookie also needs the owner's secret."""
     first, second = shared(TOKEN, OWNER), shared(TOKEN, new_token())
@@ -263,6 +290,8 @@ def test_a_token_of_ones_own_comes_from_a_file_or_the_environment(tmp_path: Path
     for wrong in ("short", "with spaces and so on", "ä" * 20):
         with pytest.raises(InputError, match="16 characters"):
             given_token(None, {VARIABLE: wrong})
+    with pytest.raises(InputError, match="a key has 16 characters"):
+        given_token(None, {CLASS_VARIABLE: "short"}, "--class-key", CLASS_VARIABLE)
     with pytest.raises(InputError, match="cannot be read"):
         given_token(str(tmp_path / "none"), {})
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import http.client
 import json
 import os
@@ -10,6 +11,7 @@ import shutil
 import socket
 import ssl
 import subprocess
+import tempfile
 import threading
 import urllib.error
 import urllib.request
@@ -285,6 +287,60 @@ def test_the_page_works_below_any_path(nginx: str, tmp_path: Path) -> None:
         server.close()
 
 
+def test_phones_need_no_password_and_get_no_account(nginx: str, tmp_path: Path) -> None:
+    """The printed locations of a class: only a right password opens a robot's page, however an address is
+    written."""
+    port, token = free_port(), "the-token-of-the-proxy"
+    origin = f"http://127.0.0.1:{port}"
+    with tempfile.NamedTemporaryFile("w", delete=False) as users:  # nginx may run as another user
+        users.write("prof:{PLAIN}right\n")
+    os.chmod(users.name, 0o644)
+    server = PageServer(
+        *(SceneChoice(RunSpec("planar3-hold")), "127.0.0.1", 0),
+        max_sessions=1,
+        token=token,
+        class_names=True,
+        proxy_only=True,
+        trusted_origins=[origin],
+    )
+    (site,) = re.findall(r"```text\n(location / .*?)```", PAGE.read_text(), re.DOTALL)
+    for text, here, times in (
+        ("http://127.0.0.1:8080", server.url, 2),
+        ("/etc/nginx/lab.htpasswd", users.name, 1),
+        ("-Token TOKEN", f"-Token {token}", 2),
+    ):
+        assert site.count(text) == times
+        site = site.replace(text, here)
+    kind = "map $http_upgrade $connection_upgrade { default upgrade; '' close; }"
+    site = f"{kind}\nserver {{ listen 127.0.0.1:{port}; {site} }}"
+
+    def status(path: str, password: str | None, upgrade: bool = False) -> int:
+        basic = "" if password is None else base64.b64encode(f"prof:{password}".encode()).decode()
+        more = {"Authorization": f"Basic {basic}"} if basic else {}
+        if upgrade:
+            more |= {"Connection": "Upgrade", "Upgrade": "websocket", "Sec-WebSocket-Version": "13"}
+            more |= {"Sec-WebSocket-Key": "x" * 22 + "==", "Sec-WebSocket-Protocol": PROTOCOL[0]}
+        connection = http.client.HTTPConnection("127.0.0.1", port, timeout=LONG)
+        connection.request("GET", path, headers=more)
+        found = connection.getresponse().status
+        connection.close()
+        return found
+
+    try:
+        with nginx_with(nginx, tmp_path, site, port):
+            assert server.hall is not None
+            phones = f"/v/{server.hall.code}"
+            assert status(phones, None) == 200 and status(phones, None, True) == 101
+            assert status("/", None) == 401 and status("/", "wrong", True) == 401
+            for path in ("//v/x", "/%76/x", "/x/../v/x", "/v/../", "/v/%2e%2e/page"):
+                assert status(path, "wrong", True) in (401, 403), path
+            assert not server.sessions.learners
+            assert status("/", "right", True) == 101
+    finally:
+        os.unlink(users.name)
+        server.close()
+
+
 @contextmanager
 def balanced(nginx: str, folder: Path, servers: int) -> Iterator[tuple[str, list[PageServer]]]:
     """Servers of one session each with one token, behind the printed balancer; yields the link of all."""
@@ -436,6 +492,9 @@ def test_the_page_names_options_that_exist() -> None:
     from app.commands.serve import serve
 
     shown = set(re.findall(r"--([a-z][a-z-]*)", PAGE.read_text()))
-    names = {name.replace("_", "-").strip("-") for name in serve.__code__.co_varnames[: serve.__code__.co_argcount]}
+    names = {
+        name.rstrip("_").replace("_", "-")
+        for name in serve.__code__.co_varnames[: serve.__code__.co_argcount]
+    }
     assert {"host", "trusted-origin", "no-token"} <= shown
     assert shown <= names
