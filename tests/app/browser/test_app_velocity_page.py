@@ -259,8 +259,8 @@ def test_a_crate_is_outlined_where_it_is_reported(page: Page, learner: Simulatio
     learner.send(Post(Set("report_end", 1000.0)))
     press(page, "Reset")
     assert eventually(page, lambda: is_drawn(page, "/reported/0"))
-    np.testing.assert_allclose(position(page, "/reported/0"), (1.9, 0.3, 0.25), atol=1e-6)
-    np.testing.assert_allclose(position(page, "/obstacle/0"), (1.9, 1.4, 0.25), atol=1e-6)
+    for node, place in {"/reported/0": (1.9, 0.3, 0.25), "/obstacle/0": (1.9, 1.4, 0.25)}.items():
+        assert eventually(page, lambda at=place, of=node: np.allclose(position(page, of), at, atol=1e-6))
     tab(page, "Mission")
     row(page, "Reported wrongly").locator("input").click()
     assert eventually(page, lambda: not is_drawn(page, "/reported/0"))

@@ -67,7 +67,9 @@ def test_a_task_is_added_dragged_moved_reduced_merged_passed_on_and_removed(
     learner = server.sessions.learners[0]
     tab(page, "Tasks")
     unfold(page, "Add a task")
-    row(page, "Click a link").get_by_role("checkbox").check()
+    box = row(page, "Click a link").get_by_role("checkbox")
+    box.click()
+    expect(box).to_be_checked()  # the page may draw the tick a moment after the click
     assert eventually(page, lambda: frame_clicked(page) == "link_4")
     pick(page, "On level", "a level of its own, at place 2")
     write(page, "Its name", "elbow")
