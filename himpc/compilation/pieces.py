@@ -84,15 +84,9 @@ class Whole(_Compiling):
 
 
 class Piece(_Compiling):
-    """Compiles a function that only compiled functions call. A call from Python raises TypeError."""
+    """Compiles a function that only compiled functions call."""
 
     library = _Loose
-
-    def compile_extra(self, func: Any) -> Any:
-        """Overrides Numba's entry point: refuses a call from Python."""
-        if not len(self.state.typingctx.callstack):
-            raise TypeError(f"{func.__qualname__} is a piece of compiled functions: nobody else can call it")
-        return super().compile_extra(func)
 
 
 class Open(_Compiling):

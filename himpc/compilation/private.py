@@ -13,6 +13,7 @@ from typing import Any
 import numpy.ma  # noqa: F401  (Numba imports it at the first call with an array, which would be a robot's first tick)
 from numba import njit
 from numba.core import event
+from numba.core.registry import CPUDispatcher
 
 from himpc.compilation.compiler import compile_apart, compiles_here
 from himpc.compilation.keeping import Kept
@@ -30,9 +31,30 @@ _OPTIONS: dict[str, Any] = {**OPTIONS, "no_cfunc_wrapper": True}
 _PIECE = {**_OPTIONS, "no_cpython_wrapper": True, "pipeline_class": Piece}
 _OPEN = {**_OPTIONS, "no_cpython_wrapper": True, "_nrt": False, "pipeline_class": Open}
 """Without reference counts: nothing is allocated."""
-inline_kernel = njit(**_PIECE)
-always_inline_kernel = njit(**_PIECE, forceinline=True)
-"""See `compiled`."""
+
+
+class _Inline(CPUDispatcher):
+    """A function that only compiled functions call. A call from Python raises TypeError, also after its code
+    has been compiled here as a part of another function: alone it has no address."""
+
+    def __call__(self, *_: Any, **__: Any) -> Any:  # pyright: ignore[reportIncompatibleMethodOverride]
+        name = self.py_func.__qualname__
+        raise TypeError(f"{name} is a piece of compiled functions: nobody else can call it")
+
+
+def inline_kernel(function: Function) -> Any:
+    """See `compiled`."""
+    return _as_inline(njit(**_PIECE)(function))
+
+
+def always_inline_kernel(function: Function) -> Any:
+    """See `compiled`."""
+    return _as_inline(njit(**_PIECE, forceinline=True)(function))
+
+
+def _as_inline(found: Any) -> Any:
+    found.__class__ = _Inline
+    return found
 
 
 def kernel(*arguments: Any) -> Callable[[Function], Any]:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from himpc.compilation.compiled import VECTOR, WHOLE, intermediate
 from himpc.compilation.compiling import compile_all, compiled_functions
 from himpc.compilation.sources import sources_of
 from himpc.tick.kernel.linear import dot
@@ -205,9 +206,16 @@ def test_all_that_is_compiled_in_is_part_of_what_is_kept() -> None:
 
 
 def test_nobody_but_compiled_code_calls_a_piece() -> None:
-    """A call of an inline kernel from Python raises TypeError."""
-    with pytest.raises(TypeError, match="dot is a piece of compiled functions"):
-        dot(np.ones(2), np.ones(2), 2)
+    """A call of an inline kernel from Python raises TypeError, also after the kernel was compiled in this
+    process as a part of a function, as for an export."""
+
+    def caller(a: Any, b: Any, n: int) -> float:
+        return dot(a, b, n)
+
+    for _ in range(2):
+        with pytest.raises(TypeError, match="dot is a piece of compiled functions"):
+            dot(np.ones(2), np.ones(2), 2)
+        intermediate(caller, (VECTOR, VECTOR, WHOLE))
 
 
 def test_the_first_run_equals_the_second(first_and_second_run: tuple[tuple[Path, str], ...]) -> None:

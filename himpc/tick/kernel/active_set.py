@@ -86,7 +86,8 @@ def resolve(active: ActiveSet, index: int, D: int, budget: Array) -> float:
         active.orthonormal_basis[index],
     )
     length, whole = math.sqrt(left), math.sqrt(dot(scaled_normal, scaled_normal, D))
-    return length if length > _DEPENDENT * whole and length > 1e-14 else 0.0
+    # D rows span all there is: what rounding leaves of one more must not become a row without room.
+    return length if index < D and length > _DEPENDENT * whole and length > 1e-14 else 0.0
 
 
 @inline_kernel
