@@ -121,8 +121,7 @@ class Branch(Room):
 
     def code_of(self, who: str) -> str:
         """The code of a learner's state; "" if there is none."""
-        learner = next((each for each in self._learners() if each.token == who), None)
-        told = None if learner is None else learner.latest()
+        told = self._latest(who)
         try:
             return "" if told is None else code_of(told)
         except InputError:

@@ -113,8 +113,7 @@ class Hall(Room):
 
     def code_of(self, who: str) -> str:
         """The code of a learner's state on this server. Raises InputError if there is none."""
-        learner = next((each for each in self._learners() if each.token == who), None)
-        told = None if learner is None else learner.latest()
+        told = self._latest(who)
         if told is None:
             raise InputError("the robot of this learner does not answer")
         return code_of(told)
