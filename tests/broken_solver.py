@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from himpc import qp
 from himpc.cascade import explicit
-from himpc.tick import fallbacks, problems
+from himpc.tick import fallbacks
+from himpc.tick.kernel.arrays import AT, WHOLE_AT
+from himpc.tick.kernel.control_period import LEVELS, LINEARIZE, NOT_FINITE, ONE_LEVEL
 
 Array = NDArray[np.float64]
 
@@ -35,11 +37,24 @@ def break_solver(monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
 
 def break_kernel(monkeypatch: pytest.MonkeyPatch, place: int | None = None) -> None:
     """Makes the kernel find no optimum, at one level or at all, and disables the printed QP."""
-    healthy = fallbacks.solve_level
+    healthy = fallbacks.control_period
 
-    def broken(*arguments: Any) -> bool:
-        return arguments[4] != place and place is not None and healthy(*arguments)
+    def broken(*given: Any) -> int:
+        *arena, parts, first, room = given
+        data, where, whole, whole_where = arena
+        count = whole[whole_where[WHOLE_AT.sizes] + 4]
+        if parts & ONE_LEVEL:
+            return healthy(*given) if place is not None and first != place else first
+        if not parts & LEVELS:
+            return healthy(*given)
+        if parts & LINEARIZE and healthy(*arena, LINEARIZE, 0, 0.0) == NOT_FINITE:
+            return NOT_FINITE
+        for level in range(first, count):
+            data[where[AT.U] + level * whole[whole_where[WHOLE_AT.sizes] + 8]] = np.nan
+            if place is None or level == place or healthy(*arena, ONE_LEVEL, level, 0.0) == level:
+                return level
+            data[where[AT.rung] + level] = 0.0
+        return healthy(*arena, parts & ~(LINEARIZE | LEVELS), 0, room)
 
-    monkeypatch.setattr(fallbacks, "solve_level", broken)
+    monkeypatch.setattr(fallbacks, "control_period", broken)
     monkeypatch.setattr(fallbacks, "solve_explicit", lambda *_: None)
-    monkeypatch.setattr(problems, "solve_level", broken)

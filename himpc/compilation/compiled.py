@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from numba import boolean, float64, int64, intp, types
 
 from himpc.compilation import public_only
@@ -20,6 +22,9 @@ FIXED, FIXED_VECTOR = types.Array(float64, 2, "C", readonly=True), types.Array(f
 GIVEN_VECTOR = types.Array(float64, 1, "A", readonly=True)
 GIVEN_MATRIX, GIVEN_MATRICES = float64[:, :], float64[:, :, :]
 """Arrays from callers, which may be slices."""
+
+clock_gettime: Any = types.ExternalFunction("clock_gettime", types.int32(types.int32, types.uintp))
+"""(clock, address of two whole numbers for s and ns): the function of the C library, where it has one."""
 
 inline_kernel = chain.inline_kernel
 """Compiles a function as a part of every `kernel` that calls it, in any module."""

@@ -269,7 +269,7 @@ def prepare(robot: Robot, settings: Settings) -> Prepared:
 def usable(x: Array) -> bool:
     """Whether values are finite, and small enough that their squares and the differences of bounds are also
     finite."""
-    return float(x @ x) < 1e18
+    return x.dot(x) < 1e18
 
 
 def _spread(value: float | tuple[float, ...], size: int, what: str) -> Array:

@@ -1,5 +1,5 @@
-"""Solves all levels of the cascade on an `Arena` (the numbers of one controller). A level for which no
-optimum is found within the arena's budget, which all levels share, gets a fallback."""
+"""A control period on an `Arena` (the numbers of one controller). A level for which no optimum is found
+within the arena's budget, which all levels share, gets a fallback."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from himpc.prediction.joint import JointState
 from himpc.tick.kernel.arena import Arena
 from himpc.tick.kernel.arrays import PERIOD, T_S, Array
 from himpc.tick.kernel.cascade import ALONE, LAST, SOFTENED
+from himpc.tick.kernel.control_period import LEVELS, LINEARIZE, NOT_FINITE, ONE_LEVEL, control_period
 from himpc.tick.kernel.goldfarb_idnani import TOLERANCE
-from himpc.tick.kernel.solve_level import solve_level
 from himpc.tick.printed import printed_problem
 
 _SMALL = 40
@@ -46,9 +46,9 @@ class FallbackBudget:
         return self.left >= 2
 
 
-def solve_levels(arena: Arena, like: Rows, budget: FallbackBudget) -> list[tuple[Fallback, float]]:
-    """Solves all levels of an arena whose problems have been written; returns for each level the fallback
-    that gave its U ("solve" if none was needed) and its time, microseconds.
+def perform(arena: Arena, parts: int, like: Rows, budget: FallbackBudget) -> int:
+    """Performs parts of a control period; returns for how many levels no optimum was found, NOT_FINITE if
+    the problems or the torque are not finite.
 
     The fallbacks are those of `solve_cascade` and one more, "feasible": if the kernel ran out of budget, the
     level moves towards the last point of the kernel as far as the rows allow. All levels share the budget of
@@ -56,23 +56,25 @@ def solve_levels(arena: Arena, like: Rows, budget: FallbackBudget) -> list[tuple
     ones, which then need further fallbacks.
 
     Args:
-        arena: filled by `linearize`. The rows may be wider afterwards: levels below also use rows that a
-            fallback has widened.
+        arena: the rows may be wider afterwards: levels below also use rows that a fallback has widened.
+        parts: see `control_period`.
         like: rows with the constraints, directions and L of the arena; their bounds are not used.
         budget: the budget of this tick, from which every printed QP is deducted.
     """
-    found: list[tuple[Fallback, float]] = []
-    for place in range(int(arena.i["sizes"][4])):
+    reached, unsolved = control_period(*arena.arguments, parts, 0, 0.0), 0
+    while parts & LEVELS and NOT_FINITE < reached < arena.i["sizes"][4]:
         started = perf_counter_ns()
-        arena.f["U"][place, 0, 0] = (
-            np.nan
-        )  # if the kernel fails at once, the point of an earlier tick must not be used as a direction
-        solved = solve_level(*arena.arguments, place, 0.0)
-        fallback = "solve" if solved else _climb_down(arena, place, like, budget)
-        time_us = (perf_counter_ns() - started) / 1e3
-        arena.f["rung"][place], arena.f["time_us"][place] = FALLBACKS.index(fallback), time_us
-        found.append((fallback, time_us))
-    return found
+        fallback = _climb_down(arena, reached, like, budget)
+        arena.f["rung"][reached] = FALLBACKS.index(fallback)
+        arena.f["time_us"][reached] += (perf_counter_ns() - started) / 1e3
+        unsolved += fallback != "solve"
+        reached = control_period(*arena.arguments, parts & ~LINEARIZE, reached + 1, 0.0)
+    return NOT_FINITE if reached == NOT_FINITE else unsolved
+
+
+def solve_level(arena: Arena, place: int, room: float = 0.0) -> bool:
+    """Solves one level; returns whether an optimum was found. room: see the kernel's `solve_level`."""
+    return control_period(*arena.arguments, ONE_LEVEL, place, room) != place
 
 
 def _climb_down(arena: Arena, place: int, like: Rows, budget: FallbackBudget) -> Fallback:
@@ -92,14 +94,14 @@ def _climb_down(arena: Arena, place: int, like: Rows, budget: FallbackBudget) ->
         return "solve"
     if not alone:
         # If U_{i−1} is almost the only feasible point, a small slack separates the rows.
-        if solve_level(*arena.arguments, place, TOLERANCE):
+        if solve_level(arena, place, TOLERANCE):
             return "solve"
         above = f["U"][place - 1]
         return _on_the_way(arena, place, containing(rows, above), "inherit", above, f["U"][place].copy())
     rows = resting
     if widened is not None:
         _write(arena, widened)
-        solved = bool(solve_level(*arena.arguments, place, 0.0))
+        solved = solve_level(arena, place)
         wanted = f["U"][place].copy()
         point = None if solved else _as_printed(arena, place, widened, budget)
         if point is not None:

@@ -12,7 +12,7 @@ from himpc.references import Preview
 from himpc.tasks import Damping, FrameOrientation, Task
 from himpc.tick.configure import write_tasks
 from himpc.tick.kernel.arrays import PULL, Array
-from himpc.tick.kernel.linearize import linearize
+from himpc.tick.kernel.control_period import LINEARIZE, NOT_FINITE, control_period
 from robots import Robot
 
 _NUDGES = 3
@@ -67,7 +67,7 @@ class Kinematics:
                     f["R_d"][place] = value
                 else:
                     f["x_d"][span] = value
-        if not linearize(*self._arena.arguments):
+        if control_period(*self._arena.arguments, LINEARIZE, 0, 0.0) == NOT_FINITE:
             raise np.linalg.LinAlgError("the kinematics are not finite")
         J, ahead, behind = f["B"][:, : self._solved]
         R, value, error = f["R_now"].copy(), f["value"].copy(), f["error"].copy()

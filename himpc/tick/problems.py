@@ -6,13 +6,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from himpc.cascade.level import NO_ROWS, ActiveRows, Fallback, LevelProblem, LevelSolution
+from himpc.cascade.level import FALLBACKS, NO_ROWS, ActiveRows, LevelProblem, LevelSolution
 from himpc.limits.rows import Rows
-from himpc.tick.fallbacks import FallbackBudget, solve_levels
+from himpc.tick.fallbacks import FallbackBudget, perform, solve_level
 from himpc.tick.kernel.arena import Arena, Snapshot
 from himpc.tick.kernel.arrays import PULL, Array
-from himpc.tick.kernel.finish_tick import finish_tick
-from himpc.tick.kernel.solve_level import solve_level
+from himpc.tick.kernel.control_period import FINISH, LEVELS
 from himpc.tick.tables import LevelTable, budget_of, given_of, sizes, write_effects, write_levels
 
 
@@ -23,9 +22,8 @@ def solve_problems(
 ) -> list[LevelSolution]:
     """Computes `himpc.cascade.cascade.solve_cascade` by the kernel; the arguments are the same."""
     arena = arena_of(problems, rows, previous)
-    fallbacks = solve_levels(arena, rows, FallbackBudget())
-    finish_tick(*arena.arguments, False)
-    return solutions([problem.name for problem in problems], arena.snapshot(), fallbacks)
+    perform(arena, LEVELS + FINISH, rows, FallbackBudget())
+    return solutions([problem.name for problem in problems], arena.snapshot())
 
 
 def arena_of(problems: Sequence[LevelProblem], rows: Rows, previous: Mapping[str, LevelSolution]) -> Arena:
@@ -62,14 +60,13 @@ def arena_of(problems: Sequence[LevelProblem], rows: Rows, previous: Mapping[str
 def increments_of(problem: LevelProblem, rows: Rows) -> Array | None:
     """Returns the optimum of one level alone, (N, n); None if the kernel finds none."""
     arena = arena_of([problem], rows, {})
-    return arena.f["U"][0] if solve_level(*arena.arguments, 0, 0.0) else None
+    return arena.f["U"][0] if solve_level(arena, 0) else None
 
 
-def solutions(
-    names: Sequence[str], found: Snapshot, fallbacks: Sequence[tuple[Fallback, float]]
-) -> list[LevelSolution]:
+def solutions(names: Sequence[str], found: Snapshot) -> list[LevelSolution]:
     """Returns the evidence of all levels from the results of a tick."""
     U, cost, kkt, leak, left = (found(name) for name in ("U", "cost", "kkt", "leak", "left"))
+    fallbacks, times = [FALLBACKS[int(rung)] for rung in found("rung")], found("time_us").tolist()
     return [
         LevelSolution(
             name,
@@ -83,7 +80,7 @@ def solutions(
             0.0,
             float(leak[place]),
         )
-        for place, (name, (fallback, time_us)) in enumerate(zip(names, fallbacks, strict=True))
+        for place, (name, fallback, time_us) in enumerate(zip(names, fallbacks, times, strict=True))
     ]
 
 

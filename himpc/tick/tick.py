@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from time import perf_counter_ns
 
 import numpy as np
 
-from himpc.cascade.level import Fallback, LevelProblem, LevelSolution
+from himpc.cascade.level import LevelProblem, LevelSolution
 from himpc.formulation.forms import StackForm
 from himpc.formulation.memory import Memory
 from himpc.formulation.settings import Settings
@@ -21,14 +21,21 @@ from himpc.tasks import Task
 from himpc.telemetry import Layout
 from himpc.tick.configure import arena_for, write_limits
 from himpc.tick.distances import Distances
-from himpc.tick.fallbacks import FallbackBudget, solve_levels
+from himpc.tick.fallbacks import FallbackBudget, perform
 from himpc.tick.gather import gathered
 from himpc.tick.given import GivenRows
 from himpc.tick.given_bounds import GivenBounds
 from himpc.tick.kernel.arena import Snapshot
 from himpc.tick.kernel.arrays import Array
-from himpc.tick.kernel.finish_tick import finish_tick
-from himpc.tick.kernel.linearize import linearize
+from himpc.tick.kernel.control_period import (
+    FINISH,
+    LEVELS,
+    LINEARIZE,
+    NOT_FINITE,
+    PERIOD,
+    REMEMBER,
+    control_period,
+)
 from himpc.tick.kernel.progress import progress
 from himpc.tick.preview_writer import PreviewWriter
 from himpc.tick.problems import press, solutions
@@ -107,8 +114,7 @@ class CompiledTick:
             return None
         f, i = self.arena.f, self.arena.i
         known = bool(i["known"][0])
-        fallbacks: list[tuple[Fallback, float]] = [("solve", math.nan)] * len(self._levels)
-        levels = self._solutions(self.arena.snapshot(), fallbacks) if i["known"][1] else []
+        levels = self._solutions(self.arena.snapshot()) if i["known"][1] else []
         return Memory(
             f["q_was"].copy(),
             f["v_was"].copy(),
@@ -174,8 +180,8 @@ class CompiledTick:
         """
         self._take(q, v, previews, tau_0, limits)
         arena = self.arena
-        fallbacks: list[tuple[Fallback, float]] = []
-        change, iterations, budget = math.inf, 0, FallbackBudget()
+        change, iterations, unsolved, budget = math.inf, 0, 0, FallbackBudget()
+        parts = PERIOD if self._most == 1 else LINEARIZE + LEVELS + FINISH
         arena.f["budget"][:] = self.budget
         while iterations == 0 or (change > self._tolerance and iterations < self._most):
             if iterations:
@@ -186,21 +192,18 @@ class CompiledTick:
                 before = None
             self._given.write(previews)
             self._rows = self._given_bounds.write(self._rows, limits, observed_by(previews))
-            if not linearize(*arena.arguments):
+            unsolved = perform(arena, parts, self._rows, budget)
+            if unsolved == NOT_FINITE:
                 return None
             self._looked = True
-            fallbacks = solve_levels(arena, self._rows, budget) if self._levels else []
             iterations += 1
-            once = self._most == 1
-            if not finish_tick(*arena.arguments, once):
-                return None
             if before is not None:
                 change = float(np.abs(arena.f["U"] - before).max())
-            if not budget.spared or any(fallback != "solve" for fallback, _ in fallbacks):
+            if unsolved or not budget.spared:
                 break  # another iteration needs optima at all levels and some budget
         if self._most > 1:
-            finish_tick(*arena.arguments, True)
-        return self._plan(fallbacks, tau_0, limits, iterations, started)
+            control_period(*arena.arguments, FINISH + REMEMBER, 0, 0.0)
+        return self._plan(unsolved, tau_0, limits, iterations, started)
 
     def _take(
         self, q: Array, v: Array, previews: Mapping[str, Preview], tau_0: Array, limits: LimitsInForce
@@ -215,30 +218,21 @@ class CompiledTick:
             write_limits(self.arena, limits, self._settings.limits.position == "paper")
         self._writer.write(previews)
 
-    def _solutions(self, found: Snapshot, fallbacks: Sequence[tuple[Fallback, float]]) -> list[LevelSolution]:
-        return (
-            solutions([level.name for level in self._form.levels], found, fallbacks) if self._levels else []
-        )
+    def _solutions(self, found: Snapshot) -> list[LevelSolution]:
+        return solutions([level.name for level in self._form.levels], found) if self._levels else []
 
     def _plan(
-        self,
-        fallbacks: list[tuple[Fallback, float]],
-        tau_0: Array,
-        limits: LimitsInForce,
-        iterations: int,
-        started: int,
+        self, unsolved: int, tau_0: Array, limits: LimitsInForce, iterations: int, started: int
     ) -> Plan:
-        ticks, unsolved, idle_us = self._ticks, 0, 0.0
-        for fallback, time_us in fallbacks:
-            unsolved += fallback != "solve"
-            idle_us += time_us
+        ticks = self._ticks
         # Levels that are solved alone are evidence, except for the last one, which is applied.
-        idle_us = idle_us - fallbacks[-1][1] if fallbacks and self._levels[0].alone else 0.0
+        alone = bool(self._levels) and self._levels[0].alone
+        idle_us = float(self.arena.f["time_us"][:-1].sum()) if alone else 0.0
 
         def evidence() -> Evidence:
             if self._ticks != ticks:
                 raise RuntimeError("the controller has gone on since this plan: keep plan.freeze() instead")
-            return self._evidence(fallbacks)
+            return self._evidence()
 
         return Plan(
             tau=self.arena.f["tau"].copy(),
@@ -253,12 +247,12 @@ class CompiledTick:
             M_bar=self.arena.f["M_bar"].copy() if self._settings.M_bar_adapt else None,
         )
 
-    def _evidence(self, fallbacks: Sequence[tuple[Fallback, float]]) -> Evidence:
+    def _evidence(self) -> Evidence:
         found = self.arena.snapshot()
         R, value, error = found("R_now"), found("value"), found("error")
         stopping = found("stopping") > 0.0 if self._settings.limits.position == "viability" else None
         return Evidence(
-            levels=tuple(self._solutions(found, fallbacks)),
+            levels=tuple(self._solutions(found)),
             q=found("predicted"),
             errors={task.name: error[span] for _, task, span in self._spans},
             values={

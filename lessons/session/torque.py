@@ -201,12 +201,12 @@ class TorqueSession(Session):
             self.drain()
         settings, plant = self.settings, self.plant
         T_s, t = settings.T_s, plant.t
-        q, v = plant.q, plant.v
+        q, v, tau = plant.q, plant.v, plant.tau
         state = plant.measure(T_s)
         around = observed(plant, settings.limits.avoidance)
         ahead = Outlook(self.references, t, T_s, settings.horizon, around)
         self.controller = settled(self.controller)
-        plan = self.controller.step(state.q, state.v, ahead, plant.tau)
+        plan = self.controller.step(state.q, state.v, ahead, tau)
         row, at = self._row, self._at
         write_plan(row, self.layout, plan, ahead)
         row[at.t] = t
@@ -218,7 +218,7 @@ class TorqueSession(Session):
             self.failure = plan.notice
         late = settings.is_late(1e-3 * plan.step_us)
         row[at.late] = late
-        row[at.tau] = plant.step(self._outbox.applied(plan.tau, late, plant.tau), T_s)
+        row[at.tau] = plant.step(self._outbox.applied(plan.tau, late, tau), T_s)
         row[at.touch] = plant.touch
         row[at.near] = self.clearance.measure(q, settings.limits.avoidance)
         self._ticks += 1

@@ -20,9 +20,7 @@ from himpc.limits.limits import LimitsInForce
 from himpc.limits.rows import build_rows
 from himpc.prediction.joint import JointState
 from himpc.references import previews
-from himpc.tick.kernel.finish_tick import finish_tick
-from himpc.tick.kernel.linearize import linearize
-from himpc.tick.kernel.solve_level import solve_level
+from himpc.tick.kernel import control_period
 from lessons.scenes.catalog import torque_scene
 from lessons.session.torque import TorqueSession
 from tests.commands.exported import controller_in, exported, needed, replayed, rows_of, told
@@ -187,11 +185,12 @@ def test_settings_that_do_not_fit_change_nothing(folders: dict[str, Path]) -> No
 
 def test_the_exported_functions_are_those_that_python_runs() -> None:
     """The entry consists of the functions of the lab's own tick, not of copies."""
-    assert whole_tick._linearize.py_func is linearize.py_func
-    assert whole_tick._finish.py_func is finish_tick.py_func
-    assert fallbacks.solve.py_func is solve_level.py_func
-    lab = {path for entry in (linearize, solve_level, finish_tick) for path in sources_of(entry.py_func)}
-    assert lab <= set(sources_of(whole_tick.control.py_func))
+    for part in ("linearize", "finish_tick"):
+        assert getattr(whole_tick, part) is getattr(control_period, part)
+    for part in ("solve_levels", "solve_level"):
+        assert getattr(fallbacks, part) is getattr(control_period, part)
+    lab = set(sources_of(control_period.control_period.py_func)) - {Path(control_period.__file__)}
+    assert lab <= {*sources_of(whole_tick.control.py_func)}
 
 
 @pytest.mark.parametrize(

@@ -22,8 +22,8 @@ from himpc.cascade.level import LevelProblem, LevelSolution
 from himpc.cascade.null_space import RANK_TOLERANCE
 from himpc.limits import Rows
 from himpc.qp import is_installed
+from himpc.tick.fallbacks import solve_level
 from himpc.tick.kernel.goldfarb_idnani import TOLERANCE
-from himpc.tick.kernel.solve_level import solve_level
 from himpc.tick.problems import arena_of
 
 Array = NDArray[np.float64]
@@ -192,10 +192,10 @@ def test_a_level_that_is_tried_once_more_still_follows_its_own_tasks(seed: int) 
     hierarchy = random_hierarchy(seed, 6, 4, 3)
     arena = arena_of(hierarchy.problems, hierarchy.rows, {})
     for place in range(3):
-        assert solve_level(*arena.arguments, place, 0.0)
+        assert solve_level(arena, place)
         first = arena.f["U"][place].copy()
         if place:
-            assert solve_level(*arena.arguments, place, TOLERANCE)
+            assert solve_level(arena, place, TOLERANCE)
             assert np.abs(arena.f["U"][place] - first).max() <= 1e-4
             arena.f["U"][place] = first
 

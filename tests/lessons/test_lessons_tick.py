@@ -11,9 +11,7 @@ import pytest
 from himpc.catalog import Route
 from himpc.plan import write_plan
 from himpc.references import Outlook
-from himpc.tick.kernel.finish_tick import finish_tick
-from himpc.tick.kernel.linearize import linearize
-from himpc.tick.kernel.solve_level import solve_level
+from himpc.tick.kernel.control_period import control_period
 from lessons.events import MoveTarget, Set
 from lessons.scenes.catalog import torque_scene
 from lessons.session.torque import TorqueSession
@@ -128,8 +126,7 @@ def test_a_row_gathered_at_once_is_the_row_written_field_by_field(name: str, con
 
 
 def test_nothing_is_compiled_while_a_robot_moves() -> None:
-    """One compiled form of each entry function serves every layout."""
+    """One compiled form of the entry serves every layout."""
     for name in ("iiwa14-circle", "planar3-hold"):
         TorqueSession(torque_scene(name)).tick()
-    for compiled in (linearize, solve_level, finish_tick):
-        assert len(compiled.signatures) == 1
+    assert len(control_period.signatures) == 1

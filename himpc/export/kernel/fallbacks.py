@@ -17,28 +17,25 @@ from himpc.tick.kernel.goldfarb_idnani import TOLERANCE
 from himpc.tick.kernel.linear import copy_rows, dot
 from himpc.tick.kernel.residual import add_effects, effects
 from himpc.tick.kernel.solve_level import solve_level
+from himpc.tick.kernel.solve_levels import no_clock, solve_levels
 
 SOLVE, SOFTEN, FEASIBLE, PREVIOUS, INHERIT, BRAKE, HOLD = range(7)
 """Which fallback gave a level's increments, in the order of `himpc.cascade.level.FALLBACKS`."""
 
-solve = inline_kernel(solve_level.py_func)
-
 
 @inline_kernel
-def solve_levels(
+def solve_with_fallbacks(
     t: TickArrays, p: LoopArrays, data: Array, where: Whole, whole: Whole, whole_where: Whole
 ) -> int:
     """Solves all levels; returns the last of the fallbacks that acted, SOLVE if none was needed."""
-    worst = SOLVE
-    for i in range(t.sizes[4]):
-        # If the solver fails at once, the point of an earlier tick must not be used as a direction.
-        t.U[i, 0, 0] = math.nan
-        found = SOLVE
-        if not solve(data, where, whole, whole_where, i, 0.0):
-            found = climb_down(t, p, data, where, whole, whole_where, i)
+    worst, i = SOLVE, -1
+    while True:
+        i = solve_levels(data, where, whole, whole_where, i + 1, no_clock)
+        if i >= t.sizes[4]:
+            return worst
+        found = climb_down(t, p, data, where, whole, whole_where, i)
         t.rung[i] = float(found)
         worst = max(worst, found)
-    return worst
 
 
 @inline_kernel
@@ -48,7 +45,7 @@ def climb_down(
     """Finds increments of level i that meet all rows whenever any do; returns the fallback that gave them."""
     if i > 0 and not t.level[i, ALONE]:
         # If U_{i−1} is almost the only feasible point, a small slack separates the rows.
-        if solve(data, where, whole, whole_where, i, TOLERANCE):
+        if solve_level(data, where, whole, whole_where, i, TOLERANCE):
             return SOLVE
         copy_rows(t.U[i], p.wanted)
         copy_rows(t.U[i - 1], t.U[i])
@@ -59,7 +56,7 @@ def climb_down(
         return found
     kept_rows(t, p, True)
     widened = soften(t, p)
-    if widened and solve(data, where, whole, whole_where, i, 0.0):
+    if widened and solve_level(data, where, whole, whole_where, i, 0.0):
         if i > 0:
             kept_rows(t, p, False)
         return SOFTEN

@@ -7,7 +7,7 @@ import math
 
 from himpc.compilation.compiled import inline_kernel
 from himpc.export.kernel.adjust import adjust, arrange, fade, ramp, write_rows
-from himpc.export.kernel.fallbacks import HOLD, SOLVE, solve_levels
+from himpc.export.kernel.fallbacks import HOLD, SOLVE, solve_with_fallbacks
 from himpc.export.kernel.follow import follow, rest_at_targets
 from himpc.export.kernel.loop_arrays import (
     BUDGET,
@@ -25,10 +25,6 @@ from himpc.tick.kernel.cascade import finite
 from himpc.tick.kernel.finish_tick import finish_tick
 from himpc.tick.kernel.linear import copy, copy_rows
 from himpc.tick.kernel.linearize import linearize
-
-_linearize, _finish = inline_kernel(linearize.py_func), inline_kernel(finish_tick.py_func)
-"""The very functions that Python runs, as parts of these entries."""
-
 
 TICK, RESET = -2, -1
 """What is asked of `control`; else a setting, see `adjust`."""
@@ -137,10 +133,10 @@ def iterate(t: TickArrays, p: LoopArrays, data: Array, where: Whole, whole: Whol
                 copy(t.predicted[j - 1], t.path[j], t.q.size)
             for i in range(t.sizes[4]):
                 copy_rows(t.U[i], p.before[i])
-        if not _linearize(data, where, whole, whole_where):
+        if not linearize(data, where, whole, whole_where):
             return HOLD
-        fallback = solve_levels(t, p, data, where, whole, whole_where)
-        if not _finish(data, where, whole, whole_where, most == 1):
+        fallback = solve_with_fallbacks(t, p, data, where, whole, whole_where)
+        if not finish_tick(data, where, whole, whole_where, most == 1):
             return HOLD
         if count:
             change = 0.0
@@ -152,7 +148,7 @@ def iterate(t: TickArrays, p: LoopArrays, data: Array, where: Whole, whole: Whol
         if fallback != SOLVE:
             break  # another iteration needs optima at all levels
     if most > 1:
-        _finish(data, where, whole, whole_where, True)
+        finish_tick(data, where, whole, whole_where, True)
     return fallback
 
 

@@ -97,7 +97,9 @@ class TickArrays(NamedTuple):
     frame_translation: Annotated[Array, "F 3", "m", "configure → linearize"]
     # What a tick finds; one piece, so that a plan takes its copy at once.
     tau: Annotated[Array, "n", "N·m", "finish_tick → gather tick"]
-    U: Annotated[Array, "r N n", "N·m", "fallbacks solve_level → finish_tick problems tables tick"]
+    U: Annotated[
+        Array, "r N n", "N·m", "fallbacks solve_level solve_levels → finish_tick problems tables tick"
+    ]
     predicted: Annotated[Array, "N1 n", "rad", "finish_tick → tick"]
     value: Annotated[Array, "M", "m, rad", "given linearize → gather kinematics tick"]
     error: Annotated[Array, "M", "m, rad", "given linearize → gather kinematics progress tick"]
@@ -124,8 +126,8 @@ class TickArrays(NamedTuple):
     at_bound: Annotated[Array, "n", "1", "finish_tick → gather"]
     priority_leak: Annotated[Array, "1", "m/s²", "finish_tick → gather"]
     active: Annotated[Array, "r", "1", "finish_tick → gather"]
-    rung: Annotated[Array, "r", "1", "fallbacks → gather finish_tick"]
-    time_us: Annotated[Array, "r", "µs", "fallbacks → gather"]
+    rung: Annotated[Array, "r", "1", "fallbacks solve_levels → gather finish_tick problems"]
+    time_us: Annotated[Array, "r", "µs", "fallbacks solve_levels → gather problems tick"]
     nothing: Annotated[Array, "1", "1", "configure → gather"]
     # Scratch.
     placed: Annotated[Array, "J 12", "1, m", "distance_rows linearize → distances"]
@@ -167,7 +169,11 @@ class TickArrays(NamedTuple):
     size: Annotated[Array, "2", "1/N·m, 1", "solve_level → itself"]
     budget: Annotated[Array, "1", "1", "solve_level problems tick → itself"]
     sizes: Annotated[
-        Whole, "12", "1", "configure tables → distance_rows fallbacks finish_tick linearize solve_level"
+        Whole,
+        "12",
+        "1",
+        "configure tables → "
+        "control_period distance_rows fallbacks finish_tick linearize solve_level solve_levels",
     ]
     # What is remembered, and whether `x_dot_was` and `U_was` are known.
     known: Annotated[Whole, "2", "1", "finish_tick linearize kinematics problems tick → fallbacks given"]
@@ -199,6 +205,7 @@ class TickArrays(NamedTuple):
     held_row: Annotated[Whole, "k", "1", "solve_level → itself"]
     held_joint: Annotated[Whole, "k", "1", "solve_level → itself"]
     held_side: Annotated[Whole, "k", "1", "solve_level → itself"]
+    stamp: Annotated[Whole, "2", "s, ns", "solve_levels → itself"]
 
 
 def _shapes(kind: Any) -> dict[str, str]:

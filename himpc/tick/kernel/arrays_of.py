@@ -132,4 +132,5 @@ def arrays_of(data: Array, where: Whole, whole: Whole, whole_where: Whole) -> Ti
         vector(whole, whole_where[WHOLE_AT.held_row], w + 1),
         vector(whole, whole_where[WHOLE_AT.held_joint], w + 1),
         vector(whole, whole_where[WHOLE_AT.held_side], w + 1),
+        vector(whole, whole_where[WHOLE_AT.stamp], 2),
     )

@@ -1,11 +1,11 @@
-"""Entry: evidence, torque and prediction."""
+"""Evidence, torque and prediction."""
 
 from __future__ import annotations
 
 import math
 from typing import Any
 
-from himpc.compilation.compiled import INDICES, VECTOR, WHOLE, always_inline_kernel, kernel
+from himpc.compilation.compiled import always_inline_kernel, inline_kernel
 from himpc.tick.kernel.arrays import DIRECTED, PERIOD, T_S, TickArrays, Whole
 from himpc.tick.kernel.arrays_of import arrays_of
 from himpc.tick.kernel.cascade import (
@@ -42,7 +42,7 @@ def remember(t: TickArrays, r: int) -> None:
             t.warm_multiplier[i, p] = t.multiplier[i, p]
 
 
-@kernel(VECTOR, INDICES, INDICES, INDICES, WHOLE)
+@inline_kernel
 def finish_tick(data: Any, where: Whole, whole: Whole, whole_where: Whole, keep: int) -> bool:
     """Evidence of all levels, the torque τ₀ + Δτ within its bounds, and the prediction (18). False if the
     torque is not finite; else the tick is remembered, if it is to be kept."""

@@ -1,11 +1,11 @@
-"""Entry: from the measured state and the references to the data of all QPs."""
+"""From the measured state and the references to the data of all QPs."""
 
 from __future__ import annotations
 
 import math
 from typing import Any
 
-from himpc.compilation.compiled import INDICES, VECTOR, always_inline_kernel, kernel
+from himpc.compilation.compiled import always_inline_kernel, inline_kernel
 from himpc.tick.kernel.arrays import NOW, PERIOD, PULL, REACTION, T_S, Array, TickArrays, Whole
 from himpc.tick.kernel.arrays_of import arrays_of
 from himpc.tick.kernel.bounds import bounds
@@ -69,7 +69,7 @@ def errors(t: TickArrays) -> None:
             t.error[i] = 0.0 if kind == DAMPING else t.value[i] - t.x_d[i]
 
 
-@kernel(VECTOR, INDICES, INDICES, INDICES)
+@inline_kernel
 def linearize(data: Any, where: Whole, whole: Whole, whole_where: Whole) -> bool:
     """The measured state and the references as the data of all QPs: kinematics along the last prediction
     (30), residuals, free motion (15) and bounds (32d)–(32f). False if they are not finite.

@@ -1,11 +1,11 @@
-"""Entry: one level of the cascade."""
+"""One level of the cascade."""
 
 from __future__ import annotations
 
 import math
 from typing import Any
 
-from himpc.compilation.compiled import INDICES, NUMBER, VECTOR, WHOLE, always_inline_kernel, kernel
+from himpc.compilation.compiled import always_inline_kernel, inline_kernel
 from himpc.tick.kernel.active_set import ActiveSet, Quadratic
 from himpc.tick.kernel.arrays import DIRECTED, TickArrays, Whole
 from himpc.tick.kernel.arrays_of import arrays_of
@@ -47,7 +47,7 @@ def level_of(t: TickArrays, i: int) -> LevelQP:
     )
 
 
-@kernel(VECTOR, INDICES, INDICES, INDICES, WHOLE, NUMBER)
+@inline_kernel
 def solve_level(data: Any, where: Whole, whole: Whole, whole_where: Whole, i: int, room: float) -> bool:
     """Problem i of the cascade, those above it known; False if no optimum was found within what is left of
     the tick's budget.

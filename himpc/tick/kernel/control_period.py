@@ -1,0 +1,69 @@
+"""Entry: a whole control period, or parts of it."""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import Any
+
+from himpc.compilation.compiled import (
+    INDICES,
+    NUMBER,
+    VECTOR,
+    WHOLE,
+    clock_gettime,
+    inline_kernel,
+    kernel,
+)
+from himpc.tick.kernel.arrays import Whole
+from himpc.tick.kernel.arrays_of import arrays_of
+from himpc.tick.kernel.finish_tick import finish_tick
+from himpc.tick.kernel.linearize import linearize
+from himpc.tick.kernel.solve_level import solve_level
+from himpc.tick.kernel.solve_levels import no_clock, solve_levels
+
+LINEARIZE, LEVELS, ONE_LEVEL, FINISH, REMEMBER = 1, 2, 4, 8, 16
+"""Parts of a period; `parts` is their sum."""
+PERIOD = LINEARIZE + LEVELS + FINISH + REMEMBER
+"""All parts of a period whose levels are solved once."""
+NOT_FINITE = -1
+
+
+@inline_kernel
+def _monotonic_us(stamp: Whole) -> float:
+    clock_gettime(_MONOTONIC, stamp.ctypes.data)
+    return 1e6 * stamp[0] + 1e-3 * stamp[1]
+
+
+_MONOTONIC = 6 if sys.platform == "darwin" else 1
+_clock = _monotonic_us if os.name == "posix" else no_clock
+
+
+@kernel(VECTOR, INDICES, INDICES, INDICES, WHOLE, WHOLE, NUMBER)
+def control_period(
+    data: Any, where: Whole, whole: Whole, whole_where: Whole, parts: int, i: int, room: float
+) -> int:
+    """Performs parts of a control period, in the order of their names.
+
+    Args:
+        data, where, whole, whole_where: the arena.
+        parts: what is to be done, a sum of LINEARIZE … REMEMBER. REMEMBER belongs to FINISH.
+        i: LEVELS: the first level to solve; ONE_LEVEL: the level to solve.
+        room: of ONE_LEVEL, N·m, see `solve_level`.
+
+    Returns:
+        the number of levels; else the level for which no optimum was found, whose fallback and whose later
+        parts are then the caller's to perform; NOT_FINITE if the problems or the torque are not finite.
+    """
+    t = arrays_of(data, where, whole, whole_where)
+    if parts & LINEARIZE and not linearize(data, where, whole, whole_where):
+        return NOT_FINITE
+    if parts & ONE_LEVEL and not solve_level(data, where, whole, whole_where, i, room):
+        return i
+    if parts & LEVELS:
+        reached = solve_levels(data, where, whole, whole_where, i, _clock)
+        if reached < t.sizes[4]:
+            return reached
+    if parts & FINISH and not finish_tick(data, where, whole, whole_where, parts & REMEMBER):
+        return NOT_FINITE
+    return t.sizes[4]
