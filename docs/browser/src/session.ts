@@ -1,7 +1,7 @@
 /** One run: references, controller, plant, script and settings; lessons/session/torque.py. */
 import type { MainModule } from "@mujoco/mujoco";
 import { ENABLED, FALLBACKS, GAINS, LIMITS, M_BAR, Q, R, TARGET, type Controller, type Manifest } from "../../../himpc/export/files/himpc.mjs";
-import { each, limit, type LevelData, type PlantSettings, type RobotData, type SceneData, type SceneEvent, type TaskData } from "./data";
+import { each, limit, pieceOf, type LevelData, type Pack, type RobotData, type SceneData, type SceneEvent, type Scenes, type TaskData } from "./data";
 import { Plant } from "./plant";
 import { Rows } from "./rows";
 
@@ -12,8 +12,8 @@ const LEVEL_FIELDS: Record<string, number> = { enabled: ENABLED, Q, R };
 export interface Tools {
   mj: MainModule;
   create(image: Uint8Array, manifest: Manifest): Controller;
-  /** The memory of an exported controller. */
-  image(scene: SceneData, key: string): Uint8Array;
+  /** With the memory of the exported controllers. */
+  scenes: Pack<Scenes>;
 }
 
 export class Session {
@@ -29,14 +29,14 @@ export class Session {
   private made = new Map<string, [Controller, Manifest]>();
   private script: SceneEvent[] = [];
   private pushUntil = Infinity;
-  private ticks = 0;
+  ticks = 0;
   private held: Float64Array | null = null;
   private waiting: Float64Array | null = null;
   private truth: [number, number] = [NaN, NaN];
 
   constructor(private tools: Tools, scene: SceneData, readonly robot: RobotData) {
     this.scene = structuredClone(scene);
-    this.plant = new Plant(tools.mj, robot, this.scene.plant, scene.world);
+    this.plant = new Plant(tools.mj, robot, this.scene);
     this.key = `${scene.horizon}|${scene.order.join(",")}`;
     [this.controller, this.manifest] = this.controllerFor(this.key);
     this.rows = new Rows(this.layout());
@@ -48,14 +48,12 @@ export class Session {
   get horizon(): number { return Number(this.key.split("|")[0]); }
   get order(): string[] { return this.key.split("|")[1].split(","); }
   level(name: string): LevelData { return named(this.scene.levels, name, "level"); }
-  task(name: string): TaskData { return named(this.scene.levels.flatMap((level) => level.tasks), name, "task"); }
+  task(name: string): TaskData { return named(this.scene.tasks, name, "task"); }
 
   private controllerFor(key: string): [Controller, Manifest] {
     if (!this.made.has(key)) {
-      const { manifest } = this.scene.images[key];
-      const arrays = manifest.arrays.map(([name, type, shape, offset]) => ({ name, type, shape, offset }));
-      const whole = { ...manifest, arrays };
-      this.made.set(key, [this.tools.create(this.tools.image(this.scene, key), whole), whole]);
+      const { manifest, memory } = this.scene.images[key];
+      this.made.set(key, [this.tools.create(pieceOf(this.tools.scenes, memory), manifest), manifest]);
     }
     return this.made.get(key)!;
   }
@@ -67,7 +65,7 @@ export class Session {
 
   private layout(): [string, number][] {
     const wide = (names: string[], width: number): [string, number][] => names.map((name) => [name, width]);
-    return [...wide(["t", "priority_leak", "gauge_norm", "gauge_radius", "unsolved", "late"], 1),
+    return [...wide(["t", "priority_leak", "gauge_norm", "gauge_radius", "unsolved", "late", "contact_force"], 1),
       ...wide(["q", "v", "tau", "tau_demand", "at_bound", "delta_tau", "tau_0"], this.plant.n),
       ...wide(LIMIT_FIELDS.map(([name]) => name), this.plant.n),
       ...this.manifest.tasks.flatMap((task) => wide([`error/${task.name}`, `x/${task.name}`], task.rows)),
@@ -118,7 +116,7 @@ export class Session {
     solved.forEach((name, place) => put({ [`active/${name}`]: [f("active")[place]] }));
     put({ unsolved: [FALLBACKS[fallback] === "hold" ? 1 : solved.filter((_, place) => rung[place] !== 0).length] });
     plant.step(this.applied(tau, late, before), T_s);
-    put({ tau: plant.tau });
+    put({ tau: plant.tau, contact_force: [plant.force] });
     const wild = v.some((each, a) => !(Math.abs(each) <= LOST_SPEED * limit(this.robot.v_limit[a])));
     this.lost ||= plant.broken || wild;
   }
@@ -156,11 +154,11 @@ export class Session {
     this.controller.set(TARGET, index, whole);
   }
 
-  /** Where the target of a task is: the numbers of its value, a rotation row by row. */
-  target(task: string): Float64Array | null {
-    const { index, rows, target } = named(this.manifest.tasks, task, "task"), samples = this.controller.view("samples");
-    const stride = samples.length / this.manifest.tasks.length, at = index * stride;
-    return target === "none" || target === "fixed" ? null : samples.slice(at, at + (target === "orientation" ? 9 : rows));
+  /** Where the target of a position is. */
+  target(task: string): Float64Array {
+    const { index, rows } = named(this.manifest.tasks, task, "task"), samples = this.controller.view("samples");
+    const at = index * (samples.length / this.manifest.tasks.length);
+    return samples.slice(at, at + rows);
   }
 
   private M_bar(): number[] { return this.scene.M_bar.map((each) => each * this.scene.M_bar_scale); }
@@ -180,9 +178,9 @@ export class Session {
       this.sendLimits();
     } else if (head === "plant" && name in scene.plant && name !== "diagonal_scale") {
       const { plant } = scene;
-      if (key) (plant as unknown as Record<string, unknown>)[name] = each(plant[name as "friction"], n).map((own, a) => (a === Number(key) - 1 ? value : own));
-      else Object.assign(plant, { [name]: value });
-      this.plant.configure(plant as PlantSettings);
+      const whole = key ? each(plant[name as "friction"], n).with(Number(key) - 1, value as number) : value;
+      Object.assign(plant, { [name]: whole });
+      this.plant.configure();
     } else if (head === "tasks" && (key === "K_p" || key === "K_v")) {
       this.task(name)[key] = value as number;
       this.sendGains(name);
@@ -233,8 +231,8 @@ export class Session {
     for (const level of this.scene.levels) {
       this.sendLevel(Q, level.name);
       if (this.scene.controller !== "weighted") for (const what of [ENABLED, R]) this.sendLevel(what, level.name);
-      for (const task of level.tasks) this.sendGains(task.name);
     }
+    for (const task of this.scene.tasks) this.sendGains(task.name);
     now.reset(this.plant.tau);
     for (const name of ["q_was", "v_was", "limits", "scalars", "state"]) f(name)[1].set(f(name)[0]);
     const [was, path] = f("path"), [q_was] = f("q_was"), [v_was] = f("v_was");
@@ -267,7 +265,6 @@ export class Session {
     }
   }
 
-  delete(): void { this.plant.delete(); }
 }
 
 function named<T extends { name: string }>(list: T[], name: string, kind: string): T {
