@@ -153,9 +153,23 @@ def _objects(scene: TorqueScene) -> list[dict[str, Any]]:
 
 
 def _told(image: Image, pack: Pack) -> dict[str, Any]:
-    """The memory, and what of its manifest the page needs."""
-    arrays = [
-        {key: each[key] for key in ("name", "type", "shape", "offset")} for each in image.manifest["arrays"]
-    ]
-    told = {key: image.manifest[key] for key in ("joints", "tasks", "levels")}
-    return {"memory": pack.add(image.memory), "manifest": told | {"arrays": arrays}}
+    """The memory, what of its manifest the page needs, and where fields of telemetry are: (name, array, first
+    number, count)."""
+    manifest = image.manifest
+    arrays = {each["name"]: each for each in manifest["arrays"]}
+    n, place = len(manifest["joints"]), arrays["task"]["offset"]
+    rows = np.frombuffer(image.memory, np.int64, 4 * len(manifest["tasks"]), place).reshape(-1, 4)
+    fields = [("at_bound", "at_bound", 0, n), ("delta_tau", "delta_tau", 0, n)]
+    fields += [("priority_leak", "priority_leak", 0, 1)]
+    fields += [(name, "limits", n * row, n) for name, row in _BOUNDS.items()]
+    for task in manifest["tasks"]:
+        first = int(rows[task["index"], 2])
+        for field, array in (("error", "error"), ("x", "value")):
+            fields.append((f"{field}/{task['name']}", array, first, task["rows"]))
+    kept = [{key: each[key] for key in ("name", "type", "shape", "offset")} for each in arrays.values()]
+    told = {key: manifest[key] for key in ("joints", "tasks", "levels")}
+    return {"memory": pack.add(image.memory), "manifest": told | {"arrays": kept, "fields": fields}}
+
+
+_BOUNDS = {"tau_lower": 0, "tau_upper": 1, "v_limit": 2, "q_lower": 6, "q_upper": 7}
+"""Rows of `limits` in the kernel's memory, see `himpc/tick/kernel/arrays.py`."""

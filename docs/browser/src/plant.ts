@@ -1,9 +1,9 @@
-/** The robot in MuJoCo under torque control: robots/plant.py and robots/signals.py, without an altered diagonal. */
+/** The robot in MuJoCo under torque control: robots/plant.py and robots/signals.py, without an altered diagonal, lag or delay. */
 import type { MainModule, MjData, MjModel } from "@mujoco/mujoco";
 import { limit, type PlantSettings, type RobotData, type SceneData } from "./data";
 import { mjcf } from "./model";
 
-const TIMESTEP = 1e-3, MEMORY_S = 1.5, SAMPLES_S = 0.3, BROKEN = 1e6;
+const TIMESTEP = 1e-3, SAMPLES_S = 0.3, BROKEN = 1e6;
 type Vector = Float64Array;
 type Stamped = [t: number, value: Vector];
 
@@ -13,7 +13,6 @@ export class Plant {
   broken = false;
   private model!: MjModel;
   data!: MjData;
-  private commands: Stamped[] = [];
   private samples: Stamped[] = [];
   private start!: { q: Vector; v: Vector };
   private wrench: { joint: number; values: number[] } | null = null;
@@ -52,7 +51,6 @@ export class Plant {
     this.broken = false;
     this.tau = this.clipped(tau === null ? this.holding() : Float64Array.from(tau));
     this.data.qvel.set(v);
-    this.commands = [[-MEMORY_S, this.tau]];
     this.start = { q: Float64Array.from(q), v: Float64Array.from(v) };
     this.samples = [[0, this.start.q]];
   }
@@ -79,7 +77,6 @@ export class Plant {
     this.data.time = t;
     for (const [name, values] of kept)
       this.data[name].set(values.length === this.data[name].length ? values : values.slice(0, this.n));
-    this.commands = this.commands.map(([t, tau]) => [t, this.clipped(tau)]);
     this.tau = this.clipped(this.tau);
     if (this.wrench) this.push(this.wrench.joint, this.wrench.values);
   }
@@ -109,17 +106,12 @@ export class Plant {
   }
 
   step(tau: Vector, period: number): void {
-    const { torque_lag_ms, delay_ms } = this.settings, now = this.t;
-    this.commands.push([now, this.clipped(Float64Array.from(tau))]);
-    while (this.commands.length > 1 && this.commands[1][0] < now - MEMORY_S) this.commands.shift();
+    this.tau = this.clipped(Float64Array.from(tau));
+    this.data.ctrl.set(this.tau);
     const count = Math.max(1, Math.ceil(period / TIMESTEP - 1e-9)), h = period / count;
     this.model.opt.timestep = h;
     this.force = 0;
     for (let k = 0; k < count; k++) {
-      const t = this.t, wanted = delay_ms > 0 ? this.delayed(t - 1e-3 * delay_ms + 0.5 * h) : this.commands.at(-1)![1];
-      const share = torque_lag_ms > 0 ? 1 - Math.exp(-h / (1e-3 * torque_lag_ms)) : 1;
-      this.tau = share === 1 ? wanted : this.tau.map((value, a) => value + share * (wanted[a] - value));
-      this.data.ctrl.set(this.tau);
       const before = this.q;
       this.mj.mj_step(this.model, this.data);
       if (!this.v.every((value) => Math.abs(value) < BROKEN)) {
@@ -150,10 +142,6 @@ export class Plant {
       forces.set(key, before.map((sum, a) => sum + force[0] * frame[a] + force[1] * frame[3 + a] + force[2] * frame[6 + a]));
     }
     return Math.max(0, ...[...forces.values()].map((force) => Math.hypot(...force)));
-  }
-
-  private delayed(stamp: number): Vector {
-    return (this.commands.findLast(([t]) => t <= stamp) ?? this.commands[0])[1];
   }
 
   /** ‖I − M⁻¹M̄‖₂ and the spectral radius of I − M⁻¹M̄: robots/inertia.py. */

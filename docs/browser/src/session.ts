@@ -6,8 +6,7 @@ import { Plant } from "./plant";
 import { Rows } from "./rows";
 
 const TRUTH_TICKS = 20, LOST_SPEED = 20;
-const LIMIT_FIELDS: [string, number][] = [["tau_lower", 0], ["tau_upper", 1], ["v_limit", 2], ["q_lower", 6], ["q_upper", 7]];
-const LEVEL_FIELDS: Record<string, number> = { enabled: ENABLED, Q, R };
+const NOT_HERE = ["diagonal_scale", "torque_lag_ms", "delay_ms"];
 
 export interface Tools {
   mj: MainModule;
@@ -65,10 +64,9 @@ export class Session {
 
   private layout(): [string, number][] {
     const wide = (names: string[], width: number): [string, number][] => names.map((name) => [name, width]);
-    return [...wide(["t", "priority_leak", "gauge_norm", "gauge_radius", "unsolved", "late", "contact_force"], 1),
-      ...wide(["q", "v", "tau", "tau_demand", "at_bound", "delta_tau", "tau_0"], this.plant.n),
-      ...wide(LIMIT_FIELDS.map(([name]) => name), this.plant.n),
-      ...this.manifest.tasks.flatMap((task) => wide([`error/${task.name}`, `x/${task.name}`], task.rows)),
+    return [...wide(["t", "gauge_norm", "gauge_radius", "unsolved", "late", "contact_force"], 1),
+      ...wide(["q", "v", "tau", "tau_demand", "tau_0"], this.plant.n),
+      ...this.manifest.fields.map(([name, , , width]): [string, number] => [name, width]),
       ...wide(this.manifest.levels.map((level) => `active/${level.name}`), 1)];
   }
 
@@ -94,7 +92,7 @@ export class Session {
       this.plant.push(0, []);
       this.pushUntil = Infinity;
     }
-    const { plant, scene, rows, controller } = this, n = plant.n, T_s = scene.period;
+    const { plant, scene, rows, controller } = this, T_s = scene.period;
     const q = plant.q, v = plant.v, [q_measured, v_measured] = plant.measure(T_s), before = plant.tau;
     const [found, fallback] = controller.tick(q_measured, v_measured, before), tau = Float64Array.from(found);
     this.fallback = fallback;
@@ -104,16 +102,12 @@ export class Session {
     const put = (values: Record<string, ArrayLike<number>>): void => {
       for (const name in values) rows.at(-1, name).set(values[name]);
     };
-    const f = (name: string): Float64Array => controller.view(name), limits = f("limits"), rung = f("rung");
-    put({ t: [plant.t], q, v, tau_demand: tau, tau_0: before, at_bound: f("at_bound"), delta_tau: f("delta_tau"),
-      priority_leak: f("priority_leak"), gauge_norm: [this.truth[0]], gauge_radius: [this.truth[1]], late: [Number(late)] });
-    for (const [name, place] of LIMIT_FIELDS) put({ [name]: limits.subarray(place * n, (place + 1) * n) });
-    for (const { name, index, rows: wide } of this.manifest.tasks) {
-      const first = Number(f("task")[4 * index + 2]), of = (field: string) => f(field).subarray(first, first + wide);
-      put({ [`error/${name}`]: of("error"), [`x/${name}`]: of("value") });
-    }
-    const solved = this.solved();
-    solved.forEach((name, place) => put({ [`active/${name}`]: [f("active")[place]] }));
+    put({ t: [plant.t], q, v, tau_demand: tau, tau_0: before, gauge_norm: [this.truth[0]], gauge_radius: [this.truth[1]],
+      late: [Number(late)] });
+    for (const [name, array, start, width] of this.manifest.fields)
+      put({ [name]: controller.view(array).subarray(start, start + width) });
+    const solved = this.solved(), active = controller.view("active"), rung = controller.view("rung");
+    solved.forEach((name, place) => put({ [`active/${name}`]: [active[place]] }));
     put({ unsolved: [FALLBACKS[fallback] === "hold" ? 1 : solved.filter((_, place) => rung[place] !== 0).length] });
     plant.step(this.applied(tau, late, before), T_s);
     put({ tau: plant.tau, contact_force: [plant.force] });
@@ -165,56 +159,49 @@ export class Session {
 
   /** Changes a setting; the paths are those of himpc-lab. Throws an Error with a sentence if it cannot. */
   set(path: string, value: unknown): void {
-    const { scene } = this, [head, name, key] = path.split("."), n = this.plant.n;
+    const { scene } = this, [head, name, key] = path.split("."), { plant } = scene;
     if (path === "horizon" || path === "order") {
       const order = Array.isArray(value) ? value as string[] : String(value).split(",");
       this.exchange(path === "horizon" ? Number(value) : this.horizon, path === "order" ? order : this.order);
-    } else if (path === "M_bar_scale" || path === "M_bar") {
-      const before = this.M_bar();
-      Object.assign(scene, { [path]: value });
-      this.sendM_bar(before);
-    } else if (head === "limits" && name in scene.limits && name !== "position") {
-      Object.assign(scene.limits, { [name]: value });
-      this.sendLimits();
-    } else if (head === "plant" && name in scene.plant && name !== "diagonal_scale") {
-      const { plant } = scene;
-      const whole = key ? each(plant[name as "friction"], n).with(Number(key) - 1, value as number) : value;
+    } else if (head === "plant" && name in plant && !NOT_HERE.includes(name)) {
+      const whole = key ? each(plant[name as "friction"], this.plant.n).with(Number(key) - 1, value as number) : value;
       Object.assign(plant, { [name]: whole });
       this.plant.configure();
-    } else if (head === "tasks" && (key === "K_p" || key === "K_v")) {
-      this.task(name)[key] = value as number;
-      this.sendGains(name);
-    } else if (head === "levels" && key in LEVEL_FIELDS) {
-      Object.assign(this.level(name), { [key]: value });
-      this.sendLevel(LEVEL_FIELDS[key], name);
-    } else throw new Error(`${path} cannot be changed here; himpc-lab can`);
+    } else {
+      if (path === "M_bar_scale" || path === "M_bar") Object.assign(scene, { [path]: value });
+      else if (head === "limits" && name in scene.limits && name !== "position") Object.assign(scene.limits, { [name]: value });
+      else if (head === "tasks" && ["K_p", "K_v"].includes(key)) Object.assign(this.task(name), { [key]: value });
+      else if (head === "levels" && ["enabled", "Q", "R"].includes(key)) Object.assign(this.level(name), { [key]: value });
+      else throw new Error(`${path} cannot be changed here; himpc-lab can`);
+      this.send();
+    }
   }
 
-  private sendM_bar(before: number[]): void {
-    const now = this.M_bar(), weights = Float64Array.from(this.controller.view("R"));
-    this.controller.set(M_BAR, 0, now);
-    if (this.scene.R_on !== "acceleration") return;
-    for (const { index } of this.manifest.levels)
-      this.controller.set(R, index, now.map((value, a) => weights[index * now.length + a] * (value / before[a]) ** 2));
-  }
-  private sendLimits(): void {
-    const { robot, scene: { limits } } = this, ends = limits.position !== "off";
+  /** Sends all numbers of the settings to the kernel; those that have not changed have no effect. */
+  private send(): void {
+    const { robot, scene, controller, manifest } = this, { limits } = scene, ends = limits.position !== "off";
+    const M_bar = this.M_bar(), before = controller.view("M_bar").slice(), weights = controller.view("R").slice();
+    const changed = M_bar.some((value, a) => value !== before[a]), n = M_bar.length;
+    const heavy = scene.R_on === "acceleration", strict = scene.controller !== "weighted";
     const scaled = (bounds: (number | null)[], on: boolean, scale: number, sign = 1): number[] =>
       bounds.map((each) => (on ? limit(each, sign) * scale : sign * Infinity));
-    this.controller.set(LIMITS, 0, [...scaled(robot.tau_limit, limits.torque, limits.torque_scale),
+    if (changed) controller.set(M_BAR, 0, M_bar);
+    controller.set(LIMITS, 0, [...scaled(robot.tau_limit, limits.torque, limits.torque_scale),
       ...scaled(robot.v_limit, limits.velocity, limits.velocity_scale),
       ...scaled(robot.q_lower, ends, 1, -1), ...scaled(robot.q_upper, ends, 1)]);
-  }
-  private sendGains(name: string): void {
-    const { index, rows } = named(this.manifest.tasks, name, "task"), { K_p, K_v } = this.task(name);
-    this.controller.set(GAINS, index, [...each(K_p, rows), ...each(K_v, rows)]);
-  }
-  /** Sends Q or R of a level, or whether it is on. */
-  private sendLevel(what: number, name: string): void {
-    const { index, rows } = named(this.manifest.levels, name, "level"), level = this.level(name), M_bar = this.M_bar();
-    const squared = (a: number): number => (this.scene.R_on === "acceleration" ? M_bar[a] ** 2 : 1);
-    this.controller.set(what, index, what === ENABLED ? [Number(level.enabled)] : what === Q ? each(level.Q, rows) :
-      each(level.R, M_bar.length).map((value, a) => value * squared(a)));
+    for (const { name, index, rows } of manifest.levels) {
+      const own = scene.levels.find((level) => level.name === name);
+      // Damping is no level of the scene: its R follows M̄ only.
+      const R_own = own ? each(own.R, n).map((value, a) => value * (heavy ? M_bar[a] ** 2 : 1)) :
+        M_bar.map((value, a) => weights[index * n + a] * (heavy ? (value / before[a]) ** 2 : 1));
+      if (own) controller.set(Q, index, each(own.Q, rows));
+      if (strict) controller.set(R, index, R_own);
+      if (own && strict) controller.set(ENABLED, index, [Number(own.enabled)]);
+    }
+    for (const { name, K_p, K_v } of scene.tasks) {
+      const { index, rows } = named(manifest.tasks, name, "task");
+      controller.set(GAINS, index, [...each(K_p, rows), ...each(K_v, rows)]);
+    }
   }
 
   /** Goes on with a controller of another order or N: himpc/tick/tick.py, `recall`. */
@@ -226,13 +213,7 @@ export class Session {
     [this.controller, this.manifest] = this.controllerFor(key);
     this.key = key;
     const now = this.controller, f = (name: string): [Float64Array, Float64Array] => [old.view(name), now.view(name)];
-    this.sendM_bar(this.M_bar());
-    this.sendLimits();
-    for (const level of this.scene.levels) {
-      this.sendLevel(Q, level.name);
-      if (this.scene.controller !== "weighted") for (const what of [ENABLED, R]) this.sendLevel(what, level.name);
-    }
-    for (const task of this.scene.tasks) this.sendGains(task.name);
+    this.send();
     now.reset(this.plant.tau);
     for (const name of ["q_was", "v_was", "limits", "scalars", "state"]) f(name)[1].set(f(name)[0]);
     const [was, path] = f("path"), [q_was] = f("q_was"), [v_was] = f("v_was");
