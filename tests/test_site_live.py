@@ -113,7 +113,7 @@ def simulated_in_firefox(everything: str, in_firefox: Tab) -> Tab:
 
 def torques(scene: TorqueScene, seconds: float) -> np.ndarray:
     """Returns the torques that Python computes in closed loop, (ticks, n) N·m, until the robot touches
-    something: the page's MuJoCo is an older one, whose forces of contacts differ in the fifth digit."""
+    something: the page's MuJoCo is an older one, and from then on its forces of contact differ."""
     session = TorqueSession(scene, 0)
     demand, touch = (session.layout.fields[name] for name in ("tau_demand", "contact_force"))
     found: list[np.ndarray] = []
