@@ -2,7 +2,7 @@
 import { assignment, encode, split } from "./code";
 import { unpacked, type Pack, type RobotData, type SceneData, type Scenes, type StepData } from "./data";
 import { packed, type Engine } from "./engine";
-import { AXES, Panel, button, element } from "./panel";
+import { AXES, Panel, boxed, button, element } from "./panel";
 import { Plots } from "./plots";
 import { holds } from "./rows";
 import { View } from "./view";
@@ -31,10 +31,9 @@ export class Figure {
   private step: StepData | null = null;
   private changes = new Map<string, unknown>();
   private raw = new Map<string, number[]>();
-  private running = false;
   private status = element("p", { class: "hl-status" }, "Loading the controller and MuJoCo …");
   private notice = element("p", { class: "hl-notice", role: "status" });
-  private run = button("Run", () => this.toggle());
+  private run = button("Run", () => this.engine.tell(this.frame?.running ? "pause" : "run"));
   private code = element("input", { readOnly: true, type: "text", ariaLabel: "State code" });
   private guess: () => number | null = () => null;
   private claims: HTMLElement[] = [];
@@ -66,7 +65,7 @@ export class Figure {
     await Promise.all([engine.load(), this.reopen(asked.assignments)]);
     this.root.append(this.origin());
     side.inert = false;
-    if (asked.running) this.toggle();
+    if (asked.running) engine.tell("run");
     return this;
   }
 
@@ -109,7 +108,7 @@ export class Figure {
   private asking({ prediction, claims, scene }: StepData): HTMLElement[] {
     const found: HTMLElement[] = [];
     if (prediction) {
-      const box = element("fieldset", {}, element("legend", {}, prediction.question));
+      const box = boxed(prediction.question);
       if (prediction.kind === "choice") {
         const name = `hl-${Math.random().toString(36).slice(2)}`;
         const inputs = prediction.options!.map(() => element("input", { type: "radio", name }));
@@ -133,8 +132,7 @@ export class Figure {
     this.changes.clear();
     this.claims.forEach((each) => delete each.dataset.holds);
     this.raw.clear();
-    this.running = false;
-    this.toggle();
+    this.engine.tell("run");
     void this.recode();
   }
 
@@ -161,12 +159,6 @@ export class Figure {
   pixel(task: string): [number, number] { return this.view!.pixel(task); }
 
   private say(words: string): void { this.notice.textContent = words; }
-
-  private toggle(): void {
-    this.running = !this.running;
-    this.engine.tell(this.running ? "run" : "pause");
-    this.run.textContent = this.running ? "Pause" : "Run";
-  }
 
   private reset(): void {
     this.raw.clear();
@@ -206,7 +198,6 @@ export class Figure {
 
   private show(frame: Frame): void {
     this.frame = frame;
-    this.running = frame.running;
     this.run.textContent = frame.running ? "Pause" : "Run";
     this.view?.show(frame);
     this.plots.take(frame);

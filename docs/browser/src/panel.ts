@@ -17,7 +17,7 @@ export const button = (words: string, onclick: () => void, title = words): HTMLB
   element("button", { type: "button", title, onclick, ariaLabel: title === words ? null : title }, words);
 const group = (title: string, open: boolean, ...children: Node[]): HTMLElement =>
   element("details", { open }, element("summary", {}, title), ...children);
-const boxed = (title: string, ...children: (Node | string)[]): HTMLElement =>
+export const boxed = (title: string, ...children: (Node | string)[]): HTMLElement =>
   element("fieldset", {}, element("legend", {}, title), ...children);
 const small = (words: string): HTMLElement => element("p", { class: "hl-small" }, words);
 const choice = (ariaLabel: string, options: [value: string, words: string][], value: string): HTMLSelectElement => {

@@ -1,7 +1,7 @@
 /** One run: references, controller, plant, script and settings; lessons/session/torque.py. */
 import type { MainModule } from "@mujoco/mujoco";
 import { ENABLED, FALLBACKS, GAINS, LIMITS, M_BAR, Q, R, TARGET, type Controller, type Manifest } from "../../../himpc/export/files/himpc.mjs";
-import { each, limit, pieceOf, type LevelData, type Pack, type RobotData, type SceneData, type SceneEvent, type Scenes, type TaskData } from "./data";
+import { each, limit, pieceOf, type Pack, type RobotData, type SceneData, type SceneEvent, type Scenes } from "./data";
 import { Plant } from "./plant";
 import { Rows } from "./rows";
 
@@ -46,8 +46,6 @@ export class Session {
   get t(): number { return this.plant.t; }
   get horizon(): number { return Number(this.key.split("|")[0]); }
   get order(): string[] { return this.key.split("|")[1].split(","); }
-  level(name: string): LevelData { return named(this.scene.levels, name, "level"); }
-  task(name: string): TaskData { return named(this.scene.tasks, name, "task"); }
 
   private controllerFor(key: string): [Controller, Manifest] {
     if (!this.made.has(key)) {
@@ -143,7 +141,7 @@ export class Session {
   }
 
   move(task: string, value: number[]): void {
-    const { index, target } = named(this.manifest.tasks, task, "task"), { axes } = this.task(task);
+    const { index, target } = named(this.manifest.tasks, task, "task"), { axes } = named(this.scene.tasks, task, "task");
     const whole = target === "position" && value.length < 3 ? [..."xyz"].map((axis) => value[axes.indexOf(axis)] ?? 0) : value;
     this.controller.set(TARGET, index, whole);
   }
@@ -170,8 +168,8 @@ export class Session {
     } else {
       if (path === "M_bar_scale" || path === "M_bar") Object.assign(scene, { [path]: value });
       else if (head === "limits" && name in scene.limits && name !== "position") Object.assign(scene.limits, { [name]: value });
-      else if (head === "tasks" && ["K_p", "K_v"].includes(key)) Object.assign(this.task(name), { [key]: value });
-      else if (head === "levels" && ["enabled", "Q", "R"].includes(key)) Object.assign(this.level(name), { [key]: value });
+      else if (head === "tasks" && ["K_p", "K_v"].includes(key)) Object.assign(named(scene.tasks, name, "task"), { [key]: value });
+      else if (head === "levels" && ["enabled", "Q", "R"].includes(key)) Object.assign(named(scene.levels, name, "level"), { [key]: value });
       else throw new Error(`${path} cannot be changed here; himpc-lab can`);
       this.send();
     }
