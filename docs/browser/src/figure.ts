@@ -59,6 +59,7 @@ export class Figure {
     this.plots = new Plots(scene.tasks, robot.joints.length);
     this.panel = new Panel(scene, robot, { set: (path, value) => this.set(path, value), target: drag,
       push: (joint, force) => engine.tell("push", joint, force, 0.1) }, asked.wide);
+    this.panel.show({ ...scene, off: scene.levels.filter(({ enabled }) => !enabled).map(({ name }) => name) });
     engine.onTold = (told) => this.hear(told);
     const side = this.lay();
     await asked.loaded;

@@ -121,7 +121,7 @@ export class Panel {
     this.targets.get(task)?.forEach((slider, axis) => slider.put(place[AXES.indexOf(axis)]));
   }
 
-  show({ horizon, order, off }: Frame): void {
+  show({ horizon, order, off }: Pick<Frame, "horizon" | "order" | "off">): void {
     if (this.horizon.value !== String(horizon)) this.horizon.value = String(horizon);
     const shown = `${order.join()}|${off.join()}`;
     if (this.shown === shown) return;
