@@ -1,16 +1,19 @@
 """What the first view of *Try it* costs.
 
-    python -m benchmarks.first_view SITE [--runs N]
+    python -m benchmarks.first_view SITE [SITE ...] [--runs N]
 
-Opens try.html of a site that `python -m docs.build` wrote, each time in a new Chromium, until the robot
-moves. Prints the time, and the processor time of the page's thread, of the simulation's thread, of the
-threads that compile WebAssembly, and of the whole browser, in s.
+Opens try.html of sites that `python -m docs.build` wrote, in turns and each time in a new Chromium, until
+the robot moves. Prints the medians of: size of the scripts (MB, and compressed by gzip -9), time from the
+opening of the page to its first picture and to the robot's first motion, and the processor time until then of
+the page's thread, of the simulation's thread, of the threads that compile WebAssembly, and of the whole
+browser, in s. Chromium draws with the processor here (SwiftShader).
 """
 
 from __future__ import annotations
 
 import argparse
-import time
+import gzip
+import statistics
 from collections import defaultdict
 from pathlib import Path
 
@@ -19,36 +22,58 @@ from playwright.sync_api import Playwright, sync_playwright
 
 from browsing.browser_actions import CHROMIUM_ARGS, SLOW, find_chromium
 
-MOVES = "() => HIMPC.shown?.frame?.running && HIMPC.shown.frame.t > 0.02"
+WATCH = """(() => {
+  const draw = WebGL2RenderingContext.prototype.drawElements;
+  WebGL2RenderingContext.prototype.drawElements = function (...given) {
+    window.pictured ??= performance.now();
+    return draw.apply(this, given);
+  };
+  const look = () => {
+    const frame = window.HIMPC?.shown?.frame;
+    if (frame?.running && frame.t > 0.02) window.moved = performance.now();
+    else setTimeout(look, 5);
+  };
+  look();
+})()"""
 THREADS = {"chromium": "page", "DedicatedWorker": "simulation", "ThreadPoolForeg": "compilation"}
 """Threads of the process that draws the page, as Linux names them."""
+SHOWN = ("picture", "moves", *THREADS.values(), "all")
+SCRIPTS = ("live", "mujoco", "kernel", "iiwa14-hold", "robot-iiwa14")
 
 
 def main() -> None:
     """Measures as the command line says."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("site", type=Path)
-    parser.add_argument("--runs", type=int, default=3)
+    parser.add_argument("sites", type=Path, nargs="+")
+    parser.add_argument("--runs", type=int, default=5)
     given = parser.parse_args()
+    found: dict[Path, list[dict[str, float]]] = defaultdict(list)
     with sync_playwright() as playwright:
         for _ in range(given.runs):
-            wall, spent = _opened(playwright, given.site.resolve() / "try.html")
-            waiting = psutil.getloadavg()[0]
-            told = ", ".join(f"{name} {spent[name]:.2f}" for name in (*THREADS.values(), "all"))
-            print(f"{wall:.1f} s until it moves (load {waiting:.0f}); processor time: {told}")
+            for site in given.sites:
+                found[site].append(_opened(playwright, site.resolve() / "try.html"))
+    for site, runs in found.items():
+        scripts = [(site / "live" / f"{name}.js").read_bytes() for name in SCRIPTS]
+        size, packed = (sum(map(len, each)) / 1e6 for each in (scripts, map(gzip.compress, scripts)))
+        told = ", ".join(f"{name} {statistics.median(run[name] for run in runs):.2f}" for name in SHOWN)
+        print(f"{site}: {size:.1f} MB, compressed {packed:.1f} MB; median of {given.runs}: {told}")
+    print(f"load of this machine at the end: {psutil.getloadavg()[0]:.0f}")
 
 
-def _opened(playwright: Playwright, page: Path) -> tuple[float, dict[str, float]]:
-    """Time until the robot moves, and the processor time that it took, s."""
+def _opened(playwright: Playwright, page: Path) -> dict[str, float]:
+    """Times until the robot is drawn and moves, and the processor time that it took, s."""
     browser = playwright.chromium.launch(executable_path=find_chromium(), args=CHROMIUM_ARGS)
     tab = browser.new_page(viewport={"width": 1440, "height": 900})
+    tab.add_init_script(WATCH)
     tab.goto("about:blank")
-    before, begun = _spent(), time.perf_counter()
+    before = _spent()
     tab.goto(page.as_uri() + "#iiwa14-hold")
-    tab.wait_for_function(MOVES, timeout=SLOW)
-    wall, after = time.perf_counter() - begun, _spent()
+    tab.wait_for_function("() => window.moved", timeout=SLOW)
+    after = _spent()
+    times = tab.evaluate("({ picture: window.pictured / 1e3, moves: window.moved / 1e3 })")
     browser.close()
-    return wall, {name: used - before.get(name, 0.0) for name, used in after.items()}
+    spent = {name: after.get(name, 0.0) - before.get(name, 0.0) for name in (*THREADS.values(), "all")}
+    return times | spent
 
 
 def _spent() -> dict[str, float]:

@@ -14,7 +14,7 @@ from typing import Any
 
 import mujoco
 
-from docs.figures.pack import Pack, wrapped
+from docs.figures.pack import Pack, without_names, wrapped
 from docs.figures.robot import robot_script
 from docs.figures.scene import scene_data
 from docs.figures.steps import lesson_script, robots_of
@@ -65,7 +65,7 @@ def write(site: Path) -> None:
     with (out / "live.js").open("a", encoding="utf-8") as file:
         file.write(f"window.HIMPC_ABOUT={json.dumps(about())};\n")
     wasm = PROGRAM / "node_modules" / "@mujoco" / "mujoco" / "mujoco.wasm"
-    (out / "mujoco.js").write_text(wrapped("mujoco", wasm.read_bytes()))
+    (out / "mujoco.js").write_text(wrapped("mujoco", without_names(wasm.read_bytes())))
     (out / "kernel.js").write_text(wrapped("kernel", linked(object_code(target_named("wasm32")))))
     robots: dict[str, Any] = {}
     for name in TRIED:

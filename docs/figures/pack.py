@@ -41,6 +41,21 @@ def wrapped(name: str, content: bytes) -> str:
     return f'(window.HIMPC_PACKS??={{}})["{name}"]="{packed}";\n'
 
 
+def without_names(wasm: bytes) -> bytes:
+    """Returns a WebAssembly module without its custom sections: names and notes for debuggers, more than half
+    of MuJoCo's module, of which a browser executes nothing."""
+    kept, at = bytearray(wasm[:8]), 8
+    while at < len(wasm):
+        size, shift, start, more = 0, 0, at + 1, True
+        while more:
+            size |= (wasm[start] & 0x7F) << shift
+            more, shift, start = wasm[start] >= 0x80, shift + 7, start + 1
+        if wasm[at] != 0:
+            kept += wasm[at : start + size]
+        at = start + size
+    return bytes(kept)
+
+
 def plain(values: Sequence[float]) -> list[float | None]:
     """Returns numbers for JSON; None for those that are not finite."""
     return [float(each) if math.isfinite(each) else None for each in values]

@@ -10,7 +10,7 @@ from docs.figures.pack import Pack, plain
 from robots import PlantSettings, Robot
 from robots.shapes import Shape, link_shapes
 from robots.simplify import simplify
-from robots.truth import inertial, joint_axis, pose, true_model
+from robots.truth import inertial, joint_axis, true_model
 
 FACES = 16_000
 """Triangles of a robot, at most."""
@@ -25,33 +25,28 @@ def robot_script(robot: Robot, name: str) -> str:
 
 
 def mechanics(robot: Robot) -> dict[str, Any]:
-    """Returns bodies, solids and limits of the nominal robot, in the order and with the numbers of
-    `robots.mechanics.model`. SI units; quaternions w x y z; None: no limit."""
+    """Returns inertia and limits of the nominal robot; `model_text` has the rest. SI units; None: no limit.
+
+    `reach` is the sum of the distances from joint to joint, m; `planar` says that all of them lie in one
+    horizontal plane."""
     model = true_model(robot, PlantSettings())
     bodies = []
     for joint in range(1, model.njoints):
-        prismatic, axis = joint_axis(model, joint)
         mass, lever, inertia = inertial(model.inertias[joint])
-        placed = {key: value.tolist() for key, value in pose(model.jointPlacements[joint]).items()}
         bodies.append(
-            {"parent": model.parents[joint], **placed, "mass": mass, "ipos": lever.tolist()}
-            | {"inertia": inertia, "prismatic": prismatic, "axis": axis.tolist()}
+            {"mass": mass, "ipos": lever.tolist(), "inertia": inertia}
+            | {"prismatic": joint_axis(model, joint)[0]}
         )
     tip = model.frames[robot.frame_id(robot.tip)]
-    solids = [
-        {"joint": solid.joint, "kind": solid.kind, "size": solid.size, "points": solid.points}
-        | {"pos": solid.position, "quat": solid.quaternion}
-        for solid in robot.collision.solids
-    ]
+    places = np.array([model.jointPlacements[joint].translation for joint in range(1, model.njoints)])
     return {
         "name": robot.name,
         "joints": list(robot.joint_names),
         "bodies": bodies,
+        "reach": float(np.linalg.norm(places, axis=1).sum()),
+        "planar": bool(np.abs(places[:, 2]).max() < 1e-6),
         "tip": {"joint": tip.parentJoint, "pos": tip.placement.translation.tolist()},
         "gravity": model.gravity.linear.tolist(),
-        "solids": solids,
-        "excluded": [[pair.first, pair.second] for pair in robot.collision.excluded],
-        "home": robot.home.tolist(),
         **{name: plain(getattr(robot, name)) for name in ("tau_limit", "v_limit", "q_lower", "q_upper")},
     }
 
@@ -65,13 +60,12 @@ def _drawn(robot: Robot, pack: Pack) -> list[dict[str, Any]]:
 def _coarse(shape: Shape, share: float, pack: Pack) -> dict[str, Any]:
     vertices, faces = shape.vertices.astype(float), shape.faces
     vertices, faces = simplify(vertices, faces, max(60, round(share * len(faces))))
-    counted = np.uint16 if len(vertices) < 65536 else np.uint32
+    assert len(vertices) < 65536  # FACES triangles have fewer corners
     grid = np.clip(np.round(vertices / _GRID), -32768, 32767).astype("<i2")
     return {
         "joint": shape.joint,
         "colour": list(shape.colour),
         "grid": _GRID,
-        "wide": counted is np.uint32,
         "vertices": pack.add(grid.tobytes()),
-        "faces": pack.add(faces.astype(np.dtype(counted).newbyteorder("<")).tobytes()),
+        "faces": pack.add(faces.astype("<u2").tobytes()),
     }

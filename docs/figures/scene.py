@@ -8,7 +8,9 @@ from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
+from docs.figures.model import KINDS, model_of, model_text
 from docs.figures.pack import Pack
 from himpc.export.image import Image, image_of
 from himpc.tasks import FramePosition, Task
@@ -19,7 +21,7 @@ from lessons.session.controllers import controller_of
 from lessons.session.torque import TorqueSession
 from lessons.settings.torque import TorqueSettings
 from robots import InputError, Robot
-from robots.world import Floor, Thing
+from robots.world import Floor
 
 MOST_ORDERS = 3
 """Of a stack with more levels only the scene's own order is written: there would be too many."""
@@ -41,13 +43,14 @@ def scene_data(scene: TorqueScene, pack: Pack, horizons: Iterable[int] = ()) -> 
     force = settings.limits
     plant = {field.name: getattr(settings.plant, field.name) for field in fields(settings.plant)}
     own = tuple(level.name for level in settings.levels)
-    images = {}
+    images, targets = {}, {}
     for N in dict.fromkeys((settings.horizon, *horizons)):
         for order in _orders(own) if settings.controller != "weighted" else [own]:
             changed = settings.changed("horizon", N).changed("order", ",".join(order))
             assert isinstance(changed, TorqueSettings)
             image = image_of(controller_of(changed, robot), robot, references)
             images[f"{N}|{','.join(order)}"] = _told(image, pack)
+            targets = {task["name"]: task["target"] for task in image.manifest["tasks"]}
     return {
         "name": scene.name,
         "robot": robot.name,
@@ -68,15 +71,21 @@ def scene_data(scene: TorqueScene, pack: Pack, horizons: Iterable[int] = ()) -> 
         "solve_ms_per_knot": settings.solve_ms_per_knot,
         "levels": [
             {"name": level.name, "Q": level.Q, "R": level.R, "enabled": level.enabled}
-            | {"tasks": [_task(robot, task) for task in level.tasks]}
             for level in settings.levels
+        ],
+        "tasks": [
+            _task(robot, task) | {"level": place, "target": targets[task.name]}
+            for place, level in enumerate(settings.levels)
+            for task in level.tasks
         ],
         "limits": {
             name: getattr(force, name)
             for name in ("torque", "velocity", "position", "torque_scale", "velocity_scale")
         },
         "plant": plant,
-        "world": [_floor(thing) for thing in scene.world],
+        "model": model_text(robot, scene.world),
+        "poses": _poses(scene),
+        "objects": _objects(scene),
         "events": [{"t": t, **_event(robot, event)} for t, event in scene.events],
         "images": images,
     }
@@ -89,8 +98,6 @@ def refuse(scene: TorqueScene) -> None:
         raise InputError(
             "diagonal_scale, torque_lag_ms and delay_ms of the plant are not simulated in a browser"
         )
-    if any(thing.free or not isinstance(thing.shape, Floor) for thing in scene.world):
-        raise InputError("a browser simulates the robot and a floor, no other objects")
     session = TorqueSession(replace(scene, events=()), 0)
     image_of(session.controller, scene.robot, session.references)
 
@@ -119,20 +126,50 @@ def _orders(own: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
     return itertools.permutations(own) if len(own) <= MOST_ORDERS else iter([own])
 
 
-def _floor(thing: Thing) -> dict[str, float]:
-    assert isinstance(thing.shape, Floor)  # `refuse` has checked it
-    return {"height": thing.shape.height, "friction": thing.friction}
+def _poses(scene: TorqueScene) -> list[float]:
+    """Position and quaternion w x y z of each body at the start, for the first picture."""
+    model = scene.robot.model
+    data = model.createData()
+    pin.forwardKinematics(model, data, scene.q_0)
+    return [
+        value
+        for placement in list(data.oMi)[1:]
+        for value in (*placement.translation, *np.roll(pin.Quaternion(placement.rotation).coeffs(), 1))
+    ]
+
+
+def _objects(scene: TorqueScene) -> list[dict[str, Any]]:
+    """What is drawn of the objects, in the order of their bodies; a floor is part of every picture."""
+    model = model_of(scene.robot, scene.world)
+    found = []
+    for place, thing in enumerate(scene.world):
+        body, geom = model.body(f"object{place}"), model.geom(f"shape{place}")
+        if not isinstance(thing.shape, Floor):
+            found.append(
+                {"body": f"object{place}", "kind": KINDS[int(geom.type[0])], "size": geom.size.tolist()}
+                | {"pose": [*body.pos.tolist(), *body.quat.tolist()]}
+            )
+    return found
 
 
 def _told(image: Image, pack: Pack) -> dict[str, Any]:
-    """The memory, and what of its manifest the page needs."""
+    """The memory, what of its manifest the page needs, and where fields of telemetry are: (name, array, first
+    number, count)."""
     manifest = image.manifest
-    return {
-        "memory": pack.add(image.memory),
-        "manifest": {key: manifest[key] for key in ("joints", "tasks", "levels")}
-        | {
-            "arrays": [
-                [each[key] for key in ("name", "type", "shape", "offset")] for each in manifest["arrays"]
-            ]
-        },
-    }
+    arrays = {each["name"]: each for each in manifest["arrays"]}
+    n, place = len(manifest["joints"]), arrays["task"]["offset"]
+    rows = np.frombuffer(image.memory, np.int64, 4 * len(manifest["tasks"]), place).reshape(-1, 4)
+    fields = [("at_bound", "at_bound", 0, n), ("delta_tau", "delta_tau", 0, n)]
+    fields += [("priority_leak", "priority_leak", 0, 1)]
+    fields += [(name, "limits", n * row, n) for name, row in _BOUNDS.items()]
+    for task in manifest["tasks"]:
+        first = int(rows[task["index"], 2])
+        for field, array in (("error", "error"), ("x", "value")):
+            fields.append((f"{field}/{task['name']}", array, first, task["rows"]))
+    kept = [{key: each[key] for key in ("name", "type", "shape", "offset")} for each in arrays.values()]
+    told = {key: manifest[key] for key in ("joints", "tasks", "levels")}
+    return {"memory": pack.add(image.memory), "manifest": told | {"arrays": kept, "fields": fields}}
+
+
+_BOUNDS = {"tau_lower": 0, "tau_upper": 1, "v_limit": 2, "q_lower": 6, "q_upper": 7}
+"""Rows of `limits` in the kernel's memory, see `himpc/tick/kernel/arrays.py`."""

@@ -29,6 +29,7 @@ FIELDS += (
     "gauge_radius",
     "unsolved",
     "late",
+    "contact_force",
 )
 """Fields of telemetry that a browser has, besides error/TASK, active/LEVEL and, of positions and joints,
 x/TASK."""

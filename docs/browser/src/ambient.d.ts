@@ -12,6 +12,8 @@ declare module "*/himpc.mjs" {
     tasks: { name: string; index: number; rows: number; target: string }[];
     levels: { name: string; index: number; rows: number; tasks: string[] }[];
     arrays: { name: string; type: string; shape: number[]; offset: number }[];
+    /** Fields of telemetry: where their numbers are in an array. Written by docs/figures/scene.py. */
+    fields: [name: string, array: string, start: number, width: number][];
   }
   export interface Controller {
     n: number;

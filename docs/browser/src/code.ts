@@ -1,14 +1,13 @@
 /** State codes, as lessons/replay/state.py reads and writes them: all settings of a run in a link. */
+import { through } from "./data";
+
 const PREFIX = "hl1-", MOST = 12_000;
 
 export interface State { s: string; r?: string; a?: string[]; l?: string; p?: number }
 
-async function through(bytes: Uint8Array<ArrayBuffer>, stream: CompressionStream | DecompressionStream): Promise<Uint8Array<ArrayBuffer>> {
-  return new Uint8Array(await new Response(new Blob([bytes]).stream().pipeThrough(stream)).arrayBuffer());
-}
-
 export async function encode(state: State): Promise<string> {
-  const packed = await through(new TextEncoder().encode(JSON.stringify(state)), new CompressionStream("deflate"));
+  const plain = new Blob([JSON.stringify(state)]).stream();
+  const packed = new Uint8Array(await through(plain, new CompressionStream("deflate")).arrayBuffer());
   return PREFIX + btoa(String.fromCharCode(...packed)).replace(/\+/g, "-").replace(/\//g, "_").replace(/=+$/, "");
 }
 
@@ -16,9 +15,8 @@ export async function encode(state: State): Promise<string> {
 export async function decode(code: string): Promise<State | null> {
   if (!code.startsWith(PREFIX) || code.length > MOST || !/^[\w-]+$/.test(code)) return null;
   try {
-    const text = atob(code.slice(PREFIX.length).replace(/-/g, "+").replace(/_/g, "/"));
-    const bytes = await through(Uint8Array.from(text, (each) => each.charCodeAt(0)), new DecompressionStream("deflate"));
-    const given = JSON.parse(new TextDecoder().decode(bytes)) as State, list = given.a ?? [];
+    const { body } = await fetch(`data:;base64,${code.slice(PREFIX.length).replace(/-/g, "+").replace(/_/g, "/")}`);
+    const given = await through(body!, new DecompressionStream("deflate")).json() as State, list = given.a ?? [];
     const short = typeof given.s === "string" && Array.isArray(list) && list.length <= 500;
     return short && list.every((each) => typeof each === "string" && each.includes("=")) ? given : null;
   } catch {

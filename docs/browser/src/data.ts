@@ -4,15 +4,11 @@ import type { Manifest } from "../../../himpc/export/files/himpc.mjs";
 export type Piece = [offset: number, bytes: number];
 export type Numbers = number | number[];
 
-export interface Body {
-  parent: number; pos: number[]; quat: number[]; mass: number; ipos: number[]; inertia: number[];
-  prismatic: boolean; axis: number[];
-}
-export interface Solid { joint: number; kind: string; size: number[]; points: number[][]; pos: number[]; quat: number[] }
-export interface Shape { joint: number; colour: number[]; grid: number; wide: boolean; vertices: Piece; faces: Piece }
+export interface Body { mass: number; ipos: number[]; inertia: number[]; prismatic: boolean }
+export interface Shape { joint: number; colour: number[]; grid: number; vertices: Piece; faces: Piece }
 export interface RobotData {
-  name: string; joints: string[]; bodies: Body[]; tip: { joint: number; pos: number[] }; gravity: number[];
-  solids: Solid[]; excluded: [number, number][]; home: number[]; shapes: Shape[];
+  name: string; joints: string[]; bodies: Body[]; reach: number; planar: boolean; tip: { joint: number; pos: number[] };
+  gravity: number[]; shapes: Shape[];
   tau_limit: (number | null)[]; v_limit: (number | null)[]; q_lower: (number | null)[]; q_upper: (number | null)[];
 }
 
@@ -21,20 +17,22 @@ export interface PlantSettings {
   diagonal_scale: Numbers; encoder_resolution_deg: number; torque_lag_ms: number; delay_ms: number;
   saturate: boolean; gravity: boolean; contacts: boolean; joint_stops: boolean;
 }
-export interface Floor { height: number; friction: number }
 export interface TaskData {
-  name: string; axes: string; unit: string; K_p: Numbers; K_v: Numbers; frame: { joint: number; pos: number[] } | null;
+  name: string; level: number; axes: string; unit: string; target: string; K_p: Numbers; K_v: Numbers;
+  frame: { joint: number; pos: number[] } | null;
 }
-export interface LevelData { name: string; Q: Numbers; R: Numbers; enabled: boolean; tasks: TaskData[] }
+export interface LevelData { name: string; Q: Numbers; R: Numbers; enabled: boolean }
+/** An object that is drawn: its body in MuJoCo, its geometry there, and where it is at the start. */
+export interface Thing { body: string; kind: string; size: number[]; pose: number[] }
 export type SceneEvent = { t: number; event: string; [key: string]: unknown };
-export interface ImageData { memory: Piece; manifest: Omit<Manifest, "arrays"> & { arrays: [string, string, number[], number][] } }
 export interface SceneData {
   name: string; robot: string; controller: string; period: number; horizon: number; order: string[]; duration: number;
   start: { q: number[]; v: number[]; tau: number[] | null };
   M_bar: number[]; M_bar_scale: number; R_on: string; deadline_ms: number; solve_ms_per_knot: number;
-  levels: LevelData[];
+  levels: LevelData[]; tasks: TaskData[];
   limits: { torque: boolean; velocity: boolean; position: string; torque_scale: number; velocity_scale: number };
-  plant: PlantSettings; world: Floor[]; events: SceneEvent[]; images: Record<string, ImageData>;
+  plant: PlantSettings; events: SceneEvent[]; model: string; poses: number[]; objects: Thing[];
+  images: Record<string, { memory: Piece; manifest: Manifest }>;
 }
 
 export interface SignalData { name: string; column: number | null; factor: number }
@@ -55,24 +53,27 @@ export interface StepData {
   claims: ClaimData[]; prediction: PredictionData | null;
 }
 
-/** A description with the pieces that it refers to. */
-export interface Pack<T> { told: T; piece(at: Piece): Uint8Array }
+/** A description, and the pieces that it refers to. */
+export interface Pack<T> { told: T; pieces: Uint8Array<ArrayBuffer> }
 export interface Scenes { scene?: SceneData; steps?: Record<string, StepData> }
 
-/** What a script of the site holds, decompressed by the browser itself. */
-export function unwrapped(text: string): Response {
-  const letters = atob(text), bytes = new Uint8Array(letters.length);
-  for (let k = 0; k < letters.length; k++) bytes[k] = letters.charCodeAt(k);
-  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
-  return new Response(stream, { headers: { "Content-Type": "application/wasm" } });
+export const through = (bytes: ReadableStream, way: CompressionStream | DecompressionStream, type = ""): Response =>
+  new Response(bytes.pipeThrough(way), { headers: { "Content-Type": type } });
+
+/** What a script of the site holds, decoded and decompressed by the browser itself while it is read. */
+export async function unwrapped(text: string): Promise<Response> {
+  const { body } = await fetch(`data:;base64,${text}`);
+  return through(body!, new DecompressionStream("gzip"), "application/wasm");
 }
 
 export async function unpacked<T>(text: string): Promise<Pack<T>> {
-  const bytes = await unwrapped(text).arrayBuffer(), length = Number(new BigUint64Array(bytes, 0, 1)[0]);
+  const bytes = await (await unwrapped(text)).arrayBuffer(), length = Number(new BigUint64Array(bytes, 0, 1)[0]);
   const told = JSON.parse(new TextDecoder().decode(new Uint8Array(bytes, 8, length))) as T;
-  return { told, piece: ([offset, size]) => new Uint8Array(bytes, 8 + length + offset, size) };
+  return { told, pieces: new Uint8Array(bytes, 8 + length) };
 }
 
+export const pieceOf = ({ pieces }: Pack<unknown>, [offset, size]: Piece): Uint8Array<ArrayBuffer> =>
+  pieces.subarray(offset, offset + size);
 export const each = (values: Numbers, n: number): number[] =>
   typeof values === "number" ? Array<number>(n).fill(values) : values;
 export const limit = (value: number | null, sign = 1): number => value ?? sign * Infinity;

@@ -1,6 +1,5 @@
 /** The page's end of the simulation: a thread with MuJoCo and the kernel in it. */
-import type { Frame, Told, Verdict } from "./messages";
-import type { Simulation } from "./worker";
+import type { Simulation, Told } from "./worker";
 
 type Answer<K extends keyof Simulation> = Awaited<ReturnType<Simulation[K]>>;
 
@@ -13,25 +12,17 @@ export function packed(name: string): string {
 
 export class Engine {
   private worker = new Worker(URL.createObjectURL(new Blob([WORKER_TEXT], { type: "text/javascript" })));
-  private waiting = new Map<number, PromiseWithResolvers<never>>();
-  private calls = 0;
+  private waiting: PromiseWithResolvers<never>[] = [];
   mujoco = "";
-  onFrame: (frame: Frame) => void = () => {};
-  onVerdict: (verdict: Verdict) => void = () => {};
-  /** Called with a sentence about something that did not work and that nobody waits for. */
-  onError: (words: string) => void = () => {};
+  /** Called with what the simulation says by itself, and with what did not work and nobody waits for. */
+  onTold: (told: Told) => void = () => {};
 
   constructor() {
-    this.worker.onmessage = ({ data }: MessageEvent<Told>) => {
-      if ("frame" in data) this.onFrame(data.frame);
-      else if ("verdict" in data) this.onVerdict(data.verdict);
-      else if (!("id" in data)) this.onError(data.error);
-      else {
-        const { resolve, reject } = this.waiting.get(data.id)!;
-        this.waiting.delete(data.id);
-        if (data.error === undefined) resolve(data.value as never);
-        else reject(new Error(data.error));
-      }
+    // Calls are answered in the order in which they were made.
+    this.worker.onmessage = ({ data }: MessageEvent<Told | { answer: unknown } | { refusal: string }>) => {
+      if ("answer" in data) this.waiting.shift()!.resolve(data.answer as never);
+      else if ("refusal" in data) this.waiting.shift()!.reject(new Error(data.refusal));
+      else this.onTold(data);
     };
   }
 
@@ -41,15 +32,13 @@ export class Engine {
 
   /** Calls a function of the simulation and waits for its answer; throws an Error with the sentence of a refusal. */
   call<K extends keyof Simulation>(name: K, ...given: Parameters<Simulation[K]>): Promise<Answer<K>> {
-    const asked = Promise.withResolvers<never>();
-    this.waiting.set(++this.calls, asked);
-    this.worker.postMessage({ id: this.calls, name, given });
-    return asked.promise;
+    this.worker.postMessage({ name, given });
+    return this.waiting[this.waiting.push(Promise.withResolvers<never>()) - 1].promise;
   }
 
   /** Calls a function that answers nothing. */
   tell<K extends keyof Simulation>(name: K, ...given: Parameters<Simulation[K]>): void {
-    this.call(name, ...given).catch((error: Error) => this.onError(error.message));
+    this.call(name, ...given).catch(({ message }: Error) => this.onTold({ error: message }));
   }
 
   end(): void { this.worker.terminate(); }

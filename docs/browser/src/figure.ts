@@ -1,12 +1,12 @@
 /** One live figure: the simulation in its thread, the view, the plots, the controls and, in a lesson, the claims. */
-import { assignment, encode, split, type State } from "./code";
-import { unpacked, type RobotData, type SceneData, type StepData, type TaskData } from "./data";
+import { assignment, encode, split } from "./code";
+import { unpacked, type Pack, type RobotData, type SceneData, type Scenes, type StepData } from "./data";
 import { packed, type Engine } from "./engine";
-import type { Frame, Verdict } from "./messages";
-import { LEVELS, Panel, button, element } from "./panel";
+import { AXES, Panel, boxed, button, element } from "./panel";
 import { Plots } from "./plots";
 import { holds } from "./rows";
 import { View } from "./view";
+import type { Frame, Told, Verdict } from "./worker";
 
 export interface About { version: string; commit: string; kernel: string; mujoco: string }
 declare global {
@@ -16,6 +16,8 @@ declare global {
 export interface Asked {
   /** "scene/NAME" or "lesson/NAME", and the step. */
   pack: string; robot: string; step: string | null; assignments: string[]; wide: boolean; running: boolean;
+  /** Settled when the scripts of the simulation are there; the picture needs those of robot and scene only. */
+  loaded: Promise<unknown>;
 }
 
 export class Figure {
@@ -23,17 +25,15 @@ export class Figure {
   private view: View | null = null;
   private plots!: Plots;
   private panel!: Panel;
+  private scenes!: Pack<Scenes>;
   private robot!: RobotData;
   private scene!: SceneData;
   private step: StepData | null = null;
-  private tasks = new Map<string, TaskData>();
-  private colours = new Map<string, string>();
   private changes = new Map<string, unknown>();
   private raw = new Map<string, number[]>();
-  private running = false;
-  private status = element("p", { class: "hl-status" });
+  private status = element("p", { class: "hl-status" }, "Loading the controller and MuJoCo …");
   private notice = element("p", { class: "hl-notice", role: "status" });
-  private run = button("Run", () => this.toggle());
+  private run = button("Run", () => this.engine.tell(this.frame?.running ? "pause" : "run"));
   private code = element("input", { readOnly: true, type: "text", ariaLabel: "State code" });
   private guess: () => number | null = () => null;
   private claims: HTMLElement[] = [];
@@ -43,69 +43,73 @@ export class Figure {
 
   constructor(private root: HTMLElement, private engine: Engine, private asked: Asked) {}
 
+  /** Draws the robot at its start; it moves as soon as MuJoCo and the kernel are compiled. */
   async open(): Promise<this> {
-    // The page prepares the picture while the thread compiles MuJoCo.
-    const { asked, engine } = this, loaded = engine.load(), pack = await unpacked<RobotData>(packed(`robot/${asked.robot}`));
-    const robot = this.robot = pack.told, opened = this.opened(asked.assignments);
-    const drag = (task: string, place: number[]): void => {
-      this.raw.set(task, place);
-      this.panel.aimed(task, place);
-      engine.tell("target", task, place);
-    };
+    const { asked, engine, drag } = this;
+    const [pack, scenes] = await Promise.all([unpacked<RobotData>(packed(`robot/${asked.robot}`)), unpacked<Scenes>(packed(asked.pack))]);
+    const { told } = this.scenes = scenes, robot = this.robot = pack.told;
+    const step = this.step = asked.step === null ? null : told.steps![asked.step];
+    const scene = this.scene = step ? step.scene : told.scene!;
     try {
-      this.view = new View(pack, drag);
+      this.view = new View(pack, scene, drag);
     } catch {
       this.say("This browser has no WebGL, which the 3D view needs: plots and controls work without it.");
     }
-    const [{ scene, step, tasks }] = await Promise.all([opened, loaded]);
-    [this.scene, this.step] = [scene, step];
-    for (const each of asked.assignments) this.known(...split(each));
-    scene.levels.forEach((level, k) => level.tasks.forEach((task) => {
-      this.tasks.set(task.name, task);
-      this.colours.set(task.name, LEVELS[k % 6]);
-    }));
-    const draggable = tasks.filter(({ name, target }) => this.tasks.get(name)!.frame && target === "position")
-      .map(({ name }) => ({ task: name, axes: this.tasks.get(name)!.axes }));
-    this.plots = new Plots(tasks.map((task) => ({ ...task, colour: this.colours.get(task.name)! })), robot.joints.length);
+    for (const each of asked.assignments) this.changes.set(...split(each));
+    this.plots = new Plots(scene.tasks, robot.joints.length);
     this.panel = new Panel(scene, robot, { set: (path, value) => this.set(path, value), target: drag,
-      push: (joint, force) => engine.tell("push", joint, force, 0.1) }, draggable, asked.wide);
-    engine.onFrame = (frame) => this.show(frame);
-    engine.onVerdict = (verdict) => this.judge(verdict);
-    engine.onError = (words) => this.say(`${words.replace(/^Error: /, "")}.`);
-    this.lay();
-    if (asked.running) this.toggle();
+      push: (joint, force) => engine.tell("push", joint, force, 0.1) }, asked.wide);
+    this.panel.show({ ...scene, off: scene.levels.filter(({ enabled }) => !enabled).map(({ name }) => name) });
+    engine.onTold = (told) => this.hear(told);
+    const side = this.lay();
+    await asked.loaded;
+    await Promise.all([engine.load(), this.reopen(asked.assignments)]);
+    this.root.append(this.origin());
+    side.inert = false;
+    if (asked.running) engine.tell("run");
     return this;
   }
 
-  private opened(assignments: string[]) {
-    const { pack, step } = this.asked;
-    return this.engine.call("open", { scenes: packed(pack), robot: this.robot, step, assignments });
+  private reopen(assignments: string[]): Promise<void> {
+    return this.engine.call("open", { scenes: this.scenes, robot: this.robot, step: this.asked.step, assignments });
   }
 
-  private lay(): void {
-    const { step, asked, engine, root } = this, about = window.HIMPC_ABOUT;
-    const bar = element("div", { class: "hl-bar" }, this.run, button("Reset", () => this.reset()), this.status);
+  private drag = (task: string, place: number[]): void => {
+    this.raw.set(task, place);
+    this.panel.aimed(task, place);
+    this.engine.tell("target", task, place);
+  };
+
+  /** Lays the figure out; returns the controls, which cannot be used yet. */
+  private lay(): HTMLElement {
+    const { step, asked, root, view, plots } = this, reset = button("Reset", () => this.reset());
     const link = element("div", { class: "hl-bar" }, button("Copy the link", () => this.copy()), this.code);
+    const side = element("div", { class: "hl-side", inert: true }, ...(step ? this.asking(step) : []),
+      element("div", { class: "hl-bar" }, this.run, reset, this.status), this.notice, this.panel.root, link);
+    root.classList.add("hl-figure");
+    root.classList.toggle("hl-wide", asked.wide);
+    root.replaceChildren(element("div", { class: "hl-view" }, ...(view ? [view.canvas] : [])), side, plots.root);
+    void this.recode();
+    return side;
+  }
+
+  /** What simulates here, and how that differs from himpc-lab. */
+  private origin(): HTMLElement {
+    const { step, engine } = this, about = window.HIMPC_ABOUT;
     const ghost = !step?.ghost_words ? "" : step.ghost ? `Violet: the ghost, ${step.ghost_words}. ` :
       `The ghost (${step.ghost_words}) runs in himpc-lab only: ${step.ghost_missing}. `;
-    const foot = element("p", { class: "hl-small" }, `${ghost}Kernel ${about.kernel} of himpc-lab ${about.version}, ` +
+    return element("p", { class: "hl-small" }, `${ghost}Kernel ${about.kernel} of himpc-lab ${about.version}, ` +
       `commit ${about.commit}, as WebAssembly; the robot is simulated by MuJoCo ${engine.mujoco}, in himpc-lab by ` +
       `${about.mujoco}. Unlike himpc-lab this page has no controllers that need Python (OSF, HQP, HTMPC), no tasks to add, ` +
       "no recordings and no QP drawings, and three rare fallbacks are missing. " +
       "The code opens in himpc-lab: himpc-lab --state CODE.");
-    root.classList.add("hl-figure");
-    root.classList.toggle("hl-wide", asked.wide);
-    const view = element("div", { class: "hl-view" }, ...(this.view ? [this.view.canvas] : []));
-    const side = element("div", { class: "hl-side" }, ...(step ? this.asking(step) : []), bar, this.notice, this.panel.root, link);
-    root.replaceChildren(view, side, this.plots.root, foot);
-    void this.recode();
   }
 
   /** The prediction before the run, and the table of claims. */
   private asking({ prediction, claims, scene }: StepData): HTMLElement[] {
     const found: HTMLElement[] = [];
     if (prediction) {
-      const box = element("fieldset", {}, element("legend", {}, prediction.question));
+      const box = boxed(prediction.question);
       if (prediction.kind === "choice") {
         const name = `hl-${Math.random().toString(36).slice(2)}`;
         const inputs = prediction.options!.map(() => element("input", { type: "radio", name }));
@@ -125,12 +129,11 @@ export class Figure {
 
   /** The step from its beginning, with its own settings. */
   private async again(): Promise<void> {
-    await this.opened([]);
+    await this.reopen([]);
     this.changes.clear();
     this.claims.forEach((each) => delete each.dataset.holds);
     this.raw.clear();
-    this.running = false;
-    this.toggle();
+    this.engine.tell("run");
     void this.recode();
   }
 
@@ -158,40 +161,24 @@ export class Figure {
 
   private say(words: string): void { this.notice.textContent = words; }
 
-  private toggle(): void {
-    this.running = !this.running;
-    this.engine.tell(this.running ? "run" : "pause");
-    this.run.textContent = this.running ? "Pause" : "Run";
-  }
-
   private reset(): void {
     this.raw.clear();
     this.engine.tell("reset");
   }
 
-  private known(path: string, value: unknown): void {
-    this.changes.set(path, value);
-    const level = this.scene.levels.find(({ name }) => `levels.${name}.enabled` === path);
-    if (level) level.enabled = value === true;
-  }
-
   private set(path: string, value: unknown): void {
     this.say("");
-    this.known(path, value);
+    this.changes.set(path, value);
     this.engine.tell("set", path, value);
     void this.recode();
   }
 
-  private state(): State {
-    const changed = [...this.changes].map(([path, value]) => assignment(path, value)), { step } = this;
-    const own = [...(step?.set ?? []).filter((each) => !this.changes.has(split(each)[0])), ...changed];
-    return { s: step ? step.scene_name : this.scene.name, ...(step?.robot_name ? { r: step.robot_name } : {}),
-      ...(own.length ? { a: own } : {}), ...(step ? { l: step.lesson, p: Number(this.asked.step) } : {}) };
-  }
-
   private async recode(): Promise<void> {
-    this.code.value = await encode(this.state());
-    if (this.asked.wide) history.replaceState(null, "", `#${this.changes.size ? this.code.value : this.scene.name}`);
+    const changed = [...this.changes].map(([path, value]) => assignment(path, value)), { step, scene, asked } = this;
+    const own = [...(step?.set ?? []).filter((each) => !this.changes.has(split(each)[0])), ...changed];
+    this.code.value = await encode({ s: step ? step.scene_name : scene.name, ...(step?.robot_name ? { r: step.robot_name } : {}),
+      ...(own.length ? { a: own } : {}), ...(step ? { l: step.lesson, p: Number(asked.step) } : {}) });
+    if (asked.wide) history.replaceState(null, "", `#${this.changes.size ? this.code.value : scene.name}`);
   }
 
   private async copy(): Promise<void> {
@@ -204,21 +191,22 @@ export class Figure {
     }
   }
 
+  private hear(told: Told): void {
+    if ("error" in told) this.say(`${told.error.replace(/^Error: /, "")}.`);
+    else if ("verdict" in told) this.judge(told.verdict);
+    else this.show(told.frame);
+  }
+
   private show(frame: Frame): void {
     this.frame = frame;
-    this.running = frame.running;
     this.run.textContent = frame.running ? "Pause" : "Run";
     this.view?.show(frame);
     this.plots.take(frame);
     this.panel.show(frame);
-    for (const { task, kind, value } of frame.targets) {
-      const { frame: at, axes } = this.tasks.get(task) ?? { frame: null, axes: "" };
-      if (!at || kind !== "position") continue;
-      const here = point(frame.poses, at), place = [..."xyz"].map((axis) => axes.indexOf(axis));
-      const filtered = here.map((own, a) => (place[a] < 0 ? own : value[place[a]]));
-      const raw = this.raw.get(task)?.map((own, a) => (place[a] < 0 ? here[a] : own)) ?? filtered;
-      if (!this.raw.has(task) && frame.restarted) this.panel.aimed(task, filtered);
-      this.view?.place(task, this.colours.get(task)!, filtered, raw);
+    for (const { task, value } of frame.targets) {
+      const { axes } = this.scene.tasks.find(({ name }) => name === task)!, raw = this.raw.get(task);
+      if (!raw && frame.restarted) this.panel.aimed(task, AXES.map((axis) => value[axes.indexOf(axis)]));
+      this.view?.place(task, value, raw);
     }
     const slow = frame.running && frame.speed < 0.97 ? ` · time runs at ${frame.speed.toFixed(2)} × here` : "";
     this.status.textContent = `t = ${frame.t.toFixed(2)} s${frame.running ? "" : " · paused"}${slow}` +
@@ -226,12 +214,4 @@ export class Figure {
       (frame.fallback === "solve" ? "" : ` · fallback: ${frame.fallback}`) +
       (frame.lost ? " · out of control: press Reset" : "");
   }
-}
-
-/** Where a point of a body is, m. */
-function point(poses: Float32Array, at: { joint: number; pos: number[] }): number[] {
-  if (!at.joint) return at.pos;
-  const [x, y, z, w, i, j, k] = poses.subarray(7 * (at.joint - 1), 7 * at.joint), [a, b, c] = at.pos;
-  const [tx, ty, tz] = [2 * (j * c - k * b), 2 * (k * a - i * c), 2 * (i * b - j * a)];
-  return [x + a + w * tx + j * tz - k * ty, y + b + w * ty + k * tx - i * tz, z + c + w * tz + i * ty - j * tx];
 }

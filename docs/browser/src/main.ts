@@ -6,14 +6,16 @@ import { Engine, packed } from "./engine";
 import { Figure, type Asked } from "./figure";
 import style from "./style.css";
 
-let engine: Engine | null = null, shown: Figure | null = null;
+// The first thread starts while the other scripts are loaded.
+let engine: Engine | null = null, spare: Engine | null = new Engine(), shown: Figure | null = null;
 
 /** Opens a figure in an element; an earlier one on the page ends. */
 async function open(root: HTMLElement, asked: Asked): Promise<Figure> {
   engine?.end();
-  engine = new Engine();
-  shown = await new Figure(root, engine, asked).open();
-  return shown;
+  engine = spare ?? new Engine();
+  spare = null;
+  shown = new Figure(root, engine, asked);
+  return shown.open();
 }
 
 document.head.append(Object.assign(document.createElement("style"), { textContent: uPlotStyle + style }));

@@ -1,9 +1,9 @@
 /** The controls: native inputs, so that every one works with keys. */
-import type { LevelData, Numbers, RobotData, SceneData } from "./data";
-import type { Frame } from "./messages";
+import type { LevelData, Numbers, RobotData, SceneData, TaskData } from "./data";
+import type { Frame } from "./worker";
 
 export const LEVELS = ["#e27000", "#3079f0", "#258964", "#e700c6", "#ff2172", "#027d99"];
-const AXES = ["x", "y", "z"];
+export const AXES = ["x", "y", "z"];
 
 export function element<K extends keyof HTMLElementTagNameMap>(tag: K,
   { class: className = "", ...given }: Partial<HTMLElementTagNameMap[K]> & { class?: string } = {},
@@ -17,7 +17,7 @@ export const button = (words: string, onclick: () => void, title = words): HTMLB
   element("button", { type: "button", title, onclick, ariaLabel: title === words ? null : title }, words);
 const group = (title: string, open: boolean, ...children: Node[]): HTMLElement =>
   element("details", { open }, element("summary", {}, title), ...children);
-const boxed = (title: string, ...children: (Node | string)[]): HTMLElement =>
+export const boxed = (title: string, ...children: (Node | string)[]): HTMLElement =>
   element("fieldset", {}, element("legend", {}, title), ...children);
 const small = (words: string): HTMLElement => element("p", { class: "hl-small" }, words);
 const choice = (ariaLabel: string, options: [value: string, words: string][], value: string): HTMLSelectElement => {
@@ -71,25 +71,24 @@ export class Panel {
   private horizon: HTMLSelectElement;
   private strict: boolean;
   private targets = new Map<string, Map<string, Slider>>();
-  private order: string[] = [];
+  private shown = "";
 
-  constructor(private scene: SceneData, robot: RobotData, private acts: Acts, draggable: { task: string; axes: string }[], wide: boolean) {
+  constructor(private scene: SceneData, robot: RobotData, private acts: Acts, wide: boolean) {
     const { limits, plant } = scene, keys = Object.keys(scene.images), strict = this.strict = scene.controller !== "weighted";
     const horizons = [...new Set(keys.map((key) => Number(key.split("|")[0])))].sort((a, b) => a - b);
-    const reach = robot.bodies.reduce((total, body) => total + Math.hypot(...body.pos), 0);
     const number = (path: string, words: string, unit: string, low: number, high: number, value: Numbers, log = false): HTMLElement =>
       new Slider(words, unit, low, high, value, log, (value) => acts.set(path, value)).root;
     const on = (path: string, words: string, value: boolean): HTMLElement => checkbox(words, value, (on) => acts.set(path, on));
-    const targets = draggable.map(({ task, axes }) => {
-      const aim = (): void => acts.target(task, AXES.map((axis) => made.get(axis)?.value ?? 0));
-      const made = new Map([...axes].map((axis) => [axis, new Slider(axis, "m", -reach, reach, 0, false, aim)]));
-      this.targets.set(task, made);
-      return boxed(`Target of ${task}`, ...[...made.values()].map((each) => each.root));
+    const targets = scene.tasks.filter(({ frame, target }) => frame && target === "position").map(({ name, axes }: TaskData) => {
+      const aim = (): void => acts.target(name, AXES.map((axis) => made.get(axis)?.value ?? 0));
+      const made = new Map([...axes].map((axis) => [axis, new Slider(axis, "m", -robot.reach, robot.reach, 0, false, aim)]));
+      this.targets.set(name, made);
+      return boxed(`Target of ${name}`, ...[...made.values()].map((each) => each.root));
     });
-    const weights = ({ name, Q, R, tasks }: LevelData): HTMLElement => boxed(name,
+    const weights = ({ name, Q, R }: LevelData, level: number): HTMLElement => boxed(name,
       number(`levels.${name}.Q`, "Q", "", 1, 2000, Q, true),
       ...(strict ? [number(`levels.${name}.R`, "R", "", 0.1, 1000, R, true)] : []),
-      ...tasks.filter((task) => task.unit).flatMap((task) => [
+      ...scene.tasks.filter((task) => task.unit && task.level === level).flatMap((task) => [
         number(`tasks.${task.name}.K_p`, "K_P", "1/s²", 0, 400, task.K_p),
         number(`tasks.${task.name}.K_v`, "K_V", "1/s", 0, 60, task.K_v)]));
     this.horizon = choice("N", horizons.map((N) => [String(N), String(N)]), String(scene.horizon));
@@ -122,14 +121,15 @@ export class Panel {
     this.targets.get(task)?.forEach((slider, axis) => slider.put(place[AXES.indexOf(axis)]));
   }
 
-  show({ horizon, order }: Frame): void {
+  show({ horizon, order, off }: Pick<Frame, "horizon" | "order" | "off">): void {
     if (this.horizon.value !== String(horizon)) this.horizon.value = String(horizon);
-    if (this.order.join() === order.join()) return;
-    this.order = order;
+    const shown = `${order.join()}|${off.join()}`;
+    if (this.shown === shown) return;
+    this.shown = shown;
     const { levels, images } = this.scene, here = document.activeElement?.ariaLabel;
     this.list.replaceChildren(...order.map((name, place) => {
       const index = levels.findIndex((each) => each.name === name), mark = element("i", { class: "hl-mark" });
-      const box = checkbox(name, levels[index].enabled, (on) => this.acts.set(`levels.${name}.enabled`, on));
+      const box = checkbox(name, !off.includes(name), (on) => this.acts.set(`levels.${name}.enabled`, on));
       box.querySelector("input")!.disabled = !this.strict;
       mark.style.background = LEVELS[index % 6];
       box.prepend(mark);

@@ -1,9 +1,9 @@
-/** The robot in MuJoCo under torque control: robots/plant.py and robots/signals.py, without an altered diagonal. */
+/** The robot in MuJoCo under torque control: robots/plant.py and robots/signals.py, without an altered diagonal, lag or delay. */
 import type { MainModule, MjData, MjModel } from "@mujoco/mujoco";
-import { limit, type Floor, type PlantSettings, type RobotData } from "./data";
+import { limit, type PlantSettings, type RobotData, type SceneData } from "./data";
 import { mjcf } from "./model";
 
-const TIMESTEP = 1e-3, MEMORY_S = 1.5, SAMPLES_S = 0.3, BROKEN = 1e6;
+const TIMESTEP = 1e-3, SAMPLES_S = 0.3, BROKEN = 1e6;
 type Vector = Float64Array;
 type Stamped = [t: number, value: Vector];
 
@@ -13,13 +13,16 @@ export class Plant {
   broken = false;
   private model!: MjModel;
   data!: MjData;
-  private commands: Stamped[] = [];
   private samples: Stamped[] = [];
   private start!: { q: Vector; v: Vector };
   private wrench: { joint: number; values: number[] } | null = null;
+  private settings: PlantSettings;
+  /** The largest force between the robot and something that it touched during the last step, N. */
+  force = 0;
 
-  constructor(private mj: MainModule, readonly robot: RobotData, public settings: PlantSettings, private world: Floor[]) {
+  constructor(private mj: MainModule, private robot: RobotData, private scene: SceneData) {
     this.n = robot.bodies.length;
+    this.settings = scene.plant;
     this.tau = new Float64Array(this.n);
     this.build();
   }
@@ -27,7 +30,7 @@ export class Plant {
   private build(): void {
     this.data?.delete();
     this.model?.delete();
-    this.model = this.mj.MjModel.from_xml_string(mjcf(this.robot, this.settings, this.world));
+    this.model = this.mj.MjModel.from_xml_string(mjcf(this.scene, this.robot, this.settings));
     this.data = new this.mj.MjData(this.model);
   }
 
@@ -43,42 +46,37 @@ export class Plant {
   reset(q: number[], v: number[], tau: number[] | null): void {
     this.mj.mj_resetData(this.model, this.data);
     this.data.qpos.set(q);
+    this.force = 0;
     this.wrench = null;
     this.broken = false;
     this.tau = this.clipped(tau === null ? this.holding() : Float64Array.from(tau));
     this.data.qvel.set(v);
-    this.commands = [[-MEMORY_S, this.tau]];
     this.start = { q: Float64Array.from(q), v: Float64Array.from(v) };
     this.samples = [[0, this.start.q]];
   }
 
-  /** What a copy of the state gives, of which positions have been computed. */
-  private probed<T>(act: (probe: MjData) => T): T {
+  /** A copy of the state, of which positions have been computed. */
+  private probe(): MjData {
     const probe = new this.mj.MjData(this.model);
     probe.qpos.set(this.data.qpos as Vector);
     this.mj.mj_fwdPosition(this.model, probe);
-    const found = act(probe);
-    probe.delete();
-    return found;
+    return probe;
   }
 
   /** The torque that keeps the robot where it is. */
   private holding(): Vector {
-    return this.probed((probe) => {
-      this.mj.mj_fwdVelocity(this.model, probe);
-      return Float64Array.from(probe.qfrc_bias.subarray(0, this.n) as Vector);
-    });
+    using probe = this.probe();
+    this.mj.mj_fwdVelocity(this.model, probe);
+    return Float64Array.from(probe.qfrc_bias.subarray(0, this.n) as Vector);
   }
 
-  configure(settings: PlantSettings): void {
-    this.settings = settings;
-    const { t, q, v } = this, warm = Float64Array.from(this.data.qacc_warmstart as Vector);
+  /** Takes changed settings over. The robot's numbers come first; objects appear or vanish with the contacts. */
+  configure(): void {
+    const { t } = this, kept = (["qpos", "qvel", "qacc_warmstart"] as const).map((name) => [name, [...this.data[name]]] as const);
     this.build();
     this.data.time = t;
-    this.data.qpos.set(q);
-    this.data.qvel.set(v);
-    this.data.qacc_warmstart.set(warm);
-    this.commands = this.commands.map(([t, tau]) => [t, this.clipped(tau)]);
+    for (const [name, values] of kept)
+      this.data[name].set(values.length === this.data[name].length ? values : values.slice(0, this.n));
     this.tau = this.clipped(this.tau);
     if (this.wrench) this.push(this.wrench.joint, this.wrench.values);
   }
@@ -108,16 +106,12 @@ export class Plant {
   }
 
   step(tau: Vector, period: number): void {
-    const { torque_lag_ms, delay_ms } = this.settings, now = this.t;
-    this.commands.push([now, this.clipped(Float64Array.from(tau))]);
-    while (this.commands.length > 1 && this.commands[1][0] < now - MEMORY_S) this.commands.shift();
+    this.tau = this.clipped(Float64Array.from(tau));
+    this.data.ctrl.set(this.tau);
     const count = Math.max(1, Math.ceil(period / TIMESTEP - 1e-9)), h = period / count;
     this.model.opt.timestep = h;
+    this.force = 0;
     for (let k = 0; k < count; k++) {
-      const t = this.t, wanted = delay_ms > 0 ? this.delayed(t - 1e-3 * delay_ms + 0.5 * h) : this.commands.at(-1)![1];
-      const share = torque_lag_ms > 0 ? 1 - Math.exp(-h / (1e-3 * torque_lag_ms)) : 1;
-      this.tau = share === 1 ? wanted : this.tau.map((value, a) => value + share * (wanted[a] - value));
-      this.data.ctrl.set(this.tau);
       const before = this.q;
       this.mj.mj_step(this.model, this.data);
       if (!this.v.every((value) => Math.abs(value) < BROKEN)) {
@@ -126,6 +120,7 @@ export class Plant {
         this.data.qacc_warmstart.fill(0);
         this.broken = true;
       }
+      if (this.data.ncon) this.force = Math.max(this.force, this.touch());
       if (this.settings.encoder_resolution_deg > 0) {
         this.samples.push([this.t, this.q]);
         while (this.samples[0][0] < this.t - SAMPLES_S) this.samples.shift();
@@ -133,19 +128,29 @@ export class Plant {
     }
   }
 
-  private delayed(stamp: number): Vector {
-    return (this.commands.findLast(([t]) => t <= stamp) ?? this.commands[0])[1];
+  /** The largest force between two bodies of which one is the robot's, N, the sum over their points. */
+  private touch(): number {
+    const { mj, data, model } = this, forces = new Map<string, number[]>(), object = mj.mj_name2id(model, 5, "shape0");
+    using found = new mj.DoubleBuffer(6);
+    for (let k = 0; k < data.ncon; k++) {
+      using contact = data.contact.get(k)!;
+      const { geom1, geom2, frame } = contact;
+      if ((object >= 0 && Math.min(geom1, geom2) >= object) || contact.efc_address < 0) continue;
+      mj.mj_contactForce(model, data, k, found);
+      const force = found.GetView() as Vector, key = `${model.geom_bodyid[geom1]} ${model.geom_bodyid[geom2]}`;
+      const before = forces.get(key) ?? [0, 0, 0];
+      forces.set(key, before.map((sum, a) => sum + force[0] * frame[a] + force[1] * frame[3 + a] + force[2] * frame[6 + a]));
+    }
+    return Math.max(0, ...[...forces.values()].map((force) => Math.hypot(...force)));
   }
 
   /** ‖I − M⁻¹M̄‖₂ and the spectral radius of I − M⁻¹M̄: robots/inertia.py. */
   gauge(M_bar: number[]): [norm: number, radius: number] {
-    const { n, mj } = this, solved = new mj.DoubleBuffer(n * n), unit = (at: number): number => Number(at % (n + 1) === 0);
-    const diagonal = Array.from({ length: n * n }, (_, at) => unit(at) * M_bar[at % n]);
-    const ratio = this.probed((probe) => {
-      mj.mj_solveM(this.model, probe, solved, diagonal);
-      return Float64Array.from(solved.GetView() as Vector);
-    });
-    solved.delete();
+    const { n, mj } = this, { nv } = this.model, unit = (at: number): number => Number(at % (n + 1) === 0);
+    using probe = this.probe();
+    using solved = new mj.DoubleBuffer(n * nv);
+    mj.mj_solveM(this.model, probe, solved, Array.from({ length: n * nv }, (_, at) => (at % (nv + 1) ? 0 : M_bar[at % nv])));
+    const ratio = Float64Array.from(solved.GetView() as Vector).filter((_, at) => at % nv < n);
     // Row j of the ratio is column j of M⁻¹M̄; the symmetric M̄^½M⁻¹M̄^½ has its eigenvalues.
     const root = (at: number): number => Math.sqrt(M_bar[at % n] / M_bar[Math.floor(at / n)]);
     return [norm(ratio.map((value, at) => unit(at) - value), n), norm(ratio.map((value, at) => unit(at) - root(at) * value), n)];
@@ -153,14 +158,21 @@ export class Plant {
 
   /** Position and quaternion w x y z of the body of each joint at the last stage of the last step, (n, 7). */
   poses(): Float32Array {
-    const found = new Float32Array(7 * this.n);
     this.mj.mj_kinematics(this.model, this.data);
-    for (let k = 0; k < this.n; k++) {
-      const id = this.mj.mj_name2id(this.model, 1, `body${k + 1}`);
-      found.set(this.data.xpos.subarray(3 * id, 3 * id + 3) as Vector, 7 * k);
-      found.set(this.data.xquat.subarray(4 * id, 4 * id + 4) as Vector, 7 * k + 3);
-    }
-    return found;
+    return this.placed(this.robot.joints.map((_, k) => `body${k + 1}`));
+  }
+
+  /** The same of the objects that are drawn. */
+  objects(): Float32Array {
+    const { objects } = this.scene;
+    return this.settings.contacts ? this.placed(objects.map(({ body }) => body)) : Float32Array.from(objects.flatMap(({ pose }) => pose));
+  }
+
+  private placed(bodies: string[]): Float32Array {
+    return Float32Array.from(bodies.flatMap((name) => {
+      const id = this.mj.mj_name2id(this.model, 1, name), { xpos, xquat } = this.data;
+      return [...xpos.subarray(3 * id, 3 * id + 3), ...xquat.subarray(4 * id, 4 * id + 4)];
+    }));
   }
 
   delete(): void {

@@ -1,46 +1,41 @@
 /** Errors of the tasks, and torques and velocities within their bounds, over the last seconds. */
 import uPlot from "uplot";
-import type { Frame } from "./messages";
-import { element } from "./panel";
+import type { TaskData } from "./data";
+import { element, LEVELS } from "./panel";
+import type { Frame } from "./worker";
 
 const WINDOW_S = 8;
 const JOINTS = ["#d72626", "#e27000", "#258964", "#027d99", "#3079f0", "#e700c6", "#ff2172"];
 
-interface Line { words: string; colour: string; factor: number }
+interface Line { label: string; stroke: string; factor: number }
 
 export class Plots {
   readonly root = element("div", { class: "hl-plots" });
   private drawn: { plot: uPlot; data: number[][]; first: number; lines: Line[] }[] = [];
   private frames = 0;
 
-  constructor(tasks: { name: string; unit: string; colour: string }[], joints: number) {
-    const errors = tasks.map(({ name, unit, colour }) => unit === "m" ? { words: `${name}, mm`, colour, factor: 1e3 } :
-      { words: `${name}, °`, colour, factor: 180 / Math.PI });
-    const shares = Array.from({ length: joints }, (_, k) => ({ words: `joint ${k + 1}`, colour: JOINTS[k % 7], factor: 100 }));
+  constructor(tasks: TaskData[], joints: number) {
+    const errors = tasks.map(({ name, unit, level }) => ({ label: `${name}, ${unit === "m" ? "mm" : "°"}`,
+      stroke: LEVELS[level % 6], factor: unit === "m" ? 1e3 : 180 / Math.PI }));
+    const shares = Array.from({ length: joints }, (_, k) => ({ label: `joint ${k + 1}`, stroke: JOINTS[k % 7], factor: 100 }));
     this.add("Errors of the tasks, mm and °", 1, errors, (_, __, high) => [0, Math.max(1e-3, 1.1 * high)]);
-    for (const [k, what] of ["Torques", "Velocities"].entries()) this.add(`${what}, % of their bounds`, 1 + tasks.length + k * joints,
-      shares, (_, low, high) => [Math.min(-110, low), Math.max(110, high)], [100, -100]);
+    for (const [k, what] of ["Torques", "Velocities"].entries())
+      this.add(`${what}, % of their bounds`, 1 + tasks.length + k * joints, shares,
+        (_, low, high) => [Math.min(-110, low), Math.max(110, high)], [100, -100]);
     new ResizeObserver(() => this.resize()).observe(this.root);
   }
 
   private add(title: string, first: number, lines: Line[], range: uPlot.Range.Function, bounds: number[] = []): void {
-    const legend = element("p", { class: "hl-legend" }, ...lines.flatMap(({ words, colour }) => {
-      const mark = element("i");
-      mark.style.background = colour;
-      return [element("span", {}, mark, words), " "];
-    }));
     const box = element("figure", { role: "group", ariaLabel: title }, element("figcaption", {}, title));
     const grid = { stroke: "rgba(128,128,128,.25)", width: 1 };
     const axis = { stroke: getComputedStyle(document.body).color, grid, ticks: grid, font: "11px sans-serif" };
-    const curves = [...lines.map(({ colour }) => ({ stroke: colour, dash: [] as number[] })),
-      ...bounds.map(() => ({ stroke: "#8b95a1", dash: [6, 4] }))];
-    const data: number[][] = [[], ...curves.map(() => [])];
+    const ends = bounds.map((end) => ({ label: `${end} %`, stroke: "#8b95a1", dash: [6, 4] }));
+    const data: number[][] = [[], ...lines.map(() => []), ...bounds.map(() => [])];
     const plot = new uPlot({
-      width: 320, height: 150, legend: { show: false }, cursor: { show: false }, padding: [6, 6, 0, 0],
+      width: 320, height: 150, legend: { live: false }, cursor: { show: false }, padding: [6, 6, 0, 0],
       scales: { x: { time: false }, y: { range } }, axes: [{ ...axis, size: 26 }, { ...axis, size: 46 }],
-      series: [{}, ...curves.map((each) => ({ ...each, width: 1.5, points: { show: false } }))],
+      series: [{}, ...[...lines, ...ends].map((each) => ({ ...each, width: 1.5, points: { show: false } }))],
     }, data as uPlot.AlignedData, box);
-    box.append(legend);
     this.root.append(box);
     this.drawn.push({ plot, data, first, lines });
   }

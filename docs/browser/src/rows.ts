@@ -9,8 +9,6 @@ export class Rows {
   private fields = new Map<string, [start: number, end: number]>();
   private rows: Float64Array[] = [];
   private width = 0;
-  /** Rows that were dropped because a run was long. */
-  gone = 0;
 
   constructor(widths: [name: string, width: number][]) {
     for (const [name, width] of widths) this.fields.set(name, [this.width, (this.width += width)]);
@@ -21,14 +19,11 @@ export class Rows {
 
   /** Adds a row, filled with NaN. */
   next(): void {
-    if (this.count === KEPT) this.gone += this.rows.splice(0, KEPT / 2).length;
+    if (this.count === KEPT) this.rows.splice(0, KEPT / 2);
     this.rows.push(new Float64Array(this.width).fill(NaN));
   }
 
-  clear(): void {
-    this.rows = [];
-    this.gone = 0;
-  }
+  clear(): void { this.rows = []; }
 
   /** The values of a field in a row; -1 is the last row. */
   at(row: number, name: string): Float64Array {

@@ -1,19 +1,18 @@
 /** One run: references, controller, plant, script and settings; lessons/session/torque.py. */
 import type { MainModule } from "@mujoco/mujoco";
 import { ENABLED, FALLBACKS, GAINS, LIMITS, M_BAR, Q, R, TARGET, type Controller, type Manifest } from "../../../himpc/export/files/himpc.mjs";
-import { each, limit, type LevelData, type PlantSettings, type RobotData, type SceneData, type SceneEvent, type TaskData } from "./data";
+import { each, limit, pieceOf, type Pack, type RobotData, type SceneData, type SceneEvent, type Scenes } from "./data";
 import { Plant } from "./plant";
 import { Rows } from "./rows";
 
 const TRUTH_TICKS = 20, LOST_SPEED = 20;
-const LIMIT_FIELDS: [string, number][] = [["tau_lower", 0], ["tau_upper", 1], ["v_limit", 2], ["q_lower", 6], ["q_upper", 7]];
-const LEVEL_FIELDS: Record<string, number> = { enabled: ENABLED, Q, R };
+const NOT_HERE = ["diagonal_scale", "torque_lag_ms", "delay_ms"];
 
 export interface Tools {
   mj: MainModule;
   create(image: Uint8Array, manifest: Manifest): Controller;
-  /** The memory of an exported controller. */
-  image(scene: SceneData, key: string): Uint8Array;
+  /** With the memory of the exported controllers. */
+  scenes: Pack<Scenes>;
 }
 
 export class Session {
@@ -29,14 +28,14 @@ export class Session {
   private made = new Map<string, [Controller, Manifest]>();
   private script: SceneEvent[] = [];
   private pushUntil = Infinity;
-  private ticks = 0;
+  ticks = 0;
   private held: Float64Array | null = null;
   private waiting: Float64Array | null = null;
   private truth: [number, number] = [NaN, NaN];
 
   constructor(private tools: Tools, scene: SceneData, readonly robot: RobotData) {
     this.scene = structuredClone(scene);
-    this.plant = new Plant(tools.mj, robot, this.scene.plant, scene.world);
+    this.plant = new Plant(tools.mj, robot, this.scene);
     this.key = `${scene.horizon}|${scene.order.join(",")}`;
     [this.controller, this.manifest] = this.controllerFor(this.key);
     this.rows = new Rows(this.layout());
@@ -47,15 +46,11 @@ export class Session {
   get t(): number { return this.plant.t; }
   get horizon(): number { return Number(this.key.split("|")[0]); }
   get order(): string[] { return this.key.split("|")[1].split(","); }
-  level(name: string): LevelData { return named(this.scene.levels, name, "level"); }
-  task(name: string): TaskData { return named(this.scene.levels.flatMap((level) => level.tasks), name, "task"); }
 
   private controllerFor(key: string): [Controller, Manifest] {
     if (!this.made.has(key)) {
-      const { manifest } = this.scene.images[key];
-      const arrays = manifest.arrays.map(([name, type, shape, offset]) => ({ name, type, shape, offset }));
-      const whole = { ...manifest, arrays };
-      this.made.set(key, [this.tools.create(this.tools.image(this.scene, key), whole), whole]);
+      const { manifest, memory } = this.scene.images[key];
+      this.made.set(key, [this.tools.create(pieceOf(this.tools.scenes, memory), manifest), manifest]);
     }
     return this.made.get(key)!;
   }
@@ -67,10 +62,9 @@ export class Session {
 
   private layout(): [string, number][] {
     const wide = (names: string[], width: number): [string, number][] => names.map((name) => [name, width]);
-    return [...wide(["t", "priority_leak", "gauge_norm", "gauge_radius", "unsolved", "late"], 1),
-      ...wide(["q", "v", "tau", "tau_demand", "at_bound", "delta_tau", "tau_0"], this.plant.n),
-      ...wide(LIMIT_FIELDS.map(([name]) => name), this.plant.n),
-      ...this.manifest.tasks.flatMap((task) => wide([`error/${task.name}`, `x/${task.name}`], task.rows)),
+    return [...wide(["t", "gauge_norm", "gauge_radius", "unsolved", "late", "contact_force"], 1),
+      ...wide(["q", "v", "tau", "tau_demand", "tau_0"], this.plant.n),
+      ...this.manifest.fields.map(([name, , , width]): [string, number] => [name, width]),
       ...wide(this.manifest.levels.map((level) => `active/${level.name}`), 1)];
   }
 
@@ -96,7 +90,7 @@ export class Session {
       this.plant.push(0, []);
       this.pushUntil = Infinity;
     }
-    const { plant, scene, rows, controller } = this, n = plant.n, T_s = scene.period;
+    const { plant, scene, rows, controller } = this, T_s = scene.period;
     const q = plant.q, v = plant.v, [q_measured, v_measured] = plant.measure(T_s), before = plant.tau;
     const [found, fallback] = controller.tick(q_measured, v_measured, before), tau = Float64Array.from(found);
     this.fallback = fallback;
@@ -106,19 +100,15 @@ export class Session {
     const put = (values: Record<string, ArrayLike<number>>): void => {
       for (const name in values) rows.at(-1, name).set(values[name]);
     };
-    const f = (name: string): Float64Array => controller.view(name), limits = f("limits"), rung = f("rung");
-    put({ t: [plant.t], q, v, tau_demand: tau, tau_0: before, at_bound: f("at_bound"), delta_tau: f("delta_tau"),
-      priority_leak: f("priority_leak"), gauge_norm: [this.truth[0]], gauge_radius: [this.truth[1]], late: [Number(late)] });
-    for (const [name, place] of LIMIT_FIELDS) put({ [name]: limits.subarray(place * n, (place + 1) * n) });
-    for (const { name, index, rows: wide } of this.manifest.tasks) {
-      const first = Number(f("task")[4 * index + 2]), of = (field: string) => f(field).subarray(first, first + wide);
-      put({ [`error/${name}`]: of("error"), [`x/${name}`]: of("value") });
-    }
-    const solved = this.solved();
-    solved.forEach((name, place) => put({ [`active/${name}`]: [f("active")[place]] }));
+    put({ t: [plant.t], q, v, tau_demand: tau, tau_0: before, gauge_norm: [this.truth[0]], gauge_radius: [this.truth[1]],
+      late: [Number(late)] });
+    for (const [name, array, start, width] of this.manifest.fields)
+      put({ [name]: controller.view(array).subarray(start, start + width) });
+    const solved = this.solved(), active = controller.view("active"), rung = controller.view("rung");
+    solved.forEach((name, place) => put({ [`active/${name}`]: [active[place]] }));
     put({ unsolved: [FALLBACKS[fallback] === "hold" ? 1 : solved.filter((_, place) => rung[place] !== 0).length] });
     plant.step(this.applied(tau, late, before), T_s);
-    put({ tau: plant.tau });
+    put({ tau: plant.tau, contact_force: [plant.force] });
     const wild = v.some((each, a) => !(Math.abs(each) <= LOST_SPEED * limit(this.robot.v_limit[a])));
     this.lost ||= plant.broken || wild;
   }
@@ -151,72 +141,65 @@ export class Session {
   }
 
   move(task: string, value: number[]): void {
-    const { index, target } = named(this.manifest.tasks, task, "task"), { axes } = this.task(task);
+    const { index, target } = named(this.manifest.tasks, task, "task"), { axes } = named(this.scene.tasks, task, "task");
     const whole = target === "position" && value.length < 3 ? [..."xyz"].map((axis) => value[axes.indexOf(axis)] ?? 0) : value;
     this.controller.set(TARGET, index, whole);
   }
 
-  /** Where the target of a task is: the numbers of its value, a rotation row by row. */
-  target(task: string): Float64Array | null {
-    const { index, rows, target } = named(this.manifest.tasks, task, "task"), samples = this.controller.view("samples");
-    const stride = samples.length / this.manifest.tasks.length, at = index * stride;
-    return target === "none" || target === "fixed" ? null : samples.slice(at, at + (target === "orientation" ? 9 : rows));
+  /** Where the target of a position is. */
+  target(task: string): Float64Array {
+    const { index, rows } = named(this.manifest.tasks, task, "task"), samples = this.controller.view("samples");
+    const at = index * (samples.length / this.manifest.tasks.length);
+    return samples.slice(at, at + rows);
   }
 
   private M_bar(): number[] { return this.scene.M_bar.map((each) => each * this.scene.M_bar_scale); }
 
   /** Changes a setting; the paths are those of himpc-lab. Throws an Error with a sentence if it cannot. */
   set(path: string, value: unknown): void {
-    const { scene } = this, [head, name, key] = path.split("."), n = this.plant.n;
+    const { scene } = this, [head, name, key] = path.split("."), { plant } = scene;
     if (path === "horizon" || path === "order") {
       const order = Array.isArray(value) ? value as string[] : String(value).split(",");
       this.exchange(path === "horizon" ? Number(value) : this.horizon, path === "order" ? order : this.order);
-    } else if (path === "M_bar_scale" || path === "M_bar") {
-      const before = this.M_bar();
-      Object.assign(scene, { [path]: value });
-      this.sendM_bar(before);
-    } else if (head === "limits" && name in scene.limits && name !== "position") {
-      Object.assign(scene.limits, { [name]: value });
-      this.sendLimits();
-    } else if (head === "plant" && name in scene.plant && name !== "diagonal_scale") {
-      const { plant } = scene;
-      if (key) (plant as unknown as Record<string, unknown>)[name] = each(plant[name as "friction"], n).map((own, a) => (a === Number(key) - 1 ? value : own));
-      else Object.assign(plant, { [name]: value });
-      this.plant.configure(plant as PlantSettings);
-    } else if (head === "tasks" && (key === "K_p" || key === "K_v")) {
-      this.task(name)[key] = value as number;
-      this.sendGains(name);
-    } else if (head === "levels" && key in LEVEL_FIELDS) {
-      Object.assign(this.level(name), { [key]: value });
-      this.sendLevel(LEVEL_FIELDS[key], name);
-    } else throw new Error(`${path} cannot be changed here; himpc-lab can`);
+    } else if (head === "plant" && name in plant && !NOT_HERE.includes(name)) {
+      const whole = key ? each(plant[name as "friction"], this.plant.n).with(Number(key) - 1, value as number) : value;
+      Object.assign(plant, { [name]: whole });
+      this.plant.configure();
+    } else {
+      if (path === "M_bar_scale" || path === "M_bar") Object.assign(scene, { [path]: value });
+      else if (head === "limits" && name in scene.limits && name !== "position") Object.assign(scene.limits, { [name]: value });
+      else if (head === "tasks" && ["K_p", "K_v"].includes(key)) Object.assign(named(scene.tasks, name, "task"), { [key]: value });
+      else if (head === "levels" && ["enabled", "Q", "R"].includes(key)) Object.assign(named(scene.levels, name, "level"), { [key]: value });
+      else throw new Error(`${path} cannot be changed here; himpc-lab can`);
+      this.send();
+    }
   }
 
-  private sendM_bar(before: number[]): void {
-    const now = this.M_bar(), weights = Float64Array.from(this.controller.view("R"));
-    this.controller.set(M_BAR, 0, now);
-    if (this.scene.R_on !== "acceleration") return;
-    for (const { index } of this.manifest.levels)
-      this.controller.set(R, index, now.map((value, a) => weights[index * now.length + a] * (value / before[a]) ** 2));
-  }
-  private sendLimits(): void {
-    const { robot, scene: { limits } } = this, ends = limits.position !== "off";
+  /** Sends all numbers of the settings to the kernel; those that have not changed have no effect. */
+  private send(): void {
+    const { robot, scene, controller, manifest } = this, { limits } = scene, ends = limits.position !== "off";
+    const M_bar = this.M_bar(), before = controller.view("M_bar").slice(), weights = controller.view("R").slice();
+    const changed = M_bar.some((value, a) => value !== before[a]), n = M_bar.length;
+    const heavy = scene.R_on === "acceleration", strict = scene.controller !== "weighted";
     const scaled = (bounds: (number | null)[], on: boolean, scale: number, sign = 1): number[] =>
       bounds.map((each) => (on ? limit(each, sign) * scale : sign * Infinity));
-    this.controller.set(LIMITS, 0, [...scaled(robot.tau_limit, limits.torque, limits.torque_scale),
+    if (changed) controller.set(M_BAR, 0, M_bar);
+    controller.set(LIMITS, 0, [...scaled(robot.tau_limit, limits.torque, limits.torque_scale),
       ...scaled(robot.v_limit, limits.velocity, limits.velocity_scale),
       ...scaled(robot.q_lower, ends, 1, -1), ...scaled(robot.q_upper, ends, 1)]);
-  }
-  private sendGains(name: string): void {
-    const { index, rows } = named(this.manifest.tasks, name, "task"), { K_p, K_v } = this.task(name);
-    this.controller.set(GAINS, index, [...each(K_p, rows), ...each(K_v, rows)]);
-  }
-  /** Sends Q or R of a level, or whether it is on. */
-  private sendLevel(what: number, name: string): void {
-    const { index, rows } = named(this.manifest.levels, name, "level"), level = this.level(name), M_bar = this.M_bar();
-    const squared = (a: number): number => (this.scene.R_on === "acceleration" ? M_bar[a] ** 2 : 1);
-    this.controller.set(what, index, what === ENABLED ? [Number(level.enabled)] : what === Q ? each(level.Q, rows) :
-      each(level.R, M_bar.length).map((value, a) => value * squared(a)));
+    for (const { name, index, rows } of manifest.levels) {
+      const own = scene.levels.find((level) => level.name === name);
+      // Damping is no level of the scene: its R follows M̄ only.
+      const R_own = own ? each(own.R, n).map((value, a) => value * (heavy ? M_bar[a] ** 2 : 1)) :
+        M_bar.map((value, a) => weights[index * n + a] * (heavy ? (value / before[a]) ** 2 : 1));
+      if (own) controller.set(Q, index, each(own.Q, rows));
+      if (strict) controller.set(R, index, R_own);
+      if (own && strict) controller.set(ENABLED, index, [Number(own.enabled)]);
+    }
+    for (const { name, K_p, K_v } of scene.tasks) {
+      const { index, rows } = named(manifest.tasks, name, "task");
+      controller.set(GAINS, index, [...each(K_p, rows), ...each(K_v, rows)]);
+    }
   }
 
   /** Goes on with a controller of another order or N: himpc/tick/tick.py, `recall`. */
@@ -228,13 +211,7 @@ export class Session {
     [this.controller, this.manifest] = this.controllerFor(key);
     this.key = key;
     const now = this.controller, f = (name: string): [Float64Array, Float64Array] => [old.view(name), now.view(name)];
-    this.sendM_bar(this.M_bar());
-    this.sendLimits();
-    for (const level of this.scene.levels) {
-      this.sendLevel(Q, level.name);
-      if (this.scene.controller !== "weighted") for (const what of [ENABLED, R]) this.sendLevel(what, level.name);
-      for (const task of level.tasks) this.sendGains(task.name);
-    }
+    this.send();
     now.reset(this.plant.tau);
     for (const name of ["q_was", "v_was", "limits", "scalars", "state"]) f(name)[1].set(f(name)[0]);
     const [was, path] = f("path"), [q_was] = f("q_was"), [v_was] = f("v_was");
@@ -267,7 +244,6 @@ export class Session {
     }
   }
 
-  delete(): void { this.plant.delete(); }
 }
 
 function named<T extends { name: string }>(list: T[], name: string, kind: string): T {

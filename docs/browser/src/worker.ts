@@ -2,46 +2,53 @@
 import loadMujoco from "@mujoco/mujoco";
 import { FALLBACKS, kernel } from "../../../himpc/export/files/himpc.mjs";
 import { split } from "./code";
-import { limit, unpacked, unwrapped, type Scenes, type StepData } from "./data";
-import type { Call, Open, Opened, Told, Verdict } from "./messages";
+import { limit, unwrapped, type MeasureData, type Pack, type RobotData, type Scenes, type StepData } from "./data";
 import { measured } from "./rows";
 import { Session, type Tools } from "./session";
 
 const FRAME_MS = 1000 / 60, BUSY_MS = 14, CURVE_S = 0.008;
 const NAMES = ["torque", "velocity", "position"];
-const post = (told: Told, moved: Transferable[] = []): void => (self as unknown as Worker).postMessage(told, moved);
 
-let tools: Omit<Tools, "image">;
+export interface Open { scenes: Pack<Scenes>; robot: RobotData; step: string | null; assignments: string[] }
+export interface Verdict { claims: number[]; prediction: number }
+/** What a figure draws of a moment; curves: t, then errors of the tasks, torques and speeds over their bounds. */
+export interface Frame {
+  t: number; running: boolean; poses: Float32Array; ghost: Float32Array | null; objects: Float32Array;
+  curves: number[]; width: number; targets: { task: string; value: Float64Array }[]; binding: string[];
+  fallback: string; speed: number; us: number; order: string[]; off: string[]; horizon: number;
+  lost: boolean; restarted: boolean;
+}
+/** What the simulation says by itself. */
+export type Told = { frame: Frame } | { verdict: Verdict } | { error: string };
+// MuJoCo frees its objects by this name, which Safari does not have yet.
+(Symbol as { dispose?: symbol }).dispose ??= Symbol.for("Symbol.dispose");
+const post = (told: Told | { answer: unknown } | { refusal: string }): void => (self as unknown as Worker).postMessage(told);
+
+let tools: Omit<Tools, "scenes">;
 let session: Session, ghost: Session | null = null, step: StepData | null = null;
-let running = false, judged = false, due = 0, last = 0, speed = 1, us = 0, drawn = 0, restarted = true, timer = 0;
+let running = false, judged = false, due = 0, last = 0, speed = 1, us = 0, curves: number[] = [], restarted = true, timer = 0;
 
 /** What a page may call; each call ends before the next begins. */
 const simulation = {
   /** Loads MuJoCo, compiled while it is decompressed, and the kernel; returns the version of MuJoCo. */
   async load(mujoco: string, controller: string): Promise<string> {
     const compiled = WebAssembly.compileStreaming(unwrapped(mujoco));
-    const create = await kernel(await unwrapped(controller).arrayBuffer()), module = await compiled;
+    const create = await kernel(await (await unwrapped(controller)).arrayBuffer()), module = await compiled;
     const instantiateWasm = async (imports: WebAssembly.Imports, done: (made: WebAssembly.Instance) => void): Promise<void> =>
       done(await WebAssembly.instantiate(module, imports));
     tools = { create, mj: await loadMujoco({ instantiateWasm }) };
     return tools.mj.mj_versionString();
   },
 
-  async open({ scenes, robot, step: number, assignments }: Open): Promise<Opened> {
-    const pack = await unpacked<Scenes>(scenes);
-    const whole: Tools = { ...tools, image: (scene, key) => pack.piece(scene.images[key].memory) };
-    session?.delete();
-    ghost?.delete();
-    step = number === null ? null : pack.told.steps![number];
-    const scene = step ? step.scene : pack.told.scene!;
-    session = new Session(whole, scene, robot);
-    ghost = step?.ghost ? new Session(whole, step.ghost, robot) : null;
-    for (const each of assignments) change(...split(each));
+  open({ scenes, robot, step: number, assignments }: Open): void {
+    const whole: Tools = { ...tools, scenes };
     running = false;
-    restart();
-    const units = new Map(scene.levels.flatMap((level) => level.tasks).map((task) => [task.name, task.unit]));
-    const tasks = session.manifest.tasks.filter((task) => units.has(task.name));
-    return { scene, step, tasks: tasks.map(({ name, target }) => ({ name, target, unit: units.get(name)! })) };
+    for (const each of session ? both() : []) each.plant.delete();
+    step = number === null ? null : scenes.told.steps![number];
+    session = new Session(whole, step ? step.scene : scenes.told.scene!, robot);
+    ghost = step?.ghost ? new Session(whole, step.ghost, robot) : null;
+    for (const each of assignments) simulation.set(...split(each));
+    simulation.reset();
   },
 
   run(): void {
@@ -51,8 +58,16 @@ const simulation = {
     loop();
   },
   pause(): void { running = false; },
-  reset(): void { restart(); },
-  set(path: string, value: unknown): void { change(path, value); },
+  reset(): void {
+    for (const each of both()) each.reset();
+    [judged, restarted, curves] = [false, true, []];
+    pace();
+  },
+  /** A setting of the run and of its ghost, unless it is one by which they differ. */
+  set(path: string, value: unknown): void {
+    session.set(path, value);
+    if (ghost && !step!.ghost_set.includes(path)) ghost.set(path, value);
+  },
   target(task: string, value: number[]): void {
     for (const each of both()) each.move(task, value);
   },
@@ -62,7 +77,7 @@ const simulation = {
 
   /** The torques of so many periods from the start, row by row, and what they are judged to be. */
   replay(ticks: number): { tau: Float64Array } & Verdict {
-    restart();
+    simulation.reset();
     const n = session.plant.n, tau = new Float64Array(ticks * n);
     for (let k = 0; k < ticks; k++) {
       advance();
@@ -75,31 +90,23 @@ export type Simulation = typeof simulation;
 
 const both = (): Session[] => (ghost ? [session, ghost] : [session]);
 
-function restart(): void {
-  for (const each of both()) each.reset();
-  judged = false;
-  drawn = 0;
-  restarted = true;
-  pace();
-}
-
 function pace(): void {
   [due, last, speed] = [0, performance.now(), 1];
 }
 
-/** A setting of the run and of its ghost, unless it is one by which they differ. */
-function change(path: string, value: unknown): void {
-  session.set(path, value);
-  if (ghost && !step!.ghost_set.includes(path)) ghost.set(path, value);
-}
-
+/** One period, and what the plots show of it. */
 function advance(): void {
+  const { rows, scene, robot } = session, at = (name: string): number[] => [...rows.at(-1, name)];
   session.tick();
   while (ghost && ghost.t + ghost.scene.period <= session.t + 1e-6) ghost.tick();
+  if ((session.ticks - 1) % Math.max(1, Math.round(CURVE_S / scene.period))) return;
+  curves.push(...at("t"), ...scene.tasks.map((task) => Math.hypot(...at(`error/${task.name}`))),
+    ...at("tau").map((value, a) => value / limit(robot.tau_limit[a])),
+    ...at("v").map((value, a) => value / limit(robot.v_limit[a])));
 }
 
 function verdict(): Verdict {
-  const of = (measure: StepData["claims"][0]["measure"]): number => measured(measure, session.rows, ghost?.rows ?? null);
+  const of = (measure: MeasureData): number => measured(measure, session.rows, ghost?.rows ?? null);
   return { claims: step ? step.claims.map((claim) => (claim.live ? of(claim.measure) : NaN)) : [],
     prediction: step?.prediction ? of(step.prediction.measure) : NaN };
 }
@@ -135,32 +142,22 @@ function loop(): void {
 }
 
 function show(): void {
-  const { rows, plant, scene, robot, manifest } = session, n = plant.n;
-  const tasks = manifest.tasks.filter((task) => rows.has(`error/${task.name}`));
-  const every = Math.max(1, Math.round(CURVE_S / scene.period)), total = rows.count + rows.gone, curves: number[] = [];
-  for (let k = Math.ceil(Math.max(drawn, rows.gone) / every) * every; k < total; k += every) {
-    const at = (name: string): number[] => [...rows.at(k - rows.gone, name)];
-    curves.push(...at("t"), ...tasks.map((task) => Math.hypot(...at(`error/${task.name}`))),
-      ...at("tau").map((value, a) => value / limit(robot.tau_limit[a])),
-      ...at("v").map((value, a) => value / limit(robot.v_limit[a])));
-  }
-  drawn = total;
+  const { rows, plant, scene, order, horizon, lost, t } = session;
   const binding = (rows.count ? [...rows.at(-1, "at_bound")] : []).flatMap((bits, a) =>
     NAMES.filter((_, k) => bits > 0 && bits & (1 << k)).map((name) => `joint ${a + 1}: ${name}`));
-  const targets = manifest.tasks.flatMap(({ name: task, target: kind }) => {
-    const value = session.target(task);
-    return value ? [{ task, kind, value: [...value] }] : [];
-  });
-  post({ frame: { t: session.t, running, poses: plant.poses(), ghost: ghost?.plant.poses() ?? null, targets, binding,
-    curves: Float32Array.from(curves), width: 1 + tasks.length + 2 * n, fallback: FALLBACKS[session.fallback], speed, us,
-    order: session.order, horizon: session.horizon, lost: session.lost, restarted } });
-  restarted = false;
+  const targets = scene.tasks.filter(({ target }) => target === "position")
+    .map(({ name }) => ({ task: name, value: session.target(name) }));
+  const off = scene.levels.filter((level) => !level.enabled).map((level) => level.name);
+  post({ frame: { t, running, poses: plant.poses(), ghost: ghost?.plant.poses() ?? null, objects: plant.objects(), targets,
+    binding, curves, width: 1 + scene.tasks.length + 2 * plant.n, fallback: FALLBACKS[session.fallback], speed, us, order,
+    off, horizon, lost, restarted } });
+  [restarted, curves] = [false, []];
 }
 
 let turn = Promise.resolve();
-self.onmessage = ({ data: { id, name, given } }: MessageEvent<Call>) => {
-  turn = turn.then(() => (simulation[name] as (...given: unknown[]) => unknown)(...given)).then((value) => {
-    post({ id, value });
+self.onmessage = ({ data: { name, given } }: MessageEvent<{ name: keyof Simulation; given: unknown[] }>) => {
+  turn = turn.then(() => (simulation[name] as (...given: unknown[]) => unknown)(...given)).then((answer) => {
     if (!running && name !== "load") show();
-  }).catch((error: Error) => post({ id, error: error.message ?? String(error) }));
+    post({ answer });
+  }).catch((error: Error) => post({ refusal: error.message ?? String(error) }));
 };

@@ -13,8 +13,9 @@ const himpcLoad = (root, names) => Promise.all(["live", ...names].map((name) => 
 async function himpcFigure(place, { root, pack, file, robot, step, assignments, wide }) {
   if (typeof WebAssembly !== "object" || typeof DecompressionStream !== "function")
     throw new Error("this browser has no WebAssembly or cannot decompress; the recording shows the same run");
-  await himpcLoad(root, ["mujoco", "kernel", `robot-${robot}`, file]);
-  return HIMPC.open(place, { pack, robot, step, assignments, wide, running: wide && !HIMPC.calm() });
+  const loaded = himpcLoad(root, ["mujoco", "kernel"]);
+  await himpcLoad(root, [`robot-${robot}`, file]);
+  return HIMPC.open(place, { pack, robot, step, assignments, wide, loaded, running: wide && !HIMPC.calm() });
 }
 
 document.addEventListener("click", (event) => {
@@ -22,22 +23,19 @@ document.addEventListener("click", (event) => {
   if (button) himpcStep(button, []);
 });
 async function himpcStep(button, assignments) {
-  const [file, step, robot] = button.dataset.live.split("/"), figure = button.closest("figure"), words = button.textContent;
-  button.disabled = true;
-  button.textContent = "Loading: the controller and MuJoCo, about 3 MB …";
-  const place = document.createElement("div");
+  const [file, step, robot] = button.dataset.live.split("/"), figure = button.closest("figure");
+  const place = Object.assign(document.createElement("div"), { textContent: "Loading: the controller and MuJoCo, about 2 MB …" });
+  // One figure runs at a time; the place of an earlier one has its button again.
+  for (const other of document.querySelectorAll("figure.live.open")) other.replaceChildren(...other.himpcBefore), other.classList.remove("open");
+  figure.himpcBefore = [...figure.childNodes];
+  figure.classList.add("open");
+  figure.replaceChildren(place);
   try {
     await himpcFigure(place, { root: button.dataset.root, pack: `lesson/${file}`, file, robot, step, assignments, wide: false });
-    // One figure runs at a time; the place of an earlier one has its button again.
-    for (const other of document.querySelectorAll("figure.live.open")) other.replaceChildren(...other.himpcBefore), other.classList.remove("open");
-    figure.himpcBefore = [...figure.childNodes];
-    figure.classList.add("open");
-    figure.replaceChildren(place);
   } catch (error) {
-    figure.append(Object.assign(document.createElement("p"), { textContent: `This did not work: ${error.message}.` }));
+    figure.classList.remove("open");
+    figure.replaceChildren(...figure.himpcBefore, Object.assign(document.createElement("p"), { textContent: `This did not work: ${error.message}.` }));
   }
-  button.disabled = false;
-  button.textContent = words;
 }
 // A link with the code of a step opens it.
 document.addEventListener("DOMContentLoaded", async () => {
