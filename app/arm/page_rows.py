@@ -36,11 +36,6 @@ class PageRows:
             ("v_limit", limits.v),
             ("q_lower", limits.q_lower),
             ("q_upper", limits.q_upper),
-            ("at_bound", 0.0),
-            ("contact_depth", 0.0),
-            ("contact_force", 0.0),
-            ("unsolved", 0.0),
-            ("iterations", 0.0),
         ):
             self._row[fields[name]] = value
 

@@ -272,5 +272,5 @@ class Shown:
             binding=(),
             notices=notices,
             settings=None if told else self._session.settings,
-            arm=ArmView(self._missed, self._begun, self._ended),
+            arm=ArmView(self._missed, self._begun, self._ended, max(0.0, self._t - self._reached)),
         )

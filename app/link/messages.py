@@ -162,12 +162,13 @@ class TaskView:
 
 @dataclass(frozen=True)
 class ArmView:
-    """An arm instead of a simulation. missed: periods without a torque of ours, in all; begun: whether it has
-    been taken over; ended: why it was stopped, "" before that."""
+    """An arm. missed: periods without a torque of ours, in all; begun: whether it has been taken over; ended:
+    why it was stopped, "" before that; behind: s, by which its ghost is late."""
 
     missed: int
     begun: bool
     ended: str
+    behind: float
 
 
 @dataclass(frozen=True)

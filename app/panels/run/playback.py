@@ -24,6 +24,7 @@ from lessons.settings.settings import SceneSettings
 
 _PAUSE, _RUN, _STEP, _RESET, _RESET_ALL = "Pause", "Run", "Step", "Reset", "Reset all"
 _STOP = "Stop gently"
+_LATE = 0.5  # s by which the ghost of an arm may be late without a word
 
 
 class PlaybackPanel:
@@ -138,9 +139,10 @@ class PlaybackPanel:
 
 def _of_arm(status: Status, arm: ArmView) -> str:
     """The status line of an arm."""
-    missed = "1 period missed" if arm.missed == 1 else f"{arm.missed} periods missed"
     if not arm.begun:
         return f"{badge('ARM', LEVELS[1])} &nbsp;at rest: Run takes it over, and it holds where it is"
     state = badge("ARM STOPPED", BAD) if arm.ended else badge("ARM RUNNING", GOOD)
-    line = f"{state} &nbsp;t = {status.t:.2f} s &nbsp;·&nbsp; {missed} of {status.ticks + arm.missed}"
-    return f"{line}<br>stopped: {esc(arm.ended)}" if arm.ended else f"{line}"
+    line = f"{state} &nbsp;t = {status.t:.2f} s<br>{arm.missed} of {status.ticks + arm.missed} periods missed"
+    if arm.behind > _LATE and not arm.ended:
+        line += f" &nbsp;·&nbsp; simulation {arm.behind:.1f} s behind"
+    return f"{line}<br>stopped: {esc(arm.ended)}" if arm.ended else line

@@ -41,7 +41,7 @@ def test_an_arm_and_its_simulation_on_a_page(browser: Browser, program: subproce
     expect(page.get_by_text("Start lesson 1")).to_have_count(0)
     press(page, "Run")
     expect(page.get_by_text("ARM RUNNING")).to_be_visible()
-    expect(page.get_by_text("0 periods missed of")).to_be_visible()
+    expect(page.get_by_text("periods missed")).to_be_visible()
     assert eventually(page, lambda: is_drawn(page, "/ghost/1"))
     expect(page.get_by_text("position [mm], ghost")).to_be_visible()
     page.get_by_text("Move a target by keys").click()
