@@ -21,7 +21,7 @@ from app.arm.drive import Drive, Driven, drive
 from app.arm.guard import Tolerances
 from app.arm.loop import Columns
 from app.arm.model import Model
-from app.arm.shown import DEAF, LEFT, ONLY_TARGETS, PRESSED, STOPPED, Shown
+from app.arm.shown import DEAF, GONE, LEFT, ONLY_TARGETS, PRESSED, STOPPED, Shown
 from app.client.moment import moment_of
 from app.client.simulation_client import ARM_AGAIN, ARM_GHOST, SimulationClient
 from app.link.children import forked_here
@@ -186,6 +186,7 @@ def test_a_page_that_hangs_delays_nothing(bench: Bench) -> None:
     at = Columns.of(7, bench.make().view("error").size)
     tolerances = replace(PATIENT, silent=DEAF - 1.0)
     ours, theirs = socket.socketpair()
+    theirs.settimeout(10.0)  # a watcher that waits for the page would else hang here
     theirs.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 8192)
     plan, model = plan_of(bench, partial(blocked_counts, last=[], periods=None), tolerances, 4 * T_S)
     shown = Shown(Wire(theirs), CHOICE, bench.prepared(bench.scene), T_S)
@@ -197,7 +198,9 @@ def test_a_page_that_hangs_delays_nothing(bench: Bench) -> None:
     cycles, missed = published(hung, at)
     assert cycles > 100
     plan, model = plan_of(bench, partial(blocked_counts, last=[], periods=cycles - 1), tolerances, 4 * T_S)
-    assert published(drive(plan, model, lambda text: None), at) == (cycles, missed)
+    cycles_alone, missed_alone = published(drive(plan, model, lambda text: None), at)
+    assert cycles == cycles_alone
+    assert missed <= missed_alone + 3  # a slow disk may stop either loop now and then
     ours.close()
     theirs.close()
 
@@ -206,21 +209,16 @@ def test_an_arm_stops_when_its_page_s_program_is_killed(bench: Bench, tmp_path: 
     """The process that watches the arm outlives it for as long as it takes to stop the arm gently."""
     begun, over = tmp_path / "begun", tmp_path / "over"
 
-    class Noting(Scripted):
-        def stop(self) -> None:
-            super().stop()
-            over.write_text(str(np.abs(self.plant.v).max()))
-
     def note(k: int, arm: Scripted) -> None:
         if k == 5:
             begun.touch()
 
     def watch(wire: Wire) -> None:
-        plan, model = plan_of(bench)
-        plan = replace(plan, arm=lambda: Noting(bench.plant(), note, T_S))
+        plan, model = plan_of(bench, note)
         shown = Shown(wire, CHOICE, bench.prepared(bench.scene), T_S)
         if shown.wait_for_start():
-            drive(plan, model, lambda text: None, shown)
+            driven = drive(plan, model, lambda text: None, shown)
+            over.write_text(f"{driven.why}, {driven.gently}")
 
     def serve() -> None:
         process = Process(partial(forked_here, watch))
@@ -233,4 +231,4 @@ def test_an_arm_stops_when_its_page_s_program_is_killed(bench: Bench, tmp_path: 
     server.kill()
     server.join()
     assert wait_until(lambda: over.exists() and over.read_text() != "", LONG)
-    assert float(over.read_text()) < 1e-3
+    assert over.read_text() == f"{GONE}, True"
