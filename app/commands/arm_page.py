@@ -60,5 +60,9 @@ def drive_on_a_page(
         return watching[-1]
 
     room = Classroom(choice, all_steer=True, arm=Process(start))
-    serve(choice, port=port, open_browser=open_browser, room=room, over=lambda: room.deserted)
+    try:
+        serve(choice, port=port, open_browser=open_browser, room=room, over=lambda: room.deserted)
+    except BaseException:
+        room.close()
+        raise
     return watching[-1].exitcode or 0

@@ -44,6 +44,7 @@ def test_the_command_drives_and_records(tmp_path: Path, capsys: pytest.CaptureFi
     [
         (["panda-hold", "--robot", "simulated", "--duration", "0"], "--duration is 0.0 s"),
         (["panda-hold", "--robot", "simulated", "--distance", "nan"], "--distance is nan"),
+        (["panda-hold", "--robot", "simulated", "--missed-share", "2"], "--missed-share is 2.0"),
         (["iiwa14-htmpc", "--robot", "simulated"], "driven by velocities"),
         (["panda-hold", "--robot", "simulated", "--drag", "1:hand=0,0,0"], "task with a target"),
         (["panda-hold", "--robot", "simulated", "--drag", "soon"], "cannot be read"),

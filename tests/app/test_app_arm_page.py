@@ -21,21 +21,24 @@ from app.arm.drive import Drive, Driven, drive
 from app.arm.guard import Tolerances
 from app.arm.loop import Columns
 from app.arm.model import Model
+from app.arm.prepared import nominal, prepared
 from app.arm.shown import DEAF, GONE, LEFT, ONLY_TARGETS, PRESSED, STOPPED, Shown
 from app.client.moment import moment_of
 from app.client.simulation_client import ARM_AGAIN, ARM_GHOST, SimulationClient
 from app.link.children import forked_here
 from app.link.choice import SceneChoice
 from app.link.forkserver import ForkServer
-from app.link.messages import ArmView, PageLeft, Play, Post, Quit, Status, StepTicks
+from app.link.messages import ArmView, Begin, PageLeft, Play, Post, Quit, Status, StepTicks
 from app.link.process import Process, wait_until
 from app.link.spares import Spares
 from app.link.wire import Wire
 from app.server.sessions import WORKER
+from app.worker.ghost import GhostBody
 from lessons.events import MoveTarget, Reset, Set
 from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.lesson import Ghost
 from robots.processes.isolation import waited
+from robots.simulated_arm import SimulatedArm
 
 CHOICE = SceneChoice(RunSpec("panda-hold"))
 LONG = 60.0  # s
@@ -232,3 +235,31 @@ def test_an_arm_stops_when_its_page_s_program_is_killed(bench: Bench, tmp_path: 
     server.join()
     assert wait_until(lambda: over.exists() and over.read_text() != "", LONG)
     assert over.read_text() == f"{GONE}, True"
+
+
+def test_the_simulation_knows_nothing_of_the_arm_but_where_it_is(bench: Bench) -> None:
+    """`--set plant.…` describes the arm alone; the ghost begins at rest in the measured pose, and nothing
+    pulls it down."""
+    loaded = bench.scene
+    heavy = replace(loaded.settings, plant=replace(loaded.settings.plant, payload_kg=3.0))
+    start = loaded.q_0 + 0.1
+    ready = prepared(
+        nominal(replace(loaded, settings=heavy), loaded), start, SimulatedArm(bench.plant()).limits, ()
+    )
+    assert np.abs(ready.plant.holding_torque() - torque_without_a_payload(bench, start)).max() < 1e-9
+    ghost = GhostBody(Begin(CHOICE, ready.session.settings, start), ())
+    try:
+        assert np.array_equal(ghost.body.session.plant.q, start)
+        ghost.driver.hear((), 0.05)
+        while ghost.catch_up(0.0):
+            pass
+        assert np.abs(ghost.body.session.plant.q - start).max() < 1e-9
+    finally:
+        ghost.body.close()
+
+
+def torque_without_a_payload(bench: Bench, q: np.ndarray) -> np.ndarray:
+    """What holds the arm of the description at q, without a payload."""
+    plant = bench.plant()
+    plant.reset(q)
+    return plant.holding_torque()
