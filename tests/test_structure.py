@@ -112,14 +112,14 @@ APP = {
     "view": ("client", "html", "link", "adapter"),
     "client": ("html", "link"),
     "worker": ("link",),
-    "arm": ("link",),
+    "arm": ("worker", "link"),
     "link": (),
     "html": (),
     "adapter": (),
 }
 """The folders that each folder of app/ may import beside itself: page and simulation meet only in `link`.
 Only the server imports both; it passes the entry point of the simulation on. The loop of a real arm stands
-beside the simulation."""
+beside the simulation, whose reports it uses."""
 
 
 def test_app_is_the_folders_it_says() -> None:

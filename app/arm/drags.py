@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +31,7 @@ def drags_of(texts: Sequence[str], session: TorqueSession, manifest: dict[str, A
         InputError: a text cannot be read, or names a task without a target that can be dragged.
     """
     tasks = {each["name"]: each for each in manifest["tasks"]}
-    movable = [name for name, each in tasks.items() if each["target"] in _MOVED]
+    movable = [name for name, each in tasks.items() if each["target"] in KINDS]
     places: dict[str, Array] = {}
     found = []
     for t, name, moved, text in sorted((_read(each) for each in texts), key=lambda each: each[0]):
@@ -43,9 +43,9 @@ def drags_of(texts: Sequence[str], session: TorqueSession, manifest: dict[str, A
         size = 3 if tasks[name]["target"] != "joints" else raw.size
         if moved.size != size:
             raise InputError(f"--drag {text} has {moved.size} numbers: task '{name}' takes {size}")
-        task = next(each for level in session.settings.levels for each in level.tasks if each.name == name)
-        places[name], values = _MOVED[tasks[name]["target"]](task, raw, moved)
-        found.append(Drag(t, Order(tasks[name]["index"], values)))
+        task, kind = _task(session, name), KINDS[tasks[name]["target"]]
+        places[name] = kind.move(task, raw, moved)
+        found.append(Drag(t, Order(tasks[name]["index"], kind.values(task, places[name]))))
     return found
 
 
@@ -61,21 +61,44 @@ def _read(text: str) -> tuple[float, str, Array, str]:
     return t, name, moved, text
 
 
-def _position(task: Any, raw: Array, moved: Array) -> tuple[Array, Array]:
-    """The new raw target, and all three coordinates, of which the kernel takes those of the task."""
-    where = getattr(task, "components", slice(raw.size))
+def order_to(session: TorqueSession, manifest: dict[str, Any], name: str) -> Order | None:
+    """Returns the order that moves the target of a task to where it is in the session; None for a task
+    without a target that an arm can be given."""
+    (entry,) = (each for each in manifest["tasks"] if each["name"] == name)
+    target = session.target(name)
+    if target is None or entry["target"] not in KINDS:
+        return None
+    return Order(entry["index"], KINDS[entry["target"]].values(_task(session, name), target.raw))
+
+
+def _task(session: TorqueSession, name: str) -> Any:
+    return next(each for level in session.settings.levels for each in level.tasks if each.name == name)
+
+
+def _place(task: Any, raw: Array) -> Array:
+    """All three coordinates, of which the kernel takes those of the task."""
     full = np.zeros(3)
-    full[where] = raw + moved[where]
-    return full[where], full
+    full[_components(task, raw)] = raw
+    return full
 
 
-def _orientation(task: Any, raw: Array, moved: Array) -> tuple[Array, Array]:
-    turned = exp3(moved) @ raw
-    return turned, np.array(quaternion(turned))
+def _components(task: Any, raw: Array) -> Any:
+    return getattr(task, "components", slice(raw.size))
 
 
-def _joints(task: Any, raw: Array, moved: Array) -> tuple[Array, Array]:
-    return raw + moved, raw + moved
+class Kind(NamedTuple):
+    """A kind of target. move: (task, raw target, how far) → new raw target; values: (task, raw target) →
+    values of an order."""
+
+    move: Callable[[Any, Array, Array], Array]
+    values: Callable[[Any, Array], Array]
 
 
-_MOVED = {"position": _position, "orientation": _orientation, "joints": _joints}
+KINDS = {
+    "position": Kind(lambda task, raw, moved: raw + moved[_components(task, raw)], _place),
+    "orientation": Kind(
+        lambda task, raw, moved: exp3(moved) @ raw, lambda task, raw: np.array(quaternion(raw))
+    ),
+    "joints": Kind(lambda task, raw, moved: raw + moved, lambda task, raw: raw),
+}
+"""By the word of the manifest."""

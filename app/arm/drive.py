@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from app.arm.audience import Audience
 from app.arm.bounded import STUCK, Bounded
 from app.arm.guard import Tolerances
 from app.arm.loop import ASKED, Columns, Ended, run
@@ -27,6 +28,7 @@ Array = NDArray[np.float64]
 
 _LOOK = 0.02
 """s between two looks at the loop."""
+_AT_ONCE = 100  # rows between two looks at the page
 _PRIORITY = 50
 _PATIENCE = 4.0
 """s that a loop gets to end after it was told to; its own end takes at most 2."""
@@ -87,7 +89,9 @@ class Driven(NamedTuple):
     tau_model: Array
 
 
-def drive(plan: Drive, model: Model, tell: Callable[[str], None] = print) -> Driven:
+def drive(
+    plan: Drive, model: Model, tell: Callable[[str], None] = print, audience: Audience | None = None
+) -> Driven:
     """Drives the arm for a time, or until something ends it. An interrupt from the keyboard stops the arm
     gently, and the drive returns.
 
@@ -95,8 +99,9 @@ def drive(plan: Drive, model: Model, tell: Callable[[str], None] = print) -> Dri
         plan: see there.
         model: the simulated robot beside it.
         tell: is told what happens, a sentence at a time.
+        audience: a page, if there is one.
     """
-    watcher = _Watcher(plan, model, tell)
+    watcher = _Watcher(plan, model, tell, audience)
     try:
         watcher.watch()
     except KeyboardInterrupt:
@@ -112,8 +117,10 @@ def drive(plan: Drive, model: Model, tell: Callable[[str], None] = print) -> Dri
 class _Watcher:
     """The state of a drive between two looks at the loop."""
 
-    def __init__(self, plan: Drive, model: Model, tell: Callable[[str], None]) -> None:
-        self._plan, self._model, self._tell = plan, model, tell
+    def __init__(
+        self, plan: Drive, model: Model, tell: Callable[[str], None], audience: Audience | None
+    ) -> None:
+        self._plan, self._model, self._tell, self._audience = plan, model, tell, audience
         controller = plan.controller()
         self._at = Columns.of(controller.n, controller.view("error").size)
         self._orders = Orders(len(controller.manifest["tasks"]))
@@ -124,6 +131,7 @@ class _Watcher:
         self._applied = 0
         self._rows: list[tuple[Array, Array, Array]] = []
         self._count = 0
+        self._behind = False
         self._ended: Ended | None = None
         self._first: float | None = None
         self._said = 1.0
@@ -134,14 +142,25 @@ class _Watcher:
         drags = list(self._plan.drags)
         while self._child.is_alive():
             self._orders.beat()
-            over = self._pipe.poll(_LOOK)
+            over = self._pipe.poll(0.0 if self._behind else _LOOK)
             t = self._look()
             while drags and drags[0].t <= t:
                 self._give(drags.pop(0).order)
+            self._attend()
             if t >= self._plan.duration:
                 self.ask(f"the {self._plan.duration:g} s are over", True)
             if over:
                 break
+
+    def _attend(self) -> None:
+        """Does what the audience wishes."""
+        if self._audience is None:
+            return
+        for order in self._audience.look():
+            self._give(order)
+        wish = self._audience.wish()
+        if wish is not None:
+            self.ask(wish, True)
 
     def ask(self, why: str, wanted: bool = False) -> None:
         """Asks the loop to end gently; wanted: whether nothing is wrong."""
@@ -155,6 +174,9 @@ class _Watcher:
         while self._child.is_alive() and time.monotonic() < until:
             self._orders.beat()
             self._child.join(_LOOK)
+            self._look()
+            if self._audience is not None:
+                self._audience.look()
         with contextlib.suppress(EOFError):
             if self._pipe.poll():
                 self._ended = self._pipe.recv()
@@ -162,6 +184,8 @@ class _Watcher:
             self._child.kill()
             self._child.join()
         self._look()
+        while self._behind:
+            self._look()
 
     def result(self) -> Driven:
         n = len(self._plan.start)
@@ -178,11 +202,14 @@ class _Watcher:
     def _give(self, order: Order) -> None:
         self._orders.drag(order)
         self._given.append(order)
+        if self._audience is not None:
+            self._audience.given(order)
 
     def _look(self) -> float:
         """Reads the new rows and moves the model on; returns the time of the last row since the first, s."""
         first, rows = self._block.since(self._count)
-        for place, row in enumerate(rows):
+        self._behind = len(rows) > _AT_ONCE
+        for place, row in enumerate(rows[:_AT_ONCE]):
             self._orders.beat()
             self._beside(row)
             self._count = first + place + 1
@@ -205,6 +232,8 @@ class _Watcher:
                 joint = int(np.argmax(away))
                 self.ask(f"joint {joint + 1} is {away[joint]:.2f} rad away from the model")
         self._rows.append((row, model.q, model.tau))
+        if self._audience is not None:
+            self._audience.see(t, row, model)
         if t >= self._said:
             self._said += 1.0
             self._say(t)
@@ -230,13 +259,18 @@ def _started(plan: Drive, controller: NativeController, orders: Orders, block: B
     return ours, child
 
 
+def hurry(priority: int) -> None:
+    """Asks for real-time scheduling of this process, where that is allowed."""
+    with contextlib.suppress(OSError, AttributeError):
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+
+
 def _work(plan: Drive, controller: NativeController, orders: Orders, block: Block, pipe: Any) -> None:
     """The process of the loop. Interrupts are for the watcher, who then asks the loop to end gently."""
     signal.set_wakeup_fd(-1)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, lambda *_: orders.stop())
-    with contextlib.suppress(OSError, AttributeError):
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_PRIORITY))
+    hurry(_PRIORITY)
     try:
         arm = Bounded(plan.arm(), plan.stuck)
         ended = run(

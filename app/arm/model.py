@@ -24,6 +24,7 @@ class Model:
 
     Attributes:
         q, tau: of the simulated robot, (n,) rad and N·m (without gravity).
+        x_d, R_d: where the dragged targets are on their way, per row and per task (m, rad; rotations).
     """
 
     def __init__(self, plant: Plant, controller: NativeController, limits: ArmLimits, period: float) -> None:
@@ -34,6 +35,7 @@ class Model:
         controller.set(LIMITS, 0, [*limits.tau, *limits.v, *limits.q_lower, *limits.q_upper])
         controller.reset()
         self.q, self.tau = plant.q, np.zeros(controller.n)
+        self.x_d, self.R_d = controller.view("x_d"), controller.view("R_d")
         self._periods = 0
 
     def take(self, order: Order) -> None:

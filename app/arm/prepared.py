@@ -27,12 +27,14 @@ _NEAR = 0.05
 
 class Prepared(NamedTuple):
     """What a drive needs of a scene: the exported controller, the limits in force, the simulated robot that
-    stands where the arm does, and the drags."""
+    stands where the arm does, the drags, and a session that begins there: its simulation has no gravity, as
+    the arm compensates its own."""
 
     image: Image
     limits: ArmLimits
     plant: Plant
     drags: list[Drag]
+    session: TorqueSession
 
 
 def prepared(scene: TorqueScene, start: Array, limits: ArmLimits, texts: Sequence[str]) -> Prepared:
@@ -55,12 +57,19 @@ def prepared(scene: TorqueScene, start: Array, limits: ArmLimits, texts: Sequenc
                 f"joint '{name}' of the arm is at {q:.3f} rad, outside {low:.3f} … {high:.3f} rad: "
                 "move the arm by hand into the range"
             )
-    rest = replace(scene, q_0=start, v_0=np.zeros(robot.n), tau_0=None, events=())
+    weightless = replace(scene.settings, plant=replace(scene.settings.plant, gravity=False))
+    rest = replace(scene, settings=weightless, q_0=start, v_0=np.zeros(robot.n), tau_0=None, events=())
     session = TorqueSession(rest)
     image = image_of(session.controller, robot, session.references)
     plant = Plant(robot, scene.settings.plant, scene.settings.T_s, scene.world)
     plant.reset(start)
-    return Prepared(image, force, plant, drags_of(texts, session, image.manifest))
+    return Prepared(image, force, plant, drags_of(texts, session, image.manifest), session)
+
+
+def nominal(scene: TorqueScene, plain: TorqueScene) -> TorqueScene:
+    """Returns a scene with another one's plant: `--set plant.…` describes a simulated arm, of which the
+    simulation beside it knows nothing."""
+    return replace(scene, settings=replace(scene.settings, plant=plain.settings.plant))
 
 
 def check_start(controller: NativeController, start: Array) -> None:

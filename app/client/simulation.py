@@ -54,7 +54,7 @@ class Simulation(ABC):
         self._start()
 
     def _start(self) -> None:
-        process = self._process = self._spares.take()
+        process = self._process = self._source()
         self._loading = False
 
         def hear(report: Report) -> None:
@@ -62,6 +62,10 @@ class Simulation(ABC):
             self._heard(process, report)
 
         process.listen(hear)
+
+    def _source(self) -> Process:
+        """A process to start with."""
+        return self._spares.take()
 
     @property
     def pid(self) -> int | None:

@@ -6,6 +6,7 @@ import os
 import time
 from collections import deque
 from contextlib import suppress
+from dataclasses import replace
 from queue import Empty, Queue
 from typing import TYPE_CHECKING, final
 
@@ -39,6 +40,10 @@ if TYPE_CHECKING:
 BEHIND = 5
 """How much lower than the server's the priority of a robot is that gives way."""
 STAYING = "Your teacher keeps the class at this step: wait for the next one."
+ARM_AGAIN = "An arm is driven once: end this program and start himpc-lab arm again."
+ARM_GHOST = "The ghost of an arm is its simulation, which gets the same targets: there is no other one."
+SIMULATION = "simulation"
+"""The name of the ghost of an arm."""
 WAITING = "Your teacher runs this step for everybody: say what you expect, and wait."
 
 
@@ -48,7 +53,10 @@ class SimulationClient(Simulation):
 
     who = "The simulation"
 
-    def __init__(self, token: str, choice: SceneChoice, spares: Spares) -> None:
+    def __init__(self, token: str, choice: SceneChoice, spares: Spares, arm: Process | None = None) -> None:
+        """arm: watches an arm, in place of a simulation: no other process and no scene takes its place, and
+        its ghost is the simulation that gets the same targets."""
+        self._arm = arm
         self.token = token
         self.choice = self._start_choice = choice
         self.attached = False
@@ -66,11 +74,17 @@ class SimulationClient(Simulation):
         resets at the time of the request."""
         super().__init__(spares)
         self.send(Load(choice))
+        if arm is not None:
+            self._replace_ghost(SIMULATION, ())
+
+    def _source(self) -> Process:
+        return self._arm or super()._source()
 
     def trouble(self) -> Trouble | None:
         """The problem of the simulation or its ghost that the page should show; None if there is none."""
         ghost = self.ghost
-        return super().trouble() or (None if ghost is None else ghost.trouble())
+        found = super().trouble() or (None if ghost is None else ghost.trouble())
+        return found if found is None or self._arm is None else replace(found, offer=None)
 
     def load(self, choice: SceneChoice) -> None:
         """Loads another scene, in a new process if the present one is in trouble. A learner who is kept at a
@@ -112,6 +126,9 @@ class SimulationClient(Simulation):
     def _begin_anew(self, command: Load | ResetAll, choice: SceneChoice | None) -> None:
         """Sends the command, or starts a new process if the present one is in trouble, also if that one has
         just ended unnoticed."""
+        if self._arm is not None:
+            self._refuse(ARM_AGAIN)
+            return
         with self._lock:
             if self.trouble() is not None:
                 self.restart(choice)
@@ -122,6 +139,9 @@ class SimulationClient(Simulation):
     def restart(self, choice: SceneChoice | None = None) -> None:
         """Starts a new process with another scene, or with the last one. The old process ends, by force if it
         does not answer. Does not wait for either."""
+        if self._arm is not None:
+            self._refuse(ARM_AGAIN)
+            return
         with self._lock:
             if self._closed:
                 return
@@ -228,7 +248,10 @@ class SimulationClient(Simulation):
         """Starts a ghost: a second robot with `ghost.set` on top of the present settings, in the same scene.
         The scene starts again, so that both begin together. An existing ghost is replaced. If `ghost.set`
         does not fit the scene, a notice says so and there is no ghost."""
-        self._replace_ghost(ghost.words, ghost.set)
+        if self._arm is None:
+            self._replace_ghost(ghost.words, ghost.set)
+        else:
+            self._refuse(ARM_GHOST)
 
     def _replace_ghost(self, words: str, own: tuple[str, ...]) -> None:
         with self._lock:
@@ -244,6 +267,12 @@ class SimulationClient(Simulation):
 
     def stop_ghost(self) -> None:
         """Ends the ghost; the robot continues alone."""
+        if self._arm is None:
+            self._end_ghost()
+        else:
+            self._refuse(ARM_GHOST)
+
+    def _end_ghost(self) -> None:
         with self._lock:
             before, self.ghost = self.ghost, None
         self.send(Lead(False))
@@ -255,7 +284,7 @@ class SimulationClient(Simulation):
             if ghost is not self.ghost:
                 return
             self._notices.append(f"There is no ghost: {sentence}")
-        self.stop_ghost()
+        self._end_ghost()
 
     def close(self) -> None:
         super().close()

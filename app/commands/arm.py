@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tempfile
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,6 +13,7 @@ import tyro
 from robots import InputError
 
 if TYPE_CHECKING:
+    from app.arm.drive import Driven
     from himpc.export.image import Image
     from lessons.scenes.torque_scene import TorqueScene
     from robots.arm import Arm
@@ -31,13 +33,17 @@ def arm(
     drag: Annotated[
         tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="TIME:TASK=X,Y,Z")
     ] = (),
-    duration: float = 10.0,
+    duration: float | None = None,
     distance: float = 0.2,
     missed: int = 10,
+    missed_share: float = 0.2,
     delay: int = 0,
     real_time: bool = False,
     npz: str | None = None,
     plot: str | None = None,
+    page: bool = False,
+    port: int = 8080,
+    no_browser: bool = False,
 ) -> int:
     """Drive a Franka arm by a scene's exported controller, and watch it beside a simulated one.
 
@@ -49,23 +55,30 @@ def arm(
         controller: himpc, hiqp, nhimpc or weighted; the scene's own by default.
         set: change a setting, e.g. --set M_bar_scale=2 --set limits.velocity_scale=0.3.
         drag: after so many seconds, move the target of a task by so much, e.g. --drag 2:position=0,0.05,0.
-        duration: seconds; then the arm is stopped gently.
+        duration: seconds; then the arm is stopped gently. 10 by default, 600 with --page.
         distance: how far a joint may be from the simulated one, rad.
         missed: how many periods may be missed one after another.
+        missed_share: which share of the periods may be missed within about a second, 1 for all.
         delay: after how many periods a torque acts; 0 believes the arm's own word for what acted.
         real_time: refuse to run where the kernel has no real-time scheduling.
         npz: write one row per period to this file.
         plot: draw arm and model over each other, errors and torques, as arm.png in this folder.
+        page: open the page: it shows the arm and, as a ghost, the simulated one; Run begins, dragged targets
+            move both, and closing the page stops the arm gently.
+        port: port of the page, on this machine only.
+        no_browser: do not open a browser.
     """
     from app.arm.drive import Drive, drive
     from app.arm.guard import Tolerances
     from app.arm.model import Model
-    from app.arm.prepared import check_start, maker, prepared
-    from app.arm.recorded import arrays
+    from app.arm.prepared import check_start, maker, nominal, prepared
+    from app.link.choice import SceneChoice
     from himpc.export.native import build
     from lessons.scenes.catalog import as_torque_scene
     from lessons.scenes.run_spec import RunSpec
 
+    if duration is None:
+        duration = _LONGEST if page else 10.0
     if not 0.0 < duration <= _LONGEST:
         raise InputError(f"--duration is {duration} s: give a time above 0 and at most {_LONGEST:g}")
     if not distance > 0.0:
@@ -74,10 +87,14 @@ def arm(
         raise InputError(f"--delay is {delay}: give a number of periods from 0 to {_LONGEST_DELAY}")
     if missed < 0:
         raise InputError(f"--missed is {missed}: give a number of periods, 0 or more")
-    spec = RunSpec(scene, urdf, tip, controller=controller).but(*set)
+    if not 0.0 <= missed_share <= 1.0:
+        raise InputError(f"--missed-share is {missed_share}: give a share from 0 to 1")
+    plain = RunSpec(scene, urdf, tip, controller=controller)
+    spec = plain.but(*set)
     loaded = as_torque_scene(spec.prepared(), "an arm")
     limits, start = _found(loaded, robot, real_time)
-    ready = prepared(loaded, start, limits, drag)
+    beside = nominal(loaded, as_torque_scene(plain.prepared(), "an arm"))
+    ready = prepared(beside, start, limits, drag)
     with tempfile.TemporaryDirectory() as folder:
         print("compiling the controller: up to a minute at the first time …", flush=True)
         make = maker(build(Path(folder)), ready.image)
@@ -91,20 +108,33 @@ def arm(
             period=period,
             duration=duration,
             drags=ready.drags,
-            tolerances=Tolerances(missed=missed, distance=distance),
+            tolerances=Tolerances(missed=missed, missed_share=missed_share, distance=distance),
             delay=delay,
         )
         model = Model(ready.plant, make(), ready.limits, period)
-        driven = drive(wanted, model, lambda text: print(text, flush=True))
-    rest = "it came to rest under control" if driven.gently else "it was not brought to rest by us"
-    print(f"ended: {driven.why}; {rest}")
-    data = arrays(driven, ready.image)
-    if npz is not None:
         how: dict[str, Any] = {"scene": scene, "robot": robot, "set": list(set), "drag": list(drag)}
+        if page:
+            from app.commands.arm_page import drive_on_a_page
+
+            choice = SceneChoice.of_run(spec)
+            end = partial(_finish, image=ready.image, npz=npz, plot=plot, how=how)
+            return drive_on_a_page(choice, ready, wanted, model, end, port, not no_browser)
+        driven = drive(wanted, model, lambda text: print(text, flush=True))
+    return _finish(driven, ready.image, npz, plot, how)
+
+
+def _finish(driven: Driven, image: Image, npz: str | None, plot: str | None, how: dict[str, Any]) -> int:
+    """Tells how a drive ended, writes its files, and returns the exit code."""
+    from app.arm.recorded import arrays
+
+    rest = "it came to rest under control" if driven.gently else "it was not brought to rest by us"
+    print(f"ended: {driven.why}; {rest}", flush=True)
+    data = arrays(driven, image)
+    if npz is not None:
         _save(npz, data, how)
-        print(f"{len(driven.rows)} rows written to {npz}")
+        print(f"{len(driven.rows)} rows written to {npz}", flush=True)
     if plot is not None and len(driven.rows):
-        print(f"drawn: {_drawn(plot, data, ready.image)}")
+        print(f"drawn: {_drawn(plot, data, image)}", flush=True)
     return 0 if driven.wanted and driven.gently else 1
 
 

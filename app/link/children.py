@@ -1,5 +1,5 @@
-"""A child process as the page sees it: forked by the fork server, or spawned where forking is not
-available."""
+"""A child process as the page sees it: forked by the fork server, spawned where forking is not available, or
+a fork of this process."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import signal
 import socket
 from collections.abc import Callable
 from importlib import import_module
+from multiprocessing.process import BaseProcess
 
 from app.link.wire import Wire
 from robots.processes.orphans import end_with_parent
@@ -78,15 +79,15 @@ class Forked:
 
 
 class Spawned:
-    """A new interpreter, which takes a second or two to import everything; methods as of `Forked`."""
+    """A process of Python's own `multiprocessing`; methods as of `Forked`."""
 
     doing = ""
 
-    def __init__(self, worker: str, theirs: socket.socket) -> None:
-        """worker: module name, as for `ForkServer`."""
-        self._process = mp.get_context("spawn").Process(target=_run, args=(worker, theirs), daemon=True)
-        self._process.start()
-        self.pid = self._process.pid
+    def __init__(self, process: BaseProcess) -> None:
+        """process: to be started."""
+        self._process = process
+        process.start()
+        self.pid = process.pid
         self.exitcode: int | None = None
 
     def fileno(self) -> int:
@@ -107,6 +108,24 @@ class Spawned:
 
 
 Child = Forked | Spawned
+
+
+def spawned(worker: str, theirs: socket.socket) -> Spawned:
+    """Returns a new interpreter, which takes a second or two to import everything. worker: module name, as
+    for `ForkServer`."""
+    return Spawned(mp.get_context("spawn").Process(target=_run, args=(worker, theirs), daemon=True))
+
+
+def forked_here(work: Callable[[Wire], object], theirs: socket.socket) -> Spawned:
+    """Returns a fork of this process, which has in memory all that it needs; to be called before there are
+    threads. Unlike other children it does not end with this process.
+
+    Args:
+        work: what the child does with its end of the socket.
+        theirs: that end.
+    """
+    fork = mp.get_context("fork")
+    return Spawned(fork.Process(target=lambda: work(Wire(theirs)), daemon=False))
 
 
 def _run(worker: str, theirs: socket.socket) -> None:

@@ -82,10 +82,12 @@ class WaitAt:
 
 @dataclass(frozen=True, eq=False)
 class Begin:
-    """The start of a ghost: the leader's scene, and its settings at its last reset."""
+    """The start of a ghost: the leader's scene, and its settings at its last reset. q_0: (n,) rad, where it
+    begins at rest; None: at the scene's start."""
 
     choice: SceneChoice
     settings: SceneSettings
+    q_0: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +102,11 @@ class FollowLeader:
 @dataclass(frozen=True)
 class Tell:
     """Request a description of the run; the answer is `Told`."""
+
+
+@dataclass(frozen=True)
+class PageLeft:
+    """The last page was closed: an arm is stopped gently, a simulation goes on."""
 
 
 @dataclass(frozen=True)
@@ -121,6 +128,7 @@ Command = (
     | Predict
     | RunStep
     | InsideRequest
+    | PageLeft
     | Quit
 )
 
@@ -153,6 +161,17 @@ class TaskView:
 
 
 @dataclass(frozen=True)
+class ArmView:
+    """An arm. missed: periods without a torque of ours, in all; begun: whether it has been taken over; ended:
+    why it was stopped, "" before that; behind: s, by which its ghost is late."""
+
+    missed: int
+    begun: bool
+    ended: str
+    behind: float
+
+
+@dataclass(frozen=True)
 class ContactPoint:
     """A point at which the robot touches an object or itself: names of an object, or of another link, and
     of the link that feels the force; position, m, and force on it, N, in the world."""
@@ -166,7 +185,8 @@ class ContactPoint:
 class Ready:
     """A scene is loaded and its first tick can run. room: (k, 3) points, m, that the camera should show
     besides the robot; again: the same run continues with another stack; left_out: a sentence for each of
-    the user's own tasks that is not offered; world: the objects around the robot."""
+    the user's own tasks that is not offered; world: the objects around the robot; arm: whether it is a
+    measured arm."""
 
     choice: SceneChoice
     block: Handle  # of the shared memory
@@ -178,6 +198,7 @@ class Ready:
     again: bool = False
     left_out: tuple[str, ...] = ()
     world: World = ()
+    arm: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,7 +214,7 @@ class Status:
         file;
     ranks: per level the number of directions that it gets, and the number of its rows; contacts: the points
     of contact after the last tick; objects: (k, 7), the poses of the free objects of the world; nearest: the
-    names of the nearest pair, "" if none is measured.
+    names of the nearest pair, "" if none is measured; arm: of an arm.
     """
 
     t: float
@@ -219,6 +240,7 @@ class Status:
     contacts: tuple[ContactPoint, ...] = ()
     objects: np.ndarray = field(default_factory=lambda: np.zeros((0, 7)))
     nearest: str = ""
+    arm: ArmView | None = None
 
 
 @dataclass(frozen=True)

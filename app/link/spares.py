@@ -7,7 +7,7 @@ import contextlib
 import socket
 import threading
 
-from app.link.children import Child, Spawned
+from app.link.children import Child, spawned
 from app.link.forkserver import ForkServer
 from app.link.process import Process
 
@@ -78,7 +78,7 @@ class Spares:
                 self._forks = False
 
     def _spawn(self, theirs: socket.socket) -> Child:
-        return Spawned(self._worker, theirs)
+        return spawned(self._worker, theirs)
 
     def close(self) -> None:
         """Ends the spare, the fork server unless it is lent, and all remaining children of that server."""

@@ -67,6 +67,8 @@ class Wire:
         self._end = end
         self._poll = select.poll()
         self._poll.register(end, select.POLLIN)
+        self._room = select.poll()
+        self._room.register(end, select.POLLOUT)
 
     def fileno(self) -> int:
         return self._end.fileno()
@@ -91,6 +93,10 @@ class Wire:
         """Whether a message, or the end of the connection, can be received within `timeout` seconds; None: no
         limit."""
         return bool(self._poll.poll(None if timeout is None else 1e3 * timeout))
+
+    def takes(self) -> bool:
+        """Whether a message of up to 50 kB can be sent without waiting: most of the socket's room is free."""
+        return bool(self._room.poll(0))
 
     def recv(self) -> Any:
         """Waits for the next message and returns it. Raises EOFError or OSError if the other end is

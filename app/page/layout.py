@@ -111,7 +111,8 @@ class Stage:
         self._playback = PlaybackPanel(gui, self._learner, loop, self._face.fastest)
         self._time_line = TimeLine(gui, self._learner, loop)
         exercise = self._learner.choice_of(self._ready).exercise
-        self._course = Course(gui, self._learner, exercise, notebook, choose, self._settings, loop)
+        offered = not self._ready.arm
+        self._course = Course(gui, self._learner, exercise, notebook, choose, self._settings, loop, offered)
         tabs = gui.add_tab_group()
         plots = tabs if narrow else gui.add_panel()
         if not narrow:

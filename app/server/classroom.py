@@ -1,16 +1,25 @@
-"""The classroom: all pages show one session, and only pages with the instructor's token control it."""
+"""The classroom: all pages show one session, and only pages with the instructor's token control it. Also the
+room of an arm, which every page controls."""
 
 from __future__ import annotations
 
 import secrets
+import threading
+import time
 from collections.abc import Sequence
 from typing import ClassVar, cast
 
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
+from app.link.messages import PageLeft, Quit
+from app.link.process import Process, wait_until
 from app.link.spares import Spares
 from app.server.sessions import WORKER, Refuse
 
+RETURN = 5.0
+"""Time, s, in which a page that is reloaded comes back."""
+_PATIENCE = 60.0
+"""Time, s, in which an arm comes to rest and the files of its drive are written."""
 STEERING = "Only the instructor can control the robot: enter the instructor's token on this page first."
 
 
@@ -62,13 +71,15 @@ class Classroom:
 
     turns_away: ClassVar[bool] = False
 
-    def __init__(self, choice: SceneChoice, all_steer: bool = False) -> None:
-        """all_steer: whether every page controls the robot, without the token."""
-        self._all_steer = all_steer
+    def __init__(self, choice: SceneChoice, all_steer: bool = False, arm: Process | None = None) -> None:
+        """all_steer: whether every page controls the robot, without the token; arm: watches an arm, in place
+        of a simulation. When the last page is closed, the arm is stopped gently."""
+        self.all_steer, self._arm = all_steer, arm
+        self._lock, self._pages, self._left_at = threading.Lock(), 0, 0.0
         self.token = secrets.token_urlsafe(16)
         self.max_sessions = 1
         self._spares = Spares(WORKER)
-        self._learner = SimulationClient(self.token, choice, self._spares)
+        self._learner = SimulationClient(self.token, choice, self._spares, arm)
 
     @property
     def learners(self) -> tuple[SimulationClient, ...]:
@@ -84,14 +95,30 @@ class Classroom:
 
     def enter(self, tokens: Sequence[str], refuse: Refuse, account: str = "") -> SimulationClient:
         """Returns the session itself to a visitor with the token, otherwise a `Watcher`."""
-        if self._all_steer or any(map(self.is_right, tokens)):
+        with self._lock:
+            self._pages += 1
+        if self.all_steer or any(map(self.is_right, tokens)):
             return self._learner
         return cast(SimulationClient, Watcher(self._learner, refuse))
 
     def leave(self, learner: SimulationClient) -> None:
-        """Called when a page was closed; the session continues."""
+        """Called when a page was closed; the session continues, but an arm stops."""
+        with self._lock:
+            self._pages -= 1
+            last, self._left_at = not self._pages, time.monotonic()
+        if last and self._arm is not None:
+            self._arm.send(PageLeft())
+
+    @property
+    def deserted(self) -> bool:
+        """Whether all pages were closed, and none has come back after a reload."""
+        with self._lock:
+            return not self._pages and 0.0 < self._left_at < time.monotonic() - RETURN
 
     def close(self) -> None:
-        """Ends the simulation process."""
+        """Ends the simulation process; an arm first comes to rest."""
+        arm = self._arm
+        if arm is not None and arm.send(Quit()):
+            wait_until(lambda: not arm.alive, _PATIENCE)
         self._learner.close()
         self._spares.close()

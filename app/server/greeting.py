@@ -19,7 +19,7 @@ _INSTRUCTOR = "instructor's token:"
 def greeting(server: PageServer, host: str, origins: Sequence[str]) -> Iterator[str]:
     """One line for a user who works alone; otherwise a block of addresses that says for whom each one is."""
     yield f"himpc-lab ready at {server.link}"
-    shared = server.public or server.hall is not None or isinstance(server.sessions, Classroom)
+    shared = server.public or server.hall is not None or _has_an_instructor(server)
     if shared:
         yield from _for_others(server, host, origins)
     if server.hall is not None:
@@ -33,6 +33,10 @@ def greeting(server: PageServer, host: str, origins: Sequence[str]) -> Iterator[
         yield "  " + _KEEP
 
 
+def _has_an_instructor(server: PageServer) -> bool:
+    return isinstance(server.sessions, Classroom) and not server.sessions.all_steer
+
+
 def _for_others(server: PageServer, host: str, origins: Sequence[str]) -> Iterator[str]:
     port = urlsplit(server.url).port
     here = f"http://{socket.gethostname()}:{port}" if host in ("0.0.0.0", "::") else server.url
@@ -40,7 +44,7 @@ def _for_others(server: PageServer, host: str, origins: Sequence[str]) -> Iterat
     for what, address in by_proxy if server.proxy_only else (("for others:", here), *by_proxy):
         link = address if server.proxy_only else server.passes.link(address, "guest")
         yield f"  {what:{_WIDTH}}{link}"
-    if isinstance(server.sessions, Classroom):
+    if isinstance(server.sessions, Classroom) and not server.sessions.all_steer:
         yield f"  {_INSTRUCTOR:{_WIDTH}}{server.sessions.token}"
 
 

@@ -61,11 +61,12 @@ class PageServer:
         proxy_only: bool = False,
         embed_in: Sequence[str] = (),
         all_steer: bool = False,
+        room: Classroom | None = None,
         class_key: str | None = None,
         class_of: str | None = None,
     ) -> None:
         """Arguments as for `serving.serve`; grace: time, s, that a session outlives its tab; all_steer: every
-        page of a classroom controls the robot."""
+        page of a classroom controls the robot; room: whose robot all pages show, instead of one made here."""
         if max_sessions < 1:
             raise InputError(f"max-sessions is {max_sessions}: give 1 or more.")
         if proxy_only and (token is None or not ask_token):
@@ -88,7 +89,8 @@ class PageServer:
         """Whether other people than the users of this machine can reach the page."""
         self.proxy_only = proxy_only
         self.guard = ConnectionGuard(Door())
-        self.sessions = Classroom(choice, all_steer) if classroom else Sessions(choice, max_sessions, grace)
+        alone = Classroom(choice, all_steer) if classroom else None
+        self.sessions = room or alone or Sessions(choice, max_sessions, grace)
         self._own_files, self._key, self._refers = own_files, key, refers
         self._visits: dict[int, Visit] = {}
         self._lock = threading.Lock()

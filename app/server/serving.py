@@ -7,9 +7,10 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 from app.link.choice import SceneChoice
+from app.server.classroom import Classroom
 from app.server.door import as_origin
 from app.server.greeting import greeting
 from app.server.opening import opened_in_a_browser
@@ -37,9 +38,11 @@ def serve(
     embed_in: Sequence[str] = (),
     class_key: str | None = None,
     class_of: str | None = None,
+    room: Classroom | None = None,
+    over: Callable[[], bool] = lambda: False,
 ) -> int:
-    """Serves the page until Ctrl-C or SIGTERM. Raises InputError for a scene, robot, host, port or origin
-    that cannot be used.
+    """Serves the page until Ctrl-C, SIGTERM, or until `over` returns True. Raises InputError for a scene,
+    robot, host, port or origin that cannot be used.
 
     With `classroom` all pages show one session, and pages on which the printed token was typed control it.
     The page asks for a token unless `ask_token` is False. The page whose address contains the owner's
@@ -48,7 +51,8 @@ def serve(
     proxy tries the next one. `class_names`: whether a class is asked for names; None: there is no class.
     `class_of` is the server of a class that this one follows; both have the same `class_key`.
     With `proxy_only` only a proxy that sends the token in its header is let in. After SIGTERM the pages that
-    are open have `drain` seconds. Pages of the origins `embed_in` may show the page in a frame.
+    are open have `drain` seconds. Pages of the origins `embed_in` may show the page in a frame. With `room`
+    all pages show the robot of that room.
     """
     server = PageServer(
         choice,
@@ -67,6 +71,7 @@ def serve(
         embed_in=embed_in,
         class_key=class_key,
         class_of=class_of,
+        room=room,
     )
     stop, now = threading.Event(), threading.Event()
     try:
@@ -75,7 +80,7 @@ def serve(
                 print(line, flush=True)
             if open_browser:
                 until_the_end.enter_context(opened_in_a_browser(server.first_link))
-            while not stop.wait(0.5):
+            while not stop.wait(0.5) and not over():
                 pass
             server.drain(drain, now)
     finally:

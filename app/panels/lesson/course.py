@@ -31,14 +31,16 @@ class Course:
         choose: Callable[[SceneChoice], None],
         settings: Callable[[], SceneSettings],
         loop: asyncio.AbstractEventLoop,
+        offered: bool = True,
     ) -> None:
-        """exercise: the active one, if there is one."""
+        """exercise: the active one, if there is one; offered: whether lessons can be begun here."""
         self._gui, self._learner, self._notebook = gui, learner, notebook
         self._exercise = exercise
         self._choose, self._settings, self._loop = choose, settings, loop
+        self._offered = offered
         self._list = PopupWindow(gui, "All lessons", "L", self._fill)
         self._panel: LessonPanel | None = None
-        if exercise is None:
+        if exercise is None and offered:
             add_invitation(gui, notebook, choose)
 
     def add_first_tabs(
@@ -66,7 +68,7 @@ class Course:
 
     def add_last_tab(self, tabs: viser.GuiTabGroupHandle) -> None:
         """Adds the list of lessons, if no lesson is active."""
-        if self._panel is None:
+        if self._panel is None and self._offered:
             with tabs.add_tab("Lessons"):
                 self._fill()
 

@@ -13,9 +13,9 @@ from app.adapter.removed_handle_errors import unless_removed
 from app.client.pending_edit import HOLD, PendingEdit
 from app.client.simulation_client import SimulationClient
 from app.client.trouble import Trouble
-from app.html.palette import GOOD, LEVELS
-from app.html.text import badge, block, in_trouble
-from app.link.messages import Play, Post, Speed, StepTicks
+from app.html.palette import BAD, GOOD, LEVELS
+from app.html.text import badge, block, esc, in_trouble
+from app.link.messages import ArmView, Play, Post, Speed, Status, StepTicks
 from app.panels.widgets.command import add_command, on_click
 from app.panels.widgets.mirror import on_scale
 from app.panels.widgets.snapshot import SessionSnapshot
@@ -23,6 +23,8 @@ from lessons.events import Reset
 from lessons.settings.settings import SceneSettings
 
 _PAUSE, _RUN, _STEP, _RESET, _RESET_ALL = "Pause", "Run", "Step", "Reset", "Reset all"
+_STOP = "Stop gently"
+_LATE = 0.5  # s by which the ghost of an arm may be late without a word
 
 
 class PlaybackPanel:
@@ -72,7 +74,7 @@ class PlaybackPanel:
 
     def _click(self, choice: str) -> None:
         learner = self._learner
-        if choice in (_PAUSE, _RUN):
+        if choice in (_PAUSE, _RUN, _STOP):
             running = self._running.now(learner.status is not None and learner.status.running)
             learner.send(Play(self._running.ask(not running)))
         elif choice == _STEP:
@@ -105,6 +107,9 @@ class PlaybackPanel:
 
     def update(self, now: SessionSnapshot[SceneSettings]) -> None:
         status = now.status
+        if status.arm is not None:
+            self._show_arm(status, status.arm)
+            return
         first = _PAUSE if status.running else _RUN
         if self._buttons.options[0] != first:
             self._buttons.options = (first, _STEP, _RESET, _RESET_ALL)
@@ -121,3 +126,23 @@ class PlaybackPanel:
             f"{state} &nbsp;t = {status.t:.2f} s &nbsp;·&nbsp; {factor}"
             f"<br>{ticks} over the {budget:g} ms budget ({share:.1f} %)"
         )
+
+    def _show_arm(self, status: Status, arm: ArmView) -> None:
+        """An arm can only be begun and stopped, and its time is the clock's."""
+        first = _STOP if status.running else _RUN
+        if self._buttons.options != (first,):
+            self._buttons.options = (first,)
+            self._speed.visible = False
+        self._buttons.visible = not arm.ended
+        self._status.content = block(_of_arm(status, arm))
+
+
+def _of_arm(status: Status, arm: ArmView) -> str:
+    """The status line of an arm."""
+    if not arm.begun:
+        return f"{badge('ARM', LEVELS[1])} &nbsp;at rest: Run takes it over, and it holds where it is"
+    state = badge("ARM STOPPED", BAD) if arm.ended else badge("ARM RUNNING", GOOD)
+    line = f"{state} &nbsp;t = {status.t:.2f} s<br>{arm.missed} of {status.ticks + arm.missed} periods missed"
+    if arm.behind > _LATE and not arm.ended:
+        line += f" &nbsp;·&nbsp; simulation {arm.behind:.1f} s behind"
+    return f"{line}<br>stopped: {esc(arm.ended)}" if arm.ended else line

@@ -89,3 +89,12 @@ def spoken(level: str) -> str:
 
 def _paragraph(head: str, rest: str) -> str:
     return block(f'<div style="font-size:1.15em"><b>{head}</b></div>{rest}', "padding-top:0.5em")
+
+
+AT_AN_ARM = _paragraph(
+    "Run, then drag the target by its arrows.",
+    "The robot is the arm as measured. The ghost is the simulation, which gets the same targets; its errors "
+    "are dashed. Stop gently, or closing this page, brakes the arm. The settings are those with which "
+    "<code>himpc-lab arm</code> was started.",
+)
+"""The guide of a page that shows an arm."""

@@ -38,7 +38,7 @@ class LevelPlots:
         self._place = gui.add_folder(None)
         self._charts: list[Chart] = []
         self._furnished = any(not isinstance(thing.shape, Floor) for thing in ready.world)
-        self._settings = settings
+        self._settings, self._measured = settings, ready.arm
         self._build(ghost=False)
 
     def rebuild(self, ready: Ready) -> None:
@@ -92,7 +92,7 @@ class LevelPlots:
         error, *distance, step, leak = self._charts
         error.show(window, lambda: self._errors_and_contacts(window, windows))
         step.show(window, lambda: [*(_times(each) for each in windows), np.full(2 * BUCKETS, 1e3 * T_s)])
-        leak.show(window, lambda: [curve for each in windows for curve in _leaks(each)])
+        leak.show(window, lambda: [curve for each in windows for curve in self._leaks(each, window)])
         for near in distance:
             near.show(window, lambda: _distances(window, windows))
 
@@ -110,6 +110,12 @@ class LevelPlots:
             else nothing
             for task in self._tasks
         ]
+
+    def _leaks(self, window: PlotWindow, first: PlotWindow) -> list[np.ndarray]:
+        """Of the robot's window, which is the first, or of the ghost's; a measured arm does not know them."""
+        if self._measured and window is first:
+            return [np.full(2 * BUCKETS, np.nan)] * 2
+        return _leaks(window)
 
 
 def _times(window: PlotWindow) -> np.ndarray:

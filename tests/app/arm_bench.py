@@ -1,0 +1,142 @@
+"""An arm in MuJoCo that does what a test scripts, and a scene prepared for drives."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app.arm.drive import Drag, Drive, Driven, drive
+from app.arm.guard import Tolerances
+from app.arm.loop import Columns, Ended, run
+from app.arm.model import Model
+from app.arm.orders import Order, Orders
+from app.arm.prepared import Prepared, maker, prepared
+from app.link.ring import Block
+from himpc.export.native import build
+from lessons.scenes.catalog import torque_scene
+from lessons.scenes.torque_scene import TorqueScene
+from robots import Plant, PlantSettings
+from robots.arm import Arm, Reading
+from robots.simulated_arm import SimulatedArm
+from tests.commands.exported import needed
+
+T_S = 1e-3
+PATIENT = Tolerances(silent=60.0)
+"""For a watcher that a busy machine may hold up."""
+ALONE = Tolerances()
+
+
+class Scripted(Arm):
+    """A simulated arm that does something at a period; `shown` changes what it says."""
+
+    def __init__(self, plant: Plant, happen: Callable[[int, Scripted], None], wait: float = 0.0) -> None:
+        """wait: s that every read takes; a period passes with each, however busy the machine is."""
+        self.inner, self.wait = SimulatedArm(plant, T_S, in_step=False), wait
+        self.limits, self.plant = self.inner.limits, plant
+        self.happen, self.reads, self.skipped = happen, 0, 0.0
+        self.written = np.zeros(plant.n)
+        self.shown: Callable[[Reading], Reading] = lambda reading: reading
+        self.stopped = False
+
+    def read(self) -> Reading:
+        self.happen(self.reads, self)
+        self.reads += 1
+        time.sleep(self.wait)
+        reading = self.inner.read()
+        return self.shown(reading._replace(t=reading.t + self.skipped))
+
+    def write(self, tau: np.ndarray) -> None:
+        self.inner.write(tau)
+        self.written = tau
+
+    def stop(self) -> None:
+        self.stopped = True
+        self.inner.stop()
+
+
+class Bench:
+    """A scene prepared for drives, with its library."""
+
+    def __init__(self, folder: Path) -> None:
+        needed("cc")
+        self.scene = torque_scene("panda-hold")
+        self.settings = PlantSettings()  # without contacts: faster
+        self.ready = self.prepared(self.scene)
+        self.make = maker(build(folder), self.ready.image)
+
+    def prepared(self, scene: TorqueScene) -> Prepared:
+        arm = SimulatedArm(self.plant())
+        return prepared(scene, scene.q_0, arm.limits, ())
+
+    def plant(self, **changes: Any) -> Plant:
+        plant = Plant(self.scene.robot, replace(self.settings, **changes), T_S)
+        plant.reset(self.scene.q_0)
+        return plant
+
+    def run(
+        self,
+        happen: Callable[[int, Scripted], None] = lambda k, arm: None,
+        periods: int = 600,
+        drags: dict[int, Order] | None = None,
+        plant: Plant | None = None,
+        shown: Callable[[Reading], Reading] | None = None,
+        delay: int = 0,
+    ) -> tuple[Ended, np.ndarray, Columns, Scripted]:
+        """The loop in this process, one period per read; `drags` by their period; asked to end after so many
+        periods."""
+        controller = self.make()
+        orders, at = Orders(4), Columns.of(7, controller.view("error").size)
+        block = Block(at.width, 8)
+
+        def each(k: int, arm: Scripted) -> None:
+            orders.beat()
+            if drags and k in drags:
+                orders.drag(drags[k])
+            if k == periods:
+                orders.stop()
+            happen(k, arm)
+
+        arm = Scripted(plant or self.plant(), each)
+        arm.shown = shown or arm.shown
+        ended = run(
+            arm, controller, self.ready.limits, self.scene.q_0, orders, block, Tolerances(), T_S, delay
+        )
+        _, rows = block.since(0)
+        assert len(rows) == ended.rows
+        return ended, rows, at, arm
+
+    def drive(
+        self,
+        happen: Callable[[int, Scripted], None] = lambda k, arm: None,
+        tell: Callable[[str], None] = lambda text: None,
+        duration: float = 0.3,
+        drags: tuple[Drag, ...] = (),
+        tolerances: Tolerances = PATIENT,
+        elsewhere: float = 0.0,
+    ) -> Driven:
+        """A drive with the loop in a process of its own; elsewhere: rad, how far joint 2 of the model is
+        off."""
+        beside = self.plant()
+        beside.reset(self.scene.q_0 + elsewhere * np.eye(7)[1])
+        wanted = Drive(
+            lambda: Scripted(self.plant(), happen, T_S),
+            self.make,
+            self.ready.limits,
+            self.scene.q_0,
+            T_S,
+            duration,
+            drags,
+            tolerances,
+        )
+        return drive(wanted, Model(beside, self.make(), self.ready.limits, T_S), tell)
+
+    def order(self, *moved: float) -> Order:
+        """The hand's target moves, m."""
+        (task,) = (each for each in self.ready.image.manifest["tasks"] if each["name"] == "position")
+        _, position = self.plant().frame_pose(self.scene.robot.tip)
+        return Order(task["index"], position + np.array(moved))

@@ -1,0 +1,27 @@
+"""Runs `himpc-lab` with a simulated arm for which a period passes whenever the loop looks, however busy the
+machine is, four times as slowly as on the wall: a test then costs a quarter."""
+
+from __future__ import annotations
+
+import sys
+from functools import partial
+from typing import Any
+
+import app.arm.guard as guard
+import app.commands.arm as command
+import app.commands.early  # noqa: F401  (must be the first import)
+from app.__main__ import main
+from robots import Plant
+from tests.app.arm_bench import T_S, Scripted
+
+
+def patient_arm(scene: Any, robot: str, real_time: bool, start: Any) -> Scripted:
+    plant = Plant(scene.robot, scene.settings.plant, T_S)
+    plant.reset(start)
+    return Scripted(plant, lambda k, arm: None, 4 * T_S)
+
+
+if __name__ == "__main__":
+    command._arm = patient_arm
+    guard.Tolerances = partial(guard.Tolerances, silent=60.0)  # type: ignore[misc]
+    sys.exit(main())
