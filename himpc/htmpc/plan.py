@@ -67,7 +67,7 @@ class LevelEvidence(NamedTuple):
         kinds, knots, parts, values, pairs = self.felt
         each = zip(kinds.tolist(), knots.tolist(), parts.tolist(), values.tolist(), pairs, strict=True)
         for kind, knot, part, multiplier, pair in each:
-            joint = pair or (joint_names[part] if kind < LEXICOGRAPHIC else f"{KINDS[kind]} {part}")
+            joint = pair or (joint_names[int(part)] if kind < LEXICOGRAPHIC else f"{KINDS[kind]} {part}")
             side = "upper" if multiplier > 0 else "lower"
             found.append(Binding(self.name, joint, KINDS[kind], side, knot, abs(multiplier), 0.0))
         return found
