@@ -3,15 +3,16 @@ left, and those that accelerate."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from himpc.limits import LimitsInForce
-from himpc.limits.load import loaded, spared
+from himpc.limits.load import HEAVY, loaded, spared
 from himpc.limits.overrun import anticipated, followed
-from himpc.limits.stall import PROGRESS, going, slowed, stalled
+from himpc.limits.stall import BLOCKED, PROGRESS, going, slowed, stalled
 from himpc.tick.distances import Distances
 
 Array = NDArray[np.float64]
@@ -48,10 +49,12 @@ class StallGuard:
             distances: the pairs of the last tick.
         """
         T_s = self._T_s
+        limits = replace(limits, v_limit=(1.0 - distances.velocity_margin) * limits.v_limit)
         self.load = loaded(np.zeros_like(tau) if self.load is None else self.load, tau, limits, T_s)
         self.mean = followed(v if self.mean is None else self.mean, v, T_s)
-        limits = anticipated(spared(limits, self.load), v, self.mean)
+        limits = anticipated(spared(limits, self.load, distances.carried), v, self.mean)
         if self.errors is not None:
             moves = distances.moves or self.fastest > PROGRESS
-            self.stall = stalled(self.stall, self.errors, moves, distances.room, T_s)
+            room = min(distances.room, BLOCKED) if self.load.max() > HEAVY else distances.room
+            self.stall = stalled(self.stall, self.errors, moves, room, T_s)
         return slowed(limits, self.stall)

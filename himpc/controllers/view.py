@@ -77,8 +77,8 @@ class Bounds:
 
 @dataclass(frozen=True, eq=False)
 class NearView:
-    """The nearest pairs of two links, or of a link and an object, nearest first; r is 0 unless
-    `avoidance.on`. Pairs that are farther apart than 0.25 m are left out.
+    """The pairs of two links, or of a link and an object, that can be at d_safe soonest, nearest first; r is
+    0 unless `avoidance.on`. Pairs that are farther apart than 0.25 m are left out.
 
     Attributes:
         names: of each pair.

@@ -47,9 +47,7 @@ class Avoidance:
         A = table.spread(place, near.knot, near.gradient, integrator(N, dt).T_q)
         room = self.margin - near.distance
         free = np.full(len(room), np.inf)
-        return ConstraintRows(
-            A, room, free, np.full(len(room), COLLISION), near.knot + 1, np.arange(len(room))
-        )
+        return ConstraintRows(A, room, free, np.full(len(room), COLLISION), near.knot + 1, near.pair)
 
     def depths(self, near: Clearances, N: int) -> Array:
         """Returns the largest violation of the margin at each knot, (N,) m, ≥ 0."""

@@ -38,6 +38,11 @@ class Clearances:
     names: tuple[str, ...]
 
     @property
+    def pair(self) -> Indices:
+        """(r,) which pair each distance belongs to, see `CollisionModel.named`."""
+        return self.shape * len(self.links) + self.sphere
+
+    @property
     def pairs(self) -> list[tuple[str, str]]:
         """The (sphere's link, obstacle's name) of each distance."""
         found = zip(self.sphere.tolist(), self.shape.tolist(), strict=True)
@@ -60,6 +65,11 @@ class CollisionModel:
     def empty(self) -> bool:
         """Whether there are no pairs to check."""
         return not self._around.names
+
+    def named(self, pair: int) -> str:
+        """What a pair is called: its link, and the obstacle or the other link."""
+        shape, sphere = divmod(pair, len(self.links))
+        return f"{self.links[sphere]} – {self._around.names[shape]}"
 
     def clearances(self, q: Array, within: float, gradients: bool = True) -> Clearances:
         """Returns all pairs nearer than `within`, m, at configurations q (K, n); without gradients, that

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
+from himpc.htmpc.kernel.kinds import COLLISION
 from himpc.htmpc.plan import Felt, LevelEvidence
 from himpc.htmpc.problem import Iterate
 from himpc.htmpc.rows import ConstraintRows
@@ -17,9 +20,11 @@ _FELT = 1e-6
 """Smaller multipliers are rounding errors."""
 
 
-def evidence(level: Tracking, solved: Solved, final: Iterate) -> LevelEvidence:
+def evidence(
+    level: Tracking, solved: Solved, final: Iterate, named: Callable[[int], str] | None = None
+) -> LevelEvidence:
     """Builds the evidence of a level from the result of `solve_level`; `final` holds the inputs after all
-    levels."""
+    levels, and `named` says what a pair is called, see `CollisionModel.named`."""
     best = solved.at.errors(level)
     return LevelEvidence(
         name=level.name,
@@ -33,12 +38,15 @@ def evidence(level: Tracking, solved: Solved, final: Iterate) -> LevelEvidence:
         iterations=len(solved.steps),
         unsolved=solved.unsolved,
         time_us=solved.time_us,
-        felt=_felt(solved.rows, solved.multipliers),
+        felt=_felt(solved.rows, solved.multipliers, named),
     )
 
 
-def _felt(rows: ConstraintRows, multipliers: Array) -> Felt:
+def _felt(rows: ConstraintRows, multipliers: Array, named: Callable[[int], str] | None) -> Felt:
     """Returns the active rows without the bounds of the slacks, whose multipliers come last."""
     multipliers = multipliers[: len(rows.kind)]
     some = np.flatnonzero(np.abs(multipliers) > _FELT)
-    return Felt(rows.kind[some], rows.knot[some], rows.part[some], multipliers[some])
+    kind, part = rows.kind[some], rows.part[some]
+    of_pairs = zip((kind == COLLISION).tolist(), part.tolist(), strict=True)
+    pairs = tuple(named(each) if is_pair and named else "" for is_pair, each in of_pairs)
+    return Felt(kind, rows.knot[some], part, multipliers[some], pairs)

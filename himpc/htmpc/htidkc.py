@@ -150,7 +150,13 @@ class HTIDKC:
     def _evidence(self, level: Level, gap: Array, solution: QPSolution, begun: int) -> LevelEvidence:
         multipliers = solution.multipliers[: self.robot.n]
         part = np.flatnonzero(np.abs(multipliers) > 1e-6)
-        felt = Felt(np.full(len(part), VELOCITY), np.ones(len(part), np.int64), part, multipliers[part])
+        felt = Felt(
+            np.full(len(part), VELOCITY),
+            np.ones(len(part), np.int64),
+            part,
+            multipliers[part],
+            ("",) * len(part),
+        )
         return LevelEvidence(
             name=level.name,
             status=solution.status,

@@ -109,7 +109,10 @@ class HTMPC:
         with np.errstate(all="ignore"):
             solved = self._solve(tick)
         at = solved[-1].at if solved else tick.iterate(tick.brake)
-        levels = tuple(evidence(level, one, at) for level, one in zip(self._levels, solved, strict=True))
+        named = None if self._avoidance is None else self._avoidance.model.named
+        levels = tuple(
+            evidence(level, one, at, named) for level, one in zip(self._levels, solved, strict=True)
+        )
         U = at.U if np.isfinite(at.U).all() else tick.brake
         U = permitted(tick.start, U, self._bounds, self._settings.period)
         motion = Motion(tick.start, U, self._settings.dt)

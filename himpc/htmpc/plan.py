@@ -18,12 +18,14 @@ Whole = NDArray[np.int64]
 
 
 class Felt(NamedTuple):
-    """Active constraint rows: kind, knot and part as in `ConstraintRows`, and the multipliers, all (r,)."""
+    """Active constraint rows: kind, knot and part as in `ConstraintRows`, and the multipliers, all (r,); and
+    what each is called if it is the distance of a pair, else ""."""
 
     kind: Whole
     knot: Whole
     part: Whole
     multiplier: Array
+    pair: tuple[str, ...]
 
 
 class LevelEvidence(NamedTuple):
@@ -62,10 +64,10 @@ class LevelEvidence(NamedTuple):
     def binding(self, joint_names: Sequence[str]) -> list[Binding]:
         """Returns the active constraints with the names of joints and kinds."""
         found: list[Binding] = []
-        kinds, knots, parts, values = self.felt
-        each = zip(kinds.tolist(), knots.tolist(), parts.tolist(), values.tolist(), strict=True)
-        for kind, knot, part, multiplier in each:
-            joint = joint_names[int(part)] if kind < LEXICOGRAPHIC else f"{KINDS[kind]} {part}"
+        kinds, knots, parts, values, pairs = self.felt
+        each = zip(kinds.tolist(), knots.tolist(), parts.tolist(), values.tolist(), pairs, strict=True)
+        for kind, knot, part, multiplier, pair in each:
+            joint = pair or (joint_names[int(part)] if kind < LEXICOGRAPHIC else f"{KINDS[kind]} {part}")
             side = "upper" if multiplier > 0 else "lower"
             found.append(Binding(self.name, joint, KINDS[kind], side, knot, abs(multiplier), 0.0))
         return found

@@ -25,7 +25,8 @@ class ConstraintRows(NamedTuple):
 
     Attributes:
         A: (r, N·n); lower, upper: (r,).
-        kind: (r,) index into KINDS; knot: (r,) 1 … N (0 … N−1 for inputs); part: (r,) joint or coordinate.
+        kind: (r,) index into KINDS; knot: (r,) 1 … N (0 … N−1 for inputs); part: (r,) joint,
+            coordinate or, of an obstacle, pair.
     """
 
     A: Array

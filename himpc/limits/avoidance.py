@@ -25,6 +25,8 @@ class Avoidance:
         pull: m, largest error on which tasks of positions act while `on`; other tasks act on up to TURN_PULL
             times as many rad. A target that cannot be reached then pulls no harder than one that is this far
             away. 0: no limit.
+        velocity_margin: share of the velocity limits that is kept free while `on`, for what time-delay
+            estimation lags when others accelerate a joint that is at its limit.
     """
 
     on: bool = False
@@ -33,6 +35,7 @@ class Avoidance:
     reaction: Annotated[float, Range(0.0, 2.0)] = 0.2
     deceleration: Annotated[float, Range(0.01, 100.0)] = 2.0
     pull: Annotated[float, Range(0.0, 10.0)] = 0.1
+    velocity_margin: Annotated[float, Range(0.0, 0.9)] = 0.08
 
     def __post_init__(self) -> None:
         check_fields(self, "avoidance.")

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 
 class Near(NamedTuple):
-    """The nearest pairs of a robot's links and of what is around it, nearest first.
+    """The pairs of a robot's links and of what is around it that can be at d_safe soonest, nearest first.
 
     Attributes:
         distance: d, (r,) m, negative inside.

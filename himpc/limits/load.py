@@ -1,4 +1,4 @@
-"""Lower velocity limits for joints whose motors have little torque left."""
+"""Lower velocity limits for joints that a motor with little torque left carries."""
 
 from __future__ import annotations
 
@@ -13,10 +13,13 @@ Array = NDArray[np.float64]
 
 _SECONDS = 0.1
 """Time constant of the mean load: the torque of a moment is no reason to slow down."""
-_RESERVE = 0.3
-"""Share of the torque limit below which what is left slows a joint down."""
-_SLOWEST = 0.15
+_FREE, _MOST = 0.55, 0.95
+"""Shares of the torque limit: up to the first a motor slows nothing down, from the second on joints are
+slowest."""
+_SLOWEST = 0.03
 """Share of its velocity limit that a joint keeps."""
+HEAVY = 0.85
+"""Load of a motor from which a robot whose tasks make no progress is stalled: the motor is in the way."""
 
 
 def loaded(before: Array, tau: Array, limits: LimitsInForce, T_s: float) -> Array:
@@ -32,9 +35,18 @@ def loaded(before: Array, tau: Array, limits: LimitsInForce, T_s: float) -> Arra
     return before + min(1.0, T_s / _SECONDS) * (share - before)
 
 
-def spared(limits: LimitsInForce, load: Array) -> LimitsInForce:
-    """The limits in force with lower velocities of joints that are loaded."""
-    if load.max() <= 1.0 - _RESERVE:
+def spared(limits: LimitsInForce, load: Array, carried: NDArray[np.bool_]) -> LimitsInForce:
+    """The limits in force with lower velocities of the joints that a loaded motor carries, its own too.
+
+    What a motor holds still depends on the posture. Where its velocity vanishes with the torque that is left,
+    a robot does not come to a posture that the motor cannot hold.
+
+    Args:
+        limits: in force.
+        load: see `loaded`.
+        carried: (n, n) whether the motor of joint j, a column, carries joint k, a row, or is its motor.
+    """
+    if load.max() <= _FREE:
         return limits
-    share = np.clip((1.0 - load) / _RESERVE, _SLOWEST, 1.0)
-    return replace(limits, v_limit=share * limits.v_limit)
+    share = np.clip((_MOST - load) / (_MOST - _FREE), _SLOWEST, 1.0)
+    return replace(limits, v_limit=np.where(carried, share, 1.0).min(axis=1) * limits.v_limit)

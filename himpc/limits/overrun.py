@@ -13,9 +13,9 @@ Array = NDArray[np.float64]
 
 _SECONDS = 0.02
 """Time constant of the mean velocity, whose distance from the velocity is a smooth acceleration."""
-_LEAD = 0.067
+_LEAD = 0.1
 """s: the velocity is extrapolated over this time, and that velocity must be within its limit."""
-_LEAST = 0.7
+_LEAST = 0.5
 """Share of its velocity limit that a joint keeps."""
 
 

@@ -127,7 +127,12 @@ def _placements(robot: Robot, data: pin.Data, q: Array) -> tuple[Array, Array]:
 
 
 class Distances:
-    """The distances of a robot's cover from the objects that a controller knows, and between its links."""
+    """The distances of a robot's cover from the objects that a controller knows, and between its links.
+
+    Attributes:
+        carried: (n, n) whether the motor of joint j, a column, carries joint k, a row, or is its motor.
+        velocity_margin: see `Avoidance`.
+    """
 
     def __init__(self, robot: Robot, avoidance: Avoidance) -> None:
         self._robot, self._avoidance, self._data = robot, avoidance, robot.model.createData()
@@ -138,13 +143,18 @@ class Distances:
         self._numbers = np.array(
             (avoidance.d_safe, avoidance.margin, avoidance.reaction, avoidance.deceleration)
         )
+        # A joint without a limit counts as one that is as fast as the fastest of the others.
+        limited = np.isfinite(robot.v_limit)
+        self._fastest = np.where(limited, robot.v_limit, robot.v_limit[limited].max(initial=1.0))
+        self.carried = geometry(robot).moves[1:] > 0
+        self.velocity_margin = avoidance.velocity_margin
         self._observed = NOTHING
         self._know(NOTHING)
 
     @property
     def room(self) -> float:
-        """By how much the nearest pair of the last tick was farther apart than d_safe, m; infinite if no pair
-        was within `WITHIN`."""
+        """By how much the nearest pair of the last tick was farther apart than it must be, m; infinite if no
+        pair was within `WITHIN`."""
         return float(self._about[ROOM])
 
     @property
@@ -172,10 +182,8 @@ class Distances:
         self._shares = np.ones(around.meets.shape)
         if kept > 0.0:
             self._shares[B:] = np.minimum(1.0, links.kept / kept)
-        self._pairs, self._taken = (
-            _Pairs(geometry(self._robot), around),
-            np.zeros(around.meets.sum() + 1, np.intp),
-        )
+        self._pairs = _Pairs(geometry(self._robot), around)
+        self._times = np.empty(len(self._pairs.distance))
         self._links[:], self._named = -1, ("",) * self._robot.n
         self._names = [[f"{link} – {name}" for link in around.links] for name in around.names]
 
@@ -184,9 +192,10 @@ class Distances:
         pairs, velocity = self._pairs, self._observed.velocity
         pairs.find(placed, z, WITHIN)
         count = nearest(
-            *(pairs.count, pairs.distance, pairs.sphere, pairs.shape, pairs.normal, self._shares),
-            *(_STILL if velocity is None else velocity, self._avoidance.d_safe, self._taken),
-            *(self._chosen, self._links, self._others, self._share, self._moving, self._about),
+            *(pairs.count, pairs.distance, pairs.sphere, pairs.shape, pairs.normal, pairs.slopes),
+            *(self._shares, _STILL if velocity is None else velocity, self._fastest),
+            *(self._avoidance.d_safe, self._times, self._chosen),
+            *(self._links, self._others, self._share, self._moving, self._about),
         )
         if self._about[CHANGED]:
             at = zip(self._others[:count].tolist(), self._links[:count].tolist(), strict=True)

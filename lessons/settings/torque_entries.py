@@ -64,6 +64,10 @@ TORQUE_ENTRIES = (
           "Largest error of a position on which its task acts while distances are kept; other tasks act on "
               "up to five times as many rad. 0: no limit",
           "m", 0.0, 2.0, 0.01, name="pull of targets"),
+    Entry("avoidance.velocity_margin", "Free velocity",
+          "Share of the velocity limits that is kept free while distances are kept, for what time-delay "
+              "estimation lags",
+          "", 0.0, 0.5, 0.01, name="margin of velocities"),
     Entry("route", "Route", "Method that computes the torque; both methods give the same torque"),
     Entry("solver", "QP solver",
           "Solver of the QPs of hqp and of the explicit route; controllers without QPs and the compiled "

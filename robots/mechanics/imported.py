@@ -11,13 +11,14 @@ from robots.mechanics.covers import made_cover
 from robots.mechanics.exclusions import collision_model
 from robots.report import Finding
 from robots.robot import Robot
+from robots.world import no_floor
 
 
 def with_collision(robot: Robot, meshes: bool = True) -> Robot:
     """Returns the robot with its collision geometry.
 
     meshes: whether mesh files are read; without them their bodies become capsules. Shapes that MuJoCo
-    cannot use are all left out, and the report says so.
+    cannot use are all left out, and the report says so, and why a robot has no floor.
     """
     try:
         found = collision_model(robot, collision_solids(robot, meshes))
@@ -26,7 +27,8 @@ def with_collision(robot: Robot, meshes: bool = True) -> Robot:
         found, text = CollisionModel(), "MuJoCo cannot use the robot's shapes: the robot touches nothing"
     if not meshes:
         text += "; reading its meshes takes too long or fails"
-    return replace(_noted(robot, "contacts", text), collision=found)
+    with_solids = replace(_noted(robot, "contacts", text), collision=found)
+    return _noted(with_solids, "floor", missing) if (missing := no_floor(with_solids)) else with_solids
 
 
 def with_cover(robot: Robot, meshes: bool = True) -> Robot:

@@ -62,20 +62,14 @@ def between(one: tuple, other: tuple) -> float:
 @settings(max_examples=25, deadline=None)
 @given(st.integers(0, 10**6))
 def test_distances_are_those_of_the_collision_library(seed: int) -> None:
-    """The nearest pairs of links and objects, and of links, have the library's distances, and no other pair
-    that is checked is nearer."""
+    """The chosen pairs of links and objects, and of links, have the library's distances, and no object is
+    nearer than the room that is reported."""
     robot = load_robot("iiwa14")
     q = np.random.default_rng(seed).uniform(robot.q_lower, robot.q_upper)
     distances = Distances(robot, Avoidance(on=True))
     near = distances.at(q, Observed(WORLD))
     capsules = cover_of(robot).capsules
     solids = [placed(robot, q, each) for each in capsules]
-    lowest = min(
-        float(pose.getTranslation()[2] - 0.5 * abs(pose.getRotation()[2, 2]) * 2.0 * solid.halfLength)
-        - solid.radius
-        for (solid, pose), capsule in zip(solids, capsules, strict=True)
-        if capsule.joint > 1
-    )
     things = {
         name: (shape, coal.Transform3s(pin.rpy.rpyToMatrix(0.0, 0.0, yaw), np.array(place)))
         for name, (shape, place, yaw) in SHAPES.items()
@@ -84,8 +78,12 @@ def test_distances_are_those_of_the_collision_library(seed: int) -> None:
         link, other = name.split(" – ")
         mine = [solid for solid, each in zip(solids, capsules, strict=True) if each.link == link]
         if other == "floor":
-            if distance == min(d for d, n in zip(near.distance, near.names, strict=True) if "floor" in n):
-                assert distance == pytest.approx(lowest, abs=1e-6)
+            heights = [
+                float(pose.getTranslation()[2] - abs(pose.getRotation()[2, 2]) * solid.halfLength)
+                - solid.radius
+                for solid, pose in mine
+            ]
+            assert min(abs(each - distance) for each in heights) < 1e-6
             continue
         theirs = (
             [things[other]]
@@ -96,7 +94,8 @@ def test_distances_are_those_of_the_collision_library(seed: int) -> None:
         if distance > 1e-3:  # inside, a library tells the way out of convex solids, and not of segments
             assert min(abs(each - distance) for each in exact) < 1e-5
     exact = [between(one, two) for one in solids[2:] for two in things.values()]
-    assert min(exact) > near.distance[-1] - 1e-6 or min(near.distance) <= min(exact) + 1e-6
+    assert distances.room <= max(min(exact), 0.0) - 0.01 + 1e-6
+    assert (np.diff(near.distance) >= 0.0).all()
 
 
 def test_gradients_are_the_derivatives_of_the_distances(robot: Robot) -> None:
@@ -114,6 +113,24 @@ def test_gradients_are_the_derivatives_of_the_distances(robot: Robot) -> None:
             assert rate[apart] == pytest.approx((near.gradient @ step)[apart], abs=2e-3)
             checked += int(apart.sum())
     assert checked > 50
+
+
+def test_pairs_that_meet_soonest_have_the_rows() -> None:
+    """Seven pairs of a panda's wrist and elbow are nearer than a ball, and hardly move against each other:
+    the rows are those of the ball, whether it moves or not."""
+    panda = load_robot("panda")
+    q = np.array([-0.11, -0.54, 0.51, -2.27, -0.37, 1.33, 0.63])
+    data = panda.model.createData()
+    pin.framesForwardKinematics(panda.model, data, q)
+    hand = data.oMf[panda.frame_id("hand")].translation
+    ball, distances = (
+        Ball("ball", tuple((hand + np.array([0.0, 0.0, 0.3])).tolist()), 0.08),
+        Distances(panda, Avoidance(on=True)),
+    )
+    for velocity in (None, np.array([[0.0, 0.0, -0.5]])):
+        near = distances.at(q, Observed((ball,), velocity))
+        assert sum("ball" in name for name in near.names) >= 5
+        assert len(set(near.distance.tolist())) == len(near.distance) == panda.n
 
 
 def test_an_object_that_comes_closer_must_be_evaded(robot: Robot) -> None:
@@ -147,22 +164,23 @@ def test_from_the_least_rate_a_stop_is_possible() -> None:
     assert least_rates(pairs(0.025), kept) == [0.0]
 
 
-def test_a_joint_with_little_torque_left_becomes_slow(robot: Robot) -> None:
-    """Only the joint whose mean torque is close to its limit, and not for the torque of a moment."""
+def test_joints_that_a_motor_with_little_torque_left_carries_become_slow(robot: Robot) -> None:
+    """Only joints behind the motor whose mean torque is large, and not for the torque of a moment."""
     limits = in_force(robot, Limits())
-    tau, load = 0.5 * limits.tau_upper, np.zeros(robot.n)
+    tau, load = 0.4 * limits.tau_upper, np.zeros(robot.n)
     for tick in range(1000):
-        tau[1] = -0.95 * limits.tau_upper[1]
+        tau[1] = -0.75 * limits.tau_upper[1]
         tau[2] = limits.tau_upper[2] if tick == 990 else 0.0
         load = loaded(load, tau, limits, 1e-3)
-    share = spared(limits, load).v_limit / limits.v_limit
-    assert share[1] == pytest.approx(0.05 / 0.3, rel=1e-3)
-    assert np.delete(share, 1) == pytest.approx(1.0)
-    assert spared(limits, np.zeros(robot.n)) is limits
+    carried = Distances(robot, Avoidance(on=True)).carried
+    share = spared(limits, load, carried).v_limit / limits.v_limit
+    assert share[0] == 1.0
+    assert share[1:] == pytest.approx(0.2 / 0.4, rel=1e-3)
+    assert spared(limits, np.zeros(robot.n), carried) is limits
 
 
 def test_a_joint_that_accelerates_towards_its_limit_gets_a_lower_one(robot: Robot) -> None:
-    """Only the joint that becomes faster, and no less than 70 % of its limit; one that brakes keeps it."""
+    """Only the joint that becomes faster, and no less than half of its limit; one that brakes keeps it."""
     limits = in_force(robot, Limits())
     assert anticipated(limits, 0.4 * limits.v_limit, 0.4 * limits.v_limit) is limits
     v = 0.8 * limits.v_limit
@@ -174,9 +192,9 @@ def test_a_joint_that_accelerates_towards_its_limit_gets_a_lower_one(robot: Robo
         v = v + 1e-3 * acceleration / 5.0
         mean = followed(mean, v, 1e-3)
     share = anticipated(limits, v, mean).v_limit / limits.v_limit
-    lower = 1.0 - 0.067 * 0.4 / limits.v_limit
+    lower = 1.0 - 0.1 * 0.4 / limits.v_limit
     assert share[[0, 2]] == pytest.approx(lower[[0, 2]], abs=0.01)
-    assert share[3] == pytest.approx(0.7)
+    assert share[3] == pytest.approx(0.5)
     assert share[[1, 4, 5, 6]] == pytest.approx(1.0)
 
 

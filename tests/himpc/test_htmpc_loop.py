@@ -22,6 +22,7 @@ from himpc.htmpc import (
 from himpc.references import Hold, Reference, SquareWave
 from robots import InputError, Robot, VelocityPlant, VelocityPlantSettings, load_robot
 from robots.collision import Ball, Floor
+from robots.spheres import covering_spheres
 
 Array = np.ndarray
 FAR = np.array([-0.6, -0.7])  # out of reach behind the robot
@@ -280,7 +281,8 @@ def test_noise_and_wild_states_never_break_it(robot: Robot) -> None:
 
 
 def test_an_obstacle_in_the_way_is_not_entered(robot: Robot) -> None:
-    """The base passes a ball that appears in front of it at full speed, without touching it."""
+    """The base passes a ball that appears in front of it at full speed, without touching it; the bounds that
+    are active say which link passes what."""
     ball = Ball("ball", (2.2, 0.0, 0.3), 0.2)
     goal = {
         "ee": Hold(point(robot, robot.home) + np.array([1.2, 0.0, 0.0])),
@@ -299,6 +301,12 @@ def test_an_obstacle_in_the_way_is_not_entered(robot: Robot) -> None:
     assert nearest < 0.2
     assert sum(plan.unsolved for plan in plans) == 0
     assert worst_ratios(robot, plans, path)["velocity"] <= 1.001
+    passed = {
+        each.joint for plan in plans for each in plan.binding(robot.joint_names) if each.kind == "collision"
+    }
+    links = {sphere.link for sphere in covering_spheres(robot)}
+    assert passed
+    assert passed <= {f"{link} – {name}" for link in links for name in ("ball", "floor")}
 
 
 def test_a_start_inside_the_margin_recovers(robot: Robot) -> None:

@@ -15,7 +15,7 @@ from app.panels.widgets.snapshot import SessionSnapshot
 from lessons.settings.torque import TorqueSettings
 from robots import Robot
 
-_DISTANCES = ("on", "d_safe", "margin", "reaction", "deceleration", "pull")
+_DISTANCES = ("on", "d_safe", "margin", "reaction", "deceleration", "pull", "velocity_margin")
 _LIMITS = ("torque", "velocity", "position", "torque_scale", "velocity_scale", "torque_rate")
 
 

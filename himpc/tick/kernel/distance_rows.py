@@ -32,13 +32,50 @@ def least_rate(distance: float, d_safe: float, margin: float, reaction: float, d
 
 
 ROOM, FASTEST, CHANGED = range(3)
-"""Numbers about the chosen pairs: by how much the nearest one is farther apart than it must be, m; the
-largest speed at which an object moves towards or away from a link, m/s; 1 if they are others than before."""
+"""Numbers about the pairs: by how much the nearest one is farther apart than it must be, m; of the chosen
+ones the largest speed at which an object moves towards or away from a link, m/s; 1 if they are others than
+before."""
+
+
+@inline_kernel
+def approach(pair: int, other: int, normal: Array, velocity: Array) -> float:
+    """What the motion of a pair's object takes from its distance, m/s.
+
+    Args:
+        pair: which one.
+        other: its shape; only the first ones are objects.
+        normal: of all pairs, see `near`.
+        velocity: (b, 3) m/s, of the objects.
+    """
+    moving = 0.0
+    if other < len(velocity):
+        for a in range(3):
+            moving += normal[pair, a] * velocity[other, a]
+    return moving
+
+
+@inline_kernel
+def soonest(room: float, slope: Any, fastest: Array, moving: float) -> float:
+    """The shortest time in which a pair can be at the distance that it keeps, s; for a pair that is nearer,
+    its room, which is negative.
+
+    Args:
+        room: by how much it is farther apart, m.
+        slope: (n,) m/rad, its gradient.
+        fastest: (n,) rad/s, how fast joints may be.
+        moving: what the object's motion takes from the distance, m/s.
+    """
+    if room <= 0.0:
+        return room
+    speed = max(moving, 0.0)
+    for j in range(fastest.size):
+        speed += abs(slope[j]) * fastest[j]
+    return room / speed if speed > 0.0 else math.inf
 
 
 @kernel(
-    *(WHOLE, VECTOR, INDICES, INDICES, MATRIX, MATRIX, MATRIX, NUMBER),
-    *(INDICES, INDICES, INDICES, INDICES, VECTOR, VECTOR, VECTOR),
+    *(WHOLE, VECTOR, INDICES, INDICES, MATRIX, MATRIX, MATRIX, MATRIX, VECTOR, NUMBER),
+    *(VECTOR, INDICES, INDICES, INDICES, VECTOR, VECTOR, VECTOR),
 )
 def nearest(
     count: int,
@@ -46,10 +83,12 @@ def nearest(
     sphere: Whole,
     shape: Whole,
     normal: Array,
+    slopes: Array,
     shares: Array,
     velocity: Array,
+    fastest: Array,
     d_safe: float,
-    taken: Whole,
+    time: Array,
     chosen: Whole,
     links: Whole,
     others: Whole,
@@ -57,41 +96,51 @@ def nearest(
     moving: Array,
     about: Array,
 ) -> int:
-    """Chooses the nearest of `count` pairs, at most as many as `chosen` has room for, nearest first; returns
-    their number.
+    """Chooses those of `count` pairs that can be at the distance that they keep soonest, at most as many as
+    `chosen` has room for, nearest first; returns their number. A pair that hardly any motion changes leaves
+    its row to one that is farther apart and comes nearer.
 
     Args:
-        count, distance, sphere, shape, normal: of all pairs, see `near`.
+        count, distance, sphere, shape, normal, slopes: of all pairs, see `near`.
         shares: (B, S) share of d_safe and the margin that each pair keeps.
         velocity: (b, 3) m/s, of the first b shapes, which are objects.
+        fastest: (n,) rad/s, how fast joints may be.
         d_safe: m.
-        taken: scratch, one per pair.
+        time: scratch, one per pair.
         chosen: which ones; the result.
         links, others: `sphere` and `shape` of each chosen pair, −1 where there is none; updated.
         share, moving: of each chosen pair, see `distance_rows`; the result.
-        about: numbers about them, see ROOM; the result.
+        about: numbers about the pairs, see ROOM; the result.
     """
-    for r in range(count):
-        taken[r] = 0
+    slopes = borrowed(slopes)
     about[ROOM], about[FASTEST], about[CHANGED] = math.inf, 0.0, 0.0
-    found = 0
-    for c in range(chosen.size):
+    for r in range(count):
+        room = distance[r] - d_safe * shares[shape[r], sphere[r]]
+        about[ROOM] = min(about[ROOM], room)
+        time[r] = soonest(room, slopes[r], fastest, approach(r, shape[r], normal, velocity))
+    found = min(count, chosen.size)
+    for c in range(found):
         best = -1
         for r in range(count):
-            if not taken[r] and (best < 0 or distance[r] < distance[best]):
+            if time[r] < math.inf and (best < 0 or time[r] < time[best]):
                 best = r
-        s, o = (sphere[best], shape[best]) if best >= 0 else (-1, -1)
+        if best < 0:
+            found = c
+            break
+        time[best] = math.inf
+        place = c
+        while place > 0 and distance[chosen[place - 1]] > distance[best]:
+            chosen[place] = chosen[place - 1]
+            place -= 1
+        chosen[place] = best
+    for c in range(chosen.size):
+        s, o = (sphere[chosen[c]], shape[chosen[c]]) if c < found else (-1, -1)
         if links[c] != s or others[c] != o:
             links[c], others[c], about[CHANGED] = s, o, 1.0
         moving[c] = 0.0
-        if best < 0:
-            continue
-        taken[best], chosen[c], share[c], found = 1, best, shares[o, s], c + 1
-        about[ROOM] = min(about[ROOM], distance[best] - d_safe * share[c])
-        if o < len(velocity):
-            for a in range(3):
-                moving[c] += normal[best, a] * velocity[o, a]
-        about[FASTEST] = max(about[FASTEST], abs(moving[c]))
+        if c < found:
+            share[c], moving[c] = shares[o, s], approach(chosen[c], o, normal, velocity)
+            about[FASTEST] = max(about[FASTEST], abs(moving[c]))
     return found
 
 
