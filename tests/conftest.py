@@ -135,7 +135,7 @@ def _few_files(config: pytest.Config) -> bool:
     """Whether only files were named on the command line, no folder: each file then compiles the functions
     that it needs."""
     named = [Path(str(config.rootpath), each.split("::")[0]) for each in config.args]
-    return len(named) <= 5 and all(each.is_file() for each in named)
+    return len(named) <= 3 and all(each.is_file() for each in named)
 
 
 def pytest_configure_node(node: Any) -> None:
