@@ -67,6 +67,15 @@ _LONG = (
     "tests/lessons/test_lessons_quoted.py",
     "tests/lessons/test_lessons_interventions.py",
     "tests/commands/test_commands_reproduce.py",
+    "tests/commands/test_commands_export.py",
+    "tests/robots/test_robots_catalog.py",
+    "tests/lessons/test_lessons_adaptation.py",
+    "tests/app/test_app_lesson.py",
+    "tests/app/test_app_fork_server.py",
+    "tests/app/test_app_kept.py",
+    "tests/test_wheel.py",
+    "tests/test_notebook.py",
+    "tests/test_examples.py",
 )
 """Long tests come first, in particular those that mostly wait, so that no worker runs one alone at the
 end."""

@@ -13,15 +13,13 @@ from lessons.events import MoveTarget, Set
 from lessons.scenes.catalog import torque_scene
 from lessons.scenes.torque_scene import TorqueScene
 from lessons.session.torque import TorqueSession
-from robots import load_robot
 
 
 def test_six_joints_under_a_full_stack(example_urdf: Callable[[str], str]) -> None:
     """A 6-DoF arm with 3+3+1 rows: level 3 has no freedom, changes nothing and raises no error."""
-    robot = load_robot(example_urdf("ur_description/urdf/ur10_robot.urdf"))
-    assert robot.n == 6
     scene = torque_scene("hold", example_urdf("ur_description/urdf/ur10_robot.urdf"))
-    third = Level((Joints(name="q1", joints=robot.joint_names[:1]),))
+    assert scene.robot.n == 6
+    third = Level((Joints(name="q1", joints=scene.robot.joint_names[:1]),))
     settings = replace(scene.settings, levels=(*scene.settings.levels[:2], third))
     for route in ("compiled", "explicit"):
         session = TorqueSession(replace(scene, settings=replace(settings, route=route)))

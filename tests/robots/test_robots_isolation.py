@@ -159,6 +159,22 @@ def test_check_and_load_go_the_same_way(tmp_path: Path) -> None:
             assert robot.report == report
 
 
+def test_a_file_is_read_again_when_it_changed_or_names_a_mesh(monkeypatch, tmp_path: Path) -> None:
+    """What a mesh contains may change while the file that names it stays."""
+    read: list[object] = []
+
+    def here(work, *told: object):
+        read.append(work)
+        return work(*told)
+
+    monkeypatch.setattr("robots.load.isolated", here)
+    file, text = tmp_path / "arm.urdf", two_joint_arm()
+    for comment, times in (("", 1), ("", 1), ("<!-- new -->", 2), ("<!-- mesh -->", 3), ("<!-- mesh -->", 4)):
+        file.write_text(text.replace("</robot>", f"{comment}</robot>"))
+        assert load_robot(file).n == 2
+        assert len(read) == times
+
+
 def test_a_crash_while_loading_is_reported_and_refused(monkeypatch, tmp_path: Path) -> None:
     # A lambda cannot be sent to a process.
     monkeypatch.setattr("robots.load.import_robot", lambda *_: None)
