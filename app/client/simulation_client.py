@@ -9,17 +9,19 @@ from contextlib import suppress
 from queue import Empty, Queue
 from typing import TYPE_CHECKING, final
 
+from app.client.coming import Coming
 from app.client.ghost import GhostClient
 from app.client.simulation import Simulation, aside
 from app.client.trouble import Trouble
 from app.link.choice import SceneChoice
-from app.link.exercise import Lecture, LessonPlace, RunStep
+from app.link.exercise import Lecture, LessonPlace, Predict, RunStep
 from app.link.messages import (
     Command,
     Lead,
     Load,
     Loading,
     LoadRefused,
+    Play,
     Ready,
     Report,
     ResetAll,
@@ -36,7 +38,7 @@ from app.link.spares import Spares
 if TYPE_CHECKING:
     from lessons.teaching import lesson
 
-BEHIND = 5
+BEHIND = 15
 """How much lower than the server's the priority of a robot is that gives way."""
 STAYING = "Your teacher keeps the class at this step: wait for the next one."
 WAITING = "Your teacher runs this step for everybody: say what you expect, and wait."
@@ -59,6 +61,7 @@ class SimulationClient(Simulation):
         self.lecture: Lecture | None = None
         self.kept_at: LessonPlace | None = None
         """The step at which a teacher keeps this learner; None: the learner may go anywhere."""
+        self._coming: Coming | None = None  # the class's step, until the robot is there
         self._behind: int | None = None  # the process that gives way
         self._asking: deque[Queue[Told | None]] = deque()
         self._unheard: tuple[SceneChoice | None, int] | None = None
@@ -84,7 +87,20 @@ class SimulationClient(Simulation):
         if self.kept_at is not None and isinstance(command, RunStep) and self._has_not_run:
             self._refuse(WAITING)
             return
+        with self._lock:
+            if self._coming is not None and isinstance(command, (Predict, RunStep)):
+                self._coming = self._coming.after(command)
+                if not self._coming.sent:
+                    return
         super().send(command)
+
+    def announce(self, place: LessonPlace) -> None:
+        """Shows a step of the class at once, if the page can, and stops the robot until it loads the step,
+        see `load_for_class`."""
+        with self._lock:
+            self._coming = Coming.at(place, self.settings)
+            if self.status is not None and self.status.running:
+                self.send(Play(False))
 
     def run_with_class(self) -> None:
         """Runs the step of the lesson, also if the learner is kept at it."""
@@ -103,7 +119,12 @@ class SimulationClient(Simulation):
         """As `load`, also for a learner who is kept at a step."""
         choice = choice.admitting(self._start_choice)
         self._start_choice = self._start_choice.admitting(choice)
-        self._begin_anew(Load(choice), choice)
+        with self._lock:
+            coming = self._coming
+            self._begin_anew(Load(choice), choice)
+            self._coming = None if coming is None else coming.sent_to(choice.exercise)
+            for command in () if coming is None or self._coming is None else coming.held:
+                super().send(command)
 
     def reset_all(self) -> None:
         """Loads the scene again from its beginning, in a new process if the present one is in trouble."""
@@ -127,7 +148,7 @@ class SimulationClient(Simulation):
                 return
             before, ghost = self._process, self.ghost
             mute = super().trouble() is not None
-            self.failure = self._unheard = None
+            self.failure = self._unheard = self._coming = None
             self._forget_questions()
             self._start()
             self.send(Load((choice or self.choice).admitting(self._start_choice)))
@@ -152,7 +173,9 @@ class SimulationClient(Simulation):
         """The state of the lesson in a scene; None if another scene was loaded since. A page that will be
         rebuilt must not show the next lesson first, as a button pressed there would have no effect."""
         with self._lock:
-            return self.lecture if self.ready is ready else None
+            if self.ready is not ready:
+                return None
+            return self.lecture if self._coming is None else self._coming.lecture
 
     def _heard(self, process: Process, report: Report) -> None:
         if process is not self._process:
@@ -162,6 +185,11 @@ class SimulationClient(Simulation):
             case Status(lecture=Lecture() as lecture):
                 self.lecture = lecture
                 self.choice = self.choice.at(lecture.exercise)
+                with self._lock:
+                    if self._unheard is None and self._coming is not None and self._coming.is_at(lecture):
+                        self._coming = None
+            case LoadRefused():
+                self._coming = None
             case Told():
                 with self._lock:
                     if self._asking:

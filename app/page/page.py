@@ -30,7 +30,7 @@ from lessons.scenes.names import ALL_SCENES
 if TYPE_CHECKING:
     from app.page.layout import Stage
 
-RATE = 30.0  # Hz, poses
+RATE, CALM, STILL = 30.0, 6.0, 1.0  # Hz: poses; looks at a robot that has stood still for so many s
 PLOTS_RATE = 12.0  # Hz
 _TEXTS, NARROW = 8, 1000  # pixels with no room for panels at both sides, as in the cell of a notebook
 _BROKEN = (
@@ -107,15 +107,17 @@ class Page:
     # ---------------------------------------------------------------- loop
 
     def _loop(self) -> None:
-        frame = 0
+        frame, moved, shown = 0, 0.0, None
         while not self._closed.is_set():
             began = time.perf_counter()
             try:
                 self._look(frame)
             except Exception as error:
                 self._break(error)
-            frame += 1
-            self._closed.wait(max(0.002, 1 / RATE - (time.perf_counter() - began)))
+            before, shown = shown, None if self._stage is None else self._stage.shown
+            moved = began if shown is None or shown != before else moved
+            frame, rate = (0, CALM) if began - moved > STILL else (frame + 1, RATE)  # texts at each calm look
+            self._closed.wait(max(0.002, 1 / rate - (time.perf_counter() - began)))
 
     def _look(self, frame: int) -> None:
         learner = self.learner
@@ -203,7 +205,7 @@ class Page:
         )
         if self._again is None:
             self._again = self._client.gui.add_button("Start again")
-            self._again.on_click(self._restart)
+            self._again.on_click(lambda _: self.learner.restart())
         self._again.visible = trouble is not None and trouble.offer is not None
 
     def _load(self, choice: SceneChoice) -> None:
@@ -213,9 +215,6 @@ class Page:
             self._client.add_notification("Not loaded", _NOT_ITS_FILE, color="red")
             return
         self.learner.load(choice)
-
-    def _restart(self, _: object) -> None:
-        self.learner.restart()
 
     def _build(self, ready: Ready) -> None:
         # Imported here, so that the page can open and show a waiting message before all of this is loaded.
@@ -262,8 +261,7 @@ class Page:
         """Moves the robot into the middle of the picture, seen from the present direction."""
         from app.view.camera import look
 
-        poses = self.learner.read(lambda block, _: block.poses())
-        ready = self._built
+        poses, ready = self.learner.read(lambda block, _: block.poses()), self._built
         if poses is None or ready is None or not np.isfinite(poses).all():
             return
         base = np.zeros((0 if len(ready.room) else 1, 3))  # a mobile robot has left its initial place
@@ -281,7 +279,7 @@ class Page:
             self._client.scene.reset()
             self._client.gui.reset()
             self._client.gui.add_html(in_trouble("STOPPED", _BROKEN.format(_words(error))))
-            self._client.gui.add_button("Start again").on_click(self._restart)
+            self._client.gui.add_button("Start again").on_click(lambda _: self.learner.restart())
         if before is not None:
             with contextlib.suppress(Exception):
                 before.close()

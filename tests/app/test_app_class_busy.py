@@ -10,8 +10,10 @@ import pytest
 from test_app_class import LONG
 
 from app.classes.queue import PATIENCE, BuildQueue
-from app.client.simulation_client import BEHIND
+from app.client.simulation_client import BEHIND, SimulationClient
 from app.link.choice import SceneChoice
+from app.link.exercise import Lecture, LessonPlace
+from app.link.messages import Ready
 from app.server.server import PageServer
 from browsing.wire import Wire, eventually
 from lessons.replay.progress import read_handed_in
@@ -52,6 +54,47 @@ def test_pages_do_not_wait_for_robots(server: PageServer, monkeypatch: pytest.Mo
             assert read_handed_in(text_of(page), None)[0].code.startswith("hl1-")
         finally:
             os.kill(pid, signal.SIGCONT)
+
+
+def test_a_page_shows_the_next_step_before_its_robot_is_there() -> None:
+    """While the robot gets no time at all, the class goes on: its page shows the next step and takes the
+    prediction, which the robot gets once it is there."""
+    here, there = (LessonPlace("a-redundant-arm", place) for place in (0, 1))
+    first, second = (f"Next: {each.title}" for each in here.whole.steps[1:3])
+    server = PageServer(SceneChoice.opening(here.lesson), port=0, max_sessions=1, class_names=False)
+    try:
+        assert server.hall is not None
+        with Wire(server.guest_link) as page:
+            assert eventually(lambda: page.find(first) is not None, LONG)
+            (learner,) = server.sessions.learners
+            pid = learner.pid
+            assert pid is not None
+            os.kill(pid, signal.SIGSTOP)
+            try:
+                server.hall.go(there)
+                assert eventually(lambda: page.find(second) is not None, LONG)
+                choice = page.find("I expect")
+                assert choice is not None
+                page.write(choice, value="B")
+                ready = ready_of(learner)
+                assert eventually(lambda: answer_of(learner.lecture_of(ready)) == 1, LONG)
+                assert learner.lecture is not None and learner.lecture.exercise == here, "it cannot know yet"
+            finally:
+                os.kill(pid, signal.SIGCONT)
+            assert eventually(lambda: learner.lecture is not None and learner.lecture.exercise == there, LONG)
+            assert eventually(lambda: answer_of(learner.lecture) == 1, LONG)
+            assert page.find(second) is not None and page.find(first) is None
+    finally:
+        server.close()
+
+
+def ready_of(learner: SimulationClient) -> Ready:
+    assert learner.ready is not None
+    return learner.ready
+
+
+def answer_of(lecture: Lecture | None) -> object:
+    return None if lecture is None else lecture.answer
 
 
 def text_of(page: Wire) -> str:
