@@ -21,6 +21,7 @@ from app.client.trouble import Trouble
 from app.html.text import block, in_trouble
 from app.link.choice import SceneChoice
 from app.link.messages import Ready
+from app.page.cadence import Cadence
 from app.page.comfort import Comfort
 from app.page.fault import FaultNotice
 from app.panels.widgets.command import add_command
@@ -73,7 +74,7 @@ class Page:
         self._stage: Stage | None = None
         self._built: Ready | None = None
         self._trouble: Trouble | None = None
-        self._next_plots = 0.0
+        self._cadence = Cadence()
         self._saves = 0
         self._waiting: viser.GuiHtmlHandle | None = None
         self._again: viser.GuiButtonHandle | None = None
@@ -107,19 +108,18 @@ class Page:
     # ---------------------------------------------------------------- loop
 
     def _loop(self) -> None:
-        frame, moved, shown = 0, 0.0, None
         while not self._closed.is_set():
             began = time.perf_counter()
             try:
-                self._look(frame)
+                self._look(began)
             except Exception as error:
                 self._break(error)
-            before, shown = shown, None if self._stage is None else self._stage.shown
-            moved = began if shown is None or shown != before else moved
-            frame, rate = (0, CALM) if began - moved > STILL else (frame + 1, RATE)  # texts at each calm look
-            self._closed.wait(max(0.002, 1 / rate - (time.perf_counter() - began)))
+            status, stage = self.learner.status, self._stage
+            pace = 1.0 if status is None or not status.capped else status.real_time_factor
+            period = self._cadence.shown(None if stage is None else stage.shown, pace, began)
+            self._closed.wait(max(0.002, period - (time.perf_counter() - began)))
 
-    def _look(self, frame: int) -> None:
+    def _look(self, now: float) -> None:
         learner = self.learner
         ready = learner.ready
         if ready is not None and ready is not self._built and self._delivered():
@@ -145,7 +145,7 @@ class Page:
             learner.look()  # the connection is slow: data are stored, and the next picture is newer
             return
         try:
-            stage.follow(plots=self._plots_due(), texts=frame % _TEXTS == 0)
+            stage.follow(plots=self._cadence.plots_due(now), texts=self._cadence.texts_due(now))
         except Exception:
             # Another scene may be loaded at any moment; its rows and poses do not fit this stage.
             if learner.ready is self._built:
@@ -183,14 +183,6 @@ class Page:
             )
         self._saves = own.saves
         return None if fault is None else Trouble("YOUR CODE", fault, None)
-
-    def _plots_due(self) -> bool:
-        now = time.perf_counter()
-        if now < self._next_plots:
-            return False
-        # Frames arrive slightly early or late; this keeps the average rate.
-        self._next_plots = max(self._next_plots, now - 1 / RATE) + 1 / PLOTS_RATE
-        return True
 
     def _show_early_trouble(self) -> None:
         """Shows that the simulation ended or hangs before it sent its first report."""

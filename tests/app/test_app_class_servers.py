@@ -239,6 +239,7 @@ class OneLearner:
             ready=None,
             kept_at=None,
             give_way=lambda: None,
+            announce=lambda place: None,
             load_for_class=self.loaded.append,
         )
         self.learners = (self.one,)
