@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, final
 
 from app.client.coming import Coming
 from app.client.ghost import GhostClient
+from app.client.rest import Rest
 from app.client.simulation import Simulation, aside
 from app.client.trouble import Trouble
 from app.link.choice import SceneChoice
@@ -63,6 +64,7 @@ class SimulationClient(Simulation):
         """The step at which a teacher keeps this learner; None: the learner may go anywhere."""
         self._coming: Coming | None = None  # the class's step, until the robot is there
         self._behind: int | None = None  # the process that gives way
+        self._rest = Rest()
         self._asking: deque[Queue[Told | None]] = deque()
         self._unheard: tuple[SceneChoice | None, int] | None = None
         """The scene that was requested and not yet reported (None: the present scene), and the number of
@@ -92,6 +94,8 @@ class SimulationClient(Simulation):
                 self._coming = self._coming.after(command)
                 if not self._coming.sent:
                     return
+        if self._rest.wakes(command):
+            super().send(Play(True))
         super().send(command)
 
     def announce(self, place: LessonPlace) -> None:
@@ -184,6 +188,7 @@ class SimulationClient(Simulation):
         match report:
             case Status(lecture=Lecture() as lecture):
                 self.lecture = lecture
+                self._rest.stir()
                 self.choice = self.choice.at(lecture.exercise)
                 with self._lock:
                     if self._unheard is None and self._coming is not None and self._coming.is_at(lecture):
@@ -217,8 +222,10 @@ class SimulationClient(Simulation):
                     pass
 
     def give_way(self) -> None:
-        """Lets the pages of this server go first where there are more robots than cores. Returns at once, and
-        changes a process only once."""
+        """Lets the pages of this server go first where there are more robots than cores, and pauses a robot
+        that rests. Returns at once, and changes a process only once."""
+        if self._rest.begins(self.lecture, self.status):
+            super().send(Play(False))
         pid = self.pid
         if pid is not None and pid != self._behind:
             self._behind = pid
