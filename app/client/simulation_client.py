@@ -39,7 +39,7 @@ from app.link.spares import Spares
 if TYPE_CHECKING:
     from lessons.teaching import lesson
 
-BEHIND = 15
+BEHIND = 10
 """How much lower than the server's the priority of a robot is that gives way."""
 STAYING = "Your teacher keeps the class at this step: wait for the next one."
 WAITING = "Your teacher runs this step for everybody: say what you expect, and wait."
