@@ -13,7 +13,7 @@ from app.client.coming import Coming
 from app.client.ghost import GhostClient
 from app.client.rest import Rest
 from app.client.simulation import Simulation, aside
-from app.client.trouble import Trouble
+from app.client.trouble import DEADLINE, Trouble
 from app.link.choice import SceneChoice
 from app.link.exercise import Lecture, LessonPlace, Predict, RunStep
 from app.link.messages import (
@@ -83,7 +83,7 @@ class SimulationClient(Simulation):
         if self.kept_at is not None and choice.exercise != self.kept_at:
             self._refuse(STAYING)
             return
-        self.load_for_class(choice)
+        self.load_for_class(choice, patience=0.0)
 
     def send(self, command: Command) -> None:
         if self.kept_at is not None and isinstance(command, RunStep) and self._has_not_run:
@@ -119,26 +119,27 @@ class SimulationClient(Simulation):
         with self._lock:
             self._notices.append(sentence)
 
-    def load_for_class(self, choice: SceneChoice) -> None:
-        """As `load`, also for a learner who is kept at a step."""
+    def load_for_class(self, choice: SceneChoice, patience: float = DEADLINE) -> None:
+        """As `load`, also for a learner who is kept at a step. A robot that has been silent for less than
+        `patience`, s, is not replaced: the computer is busy, and a new process would make it busier."""
         choice = choice.admitting(self._start_choice)
         self._start_choice = self._start_choice.admitting(choice)
         with self._lock:
             coming = self._coming
-            self._begin_anew(Load(choice), choice)
+            self._begin_anew(Load(choice), choice, patience)
             self._coming = None if coming is None else coming.sent_to(choice.exercise)
             for command in () if coming is None or self._coming is None else coming.held:
                 super().send(command)
 
     def reset_all(self) -> None:
         """Loads the scene again from its beginning, in a new process if the present one is in trouble."""
-        self._begin_anew(ResetAll(), None)
+        self._begin_anew(ResetAll(), None, 0.0)
 
-    def _begin_anew(self, command: Load | ResetAll, choice: SceneChoice | None) -> None:
-        """Sends the command, or starts a new process if the present one is in trouble, also if that one has
-        just ended unnoticed."""
+    def _begin_anew(self, command: Load | ResetAll, choice: SceneChoice | None, patience: float) -> None:
+        """Sends the command, or starts a new process if the present one is in trouble."""
         with self._lock:
-            if self.trouble() is not None:
+            ended = self.failure is not None or not self._process.alive or self.quiet >= patience
+            if ended and self.trouble() is not None:
                 self.restart(choice)
                 return
             self._unheard = choice, -1 if self.status is None else self.status.resets

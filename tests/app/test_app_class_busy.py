@@ -76,6 +76,9 @@ def test_a_page_shows_the_next_step_before_its_robot_is_there() -> None:
             assert pid is not None
             os.kill(pid, signal.SIGSTOP)
             try:
+                assert eventually(lambda: learner.trouble() is not None, LONG), (
+                    "it is silent, as in a busy class"
+                )
                 server.hall.go(there)
                 assert eventually(lambda: page.find(second) is not None, LONG)
                 choice = page.find("I expect")
@@ -89,6 +92,7 @@ def test_a_page_shows_the_next_step_before_its_robot_is_there() -> None:
             assert eventually(lambda: learner.lecture is not None and learner.lecture.exercise == there, LONG)
             assert eventually(lambda: answer_of(learner.lecture) == 1, LONG)
             assert page.find(second) is not None and page.find(first) is None
+            assert learner.pid == pid, "a new process would make a busy computer busier"
     finally:
         server.close()
 
