@@ -184,8 +184,9 @@ class Room(ABC):
                 self._state = self._state.entered(learner.token, "robot", now, learner.account)
             except InputError:
                 return
-            lecture, here = self._lecture_of(learner), learner.choice.exercise
-            self._state = self._state.seen(learner.token, here, lecture, now)
+            lecture, here, coming = self._lecture_of(learner), learner.choice.exercise, learner.coming
+            shown = (here, lecture) if coming is None else (coming.lecture.exercise, coming.lecture)
+            self._state = self._state.seen(learner.token, *shown, now)
             self._run_if_due(learner)
             place, stays = self._state.place, self._state.stays
             if place is None or self._builds.has(learner.token):

@@ -62,7 +62,7 @@ class SimulationClient(Simulation):
         self.lecture: Lecture | None = None
         self.kept_at: LessonPlace | None = None
         """The step at which a teacher keeps this learner; None: the learner may go anywhere."""
-        self._coming: Coming | None = None  # the class's step, until the robot is there
+        self.coming: Coming | None = None  # the class's step, until the robot is there
         self._behind: int | None = None  # the process that gives way
         self._rest = Rest()
         self._asking: deque[Queue[Told | None]] = deque()
@@ -90,9 +90,9 @@ class SimulationClient(Simulation):
             self._refuse(WAITING)
             return
         with self._lock:
-            if self._coming is not None and isinstance(command, (Predict, RunStep)):
-                self._coming = self._coming.after(command)
-                if not self._coming.sent:
+            if self.coming is not None and isinstance(command, (Predict, RunStep)):
+                self.coming = self.coming.after(command)
+                if not self.coming.sent:
                     return
         if self._rest.wakes(command):
             super().send(Play(True))
@@ -102,7 +102,7 @@ class SimulationClient(Simulation):
         """Shows a step of the class at once, if the page can, and stops the robot until it loads the step,
         see `load_for_class`."""
         with self._lock:
-            self._coming = Coming.at(place, self.settings)
+            self.coming = Coming.at(place, self.settings)
             if self.status is not None and self.status.running:
                 self.send(Play(False))
 
@@ -125,10 +125,10 @@ class SimulationClient(Simulation):
         choice = choice.admitting(self._start_choice)
         self._start_choice = self._start_choice.admitting(choice)
         with self._lock:
-            coming = self._coming
+            coming = self.coming
             self._begin_anew(Load(choice), choice, patience)
-            self._coming = None if coming is None else coming.sent_to(choice.exercise)
-            for command in () if coming is None or self._coming is None else coming.held:
+            self.coming = None if coming is None else coming.sent_to(choice.exercise)
+            for command in () if coming is None or self.coming is None else coming.held:
                 super().send(command)
 
     def reset_all(self) -> None:
@@ -153,7 +153,7 @@ class SimulationClient(Simulation):
                 return
             before, ghost = self._process, self.ghost
             mute = super().trouble() is not None
-            self.failure = self._unheard = self._coming = None
+            self.failure = self._unheard = self.coming = None
             self._forget_questions()
             self._start()
             self.send(Load((choice or self.choice).admitting(self._start_choice)))
@@ -180,7 +180,7 @@ class SimulationClient(Simulation):
         with self._lock:
             if self.ready is not ready:
                 return None
-            return self.lecture if self._coming is None else self._coming.lecture
+            return self.lecture if self.coming is None else self.coming.lecture
 
     def _heard(self, process: Process, report: Report) -> None:
         if process is not self._process:
@@ -192,10 +192,10 @@ class SimulationClient(Simulation):
                 self._rest.stir()
                 self.choice = self.choice.at(lecture.exercise)
                 with self._lock:
-                    if self._unheard is None and self._coming is not None and self._coming.is_at(lecture):
-                        self._coming = None
+                    if self._unheard is None and self.coming is not None and self.coming.is_at(lecture):
+                        self.coming = None
             case LoadRefused():
-                self._coming = None
+                self.coming = None
             case Told():
                 with self._lock:
                     if self._asking:

@@ -81,12 +81,15 @@ def test_a_page_shows_the_next_step_before_its_robot_is_there() -> None:
                 )
                 server.hall.go(there)
                 assert eventually(lambda: page.find(second) is not None, LONG)
+                server.hall.open_vote()
                 choice = page.find("I expect")
                 assert choice is not None
                 page.write(choice, value="B")
                 ready = ready_of(learner)
                 assert eventually(lambda: answer_of(learner.lecture_of(ready)) == 1, LONG)
                 assert learner.lecture is not None and learner.lecture.exercise == here, "it cannot know yet"
+                token, hall = learner.token, server.hall
+                assert eventually(lambda: hall.mine(token) == 1, LONG), "the vote counts all the same"
             finally:
                 os.kill(pid, signal.SIGCONT)
             assert eventually(lambda: learner.lecture is not None and learner.lecture.exercise == there, LONG)

@@ -240,6 +240,7 @@ class OneLearner:
             kept_at=None,
             give_way=lambda: None,
             announce=lambda place: None,
+            coming=None,
             load_for_class=self.loaded.append,
         )
         self.learners = (self.one,)
