@@ -76,6 +76,8 @@ def _people(
         pages = [Learner(host.links["learners"]) for host in hosts for _ in range(learners)]
         for page in pages:
             all_leave.enter_context(page)
+        for page in pages:
+            page.waits_for(lambda page=page: page.find("Your name"))
         crowd = Crowd("--phones", str(phones), "--at", hosts[0].links["phones"])
         all_leave.enter_context(crowd)
         crowd.hear()
@@ -97,7 +99,7 @@ def _lecture(
     lost: list[str] = []
     for k, page in enumerate(pages):
         page.use("Your name", f"learner {k}")
-    began, busy = time.monotonic(), [host.report()["busy"] for host in hosts]
+    began, before = time.monotonic(), [host.report() for host in hosts]
     own = time.process_time()
     steps = LessonPlace(lesson).whole.steps
     for place, step in enumerate(steps):
@@ -130,7 +132,10 @@ def _lecture(
         if row["done"] != len(steps)
     ]
     reports = [host.report() for host in hosts]
-    used = [now["busy"] - then for now, then in zip(reports, busy, strict=True)]
+    used, robots = (
+        [now[what] - then[what] for now, then in zip(reports, before, strict=True)]
+        for what in ("busy", "robots")
+    )
     clients = time.process_time() - own
     factors = [factor for report in reports for factor in report["factors"]]
     lost += _handed_in(pages, waits, lesson, len(steps))
@@ -141,6 +146,7 @@ def _lecture(
         "load_average": round(psutil.getloadavg()[0], 1),
         "minutes": round(minutes, 2),
         "server_shares": [round(one / 60 / minutes, 3) for one in used],
+        "robots_share": round(sum(robots) / 60 / minutes, 3),
         "clients_share": round(clients / 60 / minutes, 3),
         "real_time_factors": {"runs": len(factors), **_figures(factors)},
         "waits": {name: _figures(times) for name, times in waits.items()},
@@ -233,7 +239,8 @@ def table(found: dict[str, Any]) -> str:
     return (
         f"{found['learners']} learners on {SERVERS} servers, {found['cores']} cores, load average "
         f"{found['load_average']}, {found['minutes']} minutes\n"
-        f"servers: {found['server_shares']} of a core; all clients: {found['clients_share']}\n"
+        f"servers: {found['server_shares']} of a core; all robots: {found['robots_share']}; all clients: "
+        f"{found['clients_share']}\n"
         f"simulated over real time in {factors['runs']} runs: least {factors['least']}, median "
         f"{factors['median']}\nwaiting times, s:\n{waits}\nlost: {found['lost'] or 'nothing'}"
     )

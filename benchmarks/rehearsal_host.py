@@ -12,6 +12,8 @@ import time
 from pathlib import Path
 from typing import Any
 
+import psutil
+
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
 from app.server.server import PageServer
@@ -22,7 +24,7 @@ KEY, CLASS_KEY = "a key of a rehearsal", "the-class-of-a-rehearsal"
 
 def be_a_server(learners: int, lesson: str, follows: str | None) -> None:
     """Serves a class, or follows the one at an address; tells its own addresses, and for each line on stdin
-    how long the run of each learner took and the processor time used so far, s."""
+    how long the run of each learner took and the processor time that server and robots used so far, s."""
     with tempfile.TemporaryDirectory() as folder:
         key = Path(folder) / "key.txt"
         key.write_text(KEY)
@@ -49,10 +51,18 @@ def be_a_server(learners: int, lesson: str, follows: str | None) -> None:
             while sys.stdin.readline():
                 ended = {each: times for each, times in runs.items() if len(times) == 3}
                 factors = [duration / (end - begin) for begin, end, duration in ended.values()]
-                _tell({"factors": [round(each, 3) for each in factors], "busy": time.process_time()})
+                robots = _processor_time(server)
+                told = {"factors": [round(each, 3) for each in factors], "robots": robots}
+                _tell({**told, "busy": time.process_time()})
             over.set()
         finally:
             server.close()
+
+
+def _processor_time(server: PageServer) -> float:
+    """The processor time that the learners' robots have used, s."""
+    times = [psutil.Process(each.pid).cpu_times() for each in server.sessions.learners if each.pid]
+    return sum(each.user + each.system for each in times)
 
 
 def _follow(

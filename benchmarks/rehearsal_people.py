@@ -11,6 +11,7 @@ from typing import Any
 
 from websockets.sync.client import connect
 
+from app.panels.widgets.in_view import AWAKE, LABEL
 from browsing.wire import Wire
 
 LONG = 300.0  # s
@@ -23,6 +24,8 @@ class Learner(Wire):
         if message["type"] == "ResetGuiMessage":
             self.controls.clear()
         super()._take(message)
+        if message["type"] == "GuiTextMessage" and message["props"]["label"] == LABEL:
+            self.write(message["uuid"], value=AWAKE)  # a browser shows the curves of the step, and no other
 
     def waits_for(self, condition: Callable[[], object]) -> float:
         """The time until a condition holds, s."""

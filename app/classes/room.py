@@ -107,6 +107,10 @@ class Room(ABC):
             self._led, self._due = {}, set()
             self._builds.clear()
             self._keep()
+            waiting, place = self._builds.before(), self._state.place
+            for learner in self._learners():
+                if place is not None and learner.token in waiting:
+                    learner.announce(place)
 
     def _keep(self) -> None:
         for learner in self._learners():
@@ -172,14 +176,17 @@ class Room(ABC):
         with self._lock:
             learner.give_way()
             if not learner.attached:
-                self._builds.leave(learner.token)
+                if self._builds.has(learner.token):
+                    self._builds.leave(learner.token)
+                    self._led.pop(learner.token, None)  # they are brought to the step when they come back
                 return
             try:
                 self._state = self._state.entered(learner.token, "robot", now, learner.account)
             except InputError:
                 return
-            lecture, here = self._lecture_of(learner), learner.choice.exercise
-            self._state = self._state.seen(learner.token, here, lecture, now)
+            lecture, here, coming = self._lecture_of(learner), learner.choice.exercise, learner.coming
+            shown = (here, lecture) if coming is None else (coming.lecture.exercise, coming.lecture)
+            self._state = self._state.seen(learner.token, *shown, now)
             self._run_if_due(learner)
             place, stays = self._state.place, self._state.stays
             if place is None or self._builds.has(learner.token):
@@ -192,6 +199,7 @@ class Room(ABC):
             self._led[learner.token] = None, now
             if here != place or (lecture is not None and lecture.attempt > 0):
                 self._builds.enter(learner.token)
+                learner.announce(place)
 
     def _arrived(self, learner: SimulationClient) -> bool:
         """Whether a robot that was led has reached the class's step, and has not run it."""

@@ -10,17 +10,20 @@ from dataclasses import replace
 from queue import Empty, Queue
 from typing import TYPE_CHECKING, final
 
+from app.client.coming import Coming
 from app.client.ghost import GhostClient
+from app.client.rest import Rest
 from app.client.simulation import Simulation, aside
-from app.client.trouble import Trouble
+from app.client.trouble import DEADLINE, Trouble
 from app.link.choice import SceneChoice
-from app.link.exercise import Lecture, LessonPlace, RunStep
+from app.link.exercise import Lecture, LessonPlace, Predict, RunStep
 from app.link.messages import (
     Command,
     Lead,
     Load,
     Loading,
     LoadRefused,
+    Play,
     Ready,
     Report,
     ResetAll,
@@ -37,7 +40,7 @@ from app.link.spares import Spares
 if TYPE_CHECKING:
     from lessons.teaching import lesson
 
-BEHIND = 5
+BEHIND = 10
 """How much lower than the server's the priority of a robot is that gives way."""
 STAYING = "Your teacher keeps the class at this step: wait for the next one."
 ARM_AGAIN = "An arm is driven once: end this program and start himpc-lab arm again."
@@ -67,7 +70,9 @@ class SimulationClient(Simulation):
         self.lecture: Lecture | None = None
         self.kept_at: LessonPlace | None = None
         """The step at which a teacher keeps this learner; None: the learner may go anywhere."""
+        self.coming: Coming | None = None  # the class's step, until the robot is there
         self._behind: int | None = None  # the process that gives way
+        self._rest = Rest()
         self._asking: deque[Queue[Told | None]] = deque()
         self._unheard: tuple[SceneChoice | None, int] | None = None
         """The scene that was requested and not yet reported (None: the present scene), and the number of
@@ -92,13 +97,28 @@ class SimulationClient(Simulation):
         if self.kept_at is not None and choice.exercise != self.kept_at:
             self._refuse(STAYING)
             return
-        self.load_for_class(choice)
+        self.load_for_class(choice, patience=0.0)
 
     def send(self, command: Command) -> None:
         if self.kept_at is not None and isinstance(command, RunStep) and self._has_not_run:
             self._refuse(WAITING)
             return
+        with self._lock:
+            if self.coming is not None and isinstance(command, (Predict, RunStep)):
+                self.coming = self.coming.after(command)
+                if not self.coming.sent:
+                    return
+        if self._rest.wakes(command):
+            super().send(Play(True))
         super().send(command)
+
+    def announce(self, place: LessonPlace) -> None:
+        """Shows a step of the class at once, if the page can, and stops the robot until it loads the step,
+        see `load_for_class`."""
+        with self._lock:
+            self.coming = Coming.at(place, self.settings)
+            if self.status is not None and self.status.running:
+                self.send(Play(False))
 
     def run_with_class(self) -> None:
         """Runs the step of the lesson, also if the learner is kept at it."""
@@ -113,24 +133,31 @@ class SimulationClient(Simulation):
         with self._lock:
             self._notices.append(sentence)
 
-    def load_for_class(self, choice: SceneChoice) -> None:
-        """As `load`, also for a learner who is kept at a step."""
+    def load_for_class(self, choice: SceneChoice, patience: float = DEADLINE) -> None:
+        """As `load`, also for a learner who is kept at a step. A robot that has been silent for less than
+        `patience`, s, is not replaced: the computer is busy, and a new process would make it busier."""
         choice = choice.admitting(self._start_choice)
         self._start_choice = self._start_choice.admitting(choice)
-        self._begin_anew(Load(choice), choice)
+        with self._lock:
+            coming = self.coming
+            self._begin_anew(Load(choice), choice, patience)
+            self.coming = None if coming is None else coming.sent_to(choice.exercise)
+            for command in () if coming is None or self.coming is None else coming.held:
+                super().send(command)
 
     def reset_all(self) -> None:
         """Loads the scene again from its beginning, in a new process if the present one is in trouble."""
-        self._begin_anew(ResetAll(), None)
+        self._begin_anew(ResetAll(), None, 0.0)
 
-    def _begin_anew(self, command: Load | ResetAll, choice: SceneChoice | None) -> None:
+    def _begin_anew(self, command: Load | ResetAll, choice: SceneChoice | None, patience: float) -> None:
         """Sends the command, or starts a new process if the present one is in trouble, also if that one has
         just ended unnoticed."""
         if self._arm is not None:
             self._refuse(ARM_AGAIN)
             return
         with self._lock:
-            if self.trouble() is not None:
+            ended = self.failure is not None or not self._process.alive or self.quiet >= patience
+            if ended and self.trouble() is not None:
                 self.restart(choice)
                 return
             self._unheard = choice, -1 if self.status is None else self.status.resets
@@ -147,7 +174,7 @@ class SimulationClient(Simulation):
                 return
             before, ghost = self._process, self.ghost
             mute = super().trouble() is not None
-            self.failure = self._unheard = None
+            self.failure = self._unheard = self.coming = None
             self._forget_questions()
             self._start()
             self.send(Load((choice or self.choice).admitting(self._start_choice)))
@@ -172,7 +199,9 @@ class SimulationClient(Simulation):
         """The state of the lesson in a scene; None if another scene was loaded since. A page that will be
         rebuilt must not show the next lesson first, as a button pressed there would have no effect."""
         with self._lock:
-            return self.lecture if self.ready is ready else None
+            if self.ready is not ready:
+                return None
+            return self.lecture if self.coming is None else self.coming.lecture
 
     def _heard(self, process: Process, report: Report) -> None:
         if process is not self._process:
@@ -181,7 +210,13 @@ class SimulationClient(Simulation):
         match report:
             case Status(lecture=Lecture() as lecture):
                 self.lecture = lecture
+                self._rest.stir()
                 self.choice = self.choice.at(lecture.exercise)
+                with self._lock:
+                    if self._unheard is None and self.coming is not None and self.coming.is_at(lecture):
+                        self.coming = None
+            case LoadRefused():
+                self.coming = None
             case Told():
                 with self._lock:
                     if self._asking:
@@ -209,8 +244,10 @@ class SimulationClient(Simulation):
                     pass
 
     def give_way(self) -> None:
-        """Lets the pages of this server go first where there are more robots than cores. Returns at once, and
-        changes a process only once."""
+        """Lets the pages of this server go first where there are more robots than cores, and pauses a robot
+        that rests. Returns at once, and changes a process only once."""
+        if self._rest.begins(self.lecture, self.status):
+            super().send(Play(False))
         pid = self.pid
         if pid is not None and pid != self._behind:
             self._behind = pid

@@ -89,6 +89,8 @@ class Stage:
                 self._change_theme,
             )
         )
+        self.shown: tuple[object, ...] | None = None
+        """Identifies the instant that was shown last; None before the first one."""
         self._resets: int | None = None
         self._ghost: GhostView | None = None
         self._shown_ghost: GhostClient | None = None
@@ -199,6 +201,7 @@ class Stage:
         moment = moment_of(learner, self._time_line.past, curves=due)
         if moment is None or learner.ready is not self._ready:
             return  # no report yet, or already a report of another scene, which the page will build
+        self.shown = moment.t, moment.live, learner.status.running if learner.status else None, learner.ghost
         if not self._in_view.asleep:
             self._draw(moment, plots)
         if texts and learner.failure is None:

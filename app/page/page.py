@@ -21,6 +21,7 @@ from app.client.trouble import Trouble
 from app.html.text import block, in_trouble
 from app.link.choice import SceneChoice
 from app.link.messages import Ready
+from app.page.cadence import Cadence
 from app.page.comfort import Comfort
 from app.page.fault import FaultNotice
 from app.panels.widgets.command import add_command
@@ -30,7 +31,7 @@ from lessons.scenes.names import ALL_SCENES
 if TYPE_CHECKING:
     from app.page.layout import Stage
 
-RATE = 30.0  # Hz, poses
+RATE, CALM, STILL = 30.0, 6.0, 1.0  # Hz: poses; looks at a robot that has stood still for so many s
 PLOTS_RATE = 12.0  # Hz
 _TEXTS, NARROW = 8, 1000  # pixels with no room for panels at both sides, as in the cell of a notebook
 _BROKEN = (
@@ -73,7 +74,7 @@ class Page:
         self._stage: Stage | None = None
         self._built: Ready | None = None
         self._trouble: Trouble | None = None
-        self._next_plots = 0.0
+        self._cadence = Cadence()
         self._saves = 0
         self._waiting: viser.GuiHtmlHandle | None = None
         self._again: viser.GuiButtonHandle | None = None
@@ -107,17 +108,18 @@ class Page:
     # ---------------------------------------------------------------- loop
 
     def _loop(self) -> None:
-        frame = 0
         while not self._closed.is_set():
             began = time.perf_counter()
             try:
-                self._look(frame)
+                self._look(began)
             except Exception as error:
                 self._break(error)
-            frame += 1
-            self._closed.wait(max(0.002, 1 / RATE - (time.perf_counter() - began)))
+            status, stage = self.learner.status, self._stage
+            pace = 1.0 if status is None or not status.capped else status.real_time_factor
+            period = self._cadence.shown(None if stage is None else stage.shown, pace, began)
+            self._closed.wait(max(0.002, period - (time.perf_counter() - began)))
 
-    def _look(self, frame: int) -> None:
+    def _look(self, now: float) -> None:
         learner = self.learner
         ready = learner.ready
         if ready is not None and ready is not self._built and self._delivered():
@@ -143,7 +145,7 @@ class Page:
             learner.look()  # the connection is slow: data are stored, and the next picture is newer
             return
         try:
-            stage.follow(plots=self._plots_due(), texts=frame % _TEXTS == 0)
+            stage.follow(plots=self._cadence.plots_due(now), texts=self._cadence.texts_due(now))
         except Exception:
             # Another scene may be loaded at any moment; its rows and poses do not fit this stage.
             if learner.ready is self._built:
@@ -182,14 +184,6 @@ class Page:
         self._saves = own.saves
         return None if fault is None else Trouble("YOUR CODE", fault, None)
 
-    def _plots_due(self) -> bool:
-        now = time.perf_counter()
-        if now < self._next_plots:
-            return False
-        # Frames arrive slightly early or late; this keeps the average rate.
-        self._next_plots = max(self._next_plots, now - 1 / RATE) + 1 / PLOTS_RATE
-        return True
-
     def _show_early_trouble(self) -> None:
         """Shows that the simulation ended or hangs before it sent its first report."""
         trouble = self.learner.trouble()
@@ -203,7 +197,7 @@ class Page:
         )
         if self._again is None:
             self._again = self._client.gui.add_button("Start again")
-            self._again.on_click(self._restart)
+            self._again.on_click(lambda _: self.learner.restart())
         self._again.visible = trouble is not None and trouble.offer is not None
 
     def _load(self, choice: SceneChoice) -> None:
@@ -213,9 +207,6 @@ class Page:
             self._client.add_notification("Not loaded", _NOT_ITS_FILE, color="red")
             return
         self.learner.load(choice)
-
-    def _restart(self, _: object) -> None:
-        self.learner.restart()
 
     def _build(self, ready: Ready) -> None:
         # Imported here, so that the page can open and show a waiting message before all of this is loaded.
@@ -262,8 +253,7 @@ class Page:
         """Moves the robot into the middle of the picture, seen from the present direction."""
         from app.view.camera import look
 
-        poses = self.learner.read(lambda block, _: block.poses())
-        ready = self._built
+        poses, ready = self.learner.read(lambda block, _: block.poses()), self._built
         if poses is None or ready is None or not np.isfinite(poses).all():
             return
         base = np.zeros((0 if len(ready.room) else 1, 3))  # a mobile robot has left its initial place
@@ -281,7 +271,7 @@ class Page:
             self._client.scene.reset()
             self._client.gui.reset()
             self._client.gui.add_html(in_trouble("STOPPED", _BROKEN.format(_words(error))))
-            self._client.gui.add_button("Start again").on_click(self._restart)
+            self._client.gui.add_button("Start again").on_click(lambda _: self.learner.restart())
         if before is not None:
             with contextlib.suppress(Exception):
                 before.close()

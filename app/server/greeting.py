@@ -38,8 +38,7 @@ def _has_an_instructor(server: PageServer) -> bool:
 
 
 def _for_others(server: PageServer, host: str, origins: Sequence[str]) -> Iterator[str]:
-    port = urlsplit(server.url).port
-    here = f"http://{socket.gethostname()}:{port}" if host in ("0.0.0.0", "::") else server.url
+    here = seen_from_outside(host, server.url, ())  # as numbers: few networks know a laptop by its name
     by_proxy = [("through the proxy:", each) for each in origins]
     for what, address in by_proxy if server.proxy_only else (("for others:", here), *by_proxy):
         link = address if server.proxy_only else server.passes.link(address, "guest")

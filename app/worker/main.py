@@ -27,6 +27,9 @@ _BEAT = 0.004
 """Time, s, between two checks for steps that are due. Waking up for each tick of a millisecond takes three
 times as much processor time, as the caches are cold each time. A command wakes the process at once."""
 _IDLE = 0.02  # s: time between two checks while the simulation is idle
+_STIR = 0.3  # s after a command or a run for which an idle simulation reports as often as a running one
+PULSE = 0.5
+"""Time, s, between two reports of a simulation that rests: it is idle, and nobody asks for anything."""
 
 
 _USUAL = ("iiwa14-hold", "ridgeback-ur10-square")
@@ -106,9 +109,11 @@ def _try(wire: Wire, choice: SceneChoice) -> SimulationRunner | None:
 def _simulate(wire: Wire, body: SimulationRunner) -> None:
     pacer = Pacer(time.perf_counter())
     next_pose = next_status = next_script = 0.0
+    stirred = time.perf_counter()
     while True:
         while wire.poll():
             command: Command = wire.recv()
+            stirred, next_status = time.perf_counter(), min(next_status, time.perf_counter() + STATUS_PERIOD)
             if isinstance(command, Quit):
                 return
             if isinstance(command, Load):
@@ -131,20 +136,25 @@ def _simulate(wire: Wire, body: SimulationRunner) -> None:
         if news is not None:
             wire.send(news)
         now = time.perf_counter()
-        if now >= next_pose:
+        if body.busy:
+            stirred = now
+        rests = now - stirred > _STIR
+        if now >= next_pose and not rests:
             body.write_poses()
             next_pose = now + POSE_PERIOD
         if now >= next_status:
             # A run at full speed never reaches the requested speed, so it does not count as slowed down.
             capped = pacer.capped(now) and body.pace == body.speed
             wire.send(body.status(pacer.real_time_factor(now), capped))
-            next_status = now + STATUS_PERIOD
+            next_status = now + (PULSE if rests else STATUS_PERIOD)
         if now >= next_script:
             script = body.leader.script(body.session)
             if script is not None:
                 wire.send(script)
             next_script = now + SCRIPT_PERIOD
-        if not behind:
+        if rests:
+            wire.poll(max(0.0, next_status - time.perf_counter()))
+        elif not behind:
             wire.poll(_BEAT if body.busy else _IDLE)
 
 

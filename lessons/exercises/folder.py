@@ -9,6 +9,7 @@ from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
+from lessons.exercises.cells import cell, of_cell
 from lessons.exercises.grade import WITHIN, Submission, grade_apart
 from lessons.exercises.result import Grade
 from lessons.own.files import SUFFIX, Source, fingerprint, is_file, read
@@ -107,19 +108,6 @@ def _text(name: str) -> str:
     return name.encode(errors="replace").decode()
 
 
-_FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
-"""First characters of cells that a spreadsheet would interpret as a formula."""
-
-
-def cell(text: str) -> str:
-    """The cell in a form that a spreadsheet shows as text."""
-    return f"'{text}" if text.startswith(_FORMULA) else text
-
-
-def _of_cell(text: str) -> str:
-    return text[1:] if text.startswith("'") and text[1:].startswith(_FORMULA) else text
-
-
 def _rows(out: Path) -> Iterator[Row]:
     """The rows that a table already contains; a file that is not such a table counts as empty."""
     if not out.exists():
@@ -130,7 +118,7 @@ def _rows(out: Path) -> Iterator[Row]:
             if tuple(reader.fieldnames or ()) != COLUMNS:
                 raise InputError(f"{out}: is not a table of himpc-lab grade; give another file for --out")
             for row in reader:
-                yield {name: _of_cell(value or "") for name, value in row.items()}
+                yield {name: of_cell(value or "") for name, value in row.items()}
     except (OSError, UnicodeDecodeError, csv.Error):
         raise InputError(f"{out}: cannot be read; give another file for --out") from None
 

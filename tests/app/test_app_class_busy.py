@@ -5,15 +5,22 @@ from __future__ import annotations
 import os
 import signal
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 from test_app_class import LONG
 
 from app.classes.queue import PATIENCE, BuildQueue
-from app.client.simulation_client import BEHIND
+from app.client import rest
+from app.client.rest import Rest
+from app.client.simulation_client import BEHIND, SimulationClient
 from app.link.choice import SceneChoice
+from app.link.exercise import Lecture, LessonPlace
+from app.link.messages import Play, Post, Ready
 from app.server.server import PageServer
+from app.worker.simulation import SimulationRunner
 from browsing.wire import Wire, eventually
+from lessons.events import Reset
 from lessons.replay.progress import read_handed_in
 from lessons.scenes.run_spec import RunSpec
 
@@ -52,6 +59,79 @@ def test_pages_do_not_wait_for_robots(server: PageServer, monkeypatch: pytest.Mo
             assert read_handed_in(text_of(page), None)[0].code.startswith("hl1-")
         finally:
             os.kill(pid, signal.SIGCONT)
+
+
+def test_a_page_shows_the_next_step_before_its_robot_is_there() -> None:
+    """While the robot gets no time at all, the class goes on: its page shows the next step and takes the
+    prediction, which the robot gets once it is there."""
+    here, there = (LessonPlace("a-redundant-arm", place) for place in (0, 1))
+    first, second = (f"Next: {each.title}" for each in here.whole.steps[1:3])
+    server = PageServer(SceneChoice.opening(here.lesson), port=0, max_sessions=1, class_names=False)
+    try:
+        assert server.hall is not None
+        with Wire(server.guest_link) as page:
+            assert eventually(lambda: page.find(first) is not None, LONG)
+            (learner,) = server.sessions.learners
+            pid = learner.pid
+            assert pid is not None
+            os.kill(pid, signal.SIGSTOP)
+            try:
+                assert eventually(lambda: learner.trouble() is not None, LONG), (
+                    "it is silent, as in a busy class"
+                )
+                server.hall.go(there)
+                assert eventually(lambda: page.find(second) is not None, LONG)
+                server.hall.open_vote()
+                choice = page.find("I expect")
+                assert choice is not None
+                page.write(choice, value="B")
+                ready = ready_of(learner)
+                assert eventually(lambda: answer_of(learner.lecture_of(ready)) == 1, LONG)
+                assert learner.lecture is not None and learner.lecture.exercise == here, "it cannot know yet"
+                token, hall = learner.token, server.hall
+                assert eventually(lambda: hall.mine(token) == 1, LONG), "the vote counts all the same"
+            finally:
+                os.kill(pid, signal.SIGCONT)
+            assert eventually(lambda: learner.lecture is not None and learner.lecture.exercise == there, LONG)
+            assert eventually(lambda: answer_of(learner.lecture) == 1, LONG)
+            assert page.find(second) is not None and page.find(first) is None
+            assert learner.pid == pid, "a new process would make a busy computer busier"
+    finally:
+        server.close()
+
+
+def test_a_robot_rests_after_its_run_until_its_learner_does_something(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    now = [0.0]
+    monkeypatch.setattr(rest.time, "monotonic", lambda: now[0])
+    lecture = Lecture(LessonPlace("a-redundant-arm"), "done", 1, 2.0, 2.0)
+    body = SimulationRunner(SceneChoice(RunSpec("planar3-hold")))
+    status = body.status()
+    body.close()
+    resting, move = Rest(), Post(Reset())
+    assert status.running and not resting.begins(lecture, status), "its learner has just seen the result"
+    now[0] += rest.AFTER + 1.0
+    assert not resting.begins(replace(lecture, phase="running"), status)
+    assert resting.begins(lecture, status)
+    assert resting.wakes(move) and not resting.wakes(move) and not resting.begins(lecture, status)
+    now[0] += rest.AFTER + 1.0
+    assert resting.begins(lecture, status)
+    assert not resting.wakes(Play(True)), "the learner has done it"
+    now[0] += rest.AFTER + 1.0
+    assert not resting.begins(lecture, status), "and wants it to move"
+    resting.stir()
+    now[0] += rest.AFTER + 1.0
+    assert resting.begins(lecture, status), "until the next run is over"
+
+
+def ready_of(learner: SimulationClient) -> Ready:
+    assert learner.ready is not None
+    return learner.ready
+
+
+def answer_of(lecture: Lecture | None) -> object:
+    return None if lecture is None else lecture.answer
 
 
 def text_of(page: Wire) -> str:

@@ -239,6 +239,8 @@ class OneLearner:
             ready=None,
             kept_at=None,
             give_way=lambda: None,
+            announce=lambda place: None,
+            coming=None,
             load_for_class=self.loaded.append,
         )
         self.learners = (self.one,)

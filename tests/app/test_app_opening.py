@@ -17,7 +17,7 @@ import pytest
 
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
-from app.server.greeting import greeting
+from app.server.greeting import greeting, seen_from_outside
 from app.server.opening import opened_in_a_browser
 from app.server.server import PageServer
 from lessons.own.folder import Folder
@@ -121,6 +121,8 @@ def test_who_serves_others_reads_which_address_is_for_whom() -> None:
         assert all(line.startswith("  ") for line in others)
         assert owner not in "".join(others)
         assert others[0] == f"  for others:           {server.url}/?himpc-token={token}"
+        numbers = seen_from_outside("0.0.0.0", server.url, ())
+        assert f"  for others:           {numbers}/?himpc-token={token}" in [*greeting(server, "0.0.0.0", ())]
         assert others[1] == f"  through the proxy:    {origin}/?himpc-token={token}"
         assert others[2].startswith("  instructor's token:   ")
         assert "Keep the first address secret" in others[3] and "--no-own-files" in others[3]

@@ -40,9 +40,9 @@ from app.link.choice import SceneChoice
 from lessons.scenes.run_spec import RunSpec
 from app.server.server import PageServer
 from browsing.wire import Wire, eventually
-running = PageServer(SceneChoice(RunSpec("{scene}")), port=0)
+running = PageServer(SceneChoice(RunSpec("{scene}")), port=0, class_names={named})
 try:
-    with Wire(running.link) as page:
+    with Wire(running.guest_link) as page:
         assert eventually(lambda: page.shows("RUNNING"), 110.0)
     print(*sorted({"numba", "matplotlib"} & set(sys.modules)))
 finally:
@@ -68,10 +68,10 @@ def test_it_listens_before_anything_that_computes_is_loaded(choice: str) -> None
     assert done.stdout.split() == []
 
 
-@pytest.mark.parametrize("scene", ["iiwa14-hold", "ridgeback-ur10-square"])
-def test_the_process_of_the_pages_compiles_nothing(scene: str) -> None:
-    """The server's process shows a running robot without importing Numba or matplotlib."""
-    code = SHOWN.replace("{scene}", scene)
+@pytest.mark.parametrize(("scene", "named"), [("iiwa14-hold", None), ("ridgeback-ur10-square", True)])
+def test_the_process_of_the_pages_compiles_nothing(scene: str, named: bool | None) -> None:
+    """The server's process shows a running robot without importing Numba or matplotlib, also with a class."""
+    code = SHOWN.replace("{scene}", scene).replace("{named}", str(named))
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=240, check=False
     )

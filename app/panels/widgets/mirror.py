@@ -45,7 +45,8 @@ class Bindings(Generic[S]):
         self.post = post
         self._loop = loop
         self._mirrors: list[_Mirror[S]] = []
-        self._reminded = -float("inf")
+        self._reminded = self._wrote = -float("inf")
+        self._written: S | None = None
         self._closed = False
 
     def bind(
@@ -58,6 +59,7 @@ class Bindings(Generic[S]):
         value."""
         mirror = _Mirror(handle, read)
         self._mirrors.append(mirror)
+        self._written = None
 
         @handle.on_update
         async def _(change: viser.GuiEvent[Any]) -> None:
@@ -81,6 +83,10 @@ class Bindings(Generic[S]):
         remind = now - self._reminded > REMIND
         if remind:
             self._reminded = now
+        touched = max((mirror.touched for mirror in self._mirrors), default=0.0)
+        if present is self._written and not remind and self._wrote - touched > HOLD:
+            return  # nothing can have changed since
+        self._written, self._wrote = present, now
         for mirror in self._mirrors:
             if now - mirror.touched > HOLD:
                 value = mirror.read(present)

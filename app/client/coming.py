@@ -1,0 +1,59 @@
+"""The step of a class on a page whose robot is not at it yet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, final
+
+from app.link.exercise import Lecture, LessonPlace, Predict, RunStep
+from robots import InputError
+
+if TYPE_CHECKING:
+    from lessons.settings.settings import SceneSettings
+
+
+@final
+@dataclass(frozen=True)
+class Coming:
+    """A step that a page shows before its robot has loaded it.
+
+    Attributes:
+        lecture: the step before its run, with the prediction that was made meanwhile.
+        held: what the learner did at it, for the robot once it loads the step.
+        sent: whether the robot was told to load the step.
+    """
+
+    lecture: Lecture
+    held: tuple[Predict | RunStep, ...] = ()
+    sent: bool = False
+
+    @classmethod
+    def at(cls, place: LessonPlace, settings: SceneSettings | None) -> Coming | None:
+        """The step, untouched; None if its controls cannot be built from the settings of the present step.
+        Raises InputError if there is no such step."""
+        from lessons.teaching.lesson import Step
+
+        part = place.part
+        if settings is None:
+            return None
+        try:
+            for control in part.controls if isinstance(part, Step) else part.knobs:
+                settings.value_at(control.path)
+        except InputError:
+            return None
+        return cls(Lecture(place, "waiting", attempt=0, t=0.0, duration=part.duration))
+
+    def after(self, command: Predict | RunStep) -> Coming:
+        """The same step after the learner made a prediction or wanted to run it."""
+        held = self.held if self.sent else (*self.held, command)
+        if isinstance(command, Predict):
+            return replace(self, lecture=replace(self.lecture, answer=command.answer), held=held)
+        return replace(self, held=held)
+
+    def sent_to(self, place: LessonPlace | None) -> Coming | None:
+        """The same step once the robot was told to load a step; None if that is another one."""
+        return replace(self, held=(), sent=True) if place == self.lecture.exercise else None
+
+    def is_at(self, lecture: Lecture) -> bool:
+        """Whether a report comes from the robot at this step."""
+        return self.sent and lecture.exercise == self.lecture.exercise

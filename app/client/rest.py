@@ -1,0 +1,44 @@
+"""When the robot of a learner in a class rests: its run is over, and its learner does nothing with it."""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import TYPE_CHECKING, final
+
+from app.link.messages import Command, Play, Post
+
+if TYPE_CHECKING:
+    from app.link.exercise import Lecture
+    from app.link.messages import Status
+
+AFTER = 5.0
+"""Time, s, after a run or after what a learner last did, until the robot rests."""
+
+
+@final
+class Rest:
+    """Whether a robot rests. It goes on as soon as its learner moves or changes anything."""
+
+    def __init__(self) -> None:
+        self._since = time.monotonic()
+        self._rests = False
+
+    def stir(self) -> None:
+        """Called when a run has come further."""
+        self._since = time.monotonic()
+
+    def wakes(self, command: Command) -> bool:
+        """Takes a command of the learner; returns whether the robot must go on first."""
+        if not isinstance(command, Post | Play):
+            return False
+        kept = isinstance(command, Play) and command.running  # the learner wants to see it move
+        self._since = math.inf if kept else max(self._since, time.monotonic())
+        woken, self._rests = self._rests and isinstance(command, Post), False
+        return woken
+
+    def begins(self, lecture: Lecture | None, status: Status | None) -> bool:
+        """Whether the robot should pause now. lecture, status: its last reports."""
+        over = lecture is not None and lecture.phase == "done" and status is not None and status.running
+        self._rests = self._rests or (over and time.monotonic() - self._since > AFTER)
+        return self._rests and over

@@ -1,0 +1,57 @@
+"""How often a page is updated: less often while its robot stands still or simulated time is slowed down."""
+
+from __future__ import annotations
+
+import math
+from typing import final
+
+POSES, PLOTS, TEXTS = 30.0, 12.0, 3.75  # Hz, while simulated time is real time
+CALM = 6.0  # Hz, all of them, when the robot has stood still for STILL
+STILL = 1.0  # s
+LEAST = 1 / 3
+"""Share of these rates while simulated time is slowed down by more than this."""
+
+
+@final
+class Cadence:
+    """The rates of one page. Times are arguments, so that tests need no clock."""
+
+    def __init__(self) -> None:
+        self._shown: object = None
+        self._moved = -math.inf
+        self._share = 1.0
+        self._next_plots = self._next_texts = 0.0
+
+    def shown(self, instant: object, pace: float, now: float) -> float:
+        """Takes what a page shows and returns the time until it should look again, s.
+
+        Args:
+            instant: identifies what is shown; None while nothing is.
+            pace: simulated over real seconds if simulated time is slowed down, else 1.
+            now: s.
+        """
+        if instant is None or instant != self._shown:
+            self._shown, self._moved = instant, now
+        self._share = min(1.0, max(LEAST, pace))
+        return 1 / CALM if self._calm(now) else 1 / (self._share * POSES)
+
+    def plots_due(self, now: float) -> bool:
+        """Whether the plots should be drawn now."""
+        if self._calm(now):
+            return True
+        if now < self._next_plots:
+            return False
+        # Looks come slightly early or late; this keeps the average rate.
+        late = now - 1 / (self._share * POSES)
+        self._next_plots = max(self._next_plots, late) + 1 / (self._share * PLOTS)
+        return True
+
+    def texts_due(self, now: float) -> bool:
+        """Whether the texts should be written now; they are at their full rate also in slowed time."""
+        if now < self._next_texts and not self._calm(now):
+            return False
+        self._next_texts = now + 1 / TEXTS
+        return True
+
+    def _calm(self, now: float) -> bool:
+        return now - self._moved > STILL
