@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-import os
 import time
-from collections import deque
-from contextlib import suppress
 from dataclasses import replace
-from queue import Empty, Queue
+from queue import Empty
 from typing import TYPE_CHECKING, final
 
 from app.client.coming import Coming
 from app.client.ghost import GhostClient
+from app.client.priority import let_go_first
+from app.client.questions import Questions
+from app.client.refused import ARM_AGAIN, ARM_GHOST, STAYING, WAITING
 from app.client.rest import Rest
 from app.client.simulation import Simulation, aside
 from app.client.trouble import DEADLINE, Trouble
+from app.client.unheard import Unheard
 from app.link.choice import SceneChoice
 from app.link.exercise import Lecture, LessonPlace, Predict, RunStep
 from app.link.messages import (
     Command,
     Lead,
     Load,
-    Loading,
     LoadRefused,
     Play,
     Ready,
@@ -30,7 +30,6 @@ from app.link.messages import (
     Script,
     SimulationFailed,
     Status,
-    Tell,
     Told,
     WaitAt,
 )
@@ -40,14 +39,8 @@ from app.link.spares import Spares
 if TYPE_CHECKING:
     from lessons.teaching import lesson
 
-BEHIND = 10
-"""How much lower than the server's the priority of a robot is that gives way."""
-STAYING = "Your teacher keeps the class at this step: wait for the next one."
-ARM_AGAIN = "An arm is driven once: end this program and start himpc-lab arm again."
-ARM_GHOST = "The ghost of an arm is its simulation, which gets the same targets: there is no other one."
 SIMULATION = "simulation"
 """The name of the ghost of an arm."""
-WAITING = "Your teacher runs this step for everybody: say what you expect, and wait."
 
 
 @final
@@ -73,10 +66,8 @@ class SimulationClient(Simulation):
         self.coming: Coming | None = None  # the class's step, until the robot is there
         self._behind: int | None = None  # the process that gives way
         self._rest = Rest()
-        self._asking: deque[Queue[Told | None]] = deque()
-        self._unheard: tuple[SceneChoice | None, int] | None = None
-        """The scene that was requested and not yet reported (None: the present scene), and the number of
-        resets at the time of the request."""
+        self._questions = Questions()
+        self._unheard: Unheard | None = None
         super().__init__(spares)
         self.send(Load(choice))
         if arm is not None:
@@ -160,7 +151,7 @@ class SimulationClient(Simulation):
             if ended and self.trouble() is not None:
                 self.restart(choice)
                 return
-            self._unheard = choice, -1 if self.status is None else self.status.resets
+            self._unheard = Unheard(choice, -1 if self.status is None else self.status.resets)
             self.send(command)
 
     def restart(self, choice: SceneChoice | None = None) -> None:
@@ -175,7 +166,7 @@ class SimulationClient(Simulation):
             before, ghost = self._process, self.ghost
             mute = super().trouble() is not None
             self.failure = self._unheard = self.coming = None
-            self._forget_questions()
+            self._questions.forget()
             self._start()
             self.send(Load((choice or self.choice).admitting(self._start_choice)))
             if ghost is not None:
@@ -206,7 +197,8 @@ class SimulationClient(Simulation):
     def _heard(self, process: Process, report: Report) -> None:
         if process is not self._process:
             return
-        self._acknowledge(report)
+        with self._lock:
+            self._unheard = None if self._unheard is None else self._unheard.after(report)
         match report:
             case Status(lecture=Lecture() as lecture):
                 self.lecture = lecture
@@ -218,30 +210,18 @@ class SimulationClient(Simulation):
             case LoadRefused():
                 self.coming = None
             case Told():
-                with self._lock:
-                    if self._asking:
-                        self._asking.popleft().put(report)
+                self._questions.answer(report)
             case SimulationFailed(_, died):
                 with self._lock:
-                    self._forget_questions()
+                    self._questions.forget()
                     if died and self._unheard is not None and process is self._process:
-                        self.restart(self._unheard[0])
+                        self.restart(self._unheard.choice)
             case Script():
                 ghost = self.ghost
                 if ghost is not None:
                     ghost.hear(report)
             case _:
                 pass
-
-    def _acknowledge(self, report: Report) -> None:
-        with self._lock:
-            match report, self._unheard:
-                case Status(resets=resets), (_, before) if resets != before:
-                    self._unheard = None
-                case Loading() | Ready() | LoadRefused(), _:
-                    self._unheard = None
-                case _:
-                    pass
 
     def give_way(self) -> None:
         """Lets the pages of this server go first where there are more robots than cores, and pauses a robot
@@ -251,8 +231,7 @@ class SimulationClient(Simulation):
         pid = self.pid
         if pid is not None and pid != self._behind:
             self._behind = pid
-            with suppress(OSError):  # it has ended, or may not be changed
-                os.setpriority(os.PRIO_PROCESS, pid, os.getpriority(os.PRIO_PROCESS, 0) + BEHIND)
+            let_go_first(pid)
 
     # ---------------------------------------------------------------- questions
 
@@ -265,19 +244,12 @@ class SimulationClient(Simulation):
     def ask(self, timeout: float = 10.0) -> Told | None:
         """The run so far; None if the simulation does not answer within `timeout` seconds. This call blocks:
         do not call it on the page's loop or on viser's."""
-        answer: Queue[Told | None] = Queue()
-        with self._lock:  # Answers arrive in the order of the questions.
-            if not self._process.send(Tell()):
-                return None
-            self._asking.append(answer)
+        with self._lock:
+            answer = self._questions.ask(self._process)
         try:
-            return answer.get(timeout=timeout)
+            return None if answer is None else answer.get(timeout=timeout)
         except Empty:
             return None
-
-    def _forget_questions(self) -> None:
-        while self._asking:
-            self._asking.popleft().put(None)
 
     # ---------------------------------------------------------------- ghost
 
@@ -317,11 +289,9 @@ class SimulationClient(Simulation):
             aside(before.close)
 
     def _lost_ghost(self, ghost: GhostClient, sentence: str) -> None:
-        with self._lock:
-            if ghost is not self.ghost:
-                return
-            self._notices.append(f"There is no ghost: {sentence}")
-        self._end_ghost()
+        if ghost is self.ghost:
+            self._refuse(f"There is no ghost: {sentence}")
+            self._end_ghost()
 
     def close(self) -> None:
         super().close()

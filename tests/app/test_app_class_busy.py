@@ -12,8 +12,9 @@ from test_app_class import LONG
 
 from app.classes.queue import PATIENCE, BuildQueue
 from app.client import rest
+from app.client.priority import BEHIND
 from app.client.rest import Rest
-from app.client.simulation_client import BEHIND, SimulationClient
+from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.exercise import Lecture, LessonPlace
 from app.link.messages import Play, Post, Ready

@@ -1,0 +1,25 @@
+"""A scene that was requested and that the simulation has not reported yet."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from app.link.choice import SceneChoice
+from app.link.messages import Loading, LoadRefused, Ready, Report, Status
+
+
+class Unheard(NamedTuple):
+    """The scene (None: the present one), and the number of resets when it was requested."""
+
+    choice: SceneChoice | None
+    resets: int
+
+    def after(self, report: Report) -> Unheard | None:
+        """Returns what is still unheard after a report."""
+        match report:
+            case Status(resets=resets) if resets != self.resets:
+                return None
+            case Loading() | Ready() | LoadRefused():
+                return None
+            case _:
+                return self
