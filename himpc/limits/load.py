@@ -45,7 +45,7 @@ def spared(limits: LimitsInForce, load: Array, carried: NDArray[np.bool_]) -> Li
     Args:
         limits: in force.
         load: see `loaded`.
-        carried: (n, n) whether the motor of joint j, a column, carries joint k, a row, or is its motor.
+        carried: (n, n), entry [k, j]: whether the motor of joint j carries joint k; true for k = j.
     """
     if load.max() <= _FREE:
         return limits
