@@ -90,7 +90,7 @@ def _learn(
     tabs = [stack.enter_context(opened(link, each, _LONG)) for each in storages]
     check(
         eventually(lambda: [_sessions(each) for each in ports] == [SESSIONS] * SERVERS, _LONG),
-        "six are in",
+        "six learners have places",
     )
     print("learners per server:", *(_sessions(each) for each in ports))
     try:
@@ -113,19 +113,19 @@ def _learn(
     for other in (place for place in range(SERVERS) if place != home):
         tabs[places.index(other)].__exit__()
     rest = [port for place, port in enumerate(ports) if place != home]
-    check(eventually(lambda: [_sessions(each) for each in rest] == [1, 1], _LONG), "two have left")
+    check(eventually(lambda: [_sessions(each) for each in rest] == [1, 1], _LONG), "two learners have left")
     servers[home].send_signal(signal.SIGKILL)
     began = time.monotonic()
     moved, there = _again(stack, tabs[companion], link)
     check(there, "the learner is at the second step")
     print(f"killed: the learner of a protocol client goes on after {time.monotonic() - began:.1f} s")
-    check(time.monotonic() - began < MOVE, "the protocol client moves in time")
+    check(time.monotonic() - began < MOVE, "the protocol client changes servers in time")
     in_browser = _until(lambda: [_sessions(each) for each in rest] == [2, 2], page)
     shown = _until(lambda: page.get_by_text("You go on where you were").count() > 0, page)
-    check(in_browser and shown, "the learner in the browser goes on")
+    check(in_browser and shown, "the learner in the browser continues on another server")
     page.get_by_text("2 of").first.wait_for()
     print(f"killed: the page in the browser goes on after {time.monotonic() - began:.1f} s")
-    check(time.monotonic() - began < MOVE, "the browser moves in time")
+    check(time.monotonic() - began < MOVE, "the browser changes servers in time")
     if picture is not None:
         page.screenshot(path=picture)
     page.context.close()

@@ -52,8 +52,8 @@ _UNDRAWN = """(() => {
     };
   }
 })()"""
-"""The calls that fill the pixels of a canvas of the page do nothing. What comes before them is as always: the
-scene, its placements, what is visible, what the mouse meets, the number of triangles."""
+"""Replaces the calls that fill the pixels of a canvas of the page; they then do nothing. All steps before
+these calls are done as usual: the scene, its placements, visibility, what the mouse meets, the triangles."""
 
 _PICTURES = """() => new Promise((done) => {
   let left = 3;

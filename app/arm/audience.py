@@ -1,4 +1,4 @@
-"""Whoever looks at a drive beside the terminal: a page."""
+"""The interface between the drive of an arm and the page that shows it."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ Array = NDArray[np.float64]
 
 
 class Audience(Protocol):
-    """Whoever looks at a drive and may drag its targets. Nothing here may wait: the arm is stopped when its
-    watcher is silent."""
+    """A page that shows a drive and can drag its targets. No method may wait: the arm is stopped if the
+    process that watches it is silent."""
 
     def look(self) -> list[Order]:
-        """Called all the time; returns the targets that were dragged since the last call."""
+        """Returns the targets that were dragged since the last call. It is called continually."""
         ...
 
     def wish(self) -> str | None:
-        """Why the drive shall end; None if it shall go on."""
+        """Returns why the drive should end; None if it should go on."""
         ...
 
     def given(self, order: Order) -> None:
-        """An order was given to the arm."""
+        """Called when an order was given to the arm."""
         ...
 
     def see(self, t: float, row: Array, model: Model) -> None:
-        """A row of the loop at t (s since the first one), and the model at that time."""
+        """Called with each row of the loop at t (s since the first one), and with the model at that time."""
         ...

@@ -62,8 +62,8 @@ def _read(text: str) -> tuple[float, str, Array, str]:
 
 
 def order_to(session: TorqueSession, manifest: dict[str, Any], name: str) -> Order | None:
-    """Returns the order that moves the target of a task to where it is in the session; None for a task
-    without a target that an arm can be given."""
+    """Returns the order that moves the arm's target of a task to the place that it has in the session; None
+    if this target cannot be moved on an arm."""
     (entry,) = (each for each in manifest["tasks"] if each["name"] == name)
     target = session.target(name)
     if target is None or entry["target"] not in KINDS:
@@ -76,7 +76,7 @@ def _task(session: TorqueSession, name: str) -> Any:
 
 
 def _place(task: Any, raw: Array) -> Array:
-    """All three coordinates, of which the kernel takes those of the task."""
+    """Returns three coordinates with those of `raw` in their places; the kernel uses only these."""
     full = np.zeros(3)
     full[_components(task, raw)] = raw
     return full
@@ -101,4 +101,4 @@ KINDS = {
     ),
     "joints": Kind(lambda task, raw, moved: raw + moved, lambda task, raw: raw),
 }
-"""By the word of the manifest."""
+"""The kinds of targets by their names in the manifest."""

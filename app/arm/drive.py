@@ -206,7 +206,8 @@ class _Watcher:
             self._audience.given(order)
 
     def _look(self) -> float:
-        """Reads the new rows and moves the model on; returns the time of the last row since the first, s."""
+        """Reads the new rows and advances the model to them; returns the time from the first row to the last,
+        s."""
         first, rows = self._block.since(self._count)
         self._behind = len(rows) > _AT_ONCE
         for place, row in enumerate(rows[:_AT_ONCE]):
@@ -216,7 +217,7 @@ class _Watcher:
         return 0.0 if self._first is None else float(self._rows[-1][0][self._at.t]) - self._first
 
     def _beside(self, row: Array) -> None:
-        """Moves the model on to a row, and compares."""
+        """Advances the model to the time of a row, and compares it with the arm."""
         at, model = self._at, self._model
         if self._first is None:
             self._first = float(row[at.t])

@@ -24,7 +24,7 @@ class Model:
 
     Attributes:
         q, tau: of the simulated robot, (n,) rad and N·m (without gravity).
-        x_d, R_d: where the dragged targets are on their way, per row and per task (m, rad; rotations).
+        x_d, R_d: the filtered targets, per row (m, rad) and per task (rotations).
     """
 
     def __init__(self, plant: Plant, controller: NativeController, limits: ArmLimits, period: float) -> None:

@@ -40,8 +40,8 @@ class PageRows:
             self._row[fields[name]] = value
 
     def of(self, t: float, row: Array, model: Model) -> Array:
-        """Returns a row of the page (a buffer) at t (s since the first row), of a row of the loop; model: at
-        the same time, whose targets are on their way as the arm's are."""
+        """Returns the page's row (a buffer) for a row of the loop at t (s since the first row). model: at the
+        same time; its filtered targets are the same as the arm's."""
         at, fields, found = self._at, self._fields, self._row
         found[fields["t"]], found[fields["step_us"]] = t, row[at.us]
         found[fields["late"]] = row[at.missed] > 0

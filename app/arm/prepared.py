@@ -26,9 +26,9 @@ _NEAR = 0.05
 
 
 class Prepared(NamedTuple):
-    """What a drive needs of a scene: the exported controller, the limits in force, the simulated robot that
-    stands where the arm does, the drags, and a session that begins there: its simulation has no gravity, as
-    the arm compensates its own."""
+    """What a drive needs of a scene: the exported controller, the limits in force, a simulated robot in the
+    pose of the arm, the drags, and a session that begins in this pose. The session simulates no gravity: an
+    arm compensates its own."""
 
     image: Image
     limits: ArmLimits
@@ -67,8 +67,8 @@ def prepared(scene: TorqueScene, start: Array, limits: ArmLimits, texts: Sequenc
 
 
 def nominal(scene: TorqueScene, plain: TorqueScene) -> TorqueScene:
-    """Returns a scene with another one's plant: `--set plant.…` describes a simulated arm, of which the
-    simulation beside it knows nothing."""
+    """Returns a scene with the plant of the scene `plain`. `--set plant.…` changes the simulated arm only,
+    and not the simulation that runs beside it."""
     return replace(scene, settings=replace(scene.settings, plant=plain.settings.plant))
 
 
@@ -87,5 +87,5 @@ def check_start(controller: NativeController, start: Array) -> None:
 
 
 def maker(library: Path, image: Image) -> Callable[[], NativeController]:
-    """Returns a function that makes controllers that know nothing of each other."""
+    """Returns a function that makes independent controllers."""
     return lambda: NativeController.of(library, image)

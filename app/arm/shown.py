@@ -1,4 +1,4 @@
-"""An arm as a page shows it: the page's commands come in; rows, poses and reports go out; nobody waits."""
+"""Connects an arm with its page: receives commands, sends rows, poses and reports, and never waits."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ _LOOK = 0.05  # s between two looks at the page while no arm is driven
 _AHEAD = 0.5  # s
 _MOST = 64  # commands of a page in one look
 DEAF = 3.0
-"""Time, s, that a page may read nothing."""
+"""Time, s, after which the arm is stopped if its page reads nothing."""
 ONLY_TARGETS = (
     "On an arm only targets can be moved: the settings are those with which himpc-lab arm was started."
 )
@@ -143,7 +143,7 @@ class Shown:
     # ---------------------------------------------------------------- the page
 
     def _attend(self) -> None:
-        """Hears the page, and tells it what is due."""
+        """Receives the commands of the page, and sends the reports that are due."""
         for _ in range(_MOST):
             if not self._there or not self._wire.poll():
                 break
@@ -229,8 +229,8 @@ class Shown:
 
     @property
     def _follows(self) -> bool:
-        """Whether there is news for the ghost, and it has nearly reached where it was told to go: what it is
-        told while it is behind would fill the queue of its commands."""
+        """Whether to send the ghost a new script: time has passed, and the ghost has nearly reached the end
+        of the last one. Scripts sent to a ghost that is late would fill the queue of its commands."""
         return self._t != self._script_t and self._script_t < self._reached + _AHEAD
 
     def _tasks(self) -> tuple[TaskView, ...]:

@@ -1,4 +1,4 @@
-"""The step of a class on a page whose robot is not at it yet."""
+"""The class's step on a page whose robot has not loaded this step yet."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ class Coming:
     """A step that a page shows before its robot has loaded it.
 
     Attributes:
-        lecture: the step before its run, with the prediction that was made meanwhile.
-        held: what the learner did at it, for the robot once it loads the step.
+        lecture: the step before its run, with the prediction that the learner made meanwhile.
+        held: the learner's commands at this step; the robot gets them when it loads the step.
         sent: whether the robot was told to load the step.
     """
 
@@ -29,7 +29,7 @@ class Coming:
 
     @classmethod
     def at(cls, place: LessonPlace, settings: SceneSettings | None) -> Coming | None:
-        """The step, untouched; None if its controls cannot be built from the settings of the present step.
+        """The step before any command; None if its controls cannot be built from the present settings.
         Raises InputError if there is no such step."""
         from lessons.teaching.lesson import Step
 

@@ -6,7 +6,7 @@ import os
 from contextlib import suppress
 
 BEHIND = 10
-"""How much lower than the server's the priority of a simulation is that lets the pages go first."""
+"""A simulation has a niceness that is higher than the server's by this: pages are served first."""
 
 
 def let_go_first(pid: int) -> None:

@@ -20,7 +20,8 @@ class Questions:
         self._waiting: deque[Queue[Told | None]] = deque()
 
     def ask(self, process: Process) -> Queue[Told | None] | None:
-        """Asks for the run so far; returns where the answer will be, None if the process has ended."""
+        """Asks for the run so far. Returns the queue that will get the answer; None if the process has
+        ended."""
         answer: Queue[Told | None] = Queue()
         with self._lock:
             if not process.send(Tell()):

@@ -1,8 +1,8 @@
-"""What is refused to a learner, in sentences."""
+"""The messages for commands of a learner that are refused."""
 
 from __future__ import annotations
 
 STAYING = "Your teacher keeps the class at this step: wait for the next one."
 WAITING = "Your teacher runs this step for everybody: say what you expect, and wait."
-ARM_AGAIN = "An arm is driven once: end this program and start himpc-lab arm again."
-ARM_GHOST = "The ghost of an arm is its simulation, which gets the same targets: there is no other one."
+ARM_AGAIN = "Each start of himpc-lab arm drives the arm once: end this program and start it again."
+ARM_GHOST = "On this page the ghost is always the simulation of the arm, which gets the same targets."

@@ -1,4 +1,4 @@
-"""When the robot of a learner in a class rests: its run is over, and its learner does nothing with it."""
+"""Pauses the robot of a learner in a class when its run is over and the learner does nothing."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ AFTER = 5.0
 
 @final
 class Rest:
-    """Whether a robot rests. It goes on as soon as its learner moves or changes anything."""
+    """Whether a robot is paused. It continues as soon as its learner moves or changes anything."""
 
     def __init__(self) -> None:
         self._since = time.monotonic()
         self._rests = False
 
     def stir(self) -> None:
-        """Called when a run has come further."""
+        """Called while a run makes progress."""
         self._since = time.monotonic()
 
     def wakes(self, command: Command) -> bool:
-        """Takes a command of the learner; returns whether the robot must go on first."""
+        """Takes a command of the learner; returns whether the robot must continue before it gets it."""
         if not isinstance(command, Post | Play):
             return False
         kept = isinstance(command, Play) and command.running  # the learner wants to see it move

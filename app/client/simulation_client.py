@@ -50,8 +50,8 @@ class SimulationClient(Simulation):
     who = "The simulation"
 
     def __init__(self, token: str, choice: SceneChoice, spares: Spares, arm: Process | None = None) -> None:
-        """arm: watches an arm, in place of a simulation: no other process and no scene takes its place, and
-        its ghost is the simulation that gets the same targets."""
+        """arm: the process that watches an arm, used in place of a simulation. It is never replaced, and its
+        ghost is the simulation that gets the same targets."""
         self._arm = arm
         self.token = token
         self.choice = self._start_choice = choice
@@ -64,7 +64,7 @@ class SimulationClient(Simulation):
         self.kept_at: LessonPlace | None = None
         """The step at which a teacher keeps this learner; None: the learner may go anywhere."""
         self.coming: Coming | None = None  # the class's step, until the robot is there
-        self._behind: int | None = None  # the process that gives way
+        self._behind: int | None = None  # the process with the lower priority
         self._rest = Rest()
         self._questions = Questions()
         self._unheard: Unheard | None = None
@@ -224,8 +224,8 @@ class SimulationClient(Simulation):
                 pass
 
     def give_way(self) -> None:
-        """Lets the pages of this server go first where there are more robots than cores, and pauses a robot
-        that rests. Returns at once, and changes a process only once."""
+        """Gives the robot's process a lower priority than the server's, once per process, and pauses the
+        robot if its learner does nothing, see `Rest`. Returns at once."""
         if self._rest.begins(self.lecture, self.status):
             super().send(Play(False))
         pid = self.pid

@@ -15,7 +15,7 @@ class Unheard(NamedTuple):
     resets: int
 
     def after(self, report: Report) -> Unheard | None:
-        """Returns what is still unheard after a report."""
+        """Returns None if the report is about the requested scene, else this request."""
         match report:
             case Status(resets=resets) if resets != self.resets:
                 return None

@@ -19,7 +19,7 @@ from app.server.classroom import Classroom
 from app.server.serving import serve
 
 _PRIORITY = 10
-"""Below the loop's: a watcher that does not get a core in time looks like one that is silent."""
+"""Real-time priority, below the loop's. A watcher without it may get a core too late and count as silent."""
 
 
 def drive_on_a_page(

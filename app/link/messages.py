@@ -82,8 +82,8 @@ class WaitAt:
 
 @dataclass(frozen=True, eq=False)
 class Begin:
-    """The start of a ghost: the leader's scene, and its settings at its last reset. q_0: (n,) rad, where it
-    begins at rest; None: at the scene's start."""
+    """The start of a ghost: the leader's scene, and its settings at its last reset. q_0: (n,) rad, the
+    configuration in which the ghost begins at rest; None: that of the scene."""
 
     choice: SceneChoice
     settings: SceneSettings
@@ -106,7 +106,7 @@ class Tell:
 
 @dataclass(frozen=True)
 class PageLeft:
-    """The last page was closed: an arm is stopped gently, a simulation goes on."""
+    """The last page was closed. An arm is then stopped gently; a simulation continues."""
 
 
 @dataclass(frozen=True)
@@ -162,8 +162,9 @@ class TaskView:
 
 @dataclass(frozen=True)
 class ArmView:
-    """An arm. missed: periods without a torque of ours, in all; begun: whether it has been taken over; ended:
-    why it was stopped, "" before that; behind: s, by which its ghost is late."""
+    """The status of an arm. missed: number of periods so far in which the controller gave no torque; begun:
+    whether the controller has taken it over; ended: why it was stopped, "" before that; behind: delay of its
+    ghost, s."""
 
     missed: int
     begun: bool
@@ -210,11 +211,10 @@ class Status:
     resets: how often the scene was reset (the page then puts its gizmo back); targets: raw targets by task;
     path: (N + 1, 3) predicted tip, m; settings: only after a change; gauge: norm and spectral radius of
     I − M⁻¹M̄ while paused, when no row of telemetry contains them; mission: for scenes that have one;
-    lecture: of a lesson, when it has changed; inside: while the page requests it; own: of a controller from a
-        file;
-    ranks: per level the number of directions that it gets, and the number of its rows; contacts: the points
-    of contact after the last tick; objects: (k, 7), the poses of the free objects of the world; nearest: the
-    names of the nearest pair, "" if none is measured; arm: of an arm.
+    lecture: of a lesson, when it has changed; inside: while the page requests it; own: of a controller from
+    a file; ranks: per level the number of directions that it gets, and the number of its rows; contacts: the
+    points of contact after the last tick; objects: (k, 7), the poses of the free objects of the world;
+    nearest: the names of the nearest pair, "" if none is measured; arm: only for an arm.
     """
 
     t: float

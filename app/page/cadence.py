@@ -6,7 +6,7 @@ import math
 from typing import final
 
 POSES, PLOTS, TEXTS = 30.0, 12.0, 3.75  # Hz, while simulated time is real time
-CALM = 6.0  # Hz, all of them, when the robot has stood still for STILL
+CALM = 6.0  # Hz, the rate of all three when the robot has stood still for STILL
 STILL = 1.0  # s
 LEAST = 1 / 3
 """Share of these rates while simulated time is slowed down by more than this."""
@@ -23,7 +23,7 @@ class Cadence:
         self._next_plots = self._next_texts = 0.0
 
     def shown(self, instant: object, pace: float, now: float) -> float:
-        """Takes what a page shows and returns the time until it should look again, s.
+        """Returns the time until the page should check for changes again, s.
 
         Args:
             instant: identifies what is shown; None while nothing is.
@@ -41,13 +41,13 @@ class Cadence:
             return True
         if now < self._next_plots:
             return False
-        # Looks come slightly early or late; this keeps the average rate.
+        # The page checks slightly early or late; this keeps the average rate.
         late = now - 1 / (self._share * POSES)
         self._next_plots = max(self._next_plots, late) + 1 / (self._share * PLOTS)
         return True
 
     def texts_due(self, now: float) -> bool:
-        """Whether the texts should be written now; they are at their full rate also in slowed time."""
+        """Whether the texts should be written now; their rate is not reduced in slowed time."""
         if now < self._next_texts and not self._calm(now):
             return False
         self._next_texts = now + 1 / TEXTS

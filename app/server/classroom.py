@@ -1,5 +1,5 @@
-"""The classroom: all pages show one session, and only pages with the instructor's token control it. Also the
-room of an arm, which every page controls."""
+"""The classroom: all pages show one session, and only pages with the instructor's token control it. It is
+also used for an arm, which every page controls."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from app.link.spares import Spares
 from app.server.sessions import WORKER, Refuse
 
 RETURN = 5.0
-"""Time, s, in which a page that is reloaded comes back."""
+"""Time, s, within which a reloaded page connects again."""
 _PATIENCE = 60.0
-"""Time, s, in which an arm comes to rest and the files of its drive are written."""
+"""Longest wait, s, for an arm to come to rest and for the files of its drive to be written."""
 STEERING = "Only the instructor can control the robot: enter the instructor's token on this page first."
 
 

@@ -85,7 +85,8 @@ class Goal:
         return self.place
 
     def follow(self, goal: np.ndarray | None, text: str) -> None:
-        """goal (3,): the session's goal, m; None: it has none, and the dragged position stays."""
+        """Updates the goal and its label. goal: the session's goal, (3,) m; None if the session has none: the
+        goal then stays where it was dragged to."""
         if self._label.text != text:
             self._label.text = text
         if goal is None or time.monotonic() - self._touched < HOLD:

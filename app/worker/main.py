@@ -27,9 +27,9 @@ _BEAT = 0.004
 """Time, s, between two checks for steps that are due. Waking up for each tick of a millisecond takes three
 times as much processor time, as the caches are cold each time. A command wakes the process at once."""
 _IDLE = 0.02  # s: time between two checks while the simulation is idle
-_STIR = 0.3  # s after a command or a run for which an idle simulation reports as often as a running one
+_STIR = 0.3  # s: for this time after a command or a run, an idle simulation reports as often as a running one
 PULSE = 0.5
-"""Time, s, between two reports of a simulation that rests: it is idle, and nobody asks for anything."""
+"""Time, s, between two reports of a simulation that rests: it is idle, and the last command is long past."""
 
 
 _USUAL = ("iiwa14-hold", "ridgeback-ur10-square")

@@ -20,7 +20,7 @@ KINDS = {
     int(mujoco.mjtGeom.mjGEOM_PLANE): "plane",
 }
 OBJECTS = "<!-- objects -->"
-"""Stands before and after the objects, which count with contacts only."""
+"""A mark before and after the objects, which are left out if there are no contacts."""
 
 
 def model_of(robot: Robot, world: World) -> mujoco.MjModel:

@@ -63,23 +63,23 @@ FURTHER = Further(
             _stationary,
         ),
         Line(
-            r"Every task pulls at every other. Suppose both want the same coordinate, at $z_1$ and at "
-            r"$z_2$. At rest $\Delta\tau = 0$ and $e_i = K_{P,i}(z - z_i)$. Take $c_0 = 1$ for both. Then "
-            r"the gradient vanishes at",
+            r"In this sum every task affects all others. Suppose that both tasks control the same "
+            r"coordinate $z$, one with the target $z_1$ and one with $z_2$. At rest $\Delta\tau = 0$ and "
+            r"$e_i = K_{P,i}(z - z_i)$. Take $c_0 = 1$ for both. Then the gradient vanishes at",
             r"z = \frac{Q_1 K_{P,1} z_1 + Q_2 K_{P,2} z_2}{Q_1 K_{P,1} + Q_2 K_{P,2}}",
             _between,
             1e-6,
         ),
         Line(
-            r"with the gains as prices, too. A strict second level asks differently. Let the columns of "
-            r"$Z$ span what $J_1 \bar M^{-1}$ maps to zero. Then (33) holds for",
+            r"where the gains act as weights, too. A strict second level solves another problem. Let the "
+            r"columns of $Z$ span the null space of $J_1 \bar M^{-1}$. Then (33) holds for",
             r"\Delta\tau_2 = \Delta\tau_1^* + Z s \quad\Rightarrow\quad "
             r"J_1 \bar M^{-1} \Delta\tau_2 = J_1 \bar M^{-1} \Delta\tau_1^*",
             _kept,
         ),
         Line(
-            r"with any $s$, and level 2 is a smaller problem in $s$ alone. A sum gets there only in the "
-            r"limit:",
+            r"with any $s$, and level 2 is a smaller problem in $s$ alone. A weighted sum reaches its "
+            r"solution only in the limit:",
             r"\lim_{Q_1 \to \infty} \Delta\tau_{\mathrm{sum}} = \Delta\tau_1^* + Z s^*",
             _limit,
             1e-6,

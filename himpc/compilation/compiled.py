@@ -24,7 +24,7 @@ GIVEN_MATRIX, GIVEN_MATRICES = float64[:, :], float64[:, :, :]
 """Arrays from callers, which may be slices."""
 
 clock_gettime: Any = types.ExternalFunction("clock_gettime", types.int32(types.int32, types.uintp))
-"""(clock, address of two whole numbers for s and ns): the function of the C library, where it has one."""
+"""`clock_gettime` of the C library, if it has one: (clock, address of two whole numbers for s and ns)."""
 
 inline_kernel = chain.inline_kernel
 """Compiles a function as a part of every `kernel` that calls it, in any module."""

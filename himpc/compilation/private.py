@@ -112,12 +112,13 @@ def intermediate(function: Function, arguments: tuple[Any, ...]) -> tuple[str, l
 
 
 def kept(function: Function, key: str, make: Callable[[], bytes]) -> bytes:
-    """Returns bytes that depend on the sources of a function: from disk, or made and then kept there.
+    """Returns bytes that depend on the sources of a function. They are read from disk; if they are not there,
+    they are made and stored.
 
     Args:
         function: a Python function.
-        key: what the bytes are; part of a file's name.
-        make: makes them.
+        key: name of the kind of bytes; it becomes part of the file's name.
+        make: makes the bytes.
     """
     store = Kept(Path(function.__code__.co_filename), function.__qualname__, digest_of(function))
     found = store.load_bytes(key)

@@ -77,7 +77,7 @@ class Bounds:
 
 @dataclass(frozen=True, eq=False)
 class NearView:
-    """The pairs of two links, or of a link and an object, that can be at d_safe soonest, nearest first; r is
+    """The pairs of two links, or of a link and an object, that could reach d_safe first, nearest first; r is
     0 unless `avoidance.on`. Pairs that are farther apart than 0.25 m are left out.
 
     Attributes:

@@ -111,7 +111,7 @@ class NativeController:
         return self._c.himpc_set(self._at, what, index, numbers.ctypes.data, numbers.size)
 
     def view(self, name: str) -> np.ndarray:
-        """An array of the manifest, in its place."""
+        """Returns an array of the manifest as a view of the controller's memory, not as a copy."""
         (found,) = (each for each in self.manifest["arrays"] if each["name"] == name)
         count = int(np.prod(found["shape"]))
         part = self.memory[found["offset"] : found["offset"] + 8 * count]

@@ -136,7 +136,7 @@ class Iterate:
 
     @cached_property
     def distances(self) -> Clearances | None:
-        """Distances; with gradients only if these have been computed. None without obstacles."""
+        """Distances; they include gradients only if `near` was computed before. None without obstacles."""
         avoidance = self.tick.avoidance
         if avoidance is None or "near" in self.__dict__:
             return self.near

@@ -131,7 +131,7 @@ class Configuration:
         return joint_indices(self.robot, joints)
 
     def joint_jacobians(self, joints: tuple[str, ...]) -> Array:
-        """Returns the (N, m, n) selection of the named joints, the same at every knot."""
+        """Returns the matrices, (N, m, n), that select the named joints; they are the same at every knot."""
         return _joint_selection(self.robot, joints, self.horizon)
 
 

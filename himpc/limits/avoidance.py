@@ -19,14 +19,14 @@ class Avoidance:
     Attributes:
         on: whether distances have rows.
         d_safe: m, the distance that is kept.
-        margin: m, added to d_safe, for what time-delay estimation lags.
+        margin: m, added to d_safe, to compensate for the delay of time-delay estimation.
         reaction: s before the robot brakes, which the bound allows for.
         deceleration: m/s², of a distance's decrease, that the bound counts on.
         pull: m, largest error on which tasks of positions act while `on`; other tasks act on up to TURN_PULL
             times as many rad. A target that cannot be reached then pulls no harder than one that is this far
             away. 0: no limit.
-        velocity_margin: share of the velocity limits that is kept free while `on`, for what time-delay
-            estimation lags when others accelerate a joint that is at its limit.
+        velocity_margin: share of the velocity limits that is kept free while `on`. Time-delay estimation
+            reacts late when other joints accelerate a joint that is at its limit.
     """
 
     on: bool = False

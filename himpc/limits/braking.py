@@ -24,17 +24,17 @@ _ITERATIONS = 300
 
 
 def braking(rows: Rows) -> Array:
-    """Returns increments (N, n), N·m, that satisfy the torque rows always, and all rows but those that yield
-    first whenever this is possible.
+    """Returns increments (N, n), N·m, that always satisfy the torque rows. Whenever this is possible, they
+    also satisfy all other rows, except those that yield first.
 
-    Rows of torque, velocity and position couple no two joints. With w_j = Σ_{i≤j} τ_i, what a velocity row
-    of a joint bounds, and τ_i the torque gained up to knot i, torque rows say how far w_j may be from w_{j−1}
-    and velocity rows where it may be. Going back from the last knot, the w_j from which all later rows can
-    still be met are an interval; going forward, each w_j is put as close to `rows.rest` as these intervals
-    allow. Where there is nothing between the bounds, a velocity row of an earlier knot counts more than later
-    ones. Position rows bound sums of w_j: with them the sequence closest to `rows.rest` is a QP with N
-    unknowns for every joint. Rows that yield first follow these, see `kept_apart`: they are met if one
-    step of torque suffices. With rows of other constraints: see `closest_to_rest`.
+    Rows of torque, velocity and position do not couple joints. Let τ_i be the torque gained up to knot i, and
+    w_j = Σ_{i≤j} τ_i. Torque rows bound w_j − w_{j−1}, and velocity rows bound w_j. A pass from the last knot
+    backwards computes the interval of w_j from which all later rows can still be met. A pass forwards puts
+    each w_j as close to `rows.rest` as these intervals allow. If no w_j meets all bounds, the velocity row of
+    an earlier knot has priority over later ones. Position rows bound sums of w_j: with them, the sequence
+    closest to `rows.rest` is the solution of a QP with N unknowns for each joint. Rows that yield first come
+    after these rows: they are met if one step of torque suffices, see `kept_apart`. If there are rows of
+    other constraints, see `closest_to_rest`.
     """
     N, n = rows.L.shape[1], rows.lower.shape[1]
     rest = np.zeros((N, n)) if rows.rest is None else rows.rest

@@ -17,12 +17,12 @@ Array = NDArray[np.float64]
 
 
 class Near(NamedTuple):
-    """The pairs of a robot's links and of what is around it that can be at d_safe soonest, nearest first.
+    """The pairs of links, or of a link and an object, that could reach d_safe first, nearest first.
 
     Attributes:
         distance: d, (r,) m, negative inside.
         gradient: ∇d, (r, n) m/rad.
-        moving: (r,) m/s, what the object's own motion takes from d per second.
+        moving: (r,) m/s, the speed at which the object's own motion reduces d.
         share: (r,) of d_safe and the margin that is kept: below 1 for links that are close at home.
         names: of each pair.
     """

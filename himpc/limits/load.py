@@ -1,4 +1,4 @@
-"""Lower velocity limits for joints that a motor with little torque left carries."""
+"""Lowers the velocity limits of joints that are carried by a motor with little torque left."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from himpc.limits.limits import LimitsInForce
 Array = NDArray[np.float64]
 
 _SECONDS = 0.1
-"""Time constant of the mean load: the torque of a moment is no reason to slow down."""
+"""Time constant of the mean load: a short peak of torque slows nothing down."""
 _FREE, _MOST = 0.55, 0.95
-"""Shares of the torque limit: up to the first a motor slows nothing down, from the second on joints are
-slowest."""
+"""Shares of the torque limit: below the first, a motor slows nothing down; above the second, its joints have
+their lowest limit."""
 _SLOWEST = 0.03
-"""Share of its velocity limit that a joint keeps."""
+"""The lowest limit, as a share of the joint's own velocity limit."""
 HEAVY = 0.85
-"""Load of a motor from which a robot whose tasks make no progress is stalled: the motor is in the way."""
+"""If a motor has at least this load and the tasks make no progress, the robot counts as stalled."""
 
 
 def loaded(before: Array, tau: Array, limits: LimitsInForce, T_s: float) -> Array:
@@ -36,15 +36,16 @@ def loaded(before: Array, tau: Array, limits: LimitsInForce, T_s: float) -> Arra
 
 
 def spared(limits: LimitsInForce, load: Array, carried: NDArray[np.bool_]) -> LimitsInForce:
-    """The limits in force with lower velocities of the joints that a loaded motor carries, its own too.
+    """Returns the limits in force with lower velocity limits for the joint of a loaded motor and for all
+    joints that this motor carries.
 
-    What a motor holds still depends on the posture. Where its velocity vanishes with the torque that is left,
-    a robot does not come to a posture that the motor cannot hold.
+    The torque that a motor needs to hold the robot depends on the posture. The less torque is left, the more
+    slowly the robot approaches a posture that the motor cannot hold.
 
     Args:
         limits: in force.
         load: see `loaded`.
-        carried: (n, n) whether the motor of joint j, a column, carries joint k, a row, or is its motor.
+        carried: (n, n), entry [k, j]: whether the motor of joint j carries joint k; true for k = j.
     """
     if load.max() <= _FREE:
         return limits

@@ -16,7 +16,7 @@ _SECONDS = 0.02
 _LEAD = 0.1
 """s: the velocity is extrapolated over this time, and that velocity must be within its limit."""
 _LEAST = 0.5
-"""Share of its velocity limit that a joint keeps."""
+"""The lowest limit, as a share of the joint's own velocity limit."""
 
 
 def followed(before: Array, v: Array, T_s: float) -> Array:

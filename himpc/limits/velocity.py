@@ -14,11 +14,12 @@ from himpc.limits.viability import viability_bounds
 Array = NDArray[np.float64]
 
 REACTION = 5.0
-"""Time constants of the velocity barrier that the viability bound allows before a joint really brakes."""
+"""Reaction time of the viability bound beyond one period, in time constants of the velocity barrier."""
 
 
 def reaction(limits: Limits, T_s: float) -> float:
-    """Seconds that the viability bound allows before a joint brakes; T_s: control period, s."""
+    """Returns the reaction time before a joint brakes, as the viability bound assumes it, s; T_s: control
+    period, s."""
     return T_s + (REACTION / limits.velocity_approach if limits.velocity_approach else 0.0)
 
 
@@ -29,7 +30,8 @@ def approached(N: int, share: float) -> Array:
 
 
 def summed_twice(N: int) -> Array:
-    """Velocity at the next knot, scaled by M̄/T_s, is the sum of the torques so far, (N, N)."""
+    """Returns the (N, N) profile of velocity rows: the velocity at the next knot, scaled by M̄/T_s, is the
+    sum of the torques so far."""
     lag = lags(N)
     return np.where(lag >= 0, lag + 1.0, 0.0)
 

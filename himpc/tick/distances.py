@@ -130,7 +130,7 @@ class Distances:
     """The distances of a robot's cover from the objects that a controller knows, and between its links.
 
     Attributes:
-        carried: (n, n) whether the motor of joint j, a column, carries joint k, a row, or is its motor.
+        carried: (n, n), entry [k, j]: whether the motor of joint j carries joint k; true for k = j.
         velocity_margin: see `Avoidance`.
     """
 
@@ -153,8 +153,8 @@ class Distances:
 
     @property
     def room(self) -> float:
-        """By how much the nearest pair of the last tick was farther apart than it must be, m; infinite if no
-        pair was within `WITHIN`."""
+        """The least distance of a pair at the last tick minus what the pair must keep, m; infinite if no pair
+        was within `WITHIN`."""
         return float(self._about[ROOM])
 
     @property
@@ -163,7 +163,7 @@ class Distances:
         return bool(self._about[FASTEST] > PROGRESS)
 
     def observe(self, observed: Observed) -> None:
-        """Takes over where the objects are."""
+        """Takes over the placements of the objects."""
         before, self._observed = self._observed, observed
         if observed.shapes == before.shapes:
             return

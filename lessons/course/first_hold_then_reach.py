@@ -97,10 +97,10 @@ REACH = Step(
     """,
     do="Push the base's target around in a circle. What does the base draw on the floor?",
     why=r"""
-    The base stops exactly where the arm is stretched, 1.63 m before its target, and the hand does
-    not notice. Nobody computed where that is: it is where no plan is left that makes $\mathcal J_2$
-    smaller and leaves $\mathcal J_1$ alone. There the arm is singular, its manipulability
-    $w = \sqrt{\det J J^\top}$ all but zero.
+    The base stops exactly where the arm is stretched, 1.63 m before its target, and the hand stays
+    in its place. The program contains no rule for this place. It is where every plan that makes
+    $\mathcal J_2$ smaller also changes $\mathcal J_1$. There the arm is singular: its
+    manipulability $w = \sqrt{\det J J^\top}$ is almost zero.
     """,
     prediction=Choice(
         "The base's target cannot be reached while the hand stays. What happens to the hand?",

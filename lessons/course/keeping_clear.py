@@ -121,7 +121,7 @@ INSIDE = Step(
 
     $$\nabla d^\top \dot q_{k+j} \ge -a\left(-t + \sqrt{t^2 + 2\,(d - d_s)/a}\right),$$
 
-    the speed from which one can still stop. The seven pairs that can be at $d_s$ soonest have rows, and each
+    the speed from which one can still stop. The seven pairs that could reach $d_s$ first have rows, and each
     level is solved under them. The hand is sent to the other side of the post, and the elbow has to pass it.
     """,
     do="Open the list of active bounds: which links meet what? Then put the orientation first.",

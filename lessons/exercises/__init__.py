@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 EXERCISES: dict[str, str] = {
     "joint-pd": "PD control with gravity compensation, joint by joint",
     "null-space": "OSF: a second task that leaves the first alone",
-    "time-delay": "time-delay estimation: no model, and no load sags",
+    "time-delay": "time-delay estimation: hold an unknown load without a model",
     "one-level-qp": "one level of the QP (35), one knot, with its bounds",
     "two-levels": "two levels with the equality (33)",
     "distance-row": "rows that keep distances, above all levels",

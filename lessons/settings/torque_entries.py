@@ -53,7 +53,7 @@ TORQUE_ENTRIES = (
     Entry("avoidance.d_safe", "d_safe", "The distance that is kept", "m", 0.0, 100.0, 1.0, shown="mm",
           factor=1e3, name="safe distance"),
     Entry("avoidance.margin", "Margin",
-          "Added to d_safe, for what time-delay estimation lags", "m", 0.0, 100.0, 1.0, shown="mm",
+          "Added to d_safe, for the delay of time-delay estimation", "m", 0.0, 100.0, 1.0, shown="mm",
           factor=1e3, name="margin of distances"),
     Entry("avoidance.reaction", "Reaction", "Time before the robot brakes, which the bound allows for", "s",
           0.0, 1.0, 0.01, name="reaction of distances"),
@@ -65,8 +65,8 @@ TORQUE_ENTRIES = (
               "up to five times as many rad. 0: no limit",
           "m", 0.0, 2.0, 0.01, name="pull of targets"),
     Entry("avoidance.velocity_margin", "Free velocity",
-          "Share of the velocity limits that is kept free while distances are kept, for what time-delay "
-              "estimation lags",
+          "Share of the velocity limits that is kept free while distances are kept, for the delay of "
+              "time-delay estimation",
           "", 0.0, 0.5, 0.01, name="margin of velocities"),
     Entry("route", "Route", "Method that computes the torque; both methods give the same torque"),
     Entry("solver", "QP solver",

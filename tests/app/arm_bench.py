@@ -1,4 +1,4 @@
-"""An arm in MuJoCo that does what a test scripts, and a scene prepared for drives."""
+"""An arm in MuJoCo that follows the script of a test, and a scene prepared for drives."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ from tests.commands.exported import needed
 
 T_S = 1e-3
 PATIENT = Tolerances(silent=60.0)
-"""For a watcher that a busy machine may hold up."""
+"""Tolerances for a watcher that a busy machine may delay."""
 ALONE = Tolerances()
 
 
 class Scripted(Arm):
-    """A simulated arm that does something at a period; `shown` changes what it says."""
+    """A simulated arm that calls `happen` at each period; `shown` changes the state that it reports."""
 
     def __init__(self, plant: Plant, happen: Callable[[int, Scripted], None], wait: float = 0.0) -> None:
-        """wait: s that every read takes; a period passes with each, however busy the machine is."""
+        """wait: duration of every read, s. Each read simulates one period, also on a busy machine."""
         self.inner, self.wait = SimulatedArm(plant, T_S, in_step=False), wait
         self.limits, self.plant = self.inner.limits, plant
         self.happen, self.reads, self.skipped = happen, 0, 0.0
@@ -87,8 +87,8 @@ class Bench:
         shown: Callable[[Reading], Reading] | None = None,
         delay: int = 0,
     ) -> tuple[Ended, np.ndarray, Columns, Scripted]:
-        """The loop in this process, one period per read; `drags` by their period; asked to end after so many
-        periods."""
+        """Runs the loop in this process, one period per read. drags: by the number of the period; periods:
+        after so many the loop is asked to end."""
         controller = self.make()
         orders, at = Orders(4), Columns.of(7, controller.view("error").size)
         block = Block(at.width, 8)
@@ -119,8 +119,8 @@ class Bench:
         tolerances: Tolerances = PATIENT,
         elsewhere: float = 0.0,
     ) -> Driven:
-        """A drive with the loop in a process of its own; elsewhere: rad, how far joint 2 of the model is
-        off."""
+        """Runs a drive with the loop in a process of its own; elsewhere: offset of the model's joint 2,
+        rad."""
         beside = self.plant()
         beside.reset(self.scene.q_0 + elsewhere * np.eye(7)[1])
         wanted = Drive(

@@ -1,5 +1,5 @@
-"""Runs `himpc-lab` with a simulated arm for which a period passes whenever the loop looks, however busy the
-machine is, four times as slowly as on the wall: a test then costs a quarter."""
+"""Runs `himpc-lab` with a simulated arm that simulates one period whenever the loop reads, also on a busy
+machine. A period takes four times as long as in real time, which reduces the load of a test to a quarter."""
 
 from __future__ import annotations
 

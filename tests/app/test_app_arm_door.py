@@ -62,7 +62,7 @@ def test_what_cannot_be_driven_is_told_in_one_sentence(
 
 
 def test_an_arm_that_does_not_fit_the_scene_is_refused(bench: Bench) -> None:
-    """Another number of joints, a joint outside its range, a motion that begins elsewhere."""
+    """A scene's robot with another number of joints is refused, and an arm with a joint outside its range."""
     limits = SimulatedArm(bench.plant()).limits
     with pytest.raises(InputError, match="has 7 joints and the scene's robot 'planar3' has 3"):
         limits.with_robot(torque_scene("planar3-hold").robot)
@@ -84,7 +84,7 @@ def test_a_motion_that_begins_elsewhere_is_refused(bench: Bench, tmp_path: Path)
 
 
 class FakeLibrary:
-    """pylibfranka's names that the door uses, with one arm that answers as told."""
+    """Replaces pylibfranka: the names that `robots.franka` uses, and one arm with given answers."""
 
     class FrankaException(Exception):
         pass
@@ -135,7 +135,7 @@ def library(monkeypatch: pytest.MonkeyPatch) -> FakeLibrary:
 
 
 def test_the_door_reads_the_torque_without_gravity(library: FakeLibrary) -> None:
-    """`tau_J_d`, not the measured `tau_J`; the last torque is zero and says that it is the last."""
+    """The torque is `tau_J_d`, not the measured `tau_J`. The last torque is zero and marked as the last."""
     arm = door.Franka("arm")
     assert library.config == "ignore"
     found = arm.read()
@@ -163,8 +163,8 @@ def test_the_door_tells_what_the_library_tells(library: FakeLibrary) -> None:
 
 
 def test_the_arm_must_be_the_scene_s_robot(library: FakeLibrary, bench: Bench) -> None:
-    """The flange that the arm tells must be on the last axis of the description; another arm of seven joints
-    is refused."""
+    """The flange that the arm reports must be on the last axis of the described robot. Another arm of seven
+    joints is refused."""
     robot = bench.scene.robot
     library.q = robot.home.tolist()
     rotation, position = bench.plant().frame_pose("flange" if "flange" in robot.frames else "link8")
@@ -176,7 +176,7 @@ def test_the_arm_must_be_the_scene_s_robot(library: FakeLibrary, bench: Bench) -
 
 
 def test_nobody_answers_at_this_machine() -> None:
-    """The real library says so in a sentence. No arm listens here."""
+    """No arm listens at this address: the message of the real library is part of the error."""
     pytest.importorskip("pylibfranka")
     with pytest.raises(InputError, match="is this the address of the arm"):
         door.Franka("127.0.0.1")

@@ -23,7 +23,7 @@ from robots.arm import ArmLost, Reading
 
 
 def test_missed_periods_end_the_loop_gently(bench: Bench) -> None:
-    """Eleven periods in a row are too many; the torque is then taken away as at every end."""
+    """Eleven missed periods in a row are too many. The arm is then stopped gently, as at every end."""
 
     def skip(k: int, arm: Scripted) -> None:
         if k == 200:
@@ -37,7 +37,7 @@ def test_missed_periods_end_the_loop_gently(bench: Bench) -> None:
 
 
 def test_a_lost_connection_ends_the_loop(bench: Bench) -> None:
-    """What the arm told is passed on, and what was recorded stays."""
+    """The reason contains the message of the arm, and the recorded rows are kept."""
 
     def lose(k: int, arm: Scripted) -> None:
         if k == 300:
@@ -68,8 +68,8 @@ def reading(v: float = 0.0, q: float = 0.0) -> Reading:
 def test_the_guard_finds_every_reason_to_end(
     bench: Bench, each: dict[str, Any], periods: int, words: str
 ) -> None:
-    """Each reason is found when it has lasted long enough and no earlier than it may be; without it nothing
-    is found."""
+    """Each reason is found when it has lasted long enough, and not earlier. If there is no reason, nothing is
+    found."""
     calm = {"reading": reading(), "missed": 0, "hurried": False, "fallback": 0}
     guard, found = ArmGuard(bench.ready.limits, Tolerances(), T_S), None
     for k in range(periods):
@@ -83,7 +83,7 @@ def test_the_guard_finds_every_reason_to_end(
 
 
 def test_an_arm_far_from_its_model_is_stopped(bench: Bench) -> None:
-    """A model that stands elsewhere ends the drive, and the reason names the joint."""
+    """A drive ends if the model is in another posture than the arm, and the reason names the joint."""
     driven = bench.drive(duration=60.0, tolerances=replace(PATIENT, distance=0.05), elsewhere=0.1)
     assert driven.why == "joint 2 is 0.10 rad away from the model"
     assert driven.gently
@@ -91,7 +91,7 @@ def test_an_arm_far_from_its_model_is_stopped(bench: Bench) -> None:
 
 
 def test_a_killed_loop_is_told_and_its_rows_stay(bench: Bench) -> None:
-    """Whoever watches hears of it at once."""
+    """The process that watches the loop notices its end, and keeps the rows."""
 
     def die(k: int, arm: Scripted) -> None:
         if k == 100:
@@ -104,7 +104,7 @@ def test_a_killed_loop_is_told_and_its_rows_stay(bench: Bench) -> None:
 
 
 def test_a_library_that_hangs_ends_the_loop_s_process(bench: Bench) -> None:
-    """No process stays behind that waits for an answer of the arm for ever."""
+    """The process of the loop does not wait for ever for an answer of the arm."""
 
     def hang(k: int, arm: Scripted) -> None:
         if k == 20:
@@ -126,7 +126,7 @@ def test_a_library_that_hangs_ends_the_loop_s_process(bench: Bench) -> None:
 
 
 def test_a_watcher_that_hangs_delays_nothing(bench: Bench) -> None:
-    """The loop notices its silence and stops the arm gently meanwhile."""
+    """The loop notices that its watcher is silent, and stops the arm gently meanwhile."""
     over = multiprocessing.get_context("fork").Event()
 
     def hang(text: str) -> None:
@@ -153,7 +153,7 @@ def test_a_watcher_that_hangs_delays_nothing(bench: Bench) -> None:
 
 
 def test_a_killed_watcher_leaves_no_moving_arm(bench: Bench, tmp_path: Path) -> None:
-    """The loop outlives whoever watched it for as long as it takes to stop the arm gently."""
+    """If its watcher is killed, the loop continues until it has stopped the arm gently."""
     begun, over = tmp_path / "begun", tmp_path / "over"
 
     class Noting(Scripted):

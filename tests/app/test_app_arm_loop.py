@@ -15,7 +15,7 @@ from robots.arm import Reading
 
 
 def test_without_gravity_nothing_has_to_be_commanded(bench: Bench) -> None:
-    """An arm that compensates its gravity is held by torques near zero, and moves by nothing."""
+    """An arm that compensates its gravity is held by torques near zero, and does not move."""
     ended, rows, at, arm = bench.run()
     assert ended.gently
     assert arm.stopped
@@ -33,8 +33,8 @@ def test_a_torque_with_gravity_in_it_moves_the_arm(bench: Bench) -> None:
 
 
 def test_an_arm_that_compensates_gravity_moves_as_the_lab_does(bench: Bench) -> None:
-    """The torques differ by gravity, and the motion does not: a drag of 7 cm comes out as in the lab's own
-    run, whose torques contain gravity."""
+    """The torques of the arm and of the lab's own run differ by gravity, which only those of the run contain.
+    A drag of 7 cm gives the same motion in both."""
     order = bench.order(0.05, 0.0, -0.05)
     spec = RunSpec("panda-hold", events=((0.05, MoveTarget("position", tuple(order.values.tolist()))),))
     spec = spec.but("plant.contacts=false", "plant.joint_stops=false")
@@ -57,7 +57,7 @@ def test_a_load_that_the_arm_was_not_told_of_is_carried(bench: Bench) -> None:
 
 
 def test_no_torque_changes_faster_than_the_arm_accepts(bench: Bench) -> None:
-    """Not while it is pushed hard, and not while it is stopped; at the end nothing is commanded."""
+    """This holds while the arm is pushed hard and while it is stopped. At the end the torque is small."""
 
     def push(k: int, arm: Scripted) -> None:
         if k in (100, 150):
@@ -74,9 +74,9 @@ def test_no_torque_changes_faster_than_the_arm_accepts(bench: Bench) -> None:
 
 
 def test_accelerations_are_over_the_time_that_has_passed(bench: Bench) -> None:
-    """While the hand moves, four periods are missed, and the torque jumps by little. A controller that took
-    the five periods for one would see five times the acceleration; its torque jumps by more than five times
-    as much."""
+    """Four periods are missed while the hand moves, and the torque changes little. A controller that counted
+    the five periods as one would compute five times the acceleration; the change of its torque is more than
+    five times as large."""
 
     def miss(k: int, arm: Scripted) -> None:
         if k == 120:

@@ -1,5 +1,5 @@
-"""The page of an arm, with an arm in MuJoCo: the arm as measured, its simulation as ghost, and nothing on the
-page's side that the loop would wait for."""
+"""The page of an arm, with an arm in MuJoCo: it shows the measured arm and its simulation as ghost, and the
+loop never waits for it."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def plan_of(
 
 
 def watched(bench: Bench, wire: Wire) -> None:
-    """What the process that watches the arm does."""
+    """Runs what the process that watches an arm runs."""
     plan, model = plan_of(bench)
     shown = Shown(wire, CHOICE, bench.prepared(bench.scene), T_S)
     if shown.wait_for_start():
@@ -66,7 +66,7 @@ def watched(bench: Bench, wire: Wire) -> None:
 
 @pytest.fixture
 def page(bench: Bench, fork_server: ForkServer | None) -> Iterator[SimulationClient]:
-    """The page's handle of an arm, which waits for Run."""
+    """The page's client of an arm; the arm waits for Run."""
     arm = Process(partial(forked_here, partial(watched, bench)))
     spares = Spares(WORKER, fork_server)
     made = SimulationClient("", CHOICE, spares, arm)
@@ -168,8 +168,8 @@ def test_an_arm_stops_when_its_page_is_closed(page: SimulationClient) -> None:
 
 
 def blocked_counts(k: int, arm: Scripted, last: list[float], periods: int | None) -> None:
-    """Counts a period as missed if the loop was away for long although it had a core: it waited for
-    somebody."""
+    """Counts a period as missed if the loop waited for long, and not for a core: it waited for another
+    process."""
     now = time.monotonic() - waited(os.getpid())
     if last and now - last[0] > 0.05:
         arm.skipped += T_S
@@ -179,14 +179,14 @@ def blocked_counts(k: int, arm: Scripted, last: list[float], periods: int | None
 
 
 def published(driven: Driven, at: Columns) -> tuple[int, int]:
-    """Cycles that the loop has published until its end, and periods that it has missed."""
+    """Returns the number of cycles that the loop has published until its end, and of missed periods."""
     rows = driven.rows[driven.rows[:, at.ending] == 0]
     return len(rows), int(rows[:, at.missed].sum())
 
 
 def test_a_page_that_hangs_delays_nothing(bench: Bench) -> None:
-    """A page that reads nothing, with a queue that is full at once, makes the loop miss no period more than
-    it misses without a page; after some seconds the arm is stopped gently."""
+    """A page reads nothing, and its queue is soon full. The loop misses hardly more periods than without
+    a page, and after some seconds the arm is stopped gently."""
     at = Columns.of(7, bench.make().view("error").size)
     tolerances = replace(PATIENT, silent=DEAF - 1.0)
     ours, theirs = socket.socketpair()
@@ -210,7 +210,7 @@ def test_a_page_that_hangs_delays_nothing(bench: Bench) -> None:
 
 
 def test_an_arm_stops_when_its_page_s_program_is_killed(bench: Bench, tmp_path: Path) -> None:
-    """The process that watches the arm outlives it for as long as it takes to stop the arm gently."""
+    """If the page's program is killed, the process that watches the arm first stops the arm gently."""
     begun, over = tmp_path / "begun", tmp_path / "over"
 
     def note(k: int, arm: Scripted) -> None:
@@ -239,8 +239,8 @@ def test_an_arm_stops_when_its_page_s_program_is_killed(bench: Bench, tmp_path: 
 
 
 def test_the_simulation_knows_nothing_of_the_arm_but_where_it_is(bench: Bench) -> None:
-    """`--set plant.…` describes the arm alone; the ghost begins at rest in the measured pose, and nothing
-    pulls it down."""
+    """`--set plant.…` changes the arm only. The ghost begins at rest in the measured pose, and without
+    gravity it stays there."""
     loaded = bench.scene
     heavy = replace(loaded.settings, plant=replace(loaded.settings.plant, payload_kg=3.0))
     start = loaded.q_0 + 0.1
@@ -260,7 +260,7 @@ def test_the_simulation_knows_nothing_of_the_arm_but_where_it_is(bench: Bench) -
 
 
 def torque_without_a_payload(bench: Bench, q: np.ndarray) -> np.ndarray:
-    """What holds the arm of the description at q, without a payload."""
+    """Returns the torque that holds the described arm at q, without a payload."""
     plant = bench.plant()
     plant.reset(q)
     return plant.holding_torque()

@@ -176,7 +176,8 @@ def test_controls_open_on_whatever_is_set(viser_server: viser.ViserServer) -> No
 def test_menus_offer_every_word_a_setting_may_hold(
     viser_server: viser.ViserServer, path: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A state code may set any of these values, and a menu without its present value cannot be created."""
+    """A state code may set any of these values. A menu cannot be created if the present value is not among
+    its options."""
     # CasADi is an optional package
     monkeypatch.setattr("himpc.formulation.settings.is_installed", lambda _: True)
     scene, bindings = torque_scene("planar3-hold"), Bindings(lambda _: None, viser_server.get_event_loop())

@@ -63,8 +63,8 @@ def test_pages_do_not_wait_for_robots(server: PageServer, monkeypatch: pytest.Mo
 
 
 def test_a_page_shows_the_next_step_before_its_robot_is_there() -> None:
-    """While the robot gets no time at all, the class goes on: its page shows the next step and takes the
-    prediction, which the robot gets once it is there."""
+    """While the robot gets no processor time, the class continues: its page shows the next step and stores
+    the prediction, which the robot gets when it loads the step."""
     here, there = (LessonPlace("a-redundant-arm", place) for place in (0, 1))
     first, second = (f"Next: {each.title}" for each in here.whole.steps[1:3])
     server = PageServer(SceneChoice.opening(here.lesson), port=0, max_sessions=1, class_names=False)

@@ -55,8 +55,8 @@ def open_file(wire: Wire, path: Path) -> None:
 
 
 def test_files_of_ones_own_are_opened_by_path(server: PageServer, tmp_path: Path) -> None:
-    """A file may contain a controller for the present scene or a task to add; a wrong file gives one
-    sentence."""
+    """A file may contain a controller for the present scene, or a task to add. For a file with an error, the
+    page shows a message of one sentence."""
     law, task, wrong = (tmp_path / f"{name}.py" for name in ("law", "task", "wrong"))
     law.write_text("def torque(now):\n    return now.bias - 10 * now.M_bar * now.q_dot\n")
     task.write_text(text_of("task", None, "task.py"))

@@ -165,7 +165,7 @@ def test_from_the_least_rate_a_stop_is_possible() -> None:
 
 
 def test_joints_that_a_motor_with_little_torque_left_carries_become_slow(robot: Robot) -> None:
-    """Only joints behind the motor whose mean torque is large, and not for the torque of a moment."""
+    """Only the motor whose mean torque is large slows its joints down; a short peak of torque does not."""
     limits = in_force(robot, Limits())
     tau, load = 0.4 * limits.tau_upper, np.zeros(robot.n)
     for tick in range(1000):
@@ -180,7 +180,8 @@ def test_joints_that_a_motor_with_little_torque_left_carries_become_slow(robot: 
 
 
 def test_a_joint_that_accelerates_towards_its_limit_gets_a_lower_one(robot: Robot) -> None:
-    """Only the joint that becomes faster, and no less than half of its limit; one that brakes keeps it."""
+    """Only a joint that becomes faster gets a lower limit, at least half of its own; one that brakes keeps
+    its limit."""
     limits = in_force(robot, Limits())
     assert anticipated(limits, 0.4 * limits.v_limit, 0.4 * limits.v_limit) is limits
     v = 0.8 * limits.v_limit

@@ -86,8 +86,8 @@ def test_all_architectures_have_one_mission(rule: tuple[str, ...]) -> None:
 
 @pytest.mark.parametrize("rule", [(), STRICT])
 def test_waypoints_have_one_rule(rule: tuple[str, ...]) -> None:
-    """Fig. 8: the missions differ, as in the paper, but not the rules of completion; with two tasks at a
-    time, the last task has no condition."""
+    """Fig. 8: the missions of the architectures differ, as in the paper, but their tasks are completed by the
+    same rules. The task 'stay', which only keeps the base at its last place, has no rule."""
 
     def rules(architecture: str) -> dict[str, set[tuple[float, float | None, float]]]:
         options = scene_of("ridgeback-ur10-waypoints", f"architecture={architecture}", *rule).settings.options
@@ -148,7 +148,8 @@ def test_the_factor_hangs_on_the_rule() -> None:
     assert single[0] / both[0] == pytest.approx(1.6, abs=0.05)
     assert single[1] / both[1] == pytest.approx(1.2, abs=0.05)
     assert single[1] / both[0] == pytest.approx(2.1, abs=0.05)
-    # The text says "about half" of the saved 22 of 41 s: one share or the other, depending on the order.
+    # The text says that the rule saves "about half" of the 22 s, of 41 s. Its share is below one half if the
+    # rule is changed first, and above if it is changed after the number of tasks.
     assert single[1] == pytest.approx(41.0, abs=0.5)
     saved = single[1] - both[0]
     assert saved == pytest.approx(22.0, abs=0.5)

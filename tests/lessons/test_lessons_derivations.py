@@ -189,8 +189,8 @@ def test_R_weighs_as_much_as_the_error_around_1e5() -> None:
     [("limits.velocity=false", True), ("damping=true", False), ("limits.velocity=true", False)],
 )
 def test_a_direction_that_is_nobodys_keeps_its_torque(change: str, kept: bool) -> None:
-    """*What nobody asks for*: under a push Δτ has no component along torques that move no task, unless a
-    bound or another level requires it."""
+    """Step *What nobody asks for*: during a push, Δτ has no component in a direction that moves no task,
+    unless a bound or another level requires it."""
     lesson = load_lesson("one-task")
     assert "in that direction the torque stays what it is, as long as no bound changes it" in " ".join(
         lesson.steps[3].text.split()

@@ -73,7 +73,8 @@ def test_each_level_is_best_in_the_cut_through_its_own_solution(scene: str, hori
 
 
 def test_the_cost_is_the_solvers() -> None:
-    """P, c and least are those of (32a) and (34a), at every point of the plane and for every horizon."""
+    """The cost of a level at a point of the plane is the cost of its problem, (32a) or (34a), also with a
+    horizon of more than one knot; the ellipse through the point has this cost."""
     session = running("horizon=4", scene="iiwa14-hold")
     tick = tick_of(session)
     held = np.array(tick.strict[-1].U)

@@ -31,7 +31,7 @@ _MARKS = (
     ("Q, R", "weights of the residual and of the changes of torque"),
     (
         "dynamic leak",
-        "the leak with the plant's true inertia instead of M̄: the effect of the wrong M̄",
+        "the leak, computed with the plant's true inertia instead of M̄; it shows the effect of a wrong M̄",
     ),
     (
         "rung",

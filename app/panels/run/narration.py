@@ -35,7 +35,7 @@ class Facts:
         levels: (name, whether it is on), highest priority first.
         errors: by task, its error and unit, m or rad.
         limits: active limits, as (kind, joint).
-        rest: a word for no time passing.
+        rest: the word that is shown while no simulated time passes.
     """
 
     running: bool

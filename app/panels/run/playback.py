@@ -24,7 +24,7 @@ from lessons.settings.settings import SceneSettings
 
 _PAUSE, _RUN, _STEP, _RESET, _RESET_ALL = "Pause", "Run", "Step", "Reset", "Reset all"
 _STOP = "Stop gently"
-_LATE = 0.5  # s by which the ghost of an arm may be late without a word
+_LATE = 0.5  # s: a delay of an arm's ghost is shown only above this
 
 
 class PlaybackPanel:
@@ -128,7 +128,7 @@ class PlaybackPanel:
         )
 
     def _show_arm(self, status: Status, arm: ArmView) -> None:
-        """An arm can only be begun and stopped, and its time is the clock's."""
+        """Shows the buttons and the status of an arm, which can only be started and stopped."""
         first = _STOP if status.running else _RUN
         if self._buttons.options != (first,):
             self._buttons.options = (first,)

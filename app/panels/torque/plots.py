@@ -112,7 +112,7 @@ class LevelPlots:
         ]
 
     def _leaks(self, window: PlotWindow, first: PlotWindow) -> list[np.ndarray]:
-        """Of the robot's window, which is the first, or of the ghost's; a measured arm does not know them."""
+        """Returns the leaks of the robot (the first window) or its ghost; those of a measured arm are NaN."""
         if self._measured and window is first:
             return [np.full(2 * BUCKETS, np.nan)] * 2
         return _leaks(window)

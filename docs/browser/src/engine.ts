@@ -14,7 +14,7 @@ export class Engine {
   private worker = new Worker(URL.createObjectURL(new Blob([WORKER_TEXT], { type: "text/javascript" })));
   private waiting: PromiseWithResolvers<never>[] = [];
   mujoco = "";
-  /** Called with what the simulation says by itself, and with what did not work and nobody waits for. */
+  /** Called with messages that the simulation sends without being called, and with errors of `tell`. */
   onTold: (told: Told) => void = () => {};
 
   constructor() {

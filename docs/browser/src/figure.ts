@@ -16,7 +16,7 @@ declare global {
 export interface Asked {
   /** "scene/NAME" or "lesson/NAME", and the step. */
   pack: string; robot: string; step: string | null; assignments: string[]; wide: boolean; running: boolean;
-  /** Settled when the scripts of the simulation are there; the picture needs those of robot and scene only. */
+  /** Settled when the scripts of the simulation are loaded. The first picture needs only those of robot and scene. */
   loaded: Promise<unknown>;
 }
 

@@ -55,7 +55,7 @@ export class Plant {
     this.samples = [[0, this.start.q]];
   }
 
-  /** A copy of the state, of which positions have been computed. */
+  /** A copy of the state, with everything computed that depends on positions. */
   private probe(): MjData {
     const probe = new this.mj.MjData(this.model);
     probe.qpos.set(this.data.qpos as Vector);
@@ -162,7 +162,7 @@ export class Plant {
     return this.placed(this.robot.joints.map((_, k) => `body${k + 1}`));
   }
 
-  /** The same of the objects that are drawn. */
+  /** Position and quaternion w x y z of each object that is drawn. */
   objects(): Float32Array {
     const { objects } = this.scene;
     return this.settings.contacts ? this.placed(objects.map(({ body }) => body)) : Float32Array.from(objects.flatMap(({ pose }) => pose));

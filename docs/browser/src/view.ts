@@ -105,7 +105,7 @@ export class View {
     this.draw();
   }
 
-  /** Where a target is, along its axes, and where it was dragged to, m; it goes with the hand along the others. */
+  /** Draws a target (value: filtered, raw: as dragged, m). Along axes that it does not control it follows the hand. */
   place(task: string, value: ArrayLike<number>, raw: number[] | undefined): void {
     const { frame, axes } = this.told.tasks.find(({ name }) => name === task)!;
     if (!frame) return;

@@ -18,7 +18,7 @@ export interface Frame {
   fallback: string; speed: number; us: number; order: string[]; off: string[]; horizon: number;
   lost: boolean; restarted: boolean;
 }
-/** What the simulation says by itself. */
+/** Messages that the simulation sends without being called. */
 export type Told = { frame: Frame } | { verdict: Verdict } | { error: string };
 // MuJoCo frees its objects by this name, which Safari does not have yet.
 (Symbol as { dispose?: symbol }).dispose ??= Symbol.for("Symbol.dispose");
@@ -63,7 +63,7 @@ const simulation = {
     [judged, restarted, curves] = [false, true, []];
     pace();
   },
-  /** A setting of the run and of its ghost, unless it is one by which they differ. */
+  /** Changes a setting of the run, and of its ghost unless the ghost has a value of its own for it. */
   set(path: string, value: unknown): void {
     session.set(path, value);
     if (ghost && !step!.ghost_set.includes(path)) ghost.set(path, value);

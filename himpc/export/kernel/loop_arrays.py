@@ -31,7 +31,7 @@ class LoopArrays(NamedTuple):
     weight: Annotated[Array, "M", "1", "how far a row that was switched on has faded in, 0 … 1"]
     target: Annotated[Array, "T 4", "1", "of each task: draggable, rows, numbers of its value, samples known"]
     raw: Annotated[Array, "T V", "m, rad, 1", "where the target was dragged to"]
-    caps: Annotated[Array, "T K", "m/s, m/s², m/s³", "speed, acceleration and jerk of the target; scratch"]
+    caps: Annotated[Array, "T K", "m/s, m/s², m/s³", "speed, acceleration and jerk limits; then scratch"]
     samples: Annotated[Array, "T N1 W", "m, m/s, m/s²", "the filtered target at this and the next periods"]
     # Scratch.
     lowest: Annotated[Array, "b n", "N·m", "lower bounds before a fallback has widened them"]

@@ -52,8 +52,9 @@ def control_period(
         room: of ONE_LEVEL, N·m, see `solve_level`.
 
     Returns:
-        the number of levels; else the level for which no optimum was found, whose fallback and whose later
-        parts are then the caller's to perform; NOT_FINITE if the problems or the torque are not finite.
+        the number of levels if all went well; the level for which no optimum was found: the caller must then
+        apply its fallback and perform the remaining parts; NOT_FINITE if the problems or the torque are not
+        finite.
     """
     t = arrays_of(data, where, whole, whole_where)
     if parts & LINEARIZE and not linearize(data, where, whole, whole_where):

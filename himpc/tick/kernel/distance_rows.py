@@ -32,14 +32,14 @@ def least_rate(distance: float, d_safe: float, margin: float, reaction: float, d
 
 
 ROOM, FASTEST, CHANGED = range(3)
-"""Numbers about the pairs: by how much the nearest one is farther apart than it must be, m; of the chosen
-ones the largest speed at which an object moves towards or away from a link, m/s; 1 if they are others than
-before."""
+"""Numbers about the pairs. ROOM: the least distance of a pair minus what the pair must keep, m. FASTEST: the
+largest speed at which an object of a chosen pair moves towards or away from the link, m/s. CHANGED: 1 if
+other pairs are chosen than before."""
 
 
 @inline_kernel
 def approach(pair: int, other: int, normal: Array, velocity: Array) -> float:
-    """What the motion of a pair's object takes from its distance, m/s.
+    """Returns the speed at which the motion of a pair's object reduces the pair's distance, m/s.
 
     Args:
         pair: which one.
@@ -56,14 +56,14 @@ def approach(pair: int, other: int, normal: Array, velocity: Array) -> float:
 
 @inline_kernel
 def soonest(room: float, slope: Any, fastest: Array, moving: float) -> float:
-    """The shortest time in which a pair can be at the distance that it keeps, s; for a pair that is nearer,
-    its room, which is negative.
+    """Returns the shortest time, s, in which a pair can come to the smallest distance that it must keep. For
+    a pair that is nearer, it returns `room`, which is then negative.
 
     Args:
-        room: by how much it is farther apart, m.
-        slope: (n,) m/rad, its gradient.
+        room: the pair's distance minus the smallest distance that it must keep, m.
+        slope: (n,) m/rad, gradient of the distance.
         fastest: (n,) rad/s, how fast joints may be.
-        moving: what the object's motion takes from the distance, m/s.
+        moving: speed at which the object's motion reduces the distance, m/s.
     """
     if room <= 0.0:
         return room
@@ -96,9 +96,9 @@ def nearest(
     moving: Array,
     about: Array,
 ) -> int:
-    """Chooses those of `count` pairs that can be at the distance that they keep soonest, at most as many as
-    `chosen` has room for, nearest first; returns their number. A pair that hardly any motion changes leaves
-    its row to one that is farther apart and comes nearer.
+    """Chooses, among `count` pairs, those that can come first to the smallest distance that they must keep,
+    see `soonest`. Chooses at most as many as `chosen` has room for, sorts them by distance, and returns their
+    number. A near pair whose distance hardly changes is not chosen if farther pairs can approach faster.
 
     Args:
         count, distance, sphere, shape, normal, slopes: of all pairs, see `near`.

@@ -13,17 +13,17 @@ from himpc.tick.kernel.solve_level import solve_level
 
 @inline_kernel
 def no_clock(stamp: Whole) -> float:
-    """The time where there is no clock, as in an exported kernel, which depends on nothing."""
+    """Replaces the clock where there is none, as in an exported kernel, which calls no library."""
     return 0.0
 
 
 @always_inline_kernel
 def solve_levels(data: Any, where: Whole, whole: Whole, whole_where: Whole, first: int, clock: Any) -> int:
-    """Problem i of the cascade for i = first, first + 1, …; returns the first level for which no optimum was
-    found within what is left of the budget, or the number of levels.
+    """Solves the problems of the cascade from level `first` on. Returns the first level for which no optimum
+    was found within what is left of the budget, or the number of levels.
 
-    clock: a compiled function, (scratch) → the time in µs. `solve_levels` is always inlined: else the code
-        would hold an address of `clock`, and could not be kept on disk.
+    clock: a compiled function, (scratch) → the time in µs. `solve_levels` is always inlined: otherwise the
+        code would contain an address of `clock`, and could not be stored on disk.
     """
     t = arrays_of(data, where, whole, whole_where)
     for i in range(first, t.sizes[4]):

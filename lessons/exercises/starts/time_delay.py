@@ -1,4 +1,4 @@
-"""Exercise time-delay: no model, and no load sags.
+"""Exercise time-delay: hold an unknown load without a model.
 
     himpc-lab grade FILE.py
     himpc-lab --scene iiwa14-hold --controller FILE.py
