@@ -103,7 +103,7 @@ def _push(robot: Robot) -> str:
         "at " + _choice("Pushed link", links, str(robot.n)),
         " along " + _choice("Direction of the push", {axis: axis for axis in _AXES}, "x"),
         _slider("Force", "N", (-200.0, 200.0), 60.0),
-        '<button type="button">Push</button>',
+        '<button type="button" title="Push">Push</button>',
         name="push",
     )
 

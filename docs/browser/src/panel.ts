@@ -38,7 +38,7 @@ export class Panel {
 
   constructor(private scene: SceneData, private acts: Acts) {
     this.root.innerHTML = scene.controls;
-    const [joint, along, force, push] = this.root.querySelector<HTMLFieldSetElement>("[name=push]")!.elements as unknown as Control[];
+    const [joint, along, force, push] = this.root.querySelectorAll<Control>("[name=push] :is(select, input, button)");
     push.onclick = () => acts.push(valueOf(joint), AXES.map((axis) => (axis === along.value ? valueOf(force) : 0)));
   }
 
