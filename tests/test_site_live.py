@@ -334,8 +334,11 @@ def test_what_is_loaded_first_is_small(site: Path) -> None:
     assert sum(len(gzip.compress(path.read_bytes())) for path in files) < 4e6
 
 
-def test_the_program_is_typed_and_its_packages_are_pinned() -> None:
+def test_the_program_is_small_and_typed_and_its_packages_are_pinned() -> None:
+    """It has at most 1,500 lines."""
     told = json.loads((front.PROGRAM / "package.json").read_text())
+    files = [front.PROGRAM / "build.mjs", *(front.PROGRAM / "src").iterdir()]
+    assert sum(len(path.read_text(encoding="utf-8").splitlines()) for path in files) <= 1500
     assert all(
         re.fullmatch(r"[\d.]+", each)
         for kind in ("dependencies", "devDependencies")
