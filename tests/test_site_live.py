@@ -237,7 +237,8 @@ def test_few_claims_are_left_to_the_lab() -> None:
 
 @pytest.mark.parametrize(("width", "height"), [(1440, 900), (390, 844)])
 def test_try_it(site: Path, browser: Browser, width: int, height: int) -> None:
-    """From a file, the target is dragged with mouse and keys, levels change places, and nobody is asked."""
+    """From a file, the robot is pushed, its target is dragged with mouse and keys, levels change places, and
+    nobody is asked."""
     asked: list[str] = []
     page = browser.new_page(viewport={"width": width, "height": height}, has_touch=width < 500)
     page.set_default_timeout(SLOW)
@@ -245,6 +246,8 @@ def test_try_it(site: Path, browser: Browser, width: int, height: int) -> None:
     page.goto((site / "try.html").as_uri() + "#planar3-hold")
     page.wait_for_function("() => HIMPC.shown?.frame?.t > 0.1")
     assert page.evaluate("document.documentElement.scrollWidth") <= width
+    page.get_by_role("button", name="Push").click()
+    page.wait_for_function("() => HIMPC.shown.frame.curves[1] > 1e-3")
     start = page.evaluate("HIMPC.shown.frame.targets[0].value")
     x, y = page.evaluate("HIMPC.shown.pixel('position')")
     page.mouse.move(x, y)
@@ -331,8 +334,11 @@ def test_what_is_loaded_first_is_small(site: Path) -> None:
     assert sum(len(gzip.compress(path.read_bytes())) for path in files) < 4e6
 
 
-def test_the_program_is_typed_and_its_packages_are_pinned() -> None:
+def test_the_program_is_small_and_typed_and_its_packages_are_pinned() -> None:
+    """It has at most 1,500 lines."""
     told = json.loads((front.PROGRAM / "package.json").read_text())
+    files = [front.PROGRAM / "build.mjs", *(front.PROGRAM / "src").iterdir()]
+    assert sum(len(path.read_text(encoding="utf-8").splitlines()) for path in files) <= 1500
     assert all(
         re.fullmatch(r"[\d.]+", each)
         for kind in ("dependencies", "devDependencies")

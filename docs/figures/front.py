@@ -71,7 +71,7 @@ def write(site: Path) -> None:
     for name in TRIED:
         scene = as_torque_scene(load_scene(name), "a live page's")
         pack = Pack()
-        told = {"scene": scene_data(scene, pack, HORIZONS)}
+        told = {"scene": scene_data(scene, pack, HORIZONS, wide=True)}
         (out / f"{name}.js").write_text(pack.script(f"scene/{name}", told))
         robots[scene.robot.name] = scene.robot
     for name in COURSE:
@@ -92,8 +92,9 @@ def _program(path: Path) -> None:
     subprocess.run(("node", "build.mjs", str(path)), cwd=PROGRAM, check=True)
 
 
-def about() -> dict[str, str]:
-    """Returns which kernel and commit the figures are made from, and the versions of MuJoCo in the lab."""
+def about() -> str:
+    """Says which kernel and commit the figures are made from, and how they differ from the lab; the page puts
+    the version of its own MuJoCo in the place of @mujoco@."""
     try:
         told = subprocess.run(
             ("git", "-C", str(ROOT), "describe", "--always", "--dirty", "--abbrev=10"),
@@ -103,9 +104,10 @@ def about() -> dict[str, str]:
         ).stdout.strip()
     except (OSError, subprocess.CalledProcessError):
         told = "not known"
-    return {
-        "version": version("himpc-lab"),
-        "commit": told,
-        "kernel": f"{layout_number():014x}",
-        "mujoco": mujoco.__version__,
-    }
+    return (
+        f"Kernel {layout_number():014x} of himpc-lab {version('himpc-lab')}, commit {told}, as WebAssembly; "
+        f"the robot is simulated by MuJoCo @mujoco@, in himpc-lab by {mujoco.__version__}. Unlike himpc-lab "
+        "this page has no controllers that need Python (OSF, HQP, HTMPC), no tasks to add, no recordings and "
+        "no QP drawings, and three rare fallbacks are missing. The code opens in himpc-lab: himpc-lab "
+        "--state CODE."
+    )

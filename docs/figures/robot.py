@@ -64,7 +64,7 @@ def _coarse(shape: Shape, share: float, pack: Pack) -> dict[str, Any]:
     grid = np.clip(np.round(vertices / _GRID), -32768, 32767).astype("<i2")
     return {
         "joint": shape.joint,
-        "colour": list(shape.colour),
+        "colour": f"#{bytes(shape.colour[:3]).hex()}",
         "grid": _GRID,
         "vertices": pack.add(grid.tobytes()),
         "faces": pack.add(faces.astype("<u2").tobytes()),

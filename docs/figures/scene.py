@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterable, Iterator
+from collections.abc import Sequence
 from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
+from docs.figures.controls import controls
 from docs.figures.model import KINDS, model_of, model_text
 from docs.figures.pack import Pack
+from docs.figures.robot import mechanics
 from himpc.export.image import Image, image_of
 from himpc.tasks import FramePosition, Task
 from himpc.tasks.axes import OnAxes
@@ -23,17 +24,17 @@ from lessons.settings.torque import TorqueSettings
 from robots import InputError, Robot
 from robots.world import Floor
 
-MOST_ORDERS = 3
-"""Of a stack with more levels only the scene's own order is written: there would be too many."""
 
-
-def scene_data(scene: TorqueScene, pack: Pack, horizons: Iterable[int] = ()) -> dict[str, Any]:
+def scene_data(
+    scene: TorqueScene, pack: Pack, horizons: Sequence[int] = (), wide: bool = False
+) -> dict[str, Any]:
     """Returns a scene; the controllers' memory goes into the pack.
 
     Args:
         scene: with its settings.
         pack: for the memory of the controllers.
         horizons: N that can be chosen besides the scene's own.
+        wide: whether its page has room for controls.
 
     Raises:
         InputError: its controller cannot be exported.
@@ -41,17 +42,17 @@ def scene_data(scene: TorqueScene, pack: Pack, horizons: Iterable[int] = ()) -> 
     settings, robot = scene.settings, scene.robot
     references = TorqueSession(replace(scene, events=()), 0).references
     force = settings.limits
-    plant = {field.name: getattr(settings.plant, field.name) for field in fields(settings.plant)}
+    plant = {each.name: getattr(settings.plant, each.name) for each in fields(settings.plant)}
     own = tuple(level.name for level in settings.levels)
-    images, targets = {}, {}
-    for N in dict.fromkeys((settings.horizon, *horizons)):
-        for order in _orders(own) if settings.controller != "weighted" else [own]:
-            changed = settings.changed("horizon", N).changed("order", ",".join(order))
-            assert isinstance(changed, TorqueSettings)
-            image = image_of(controller_of(changed, robot), robot, references)
-            images[f"{N}|{','.join(order)}"] = _told(image, pack)
-            targets = {task["name"]: task["target"] for task in image.manifest["tasks"]}
-    return {
+    images, made = {}, {}
+    for N in sorted({settings.horizon, *horizons}):
+        changed = settings.changed("horizon", N)
+        assert isinstance(changed, TorqueSettings)
+        made[N] = image_of(controller_of(changed, robot), robot, references)
+        images[str(N)] = _told(made[N], pack)
+    image = made[settings.horizon]
+    targets = {task["name"]: task["target"] for task in image.manifest["tasks"]}
+    told = {
         "name": scene.name,
         "robot": robot.name,
         "controller": settings.controller,
@@ -82,13 +83,19 @@ def scene_data(scene: TorqueScene, pack: Pack, horizons: Iterable[int] = ()) -> 
             name: getattr(force, name)
             for name in ("torque", "velocity", "position", "torque_scale", "velocity_scale")
         },
-        "plant": plant,
+        "plant": {name: value for name, value in plant.items() if name not in _NOT_HERE},
         "model": model_text(robot, scene.world),
         "poses": _poses(scene),
         "objects": _objects(scene),
         "events": [{"t": t, **_event(robot, event)} for t, event in scene.events],
         "images": images,
+        "fields": _fields(image),
     }
+    return told | {"controls": controls(told, robot, mechanics(robot)["reach"], horizons, wide)}
+
+
+_NOT_HERE = ("diagonal_scale", "torque_lag_ms", "delay_ms")
+"""Settings of the plant that a browser does not have."""
 
 
 def refuse(scene: TorqueScene) -> None:
@@ -96,7 +103,7 @@ def refuse(scene: TorqueScene) -> None:
     plant = scene.settings.plant
     if np.any(np.asarray(plant.diagonal_scale) != 1.0) or plant.torque_lag_ms or plant.delay_ms:
         raise InputError(
-            "diagonal_scale, torque_lag_ms and delay_ms of the plant are not simulated in a browser"
+            f"{', '.join(_NOT_HERE[:-1])} and {_NOT_HERE[-1]} of the plant are not simulated in a browser"
         )
     session = TorqueSession(replace(scene, events=()), 0)
     image_of(session.controller, scene.robot, session.references)
@@ -122,19 +129,15 @@ def _event(robot: Robot, event: Event) -> dict[str, Any]:
     return as_data(event) | body
 
 
-def _orders(own: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
-    return itertools.permutations(own) if len(own) <= MOST_ORDERS else iter([own])
-
-
 def _poses(scene: TorqueScene) -> list[float]:
-    """Position and quaternion w x y z of each body at the start, for the first picture."""
+    """Position and quaternion x y z w of each body at the start, for the first picture."""
     model = scene.robot.model
     data = model.createData()
     pin.forwardKinematics(model, data, scene.q_0)
     return [
         value
         for placement in list(data.oMi)[1:]
-        for value in (*placement.translation, *np.roll(pin.Quaternion(placement.rotation).coeffs(), 1))
+        for value in (*placement.translation, *pin.Quaternion(placement.rotation).coeffs())
     ]
 
 
@@ -147,28 +150,38 @@ def _objects(scene: TorqueScene) -> list[dict[str, Any]]:
         if not isinstance(thing.shape, Floor):
             found.append(
                 {"body": f"object{place}", "kind": KINDS[int(geom.type[0])], "size": geom.size.tolist()}
-                | {"pose": [*body.pos.tolist(), *body.quat.tolist()]}
+                | {"pose": [*body.pos.tolist(), *np.roll(body.quat, -1).tolist()]}
             )
     return found
 
 
 def _told(image: Image, pack: Pack) -> dict[str, Any]:
-    """The memory, what of its manifest the page needs, and where fields of telemetry are: (name, array, first
-    number, count)."""
+    """The memory, and what of its manifest the page needs."""
+    manifest = image.manifest
+    kept = [{key: each[key] for key in ("name", "type", "shape", "offset")} for each in manifest["arrays"]]
+    told = {key: manifest[key] for key in ("joints", "tasks", "levels")}
+    return {"memory": pack.add(image.memory), "manifest": told | {"arrays": kept}}
+
+
+def _fields(image: Image) -> list[tuple[str, str, int, int]]:
+    """Fields of telemetry, and where the kernel has them: (name, array, first number, count); the page writes
+    those without an array."""
     manifest = image.manifest
     arrays = {each["name"]: each for each in manifest["arrays"]}
     n, place = len(manifest["joints"]), arrays["task"]["offset"]
     rows = np.frombuffer(image.memory, np.int64, 4 * len(manifest["tasks"]), place).reshape(-1, 4)
-    fields = [("at_bound", "at_bound", 0, n), ("delta_tau", "delta_tau", 0, n)]
+    own = ("t", "gauge_norm", "gauge_radius", "unsolved", "late", "contact_force")
+    fields = [(name, "", 0, 1) for name in own]
+    fields += [(name, "", 0, n) for name in ("q", "v", "tau", "tau_demand", "tau_0")]
+    fields += [(f"active/{level['name']}", "", 0, 1) for level in manifest["levels"]]
+    fields += [("at_bound", "at_bound", 0, n), ("delta_tau", "delta_tau", 0, n)]
     fields += [("priority_leak", "priority_leak", 0, 1)]
     fields += [(name, "limits", n * row, n) for name, row in _BOUNDS.items()]
     for task in manifest["tasks"]:
         first = int(rows[task["index"], 2])
         for field, array in (("error", "error"), ("x", "value")):
             fields.append((f"{field}/{task['name']}", array, first, task["rows"]))
-    kept = [{key: each[key] for key in ("name", "type", "shape", "offset")} for each in arrays.values()]
-    told = {key: manifest[key] for key in ("joints", "tasks", "levels")}
-    return {"memory": pack.add(image.memory), "manifest": told | {"arrays": kept, "fields": fields}}
+    return fields
 
 
 _BOUNDS = {"tau_lower": 0, "tau_upper": 1, "v_limit": 2, "q_lower": 6, "q_upper": 7}

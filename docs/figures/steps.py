@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from functools import cache
+from html import escape
 from typing import Any
 
 from docs.figures.pack import Pack
@@ -92,8 +93,8 @@ def lesson_script(lesson: Lesson) -> str | None:
     """Returns the script that gives the live steps of a lesson to the page; None if there is none."""
     pack = Pack()
     steps = {
-        str(place + 1): _step(lesson, step, pack)
-        for place, step in enumerate(lesson.steps)
+        str(place + 1): _step(lesson, place, pack)
+        for place in range(len(lesson.steps))
         if why_not(lesson.name, place) is None
     }
     return pack.script(f"lesson/{lesson.name}", {"steps": steps}) if steps else None
@@ -116,29 +117,65 @@ def _scene_of(run: RunSpec) -> TorqueScene:
     return scene
 
 
-def _step(lesson: Lesson, step: Step, pack: Pack) -> dict[str, Any]:
-    run = lesson.run_of(step)
-    ghost, ghost_missing = None, None
+def _step(lesson: Lesson, place: int, pack: Pack) -> dict[str, Any]:
+    step = lesson.steps[place]
+    run, ghost, ghost_missing = lesson.run_of(step), None, None
     if step.ghost is not None:
         try:
             ghost = scene_data(_scene_of(run.but(*step.ghost.set)), pack)
         except InputError as error:
             ghost_missing = str(error)
     return {
-        "title": step.title,
-        "lesson": lesson.name,
-        "scene_name": run.scene,
-        "robot_name": lesson.urdf,
+        "state": {"s": run.scene, "l": lesson.name, "p": place + 1}
+        | ({"r": lesson.urdf} if lesson.urdf else {}),
         "set": told_settings(lesson, step),
         "scene": scene_data(_scene_of(run), pack),
         "ghost": ghost,
-        "ghost_words": step.ghost.words if step.ghost else None,
+        "ghost_told": _ghost_told(step, ghost_missing),
         "ghost_set": [each.partition("=")[0] for each in step.ghost.set] if step.ghost else [],
-        "ghost_missing": ghost_missing,
         "claims": [_claim(claim, ghost is not None) for claim in step.claims],
         "prediction": _prediction(step.prediction, ghost is not None),
-        "do": step.do,
+        "asking": _asking(f"{lesson.name}-{place + 1}", step, ghost is not None),
     }
+
+
+def _ghost_told(step: Step, missing: str | None) -> str:
+    if step.ghost is None:
+        return ""
+    return (
+        f"The ghost ({step.ghost.words}) runs in himpc-lab only: {missing}. "
+        if missing
+        else f"Violet: the ghost, {step.ghost.words}. "
+    )
+
+
+def _asking(name: str, step: Step, with_ghost: bool) -> str:
+    """The prediction before the run, and the list of claims, as HTML; `name` is that of the radio buttons."""
+    claims = "".join(
+        f"<li>{escape(claim.text)}{'' if judged(claim.measure, with_ghost) else _NOT_HERE}</li>"
+        for claim in step.claims
+    )
+    question = _question(name, step.prediction) if _prediction(step.prediction, with_ghost) else ""
+    return f'{question}<ul class="hl-claims">{claims}</ul>'
+
+
+_NOT_HERE = " (judged in himpc-lab only)"
+
+
+def _question(name: str, asked: Prediction | None) -> str:
+    if isinstance(asked, Choice):
+        inputs = "".join(
+            f'<label class="hl-check"><input type="radio" name="{name}" value="{k}">'
+            f"{escape(each.text)}</label>"
+            for k, each in enumerate(asked.options)
+        )
+    elif isinstance(asked, Value):
+        given = f'<input type="number" min="{asked.low}" max="{asked.high}" step="any">'
+        inputs = f"<label>{given} {escape(asked.measure.unit)}</label>"
+    else:
+        return ""
+    box = f"<legend>{escape(asked.question)}</legend>{inputs}"
+    return f'<fieldset class="hl-guess">{box}</fieldset><p class="hl-answer"></p>'
 
 
 def judged(measure: Measure, with_ghost: bool) -> bool:
@@ -180,23 +217,15 @@ def _signal(signal: Signal) -> dict[str, Any]:
 def _prediction(prediction: Prediction | None, with_ghost: bool) -> dict[str, Any] | None:
     if prediction is None or not judged(prediction.measure, with_ghost):
         return None
-    told: dict[str, Any] = {"question": prediction.question, "measure": _measure(prediction.measure)}
+    told: dict[str, Any] = {"measure": _measure(prediction.measure)}
     if isinstance(prediction, Choice):
+        options = prediction.options
         return told | {
-            "kind": "choice",
             "options": [
-                {"text": option.text, "low": _end(option.low), "high": _end(option.high)}
-                for option in prediction.options
-            ],
+                {"text": each.text, "low": _end(each.low), "high": _end(each.high)} for each in options
+            ]
         }
-    if isinstance(prediction, Value):
-        return told | {
-            "kind": "value",
-            "low": prediction.low,
-            "high": prediction.high,
-            "factor": prediction.factor,
-        }
-    return None
+    return told if isinstance(prediction, Value) else None
 
 
 def _end(value: float) -> float | None:

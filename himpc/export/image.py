@@ -90,6 +90,7 @@ def image_of(controller: Controller, robot: Robot, references: Mapping[str, Refe
         *(settings.R_on == "acceleration", len(tables), strict and settings.damping),
         *(budget_of(arena), strict),
     )
+    f["order"][:] = f["place"][:] = np.arange(len(tables))
     f["goal"][:], f["tau_limit"][:], f["weight"][:] = arena.f["limits"], robot.tau_limit, 1.0
     for place, level in enumerate(form.levels):
         calmed = DAMPING_SHARE if level.name == DAMPING_LEVEL.name and not strict else 1.0

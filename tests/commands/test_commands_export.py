@@ -26,7 +26,7 @@ from lessons.session.torque import TorqueSession
 from tests.commands.exported import controller_in, exported, needed, replayed, rows_of, told
 
 SCENES = ("planar3-conflict", "iiwa14-circle", "iiwa14-hold")
-M_BAR, GAINS, Q, R, LIMITS, ENABLED = range(1, 7)
+M_BAR, GAINS, Q, R, LIMITS, ENABLED, ORDER = range(1, 8)
 BRAKE, HOLD = 5, 6
 
 
@@ -116,8 +116,8 @@ def test_without_optima_the_joints_brake_inside_the_rows(folders: dict[str, Path
 
 
 def test_settings_do_what_they_do_in_python(folders: dict[str, Path]) -> None:
-    """M̄, gains, weights, limits and levels that are switched off and on: the torques stay those of a Python
-    controller with the same settings."""
+    """M̄, gains, weights, limits, the order of the levels, and levels that are switched off and on: the
+    torques stay those of a Python controller with the same settings."""
     scene = torque_scene("iiwa14-hold")
     settings = replace(scene.settings.for_controller())
     python, one = HIMPC(scene.robot, settings), controller_in(folders["iiwa14-hold"])
@@ -130,12 +130,16 @@ def test_settings_do_what_they_do_in_python(folders: dict[str, Path]) -> None:
     heavy = (replace(stack[0], Q=50.0, R=20.0), *high)
     off = (heavy[0], replace(heavy[1], enabled=False), *heavy[2:])
     tight = replace(settings.limits, torque_scale=0.5, velocity_scale=0.3)
+    turned = (heavy[2], heavy[0], *heavy[1:2], *heavy[3:])
+    last = len(heavy)  # the damping level
     steps = {
         20: (replace(settings, M_bar=M_bar), [(M_BAR, 0, M_bar)]),
         40: (replace(settings, M_bar=M_bar, stack=stack), [(GAINS, 0, [80.0] * 3 + [12.0] * 3)]),
         60: (replace(settings, M_bar=M_bar, stack=heavy), [(Q, 0, [50.0] * 3), (R, 0, [20.0] * 7)]),
         80: (replace(settings, M_bar=M_bar, stack=off), [(ENABLED, 1, [0.0])]),
         110: (replace(settings, M_bar=M_bar, stack=heavy), [(ENABLED, 1, [1.0])]),
+        120: (replace(settings, M_bar=M_bar, stack=turned), [(ORDER, 0, [2, 0, 1, *range(3, last + 1)])]),
+        135: (replace(settings, M_bar=M_bar, stack=heavy), [(ORDER, 0, [*range(last + 1)])]),
         150: (
             replace(settings, M_bar=M_bar, stack=heavy, limits=tight),
             [
@@ -174,6 +178,9 @@ def test_settings_that_do_not_fit_change_nothing(folders: dict[str, Path]) -> No
     assert one.set(M_BAR, 0, [0.0] * 7) == -3
     assert one.set(GAINS, 0, [inf] * 6) == -3
     assert one.set(LIMITS, 0, [nan] * 28) == -3
+    assert one.set(ORDER, 0, [0.0, 0.0, 1.0, 2.0]) == -3
+    assert one.set(ORDER, 0, [3.0, 0.0, 1.0, 2.0]) == -3
+    assert one.set(ORDER, 0, [0.0, 1.0, 2.0]) == -2
     assert one.set(99, 0, [1.0]) == -2
     assert one.set(-2, 0, [1.0] * 7) == -2
     assert np.array_equal(one.memory, before)

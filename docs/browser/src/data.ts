@@ -1,11 +1,12 @@
-/** What docs/figures/ writes for the page. SI units; quaternions w x y z; null: no limit. */
+/** What docs/figures/ writes for the page. SI units; quaternions x y z w; null: no limit. */
 import type { Manifest } from "../../../himpc/export/files/himpc.mjs";
+import type { State } from "./code";
 
 export type Piece = [offset: number, bytes: number];
 export type Numbers = number | number[];
 
 export interface Body { mass: number; ipos: number[]; inertia: number[]; prismatic: boolean }
-export interface Shape { joint: number; colour: number[]; grid: number; vertices: Piece; faces: Piece }
+export interface Shape { joint: number; colour: string; grid: number; vertices: Piece; faces: Piece }
 export interface RobotData {
   name: string; joints: string[]; bodies: Body[]; reach: number; planar: boolean; tip: { joint: number; pos: number[] };
   gravity: number[]; shapes: Shape[];
@@ -14,8 +15,7 @@ export interface RobotData {
 
 export interface PlantSettings {
   payload_kg: number; friction: Numbers; damping: Numbers; armature: Numbers; mass_scale: Numbers; inertia_scale: Numbers;
-  diagonal_scale: Numbers; encoder_resolution_deg: number; torque_lag_ms: number; delay_ms: number;
-  saturate: boolean; gravity: boolean; contacts: boolean; joint_stops: boolean;
+  encoder_resolution_deg: number; saturate: boolean; gravity: boolean; contacts: boolean; joint_stops: boolean;
 }
 export interface TaskData {
   name: string; level: number; axes: string; unit: string; target: string; K_p: Numbers; K_v: Numbers;
@@ -24,6 +24,8 @@ export interface TaskData {
 export interface LevelData { name: string; Q: Numbers; R: Numbers; enabled: boolean }
 /** An object that is drawn: its body in MuJoCo, its geometry there, and where it is at the start. */
 export interface Thing { body: string; kind: string; size: number[]; pose: number[] }
+/** The array is empty for what the session writes itself. */
+export type Field = [name: string, array: string, start: number, width: number];
 export type SceneEvent = { t: number; event: string; [key: string]: unknown };
 export interface SceneData {
   name: string; robot: string; controller: string; period: number; horizon: number; order: string[]; duration: number;
@@ -32,7 +34,8 @@ export interface SceneData {
   levels: LevelData[]; tasks: TaskData[];
   limits: { torque: boolean; velocity: boolean; position: string; torque_scale: number; velocity_scale: number };
   plant: PlantSettings; events: SceneEvent[]; model: string; poses: number[]; objects: Thing[];
-  images: Record<string, { memory: Piece; manifest: Manifest }>;
+  /** Controllers by their N; the fields of a row, and where controllers have them; HTML. */
+  images: Record<string, { memory: Piece; manifest: Manifest }>; fields: Field[]; controls: string;
 }
 
 export interface SignalData { name: string; column: number | null; factor: number }
@@ -43,14 +46,12 @@ export interface ClaimData {
   text: string; measure: MeasureData; relation: string; bound: number; condition: string; live: boolean;
 }
 export interface PredictionData {
-  kind: "choice" | "value"; question: string; measure: MeasureData;
-  options?: { text: string; low: number | null; high: number | null }[];
-  low?: number; high?: number; factor?: number;
+  measure: MeasureData; options?: { text: string; low: number | null; high: number | null }[];
 }
 export interface StepData {
-  lesson: string; scene_name: string; robot_name: string | null; set: string[]; scene: SceneData;
-  ghost: SceneData | null; ghost_words: string | null; ghost_set: string[]; ghost_missing: string | null;
-  claims: ClaimData[]; prediction: PredictionData | null;
+  state: State; set: string[]; scene: SceneData; ghost: SceneData | null; ghost_told: string; ghost_set: string[];
+  /** The question and the list of claims as HTML. */
+  asking: string; claims: ClaimData[]; prediction: PredictionData | null;
 }
 
 /** A description, and the pieces that it refers to. */

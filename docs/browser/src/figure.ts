@@ -1,16 +1,15 @@
 /** One live figure: the simulation in its thread, the view, the plots, the controls and, in a lesson, the claims. */
 import { assignment, encode, split } from "./code";
-import { unpacked, type Pack, type RobotData, type SceneData, type Scenes, type StepData } from "./data";
+import { limit, unpacked, type Pack, type RobotData, type SceneData, type Scenes, type StepData } from "./data";
 import { packed, type Engine } from "./engine";
-import { AXES, Panel, boxed, button, element } from "./panel";
+import { AXES, Panel, button, element } from "./panel";
 import { Plots } from "./plots";
 import { holds } from "./rows";
 import { View } from "./view";
 import type { Frame, Told, Verdict } from "./worker";
 
-export interface About { version: string; commit: string; kernel: string; mujoco: string }
 declare global {
-  interface Window { HIMPC_ABOUT: About; HIMPC_PACKS?: Record<string, string> }
+  interface Window { HIMPC_ABOUT: string; HIMPC_PACKS?: Record<string, string> }
 }
 
 export interface Asked {
@@ -35,9 +34,6 @@ export class Figure {
   private notice = element("p", { class: "hl-notice", role: "status" });
   private run = button("Run", () => this.engine.tell(this.frame?.running ? "pause" : "run"));
   private code = element("input", { readOnly: true, type: "text", ariaLabel: "State code" });
-  private guess: () => number | null = () => null;
-  private claims: HTMLElement[] = [];
-  private answer = element("p", { class: "hl-answer" });
   /** The last moment that was shown; for tests. */
   frame: Frame | null = null;
 
@@ -57,14 +53,15 @@ export class Figure {
     }
     for (const each of asked.assignments) this.changes.set(...split(each));
     this.plots = new Plots(scene.tasks, robot.joints.length);
-    this.panel = new Panel(scene, robot, { set: (path, value) => this.set(path, value), target: drag,
-      push: (joint, force) => engine.tell("push", joint, force, 0.1) }, asked.wide);
+    this.panel = new Panel(scene, { set: (path, value) => this.set(path, value), target: drag,
+      push: (joint, force) => engine.tell("push", joint, force, 0.1) });
     this.panel.show({ ...scene, off: scene.levels.filter(({ enabled }) => !enabled).map(({ name }) => name) });
     engine.onTold = (told) => this.hear(told);
     const side = this.lay();
     await asked.loaded;
     await Promise.all([engine.load(), this.reopen(asked.assignments)]);
-    this.root.append(this.origin());
+    const origin = (step?.ghost_told ?? "") + window.HIMPC_ABOUT.replace("@mujoco@", engine.mujoco);
+    this.root.append(element("p", { class: "hl-small" }, origin));
     side.inert = false;
     if (asked.running) engine.tell("run");
     return this;
@@ -82,7 +79,7 @@ export class Figure {
 
   /** Lays the figure out; returns the controls, which cannot be used yet. */
   private lay(): HTMLElement {
-    const { step, asked, root, view, plots } = this, reset = button("Reset", () => this.reset());
+    const { step, asked, root, view, plots } = this, reset = button("Reset", () => this.engine.tell("reset"));
     const link = element("div", { class: "hl-bar" }, button("Copy the link", () => this.copy()), this.code);
     const side = element("div", { class: "hl-side", inert: true }, ...(step ? this.asking(step) : []),
       element("div", { class: "hl-bar" }, this.run, reset, this.status), this.notice, this.panel.root, link);
@@ -93,38 +90,18 @@ export class Figure {
     return side;
   }
 
-  /** What simulates here, and how that differs from himpc-lab. */
-  private origin(): HTMLElement {
-    const { step, engine } = this, about = window.HIMPC_ABOUT;
-    const ghost = !step?.ghost_words ? "" : step.ghost ? `Violet: the ghost, ${step.ghost_words}. ` :
-      `The ghost (${step.ghost_words}) runs in himpc-lab only: ${step.ghost_missing}. `;
-    return element("p", { class: "hl-small" }, `${ghost}Kernel ${about.kernel} of himpc-lab ${about.version}, ` +
-      `commit ${about.commit}, as WebAssembly; the robot is simulated by MuJoCo ${engine.mujoco}, in himpc-lab by ` +
-      `${about.mujoco}. Unlike himpc-lab this page has no controllers that need Python (OSF, HQP, HTMPC), no tasks to add, ` +
-      "no recordings and no QP drawings, and three rare fallbacks are missing. " +
-      "The code opens in himpc-lab: himpc-lab --state CODE.");
+  /** The prediction before the run, the list of claims, and what runs the step. */
+  private asking({ asking, scene }: StepData): Element[] {
+    return [...element("div", { innerHTML: asking }).children,
+      button(`Run the step (${scene.duration} s)`, () => void this.again())];
   }
 
-  /** The prediction before the run, and the table of claims. */
-  private asking({ prediction, claims, scene }: StepData): HTMLElement[] {
-    const found: HTMLElement[] = [];
-    if (prediction) {
-      const box = boxed(prediction.question);
-      if (prediction.kind === "choice") {
-        const name = `hl-${Math.random().toString(36).slice(2)}`;
-        const inputs = prediction.options!.map(() => element("input", { type: "radio", name }));
-        box.append(...inputs.map((each, k) => element("label", { class: "hl-check" }, each, prediction.options![k].text)));
-        this.guess = () => inputs.findIndex((each) => each.checked);
-      } else {
-        const input = element("input", { type: "number", min: String(prediction.low), max: String(prediction.high), step: "any" });
-        box.append(element("label", {}, input, ` ${prediction.measure.unit}`));
-        this.guess = () => (input.value === "" ? null : Number(input.value));
-      }
-      found.push(box, this.answer);
-    }
-    this.claims = claims.map(({ text, live }) => element("li", {}, text, live ? "" : " (judged in himpc-lab only)"));
-    return [...found, element("ul", { class: "hl-claims" }, ...this.claims),
-      button(`Run the step (${scene.duration} s)`, () => void this.again())];
+  private get claims(): HTMLElement[] { return [...this.root.querySelectorAll<HTMLElement>(".hl-claims li")]; }
+
+  /** What is predicted: the number of an option, or a value. */
+  private get guess(): number | null {
+    const given = this.root.querySelector<HTMLInputElement>(".hl-guess :is(:checked, [type=number])")?.value;
+    return given ? Number(given) : null;
   }
 
   /** The step from its beginning, with its own settings. */
@@ -132,24 +109,24 @@ export class Figure {
     await this.reopen([]);
     this.changes.clear();
     this.claims.forEach((each) => delete each.dataset.holds);
-    this.raw.clear();
     this.engine.tell("run");
     void this.recode();
   }
 
   private judge({ claims, prediction }: Verdict): void {
     const number = (value: number, unit: string): string => (isFinite(value) ? `${Number(value.toPrecision(3))} ${unit}`.trim() : "–");
-    this.step!.claims.forEach((claim, k) => {
+    this.claims.forEach((line, k) => {
+      const claim = this.step!.claims[k];
       if (!claim.live) return;
       const good = holds(claim, claims[k]), measured = number(claims[k], claim.measure.unit);
-      this.claims[k].dataset.holds = String(good);
-      this.claims[k].textContent = `${good ? "✓" : "✗"} ${claim.text} Measured: ${measured} (${claim.condition})`;
+      line.dataset.holds = String(good);
+      line.textContent = `${good ? "✓" : "✗"} ${claim.text} Measured: ${measured} (${claim.condition})`;
     });
-    const asked = this.step!.prediction, guess = this.guess();
+    const asked = this.step!.prediction, { guess } = this;
     if (asked) {
-      const was = number(prediction, asked.measure.unit), options = asked.options ?? [];
-      const right = options.findIndex(({ low, high }) => (low ?? -Infinity) <= prediction && prediction < (high ?? Infinity));
-      this.answer.textContent = asked.kind === "choice" ? right < 0 ? "The run gave nothing to measure." :
+      const was = number(prediction, asked.measure.unit), { options } = asked;
+      const right = options?.findIndex(({ low, high }) => limit(low, -1) <= prediction && prediction < limit(high)) ?? -1;
+      this.root.querySelector(".hl-answer")!.textContent = options ? right < 0 ? "The run gave nothing to measure." :
         `${guess === right ? "Right" : "It was"}: ${options[right].text} (${was}).` :
         guess === null ? `It was ${was}.` : `You said ${number(guess, asked.measure.unit)}, it was ${was}.`;
     }
@@ -161,11 +138,6 @@ export class Figure {
 
   private say(words: string): void { this.notice.textContent = words; }
 
-  private reset(): void {
-    this.raw.clear();
-    this.engine.tell("reset");
-  }
-
   private set(path: string, value: unknown): void {
     this.say("");
     this.changes.set(path, value);
@@ -176,8 +148,7 @@ export class Figure {
   private async recode(): Promise<void> {
     const changed = [...this.changes].map(([path, value]) => assignment(path, value)), { step, scene, asked } = this;
     const own = [...(step?.set ?? []).filter((each) => !this.changes.has(split(each)[0])), ...changed];
-    this.code.value = await encode({ s: step ? step.scene_name : scene.name, ...(step?.robot_name ? { r: step.robot_name } : {}),
-      ...(own.length ? { a: own } : {}), ...(step ? { l: step.lesson, p: Number(asked.step) } : {}) });
+    this.code.value = await encode({ ...(step?.state ?? { s: scene.name }), ...(own.length ? { a: own } : {}) });
     if (asked.wide) history.replaceState(null, "", `#${this.changes.size ? this.code.value : scene.name}`);
   }
 
@@ -199,6 +170,7 @@ export class Figure {
 
   private show(frame: Frame): void {
     this.frame = frame;
+    if (frame.restarted) this.raw.clear();
     this.run.textContent = frame.running ? "Pause" : "Run";
     this.view?.show(frame);
     this.plots.take(frame);

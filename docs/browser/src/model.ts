@@ -1,8 +1,8 @@
 /** The robot and its objects in MuJoCo's language: the text of docs/figures/model.py with the numbers of the settings. */
 import { each, type Numbers, type PlantSettings, type RobotData, type SceneData } from "./data";
 
-/** MJCF of a scene under plant settings; without contacts its objects are left out. */
-export function mjcf({ model }: SceneData, robot: RobotData, plant: PlantSettings): string {
+/** MJCF of a scene; without contacts its objects are left out. */
+export function mjcf({ model, plant }: SceneData, robot: RobotData): string {
   const text = plant.contacts ? model : model.replace(/<!-- objects -->.*<!-- objects -->/, "");
   return text.replace(/@(\w+) (\d+)@/g, (_, name: string, joint: string) => {
     const moved = inertia(robot, plant, Number(joint) - 1);

@@ -1,36 +1,32 @@
 /** The robot in MuJoCo under torque control: robots/plant.py and robots/signals.py, without an altered diagonal, lag or delay. */
 import type { MainModule, MjData, MjModel } from "@mujoco/mujoco";
-import { limit, type PlantSettings, type RobotData, type SceneData } from "./data";
+import { limit, type RobotData, type SceneData } from "./data";
 import { mjcf } from "./model";
 
-const TIMESTEP = 1e-3, SAMPLES_S = 0.3, BROKEN = 1e6;
+const TIMESTEP = 1e-3, BROKEN = 1e6;
 type Vector = Float64Array;
-type Stamped = [t: number, value: Vector];
 
 export class Plant {
   readonly n: number;
-  tau: Vector;
+  tau!: Vector;
   broken = false;
   private model!: MjModel;
   data!: MjData;
-  private samples: Stamped[] = [];
-  private start!: { q: Vector; v: Vector };
+  /** When the last period began, and q then. */
+  private before!: [t: number, q: Vector];
   private wrench: { joint: number; values: number[] } | null = null;
-  private settings: PlantSettings;
   /** The largest force between the robot and something that it touched during the last step, N. */
   force = 0;
 
   constructor(private mj: MainModule, private robot: RobotData, private scene: SceneData) {
     this.n = robot.bodies.length;
-    this.settings = scene.plant;
-    this.tau = new Float64Array(this.n);
     this.build();
   }
 
   private build(): void {
     this.data?.delete();
     this.model?.delete();
-    this.model = this.mj.MjModel.from_xml_string(mjcf(this.scene, this.robot, this.settings));
+    this.model = this.mj.MjModel.from_xml_string(mjcf(this.scene, this.robot));
     this.data = new this.mj.MjData(this.model);
   }
 
@@ -39,7 +35,7 @@ export class Plant {
   get v(): Vector { return Float64Array.from(this.data.qvel.subarray(0, this.n) as Vector); }
 
   private clipped(tau: Vector): Vector {
-    if (!this.settings.saturate) return tau;
+    if (!this.scene.plant.saturate) return tau;
     return tau.map((value, a) => Math.min(Math.max(value, -limit(this.robot.tau_limit[a])), limit(this.robot.tau_limit[a])));
   }
 
@@ -51,8 +47,8 @@ export class Plant {
     this.broken = false;
     this.tau = this.clipped(tau === null ? this.holding() : Float64Array.from(tau));
     this.data.qvel.set(v);
-    this.start = { q: Float64Array.from(q), v: Float64Array.from(v) };
-    this.samples = [[0, this.start.q]];
+    const { period } = this.scene;
+    this.before = [-period, this.q.map((value, a) => value - period * v[a])];
   }
 
   /** A copy of the state, with everything computed that depends on positions. */
@@ -85,32 +81,26 @@ export class Plant {
   push(joint: number, values: number[]): void {
     this.data.xfrc_applied.fill(0);
     this.wrench = joint ? { joint, values } : null;
-    // Bodies are numbered in depth-first order, which for a serial arm is that of the joints.
     if (joint) this.data.xfrc_applied.set(values, 6 * this.mj.mj_name2id(this.model, 1, `body${joint}`));
   }
 
-  measure(period: number): [q: Vector, v: Vector] {
-    const step = (this.settings.encoder_resolution_deg * Math.PI) / 180;
+  measure(): [q: Vector, v: Vector] {
+    const step = (this.scene.plant.encoder_resolution_deg * Math.PI) / 180;
     if (!(step > 0)) return [this.q, this.v];
-    const [now, q] = this.samples.at(-1)!, [then, before] = this.sampled(now - period), v = this.v;
-    const rounded = q.map((value, a) => (this.robot.bodies[a].prismatic ? value : even(value / step) * step));
+    const { t, v, before: [then, before] } = this;
+    const rounded = this.q.map((value, a) => (this.robot.bodies[a].prismatic ? value : even(value / step) * step));
     return [rounded, v.map((value, a) => this.robot.bodies[a].prismatic ? value :
-      (rounded[a] - even(before[a] / step) * step) / Math.max(now - then, 1e-9))];
+      (rounded[a] - even(before[a] / step) * step) / Math.max(t - then, 1e-9))];
   }
 
-  private sampled(stamp: number): Stamped {
-    if (stamp < -1e-9) return [stamp, this.start.q.map((value, a) => value + this.start.v[a] * stamp)];
-    const k = this.samples.findLastIndex(([t]) => t <= stamp), last = this.samples.length - 1;
-    const before = this.samples[Math.max(k, 0)], later = this.samples[Math.min(k + 1, last)];
-    return stamp - before[0] <= later[0] - stamp ? before : later;
-  }
-
-  step(tau: Vector, period: number): void {
+  /** One control period. */
+  step(tau: Vector): void {
     this.tau = this.clipped(Float64Array.from(tau));
     this.data.ctrl.set(this.tau);
-    const count = Math.max(1, Math.ceil(period / TIMESTEP - 1e-9)), h = period / count;
-    this.model.opt.timestep = h;
+    const { period } = this.scene, count = Math.max(1, Math.ceil(period / TIMESTEP - 1e-9));
+    this.model.opt.timestep = period / count;
     this.force = 0;
+    this.before = [this.t, this.q];
     for (let k = 0; k < count; k++) {
       const before = this.q;
       this.mj.mj_step(this.model, this.data);
@@ -121,10 +111,6 @@ export class Plant {
         this.broken = true;
       }
       if (this.data.ncon) this.force = Math.max(this.force, this.touch());
-      if (this.settings.encoder_resolution_deg > 0) {
-        this.samples.push([this.t, this.q]);
-        while (this.samples[0][0] < this.t - SAMPLES_S) this.samples.shift();
-      }
     }
   }
 
@@ -156,7 +142,7 @@ export class Plant {
     return [norm(ratio.map((value, at) => unit(at) - value), n), norm(ratio.map((value, at) => unit(at) - root(at) * value), n)];
   }
 
-  /** Position and quaternion w x y z of the body of each joint at the last stage of the last step, (n, 7). */
+  /** Position and quaternion x y z w of the body of each joint at the last stage of the last step, (n, 7). */
   poses(): Float32Array {
     this.mj.mj_kinematics(this.model, this.data);
     return this.placed(this.robot.joints.map((_, k) => `body${k + 1}`));
@@ -165,13 +151,14 @@ export class Plant {
   /** Position and quaternion w x y z of each object that is drawn. */
   objects(): Float32Array {
     const { objects } = this.scene;
-    return this.settings.contacts ? this.placed(objects.map(({ body }) => body)) : Float32Array.from(objects.flatMap(({ pose }) => pose));
+    return this.scene.plant.contacts ? this.placed(objects.map(({ body }) => body)) : Float32Array.from(objects.flatMap(({ pose }) => pose));
   }
 
   private placed(bodies: string[]): Float32Array {
     return Float32Array.from(bodies.flatMap((name) => {
-      const id = this.mj.mj_name2id(this.model, 1, name), { xpos, xquat } = this.data;
-      return [...xpos.subarray(3 * id, 3 * id + 3), ...xquat.subarray(4 * id, 4 * id + 4)];
+      using body = this.data.body(name);
+      const [w, ...xyz] = body.xquat as Vector;
+      return [...body.xpos as Vector, ...xyz, w];
     }));
   }
 
@@ -187,17 +174,18 @@ function even(value: number): number {
   return value - down === 0.5 ? 2 * Math.round(down / 2) : Math.round(value);
 }
 
-/** The largest singular value of an n × n matrix A: high powers of AᵀA keep its direction only. */
+/** The largest singular value of an n × n matrix A. Squaring B = A/‖A‖ again and again as BᵀB keeps its direction only. */
 function norm(A: Vector, n: number): number {
-  const gram = (B: Vector): Vector => B.map((_, at) => {
-    let total = 0;
-    for (let k = 0; k < n; k++) total += B[k * n + Math.floor(at / n)] * B[k * n + (at % n)];
-    return total;
-  });
-  const trace = (B: Vector): number => B.reduce((total, value, at) => total + (at % (n + 1) ? 0 : value), 0);
-  const squared = gram(A);
-  let power = squared;
-  for (let k = 0; k < 30 && trace(power) > 0; k++) power = gram(power.map((value) => value / trace(power)));
-  const along = power.reduce((total, value, at) => total + value * squared[at], 0);
-  return trace(power) > 0 ? Math.sqrt(along / trace(power)) : 0;
+  let power = A, log = 0;
+  for (let k = 0; k < 50; k++) {
+    const size = Math.hypot(...power), B = power.map((value) => value / size);
+    if (size === 0) return 0;
+    log += Math.log(size) / 2 ** k;
+    power = B.map((_, at) => {
+      let total = 0;
+      for (let row = 0; row < n * n; row += n) total += B[row + Math.floor(at / n)] * B[row + (at % n)];
+      return total;
+    });
+  }
+  return Math.exp(log);
 }

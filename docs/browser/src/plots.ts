@@ -22,7 +22,10 @@ export class Plots {
     for (const [k, what] of ["Torques", "Velocities"].entries())
       this.add(`${what}, % of their bounds`, 1 + tasks.length + k * joints, shares,
         (_, low, high) => [Math.min(-110, low), Math.max(110, high)], [100, -100]);
-    new ResizeObserver(() => this.resize()).observe(this.root);
+    new ResizeObserver(() => this.drawn.forEach(({ plot }) => {
+      const width = plot.root.parentElement!.clientWidth;
+      if (width && width !== plot.width) plot.setSize({ width, height: 150 });
+    })).observe(this.root);
   }
 
   private add(title: string, first: number, lines: Line[], range: uPlot.Range.Function, bounds: number[] = []): void {
@@ -52,13 +55,6 @@ export class Plots {
       const old = data[0].findIndex((each) => each >= t - WINDOW_S);
       for (const column of data) column.splice(0, Math.max(old, 0));
       if (redrawn) plot.setData(data as uPlot.AlignedData);
-    }
-  }
-
-  private resize(): void {
-    for (const { plot } of this.drawn) {
-      const width = plot.root.parentElement!.clientWidth;
-      if (width && width !== plot.width) plot.setSize({ width, height: 150 });
     }
   }
 }

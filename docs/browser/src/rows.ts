@@ -1,5 +1,5 @@
 /** The rows of a run, one per control period, and numbers about them: lessons/teaching/measure.py. */
-import type { ClaimData, MeasureData, SignalData } from "./data";
+import type { ClaimData, Field, MeasureData, SignalData } from "./data";
 
 const KEPT = 60_000;
 const AT_TORQUE = 1, AT_VELOCITY = 2, AT_POSITION = 4;
@@ -10,12 +10,11 @@ export class Rows {
   private rows: Float64Array[] = [];
   private width = 0;
 
-  constructor(widths: [name: string, width: number][]) {
-    for (const [name, width] of widths) this.fields.set(name, [this.width, (this.width += width)]);
+  constructor(fields: Field[]) {
+    for (const [name, , , width] of fields) this.fields.set(name, [this.width, (this.width += width)]);
   }
 
   get count(): number { return this.rows.length; }
-  has(name: string): boolean { return this.fields.has(name); }
 
   /** Adds a row, filled with NaN. */
   next(): void {

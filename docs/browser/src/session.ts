@@ -1,16 +1,17 @@
 /** One run: references, controller, plant, script and settings; lessons/session/torque.py. */
 import type { MainModule } from "@mujoco/mujoco";
-import { ENABLED, FALLBACKS, GAINS, LIMITS, M_BAR, Q, R, TARGET, type Controller, type Manifest } from "../../../himpc/export/files/himpc.mjs";
+import { ENABLED, FALLBACKS, GAINS, LIMITS, M_BAR, ORDER, Q, R, TARGET, type Manifest, type kernel } from "../../../himpc/export/files/himpc.mjs";
 import { each, limit, pieceOf, type Pack, type RobotData, type SceneData, type SceneEvent, type Scenes } from "./data";
 import { Plant } from "./plant";
 import { Rows } from "./rows";
 
 const TRUTH_TICKS = 20, LOST_SPEED = 20;
-const NOT_HERE = ["diagonal_scale", "torque_lag_ms", "delay_ms"];
 
+type Create = Awaited<ReturnType<typeof kernel>>;
+type Controller = ReturnType<Create>;
 export interface Tools {
   mj: MainModule;
-  create(image: Uint8Array, manifest: Manifest): Controller;
+  create: Create;
   /** With the memory of the exported controllers. */
   scenes: Pack<Scenes>;
 }
@@ -23,9 +24,9 @@ export class Session {
   manifest!: Manifest;
   lost = false;
   fallback = 0;
-  private begun: Map<string, Float64Array>;
-  private key = "";
-  private made = new Map<string, [Controller, Manifest]>();
+  private begun: Float64Array;
+  private made = new Map<number, [Controller, Manifest]>();
+  horizon: number;
   private script: SceneEvent[] = [];
   private pushUntil = Infinity;
   ticks = 0;
@@ -36,43 +37,27 @@ export class Session {
   constructor(private tools: Tools, scene: SceneData, readonly robot: RobotData) {
     this.scene = structuredClone(scene);
     this.plant = new Plant(tools.mj, robot, this.scene);
-    this.key = `${scene.horizon}|${scene.order.join(",")}`;
-    [this.controller, this.manifest] = this.controllerFor(this.key);
-    this.rows = new Rows(this.layout());
-    this.begun = new Map(this.manifest.tasks.map((task) => [task.name, this.raw(task.index).slice()]));
+    this.horizon = scene.horizon;
+    [this.controller, this.manifest] = this.controllerFor(scene.horizon);
+    this.rows = new Rows(scene.fields);
+    this.begun = this.controller.view("raw").slice();
     this.reset();
   }
 
   get t(): number { return this.plant.t; }
-  get horizon(): number { return Number(this.key.split("|")[0]); }
-  get order(): string[] { return this.key.split("|")[1].split(","); }
 
-  private controllerFor(key: string): [Controller, Manifest] {
-    if (!this.made.has(key)) {
-      const { manifest, memory } = this.scene.images[key];
-      this.made.set(key, [this.tools.create(pieceOf(this.tools.scenes, memory), manifest), manifest]);
-    }
-    return this.made.get(key)!;
-  }
-
-  private raw(task: number): Float64Array {
-    const raw = this.controller.view("raw"), width = raw.length / this.manifest.tasks.length;
-    return raw.subarray(task * width, (task + 1) * width);
-  }
-
-  private layout(): [string, number][] {
-    const wide = (names: string[], width: number): [string, number][] => names.map((name) => [name, width]);
-    return [...wide(["t", "gauge_norm", "gauge_radius", "unsolved", "late", "contact_force"], 1),
-      ...wide(["q", "v", "tau", "tau_demand", "tau_0"], this.plant.n),
-      ...this.manifest.fields.map(([name, , , width]): [string, number] => [name, width]),
-      ...wide(this.manifest.levels.map((level) => `active/${level.name}`), 1)];
+  private controllerFor(N: number): [Controller, Manifest] {
+    if (!(N in this.scene.images)) throw new Error(`this page has no controller with N = ${N}; himpc-lab has`);
+    const { manifest, memory } = this.scene.images[N];
+    if (!this.made.has(N)) this.made.set(N, [this.tools.create(pieceOf(this.tools.scenes, memory), manifest), manifest]);
+    return this.made.get(N)!;
   }
 
   reset(): void {
     const { q, v, tau } = this.scene.start;
     this.plant.reset(q, v, tau);
     // Targets return to where they were at the start; the kernel alone would leave them where they were dragged to.
-    for (const task of this.manifest.tasks) this.raw(task.index).set(this.begun.get(task.name)!);
+    this.controller.view("raw").set(this.begun);
     this.controller.reset(this.plant.tau);
     this.script = [...this.scene.events];
     this.pushUntil = Infinity;
@@ -90,8 +75,8 @@ export class Session {
       this.plant.push(0, []);
       this.pushUntil = Infinity;
     }
-    const { plant, scene, rows, controller } = this, T_s = scene.period;
-    const q = plant.q, v = plant.v, [q_measured, v_measured] = plant.measure(T_s), before = plant.tau;
+    const { plant, scene, rows, controller } = this;
+    const q = plant.q, v = plant.v, [q_measured, v_measured] = plant.measure(), before = plant.tau;
     const [found, fallback] = controller.tick(q_measured, v_measured, before), tau = Float64Array.from(found);
     this.fallback = fallback;
     if (this.ticks++ % TRUTH_TICKS === 0) this.truth = plant.gauge(this.M_bar());
@@ -102,12 +87,13 @@ export class Session {
     };
     put({ t: [plant.t], q, v, tau_demand: tau, tau_0: before, gauge_norm: [this.truth[0]], gauge_radius: [this.truth[1]],
       late: [Number(late)] });
-    for (const [name, array, start, width] of this.manifest.fields)
-      put({ [name]: controller.view(array).subarray(start, start + width) });
-    const solved = this.solved(), active = controller.view("active"), rung = controller.view("rung");
-    solved.forEach((name, place) => put({ [`active/${name}`]: [active[place]] }));
-    put({ unsolved: [FALLBACKS[fallback] === "hold" ? 1 : solved.filter((_, place) => rung[place] !== 0).length] });
-    plant.step(this.applied(tau, late, before), T_s);
+    for (const [name, array, start, width] of scene.fields)
+      if (array) put({ [name]: controller.view(array).subarray(start, start + width) });
+    const [active, rung, place] = ["active", "rung", "place"].map((name) => controller.view(name));
+    const solved = this.manifest.levels.filter(({ index }) => place[index] >= 0);
+    for (const { name, index } of solved) put({ [`active/${name}`]: [active[place[index]]] });
+    put({ unsolved: [FALLBACKS[fallback] === "hold" ? 1 : solved.filter(({ index }) => rung[place[index]] !== 0).length] });
+    plant.step(this.applied(tau, late, before));
     put({ tau: plant.tau, contact_force: [plant.force] });
     const wild = v.some((each, a) => !(Math.abs(each) <= LOST_SPEED * limit(this.robot.v_limit[a])));
     this.lost ||= plant.broken || wild;
@@ -120,13 +106,6 @@ export class Session {
     return (this.held = taken);
   }
 
-  /** The levels that the controller solves, in order. */
-  solved(): string[] {
-    const on = new Set(this.scene.levels.filter((level) => level.enabled).map((level) => level.name));
-    const count = Number(this.controller.view("sizes")[4]);
-    return this.manifest.levels.map((level) => level.name).filter((name) => on.has(name) || name === "damping").slice(0, count);
-  }
-
   happen(event: SceneEvent): void {
     if (event.event === "Set") this.set(event.path as string, event.value);
     else if (event.event === "MoveTarget") this.move(event.task as string, event.value as number[]);
@@ -134,7 +113,7 @@ export class Session {
       this.plant.push(event.joint as number, [...(event.force as number[]), ...(event.torque as number[])]);
       this.pushUntil = this.t + (event.seconds as number);
     } else if (event.event === "MoveLevel") {
-      const order = this.order.filter((name) => name !== event.level);
+      const order = this.scene.order.filter((name) => name !== event.level);
       order.splice(event.to as number, 0, event.level as string);
       this.set("order", order.join(","));
     } else throw new Error(`there is no ${event.event} here`);
@@ -158,10 +137,9 @@ export class Session {
   /** Changes a setting; the paths are those of himpc-lab. Throws an Error with a sentence if it cannot. */
   set(path: string, value: unknown): void {
     const { scene } = this, [head, name, key] = path.split("."), { plant } = scene;
-    if (path === "horizon" || path === "order") {
-      const order = Array.isArray(value) ? value as string[] : String(value).split(",");
-      this.exchange(path === "horizon" ? Number(value) : this.horizon, path === "order" ? order : this.order);
-    } else if (head === "plant" && name in plant && !NOT_HERE.includes(name)) {
+    if (path === "horizon") this.exchange(Number(value));
+    else if (path === "order") this.arrange(Array.isArray(value) ? value as string[] : String(value).split(","));
+    else if (head === "plant" && name in plant) {
       const whole = key ? each(plant[name as "friction"], this.plant.n).with(Number(key) - 1, value as number) : value;
       Object.assign(plant, { [name]: whole });
       this.plant.configure();
@@ -175,6 +153,14 @@ export class Session {
     }
   }
 
+  /** Gives the levels another order; damping stays the last. */
+  private arrange(order: string[]): void {
+    const { levels } = this.manifest, own = this.scene.order, whole = [...order, "damping"].slice(0, levels.length);
+    if (order.toSorted().join() !== own.toSorted().join()) throw new Error(`${order.join(", ")} is no order of ${own.join(", ")}`);
+    this.controller.set(ORDER, 0, whole.map((name) => levels.findIndex((level) => level.name === name)));
+    this.scene.order = order;
+  }
+
   /** Sends all numbers of the settings to the kernel; those that have not changed have no effect. */
   private send(): void {
     const { robot, scene, controller, manifest } = this, { limits } = scene, ends = limits.position !== "off";
@@ -184,6 +170,7 @@ export class Session {
     const scaled = (bounds: (number | null)[], on: boolean, scale: number, sign = 1): number[] =>
       bounds.map((each) => (on ? limit(each, sign) * scale : sign * Infinity));
     if (changed) controller.set(M_BAR, 0, M_bar);
+    if (strict) this.arrange(scene.order);
     controller.set(LIMITS, 0, [...scaled(robot.tau_limit, limits.torque, limits.torque_scale),
       ...scaled(robot.v_limit, limits.velocity, limits.velocity_scale),
       ...scaled(robot.q_lower, ends, 1, -1), ...scaled(robot.q_upper, ends, 1)]);
@@ -202,48 +189,29 @@ export class Session {
     }
   }
 
-  /** Goes on with a controller of another order or N: himpc/tick/tick.py, `recall`. */
-  private exchange(horizon: number, order: string[]): void {
-    const key = `${horizon}|${order.join(",")}`, n = this.plant.n;
-    if (key === this.key) return;
-    if (!(key in this.scene.images)) throw new Error(`this page has no controller with N = ${horizon} and the order ${order.join(", ")}; himpc-lab has`);
-    const old = this.controller, then = this.manifest, solved = this.solved(), N = this.horizon;
-    [this.controller, this.manifest] = this.controllerFor(key);
-    this.key = key;
-    const now = this.controller, f = (name: string): [Float64Array, Float64Array] => [old.view(name), now.view(name)];
+  /** Goes on with the controller of another N: himpc/tick/tick.py, `recall`. */
+  private exchange(horizon: number): void {
+    const { controller: old, horizon: N, manifest: { tasks }, plant: { n } } = this;
+    if (horizon === N) return;
+    [this.controller, this.manifest] = this.controllerFor(horizon);
+    this.horizon = horizon;
     this.send();
-    now.reset(this.plant.tau);
-    for (const name of ["q_was", "v_was", "limits", "scalars", "state"]) f(name)[1].set(f(name)[0]);
-    const [was, path] = f("path"), [q_was] = f("q_was"), [v_was] = f("v_was");
-    for (let j = 0; j <= horizon; j++) for (let a = 0; a < n; a++) {
-      if (N === horizon) path[j * n + a] = was[j * n + a];
-      else if (j) {
-        const step = N > 1 ? was[N * n + a] - was[(N - 1) * n + a] : this.scene.period * v_was[a];
-        path[j * n + a] = was[Math.min(j, N) * n + a] + q_was[a] - was[n + a] + Math.max(0, j - N) * step;
-      }
+    this.controller.reset(this.plant.tau);
+    const now = this.controller, path = now.view("path"), target = now.view("target"), samples = now.view("samples");
+    for (const name of ["q_was", "v_was", "limits", "scalars", "state", "raw", "target", "weight"])
+      now.view(name).set(old.view(name));
+    const [was, q_was, v_was, before] = ["path", "q_was", "v_was", "samples"].map((name) => old.view(name));
+    for (let j = 1; j <= horizon; j++) for (let a = 0; a < n; a++) {
+      const step = N > 1 ? was[N * n + a] - was[(N - 1) * n + a] : this.scene.period * v_was[a];
+      path[j * n + a] = was[Math.min(j, N) * n + a] + q_was[a] - was[n + a] + Math.max(0, j - N) * step;
     }
-    const known = now.view("known") as unknown as BigInt64Array, [U, U_was] = f("U_was"), size = N * n;
-    known[0] = known[1] = 0n;
-    (now.view("warm_count") as unknown as BigInt64Array).fill(0n);
-    if (N === horizon) this.solved().forEach((name, place) => {
-      const from = solved.indexOf(name);
-      if (from < 0) return;
-      U_was.set(U.subarray(from * size, (from + 1) * size), place * size);
-      known[1] = 1n;
-    });
-    for (const { name, index, rows } of this.manifest.tasks) {
-      const from = named(then.tasks, name, "task").index;
-      for (const array of ["raw", "target", "samples"]) {
-        const [a, b] = f(array), [wide, narrow] = [a.length / then.tasks.length, b.length / then.tasks.length];
-        b.set(a.subarray(from * wide, from * wide + Math.min(wide, narrow)), index * narrow);
-      }
-      const target = now.view("target"), [a, b] = f("weight"), [first, second] = f("task");
+    for (const name of ["known", "warm_count"]) (now.view(name) as unknown as BigInt64Array).fill(0n);
+    const wide = before.length / tasks.length, room = samples.length / tasks.length;
+    for (const { index } of tasks) {
+      samples.set(before.subarray(index * wide, index * wide + Math.min(wide, room)), index * room);
       target[4 * index + 3] = Math.min(target[4 * index + 3], horizon + 1);
-      const start = Number(first[4 * from + 2]);
-      b.set(a.subarray(start, start + rows), Number(second[4 * index + 2]));
     }
   }
-
 }
 
 function named<T extends { name: string }>(list: T[], name: string, kind: string): T {

@@ -1,6 +1,6 @@
 /** The 3D view: the robot, its ghost, objects, and targets that are dragged with mouse, touch or keys. */
 import {
-  AmbientLight, BoxGeometry, BufferAttribute, BufferGeometry, Color, CylinderGeometry, DirectionalLight, GridHelper, Group,
+  AmbientLight, BoxGeometry, BufferAttribute, BufferGeometry, CylinderGeometry, DirectionalLight, GridHelper, Group,
   HemisphereLight, Mesh, MeshBasicMaterial, MeshLambertMaterial, Object3D, PerspectiveCamera, Scene, SphereGeometry, Vector3,
   WebGLRenderer,
 } from "three";
@@ -16,9 +16,6 @@ const MOVES: Moves = { ArrowLeft: [0, -1, 0], ArrowRight: [0, 1, 0], ArrowUp: [-
   PageUp: [0, 0, 1], PageDown: [0, 0, -1] };
 const FLAT: Moves = { ArrowLeft: [-1, 0, 0], ArrowRight: [1, 0, 0], ArrowUp: [0, 1, 0], ArrowDown: [0, -1, 0] };
 
-/** The ball of a task: where its target is, and in what cannot be seen but grasped, where it was dragged to. */
-interface Ball { raw: Mesh; filtered: Mesh }
-
 export class View {
   readonly canvas = element("canvas", { tabIndex: 0, role: "application", ariaLabel: "The robot. Arrow keys and Page Up, " +
     "Page Down move the target by 2 cm; with Shift the arrow keys turn the camera; plus and minus move it closer or away." });
@@ -30,7 +27,8 @@ export class View {
   private links: Group[];
   private ghosts: Group[];
   private objects: Object3D[];
-  private balls = new Map<string, Ball>();
+  /** Of each task: where its target is, and in what cannot be seen but grasped, where it was dragged to. */
+  private balls = new Map<string, { raw: Mesh; filtered: Mesh }>();
   private planned = 0;
   private fitted = false;
 
@@ -76,25 +74,22 @@ export class View {
       geometry.setAttribute("position", new BufferAttribute(Float32Array.from(grid, (each) => each * shape.grid), 3));
       geometry.setIndex(new BufferAttribute(new Uint16Array(faces.buffer, faces.byteOffset, faces.byteLength / 2), 1));
       geometry.computeVertexNormals();
-      const [r, g, b] = shape.colour, color = new Color().setRGB(r / 255, g / 255, b / 255, "srgb");
-      const mesh = new Mesh(geometry, new MeshLambertMaterial({ color }));
-      (groups[shape.joint - 1] ?? this.scene).add(mesh);
+      (groups[shape.joint - 1] ?? this.scene).add(new Mesh(geometry, new MeshLambertMaterial({ color: shape.colour })));
     }
     return groups;
   }
 
-  private ball(task: string): Ball {
+  /** Adds the ball of a task. */
+  private add(task: string): void {
     const radius = 0.035 * Math.max(0.6, this.robot.told.reach), reach = matchMedia("(pointer: coarse)").matches ? 3 : 1.8;
     const color = LEVELS[this.told.tasks.find(({ name }) => name === task)!.level % 6];
     const raw = new Mesh(new SphereGeometry(reach * radius), new MeshBasicMaterial({ visible: false }));
     raw.add(new Mesh(new SphereGeometry(radius, 24, 16), new MeshLambertMaterial({ color, transparent: true, opacity: 0.75 })));
     const filtered = new Mesh(new SphereGeometry(0.45 * radius, 16, 12), new MeshBasicMaterial({ color }));
-    const ball = { raw, filtered };
     raw.name = task;
     this.scene.add(raw, filtered);
     this.dragged.objects.push(raw);
-    this.balls.set(task, ball);
-    return ball;
+    this.balls.set(task, { raw, filtered });
   }
 
   show(frame: Frame): void {
@@ -109,7 +104,8 @@ export class View {
   place(task: string, value: ArrayLike<number>, raw: number[] | undefined): void {
     const { frame, axes } = this.told.tasks.find(({ name }) => name === task)!;
     if (!frame) return;
-    const ball = this.balls.get(task) ?? this.ball(task), hand = new Vector3().fromArray(frame.pos);
+    if (!this.balls.has(task)) this.add(task);
+    const ball = this.balls.get(task)!, hand = new Vector3().fromArray(frame.pos);
     this.links[frame.joint - 1]?.localToWorld(hand);
     AXES.forEach((axis, a) => {
       const place = axes.indexOf(axis), filtered = place < 0 ? hand.getComponent(a) : value[place];
@@ -165,12 +161,11 @@ export class View {
   }
 }
 
-/** Puts things where their bodies are: position and quaternion w x y z of each. */
+/** Puts things where their bodies are: position and quaternion x y z w of each. */
 function put(things: Object3D[], poses: ArrayLike<number>): void {
   things.forEach((each, k) => {
-    const [x, y, z, w, i, j, l] = Array.from({ length: 7 }, (_, at) => poses[7 * k + at]);
-    each.position.set(x, y, z);
-    each.quaternion.set(i, j, l, w);
+    each.position.fromArray(poses, 7 * k);
+    each.quaternion.fromArray(poses, 7 * k + 3);
   });
 }
 

@@ -142,15 +142,15 @@ function loop(): void {
 }
 
 function show(): void {
-  const { rows, plant, scene, order, horizon, lost, t } = session;
+  const { rows, plant, scene, horizon, lost, t } = session;
   const binding = (rows.count ? [...rows.at(-1, "at_bound")] : []).flatMap((bits, a) =>
     NAMES.filter((_, k) => bits > 0 && bits & (1 << k)).map((name) => `joint ${a + 1}: ${name}`));
   const targets = scene.tasks.filter(({ target }) => target === "position")
     .map(({ name }) => ({ task: name, value: session.target(name) }));
   const off = scene.levels.filter((level) => !level.enabled).map((level) => level.name);
   post({ frame: { t, running, poses: plant.poses(), ghost: ghost?.plant.poses() ?? null, objects: plant.objects(), targets,
-    binding, curves, width: 1 + scene.tasks.length + 2 * plant.n, fallback: FALLBACKS[session.fallback], speed, us, order,
-    off, horizon, lost, restarted } });
+    binding, curves, width: 1 + scene.tasks.length + 2 * plant.n, fallback: FALLBACKS[session.fallback], speed, us,
+    order: scene.order, off, horizon, lost, restarted } });
   [restarted, curves] = [false, []];
 }
 

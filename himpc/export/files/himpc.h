@@ -51,7 +51,8 @@ int himpc_set(himpc_controller *c, int what, int index, const double *values, in
 /* 0 if this memory is a controller that this kernel can run. */
 int himpc_check(const void *memory, unsigned size);
 
-enum { HIMPC_TARGET, HIMPC_M_BAR, HIMPC_GAINS, HIMPC_WEIGHT_Q, HIMPC_WEIGHT_R, HIMPC_LIMITS, HIMPC_ENABLED };
+enum { HIMPC_TARGET, HIMPC_M_BAR, HIMPC_GAINS, HIMPC_WEIGHT_Q, HIMPC_WEIGHT_R, HIMPC_LIMITS, HIMPC_ENABLED,
+       HIMPC_ORDER };
 
 /* Tasks: @tasks@. */
 enum { HIMPC_TASKS = @task_count@ };
@@ -134,6 +135,13 @@ static inline int himpc_set_limits(himpc_controller *c, const double torque[HIMP
 static inline int himpc_enable(himpc_controller *c, const char *level, int on) {
     double value = on;
     return himpc_set(c, HIMPC_ENABLED, himpc_level(level), &value, 1);
+}
+
+/* Gives the levels another order: all names, highest priority first. A level named damping stays the last. */
+static inline int himpc_set_order(himpc_controller *c, const char *const levels[HIMPC_LEVELS]) {
+    double values[HIMPC_LEVELS];
+    for (int i = 0; i < HIMPC_LEVELS; i++) values[i] = himpc_level(levels[i]);
+    return himpc_set(c, HIMPC_ORDER, 0, values, HIMPC_LEVELS);
 }
 
 #ifdef __cplusplus

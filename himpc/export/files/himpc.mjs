@@ -1,10 +1,18 @@
 // The exported controller in a browser or in Node. One module may hold many controllers.
 const { sin, cos, tan, atan2, hypot, exp, expm1, log, sqrt, pow } = Math;
 const env = { sin, cos, tan, atan2, hypot, exp, expm1, log, sqrt, pow };
-export const TARGET = 0, M_BAR = 1, GAINS = 2, Q = 3, R = 4, LIMITS = 5, ENABLED = 6;
+export const TARGET = 0, M_BAR = 1, GAINS = 2, Q = 3, R = 4, LIMITS = 5, ENABLED = 6, ORDER = 7;
 export const FALLBACKS = ["solve", "soften", "feasible", "previous", "inherit", "brake", "hold"];
 
-/** Makes what creates controllers. wasm: bytes of himpc.wasm. */
+/**
+ * What controller.json says; lengths and indices are numbers of elements, `offset` is in bytes.
+ * @typedef {{ name: string, index: number, rows: number, target: string }} Task
+ * @typedef {{ name: string, index: number, rows: number, tasks: string[] }} Level
+ * @typedef {{ name: string, type: string, shape: number[], offset: number }} Listed
+ * @typedef {{ joints: string[], tasks: Task[], levels: Level[], arrays: Listed[] }} Manifest
+ */
+
+/** Makes what creates controllers. @param {ArrayBuffer} wasm bytes of himpc.wasm */
 export async function kernel(wasm) {
   const { instance } = await WebAssembly.instantiate(wasm, { env });
   const { memory, himpc_tick, himpc_reset, himpc_set, himpc_check, __heap_base } = instance.exports;
@@ -15,13 +23,18 @@ export async function kernel(wasm) {
     if (end > memory.buffer.byteLength) memory.grow(Math.ceil((end - memory.buffer.byteLength) / 65536));
     return at;
   };
-  /** A controller. image: bytes of controller.bin; manifest: controller.json, parsed. */
+  /**
+   * A controller.
+   * @param {Uint8Array} image bytes of controller.bin
+   * @param {Manifest} manifest controller.json, parsed
+   */
   return function create(image, manifest) {
     const n = manifest.joints.length;
     const at = take(image.byteLength), given = take(8 * Math.max(4 * n, 64));
     new Uint8Array(memory.buffer, at, image.byteLength).set(image);
     if (himpc_check(at, image.byteLength)) throw new Error("controller.bin was made for another kernel: export again");
     const numbers = (offset, count) => new Float64Array(memory.buffer, offset, count);
+    /** @type {(what: number, index: number, values: ArrayLike<number>) => void} */
     const set = (what, index, values) => {
       numbers(given, values.length).set(values);
       const wrong = himpc_set(at, what, index, given, values.length);
@@ -36,8 +49,11 @@ export async function kernel(wasm) {
     himpc_reset(at, 0);
     return {
       n,
-      /** (q, v, tau_applied or null) → [torque (N·m), which fallback acted]. */
-      tick(q, v, applied) {
+      /**
+       * One control period; returns the torque (N·m) and which fallback acted.
+       * @type {(q: Float64Array, v: Float64Array, applied: Float64Array | null) => [Float64Array, number]}
+       */
+      tick: (q, v, applied) => {
         const values = numbers(given, 4 * n);
         values.set(q);
         values.set(v, n);
@@ -45,6 +61,7 @@ export async function kernel(wasm) {
         const fallback = himpc_tick(at, given, given + 8 * n, applied ? given + 16 * n : 0, given + 24 * n);
         return [numbers(given + 24 * n, n), fallback];
       },
+      /** @param {Float64Array | null} tau the torque that acts now (N·m) */
       reset(tau) {
         if (tau) numbers(given, n).set(tau);
         himpc_reset(at, tau ? given : 0);
@@ -53,7 +70,7 @@ export async function kernel(wasm) {
       setTarget: (task, values) => set(TARGET, index("tasks", task), values),
       setGains: (task, K_p, K_v) => set(GAINS, index("tasks", task), [...K_p, ...K_v]),
       enable: (level, on) => set(ENABLED, index("levels", level), [on ? 1 : 0]),
-      /** A live view of an array of the manifest. */
+      /** A live view of an array of the manifest. @param {string} name @returns {Float64Array} */
       view(name) {
         const { type, shape, offset } = arrays[name], count = shape.reduce((a, b) => a * b, 1);
         return type === "int64" ? new BigInt64Array(memory.buffer, at + offset, count) : numbers(at + offset, count);

@@ -14,10 +14,10 @@ from himpc.qp import KKT_TOLERANCE
 from himpc.tick.kernel.arrays import T_S, Array, TickArrays
 from himpc.tick.kernel.bounds import PAPER
 from himpc.tick.kernel.cascade import AFRESH, FIRST, LAST
-from himpc.tick.kernel.linear import copy, dot
+from himpc.tick.kernel.linear import copy, copy_rows, dot
 from himpc.tick.tables import ACCURACY
 
-TARGET, M_BAR, GAINS, WEIGHT_Q, WEIGHT_R, LIMITS, ENABLED = range(7)
+TARGET, M_BAR, GAINS, WEIGHT_Q, WEIGHT_R, LIMITS, ENABLED, ORDER = range(8)
 """What can be set."""
 _MODE = 9
 """Where `sizes` holds how position limits are kept."""
@@ -29,17 +29,18 @@ def adjust(t: TickArrays, p: LoopArrays, what: int, index: int, values: Array, c
     changed.
 
     Args:
-        what: TARGET … ENABLED.
+        what: TARGET … ORDER.
         index: of the task (TARGET, GAINS) or of the level (WEIGHT_Q, WEIGHT_R, ENABLED).
         values, count: TARGET see `drag`; M̄ (n) kg·m²; K_p (m) 1/s², then K_v (m) 1/s; Q (m); R (n); the
         limits of
-            torque (n) N·m, velocity (n) rad/s, lower and upper position (n) rad each; 0 or 1.
+            torque (n) N·m, velocity (n) rad/s, lower and upper position (n) rad each; 0 or 1; the indices of
+            all levels (r), highest priority first, of which a damping level stays the last.
     """
     n, r = t.q.size, int(p.setup[LEVELS])
     if not dot(values, values, count) < 1e18 and what != LIMITS:
         return NOT_USABLE
     of_task = what in (TARGET, GAINS)
-    if what < 0 or what > ENABLED or index < 0 or index >= (len(t.task) if of_task else r):
+    if what < 0 or what > ORDER or index < 0 or index >= (len(t.task) if of_task else r):
         return MISFIT
     if what == TARGET:
         return drag(t, p, index, values, count)
@@ -52,13 +53,15 @@ def adjust(t: TickArrays, p: LoopArrays, what: int, index: int, values: Array, c
     wanted = n if what in (M_BAR, WEIGHT_R) else 2 * size if what == GAINS else size
     if what == ENABLED:
         wanted = 1
+    elif what == ORDER:
+        wanted = r
     if count != wanted:
         return MISFIT
-    if what != ENABLED:
+    if what != ENABLED and what != ORDER:
         for k in range(count):
             if not (values[k] > 0.0 or (what == GAINS and values[k] == 0.0)):
                 return NOT_USABLE
-    tied = what in (WEIGHT_R, ENABLED) or (what == M_BAR and p.setup[ON_ACCELERATION] != 0.0)
+    tied = what in (WEIGHT_R, ENABLED, ORDER) or (what == M_BAR and p.setup[ON_ACCELERATION] != 0.0)
     if tied and p.setup[SIMPLE] == 0.0:
         return NO_HIERARCHY
     if what == GAINS:
@@ -70,6 +73,8 @@ def adjust(t: TickArrays, p: LoopArrays, what: int, index: int, values: Array, c
         write_rows(t, p, first, last)
     elif what == ENABLED:
         switch(t, p, index, values[0] != 0.0)
+    elif what == ORDER:
+        return reorder(t, p, values)
     else:
         copy(values, t.M_bar if what == M_BAR else p.R[index], n)
         arrange(t, p)
@@ -146,6 +151,33 @@ def switch(t: TickArrays, p: LoopArrays, index: int, on: bool) -> None:
 
 
 @inline_kernel
+def reorder(t: TickArrays, p: LoopArrays, values: Array) -> int:
+    """Gives the levels another order; returns 0, or NOT_USABLE for what is none. What each level found goes
+    with it, see `himpc.tick.tick.CompiledTick.recall`."""
+    r, moved = len(p.order), False
+    for k in range(r):
+        count = 0
+        for i in range(r):
+            count += values[i] == k
+        if count != 1 or (p.setup[DAMPS] != 0.0 and k == r - 1 and values[k] != k):
+            return NOT_USABLE
+        moved = moved or values[k] != p.order[k]
+    if not moved:
+        return 0
+    for i in range(r):
+        if p.place[i] >= 0.0:
+            copy_rows(t.U[int(p.place[i])], p.before[i])
+    copy(values, p.order, r)
+    arrange(t, p)
+    for i in range(r):
+        if p.place[i] >= 0.0 and t.known[1]:
+            copy_rows(p.before[i], t.U_was[int(p.place[i])])
+        t.warm_count[i] = 0
+    t.known[0] = 0
+    return 0
+
+
+@inline_kernel
 def arrange(t: TickArrays, p: LoopArrays) -> None:
     """Writes the tables of the levels that are on, see `himpc.tick.tables.write_levels`. Without a strict
     hierarchy they stay as they are."""
@@ -156,9 +188,12 @@ def arrange(t: TickArrays, p: LoopArrays) -> None:
     for i in range(r):
         if i != damping and p.enabled[i] != 0.0:
             choice += 1 << i
-    for i in range(r):
+    for at in range(r):
+        i = int(p.order[at])
+        p.place[i] = -1.0
         if (p.damped[choice] if i == damping else p.enabled[i]) == 0.0:
             continue
+        p.place[i] = count
         for column in range(8):
             t.level[count, column] = int(p.table[i, column])
         least = math.inf

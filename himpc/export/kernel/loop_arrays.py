@@ -28,6 +28,8 @@ class LoopArrays(NamedTuple):
     enabled: Annotated[Array, "r", "1", "1 for a level that is on"]
     damped: Annotated[Array, "D", "1", "whether the damping level is added to this choice of levels"]
     table: Annotated[Array, "r 8", "1", "the table of all levels, columns as in `level`"]
+    order: Annotated[Array, "r", "1", "the levels, highest priority first"]
+    place: Annotated[Array, "r", "1", "where each level stands among those that are solved; -1: it is off"]
     weight: Annotated[Array, "M", "1", "how far a row that was switched on has faded in, 0 … 1"]
     target: Annotated[Array, "T 4", "1", "of each task: draggable, rows, numbers of its value, samples known"]
     raw: Annotated[Array, "T V", "m, rad, 1", "where the target was dragged to"]
@@ -102,19 +104,21 @@ def loop_arrays_of(loop: Array, where: Whole, t: TickArrays) -> LoopArrays:
         vector(loop, where[6], r),
         vector(loop, where[7], 1 << r),
         matrix(loop, where[8], r, 8),
-        vector(loop, where[9], M),
-        matrix(loop, where[10], T, 4),
-        matrix(loop, where[11], T, max(9, widest)),
-        matrix(loop, where[12], T, 3 + 3 * widest),
-        matrices(loop, where[13], T, N + 1, max(19, 4 * widest + 1)),
-        matrix(loop, where[14], b, n),
-        matrix(loop, where[15], b, n),
+        vector(loop, where[9], r),
+        vector(loop, where[10], r),
+        vector(loop, where[11], M),
+        matrix(loop, where[12], T, 4),
+        matrix(loop, where[13], T, max(9, widest)),
+        matrix(loop, where[14], T, 3 + 3 * widest),
+        matrices(loop, where[15], T, N + 1, max(19, 4 * widest + 1)),
         matrix(loop, where[16], b, n),
-        matrix(loop, where[17], N, n),
-        matrix(loop, where[18], N, n),
+        matrix(loop, where[17], b, n),
+        matrix(loop, where[18], b, n),
         matrix(loop, where[19], N, n),
         matrix(loop, where[20], N, n),
         matrix(loop, where[21], N, n),
-        matrices(loop, where[22], r, N, n),
-        vector(loop, where[23], n),
+        matrix(loop, where[22], N, n),
+        matrix(loop, where[23], N, n),
+        matrices(loop, where[24], r, N, n),
+        vector(loop, where[25], n),
     )
