@@ -248,6 +248,7 @@ def test_try_it(site: Path, browser: Browser, width: int, height: int) -> None:
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     page.get_by_role("button", name="Push").click()
     page.wait_for_function("() => HIMPC.shown.frame.curves[1] > 1e-3")
+    page.locator(".hl-view canvas").scroll_into_view_if_needed()
     start = page.evaluate("HIMPC.shown.frame.targets[0].value")
     x, y = page.evaluate("HIMPC.shown.pixel('position')")
     page.mouse.move(x, y)

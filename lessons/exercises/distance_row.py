@@ -24,7 +24,8 @@ from lessons.teaching.lesson import card_of
 from lessons.teaching.measure import Measure, Signal
 
 SETTINGS = (
-    *("avoidance.on=true", "avoidance.pull=0", "levels.orientation.enabled=false"),
+    *("avoidance.on=true", "avoidance.pull=0", "avoidance.velocity_margin=0"),
+    "levels.orientation.enabled=false",
     *("horizon=1", "damping=false", "T_s=0.002"),
 )
 NEAREST = Signal("distance", "mm")

@@ -170,10 +170,8 @@ MISTAKES: dict[str, dict[str, Mistake]] = {
             "it is too late to stop",
         ),
         "stops altogether": Mistake(
-            "    D, lower = distance_rows(now)\n",
-            "    if (now.near.d < 0.1).any():\n"
-            "        return now.tau_0 - now.M_bar * (now.q_ddot + 5.0 * now.q_dot)\n"
-            "    D, lower = distance_rows(now)\n",
+            "-v_stop - speed",
+            "v_stop - speed",
             3,
             "the arm stops altogether",
             "reaches a target that is free",
