@@ -17,7 +17,6 @@ from himpc.tick.kernel.goldfarb_idnani import TOLERANCE
 from himpc.tick.kernel.linear import copy_rows, dot
 from himpc.tick.kernel.residual import add_effects, effects
 from himpc.tick.kernel.solve_level import solve_level
-from himpc.tick.kernel.solve_levels import no_clock, solve_levels
 
 SOLVE, SOFTEN, FEASIBLE, PREVIOUS, INHERIT, BRAKE, HOLD = range(7)
 """Which fallback gave a level's increments, in the order of `himpc.cascade.level.FALLBACKS`."""
@@ -28,14 +27,16 @@ def solve_with_fallbacks(
     t: TickArrays, p: LoopArrays, data: Array, where: Whole, whole: Whole, whole_where: Whole
 ) -> int:
     """Solves all levels; returns the last of the fallbacks that acted, SOLVE if none was needed."""
-    worst, i = SOLVE, -1
-    while True:
-        i = solve_levels(data, where, whole, whole_where, i + 1, no_clock)
-        if i >= t.sizes[4]:
-            return worst
-        found = climb_down(t, p, data, where, whole, whole_where, i)
+    worst = SOLVE
+    for i in range(t.sizes[4]):
+        # If the solver fails at once, the point of an earlier tick must not be used as a direction.
+        t.U[i, 0, 0] = math.nan
+        found = SOLVE
+        if not solve_level(data, where, whole, whole_where, i, 0.0):
+            found = climb_down(t, p, data, where, whole, whole_where, i)
         t.rung[i] = float(found)
         worst = max(worst, found)
+    return worst
 
 
 @inline_kernel

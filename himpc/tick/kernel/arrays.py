@@ -98,7 +98,7 @@ class TickArrays(NamedTuple):
     # What a tick finds; one piece, so that a plan takes its copy at once.
     tau: Annotated[Array, "n", "N·m", "finish_tick → gather tick"]
     U: Annotated[
-        Array, "r N n", "N·m", "fallbacks solve_level solve_levels → finish_tick problems tables tick"
+        Array, "r N n", "N·m", "control_period fallbacks solve_level → finish_tick problems tables tick"
     ]
     predicted: Annotated[Array, "N1 n", "rad", "finish_tick → tick"]
     value: Annotated[Array, "M", "m, rad", "given linearize → gather kinematics tick"]
@@ -126,8 +126,8 @@ class TickArrays(NamedTuple):
     at_bound: Annotated[Array, "n", "1", "finish_tick → gather"]
     priority_leak: Annotated[Array, "1", "m/s²", "finish_tick → gather"]
     active: Annotated[Array, "r", "1", "finish_tick → gather"]
-    rung: Annotated[Array, "r", "1", "fallbacks solve_levels → gather finish_tick problems"]
-    time_us: Annotated[Array, "r", "µs", "fallbacks solve_levels → gather problems tick"]
+    rung: Annotated[Array, "r", "1", "control_period fallbacks → gather finish_tick problems"]
+    time_us: Annotated[Array, "r", "µs", "control_period fallbacks → gather problems tick"]
     nothing: Annotated[Array, "1", "1", "configure → gather"]
     # Scratch.
     placed: Annotated[Array, "J 12", "1, m", "distance_rows linearize → distances"]
@@ -172,8 +172,7 @@ class TickArrays(NamedTuple):
         Whole,
         "12",
         "1",
-        "configure tables → "
-        "control_period distance_rows fallbacks finish_tick linearize solve_level solve_levels",
+        "configure tables → control_period distance_rows fallbacks finish_tick linearize solve_level",
     ]
     # What is remembered, and whether `x_dot_was` and `U_was` are known.
     known: Annotated[Whole, "2", "1", "finish_tick linearize kinematics problems tick → fallbacks given"]
@@ -205,7 +204,7 @@ class TickArrays(NamedTuple):
     held_row: Annotated[Whole, "k", "1", "solve_level → itself"]
     held_joint: Annotated[Whole, "k", "1", "solve_level → itself"]
     held_side: Annotated[Whole, "k", "1", "solve_level → itself"]
-    stamp: Annotated[Whole, "2", "s, ns", "solve_levels → itself"]
+    stamp: Annotated[Whole, "2", "s, ns", "control_period → itself"]
 
 
 def _shapes(kind: Any) -> dict[str, str]:

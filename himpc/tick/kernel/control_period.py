@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 from typing import Any
@@ -20,7 +21,6 @@ from himpc.tick.kernel.arrays_of import arrays_of
 from himpc.tick.kernel.finish_tick import finish_tick
 from himpc.tick.kernel.linearize import linearize
 from himpc.tick.kernel.solve_level import solve_level
-from himpc.tick.kernel.solve_levels import no_clock, solve_levels
 
 LINEARIZE, LEVELS, ONE_LEVEL, FINISH, REMEMBER = 1, 2, 4, 8, 16
 """Parts of a period; `parts` is their sum."""
@@ -30,13 +30,19 @@ NOT_FINITE = -1
 
 
 @inline_kernel
+def _no_clock(stamp: Whole) -> float:
+    """Replaces the clock where the C library has none."""
+    return 0.0
+
+
+@inline_kernel
 def _monotonic_us(stamp: Whole) -> float:
     clock_gettime(_MONOTONIC, stamp.ctypes.data)
     return 1e6 * stamp[0] + 1e-3 * stamp[1]
 
 
 _MONOTONIC = 6 if sys.platform == "darwin" else 1
-_clock = _monotonic_us if os.name == "posix" else no_clock
+_clock = _monotonic_us if os.name == "posix" else _no_clock
 
 
 @kernel(VECTOR, INDICES, INDICES, INDICES, WHOLE, WHOLE, NUMBER)
@@ -62,9 +68,15 @@ def control_period(
     if parts & ONE_LEVEL and not solve_level(data, where, whole, whole_where, i, room):
         return i
     if parts & LEVELS:
-        reached = solve_levels(data, where, whole, whole_where, i, _clock)
-        if reached < t.sizes[4]:
-            return reached
+        for place in range(i, t.sizes[4]):
+            # If the solver fails at once, the point of an earlier tick must not be used as a direction.
+            t.U[place, 0, 0] = math.nan
+            started = _clock(t.stamp)
+            solved = solve_level(data, where, whole, whole_where, place, 0.0)
+            t.time_us[place] = _clock(t.stamp) - started
+            if not solved:
+                return place
+            t.rung[place] = 0.0
     if parts & FINISH and not finish_tick(data, where, whole, whole_where, parts & REMEMBER):
         return NOT_FINITE
     return t.sizes[4]
