@@ -31,9 +31,7 @@ from lessons.scenes.names import ALL_SCENES
 if TYPE_CHECKING:
     from app.page.layout import Stage
 
-RATE, CALM, STILL = 30.0, 6.0, 1.0  # Hz: poses; looks at a robot that has stood still for so many s
-PLOTS_RATE = 12.0  # Hz
-_TEXTS, NARROW = 8, 1000  # pixels with no room for panels at both sides, as in the cell of a notebook
+NARROW = 1000  # pixels with no room for panels at both sides, as in the cell of a notebook
 _BROKEN = (
     "This page cannot be shown: {}. Start again loads the scene anew; if that does not help, reload the page "
     "and choose another scene."

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from app.arm.bounded import STUCK
 from app.arm.drive import Drag, Drive, Driven, drive
 from app.arm.guard import Tolerances
 from app.arm.loop import Columns, Ended, run
@@ -123,17 +124,24 @@ class Bench:
         rad."""
         beside = self.plant()
         beside.reset(self.scene.q_0 + elsewhere * np.eye(7)[1])
-        wanted = Drive(
-            lambda: Scripted(self.plant(), happen, T_S),
-            self.make,
-            self.ready.limits,
-            self.scene.q_0,
-            T_S,
-            duration,
-            drags,
-            tolerances,
-        )
+        wanted = self.wanted(lambda: Scripted(self.plant(), happen, T_S), duration, drags, tolerances)
         return drive(wanted, Model(beside, self.make(), self.ready.limits, T_S), tell)
+
+    def wanted(
+        self,
+        arm: Callable[[], Scripted],
+        duration: float = 60.0,
+        drags: tuple[Drag, ...] = (),
+        tolerances: Tolerances = PATIENT,
+        stuck: float = STUCK,
+    ) -> Drive:
+        """A drive of this scene with an arm of the test's own."""
+        q_0 = self.scene.q_0
+        return Drive(arm, self.make, self.ready.limits, q_0, T_S, duration, drags, tolerances, stuck=stuck)
+
+    def model(self) -> Model:
+        """The model of the arm beside it."""
+        return Model(self.plant(), self.make(), self.ready.limits, T_S)
 
     def order(self, *moved: float) -> Order:
         """The hand's target moves, m."""

@@ -14,10 +14,9 @@ import numpy as np
 import pytest
 from arm_bench import ALONE, PATIENT, T_S, Bench, Scripted
 
-from app.arm.drive import Drive, drive
+from app.arm.drive import drive
 from app.arm.guard import ArmGuard, Tolerances
 from app.arm.loop import Ended
-from app.arm.model import Model
 from app.link.process import wait_until
 from robots.arm import ArmLost, Reading
 
@@ -110,17 +109,8 @@ def test_a_library_that_hangs_ends_the_loop_s_process(bench: Bench) -> None:
         if k == 20:
             time.sleep(1000.0)
 
-    wanted = Drive(
-        lambda: Scripted(bench.plant(), hang, T_S),
-        bench.make,
-        bench.ready.limits,
-        bench.scene.q_0,
-        T_S,
-        60.0,
-        tolerances=PATIENT,
-        stuck=0.5,
-    )
-    driven = drive(wanted, Model(bench.plant(), bench.make(), bench.ready.limits, T_S), lambda text: None)
+    wanted = bench.wanted(lambda: Scripted(bench.plant(), hang, T_S), stuck=0.5)
+    driven = drive(wanted, bench.model(), lambda text: None)
     assert driven.why == f"the process of the loop ended (exit code {-signal.SIGALRM})"
     assert len(driven.rows) == 20
 
@@ -137,17 +127,8 @@ def test_a_watcher_that_hangs_delays_nothing(bench: Bench) -> None:
             super().stop()
             over.set()
 
-    wanted = Drive(
-        lambda: Ending(bench.plant(), lambda k, arm: None, T_S),
-        bench.make,
-        bench.ready.limits,
-        bench.scene.q_0,
-        T_S,
-        60.0,
-        (),
-        ALONE,
-    )
-    driven = drive(wanted, Model(bench.plant(), bench.make(), bench.ready.limits, T_S), hang)
+    wanted = bench.wanted(lambda: Ending(bench.plant(), lambda k, arm: None, T_S), tolerances=ALONE)
+    driven = drive(wanted, bench.model(), hang)
     assert "the watcher has been silent" in driven.why
     assert driven.gently
 
@@ -166,17 +147,8 @@ def test_a_killed_watcher_leaves_no_moving_arm(bench: Bench, tmp_path: Path) -> 
             begun.touch()
 
     def watch() -> None:
-        bench_drive = Drive(
-            lambda: Noting(bench.plant(), note, T_S),
-            bench.make,
-            bench.ready.limits,
-            bench.scene.q_0,
-            T_S,
-            60.0,
-            (),
-            ALONE,
-        )
-        drive(bench_drive, Model(bench.plant(), bench.make(), bench.ready.limits, T_S), lambda text: None)
+        wanted = bench.wanted(lambda: Noting(bench.plant(), note, T_S), tolerances=ALONE)
+        drive(wanted, bench.model(), lambda text: None)
 
     watcher = multiprocessing.get_context("fork").Process(target=watch)
     watcher.start()
