@@ -25,3 +25,45 @@ VELOCITY_RATE = 36.0
 """1/s: rate at which its velocity approaches the desired velocity."""
 STILL = 1e-9
 """Below this distance and speed the target is set to rest; it must not drift for ever."""
+
+LOAD_SECONDS = 0.1
+"""Time constant of the mean load of a motor: a short peak of torque slows nothing down."""
+FREE_LOAD, FULL_LOAD = 0.55, 0.95
+"""Shares of the torque limit: below the first, a motor slows nothing down; above the second, its joints have
+their lowest velocity limit."""
+SLOWEST_SHARE = 0.03
+"""The lowest velocity limit of a joint whose motor is loaded, as a share of its own limit."""
+HEAVY_LOAD = 0.85
+"""If a motor has at least this load and the tasks make no progress, the robot counts as stalled."""
+
+MEAN_SECONDS = 0.02
+"""Time constant of the mean velocity, whose distance from the velocity is a smooth acceleration."""
+LEAD = 0.1
+"""s: the velocity is extrapolated over this time, and that velocity must be within its limit."""
+LEAST_WHILE_FASTER = 0.5
+"""The lowest velocity limit of a joint that accelerates, as a share of its own limit."""
+
+BLOCKED = 0.1
+"""m: only a robot with a pair that has less room than this can be stalled."""
+INSIDE = -0.03
+"""m: a robot that is farther inside must come out, and is not slowed down. A robot that is a little inside
+and does not come out is stalled, too."""
+PROGRESS = 0.05
+"""m/s, rad/s: the least decrease of an error that counts as progress. A reference that is faster than this
+counts as moving."""
+PROGRESS_SHARE = 0.25
+"""1/s: the least decrease as a share of the error; tasks that nothing blocks are ten times as fast."""
+CLOSE_ENOUGH = 0.01
+"""m, rad: a task with a smaller error has reached its target."""
+SLOWING, RECOVERY = 0.1, 0.05
+"""s: time constants with which the joints of a stalled robot become slow, and fast again."""
+DISTURBED = 0.03
+"""m, rad: a first task whose error grows by more was pushed away, and may come back."""
+STALLED, REST = 0.5, 0.02
+"""Shares of the velocity limits. Below the first, a robot stays stalled until something changes. Below the
+second, it has come to rest. Between the two, it brakes, and errors that change are neither progress nor a
+disturbance."""
+SLOWEST = 0.02
+"""rad/s: no joint of a stalled robot becomes slower than this."""
+LEAST_SHARE = 1e-9
+"""The share of a velocity limit that remains at least: a joint whose limit is infinite keeps it."""

@@ -269,7 +269,7 @@ COMPILED = {
     ),
     "controllers": (
         *("tick", "plan", "formulation", "cascade", "limits", "prediction", "stack", "tasks"),
-        *("kinematics", "references", "qp", "catalog"),
+        *("kinematics", "references", "qp", "catalog", "constants"),
     ),
     "export/kernel": ("tick/kernel", "tick", "controllers", "limits", "cascade", "compilation", "qp"),
     "export": (

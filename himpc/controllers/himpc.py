@@ -14,7 +14,7 @@ from himpc.cascade.level import NO_ROWS, LevelProblem, LevelSolution
 from himpc.controllers.adaptation import Adaptation, LoadModel, adapted
 from himpc.controllers.base import TorqueController
 from himpc.controllers.period import PeriodResult, PeriodState
-from himpc.controllers.stall_guard import StallGuard
+from himpc.controllers.stall_guard import stall_guard
 from himpc.formulation.forms import LevelForm, StackForm, measure, prepare, usable
 from himpc.formulation.memory import Memory
 from himpc.formulation.settings import Settings, check_solver
@@ -57,7 +57,7 @@ class HIMPC(TorqueController):
         """Clears plan and memory; τ₀ (n,) N·m is the torque acting now, and q̈ and ẍ start at zero."""
         super().reset(tau_0)
         self._memory: Memory | None = None
-        self._guard = StallGuard(len(self._form.tasks), self._settings.T_s)
+        self._guard = stall_guard(self._settings, len(self._form.tasks))
         self._asked: list[LevelProblem] = []
         if self.kernel is not None:
             self.kernel.forget()
@@ -92,7 +92,8 @@ class HIMPC(TorqueController):
         # A joint's torque cannot exceed its limit. A larger reading is wrong and must not be the start of a
         # bound.
         self._reach = np.maximum(self.robot.tau_limit, self._goal.tau_upper)
-        self._settings, self._guard = settings, StallGuard(len(self._form.tasks), settings.T_s)
+        self._settings = settings
+        self._guard = stall_guard(self._settings, len(self._form.tasks))
         self._load = LoadModel(self.robot, settings.nominal) if settings.M_bar_adapt else None
         avoidance = settings.limits.avoidance
         explicit = settings.route == "explicit"
@@ -187,9 +188,8 @@ class HIMPC(TorqueController):
         """The limits in force; those of a robot that keeps distances have lower velocities, see
         `StallGuard`."""
         distances = self._distances if self.kernel is None else self.kernel.distances
-        return (
-            self._limits if distances is None else self._guard.limits(self._limits, self._tau_0, v, distances)
-        )
+        now = self._limits
+        return now if distances is None else self._guard.limits(now, self._tau_0, v, distances)
 
     def _adapt(self, q: Array) -> None:
         """Adapts M̄ to the torque that acted."""

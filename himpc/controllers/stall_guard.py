@@ -3,16 +3,18 @@ left, and those that accelerate."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from himpc.constants import BLOCKED, HEAVY_LOAD, PROGRESS
+from himpc.formulation.settings import Settings
 from himpc.limits import LimitsInForce
-from himpc.limits.load import HEAVY, loaded, spared
+from himpc.limits.load import loaded, spared
 from himpc.limits.overrun import anticipated, followed
-from himpc.limits.stall import BLOCKED, PROGRESS, going, slowed, stalled
+from himpc.limits.stall import going, slowed, stalled
+from himpc.tick.compiled_stall_guard import CompiledStallGuard
 from himpc.tick.distances import Distances
 
 Array = NDArray[np.float64]
@@ -49,12 +51,18 @@ class StallGuard:
             distances: the pairs of the last tick.
         """
         T_s = self._T_s
-        limits = replace(limits, v_limit=(1.0 - distances.velocity_margin) * limits.v_limit)
+        limits = limits.with_velocities((1.0 - distances.velocity_margin) * limits.v_limit)
         self.load = loaded(np.zeros_like(tau) if self.load is None else self.load, tau, limits, T_s)
         self.mean = followed(v if self.mean is None else self.mean, v, T_s)
         limits = anticipated(spared(limits, self.load, distances.carried), v, self.mean)
         if self.errors is not None:
             moves = distances.moves or self.fastest > PROGRESS
-            room = min(distances.room, BLOCKED) if self.load.max() > HEAVY else distances.room
+            room = min(distances.room, BLOCKED) if self.load.max() > HEAVY_LOAD else distances.room
             self.stall = stalled(self.stall, self.errors, moves, room, T_s)
         return slowed(limits, self.stall)
+
+
+def stall_guard(settings: Settings, tasks: int) -> StallGuard | CompiledStallGuard:
+    """Returns the guard of a controller with this number of tasks, on the route that it takes."""
+    kind = CompiledStallGuard if settings.route == "compiled" else StallGuard
+    return kind(tasks, settings.T_s)

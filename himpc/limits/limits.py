@@ -77,6 +77,20 @@ class LimitsInForce:
     q_upper: Array
     a_max: Array
 
+    def with_velocities(self, v_limit: Array) -> LimitsInForce:
+        """The same with other velocity limits, (n,) rad/s."""
+        return LimitsInForce(self.tau_lower, self.tau_upper, v_limit, self.q_lower, self.q_upper, self.a_max)
+
+    def differs_in_velocity_only(self, other: LimitsInForce) -> bool:
+        """Whether all arrays but `v_limit` are the same objects."""
+        return (
+            self.tau_upper is other.tau_upper
+            and self.tau_lower is other.tau_lower
+            and self.q_upper is other.q_upper
+            and self.q_lower is other.q_lower
+            and self.a_max is other.a_max
+        )
+
     @cached_property
     def torque(self) -> Array:
         """Lower and upper torque bounds, (2, n)."""

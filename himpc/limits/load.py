@@ -2,24 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
+from himpc.constants import FREE_LOAD, FULL_LOAD, LOAD_SECONDS, SLOWEST_SHARE
 from himpc.limits.limits import LimitsInForce
 
 Array = NDArray[np.float64]
-
-_SECONDS = 0.1
-"""Time constant of the mean load: a short peak of torque slows nothing down."""
-_FREE, _MOST = 0.55, 0.95
-"""Shares of the torque limit: below the first, a motor slows nothing down; above the second, its joints have
-their lowest limit."""
-_SLOWEST = 0.03
-"""The lowest limit, as a share of the joint's own velocity limit."""
-HEAVY = 0.85
-"""If a motor has at least this load and the tasks make no progress, the robot counts as stalled."""
 
 
 def loaded(before: Array, tau: Array, limits: LimitsInForce, T_s: float) -> Array:
@@ -32,7 +21,7 @@ def loaded(before: Array, tau: Array, limits: LimitsInForce, T_s: float) -> Arra
         T_s: s.
     """
     share = np.abs(tau) / limits.largest_torque
-    return before + min(1.0, T_s / _SECONDS) * (share - before)
+    return before + min(1.0, T_s / LOAD_SECONDS) * (share - before)
 
 
 def spared(limits: LimitsInForce, load: Array, carried: NDArray[np.bool_]) -> LimitsInForce:
@@ -47,7 +36,7 @@ def spared(limits: LimitsInForce, load: Array, carried: NDArray[np.bool_]) -> Li
         load: see `loaded`.
         carried: (n, n), entry [k, j]: whether the motor of joint j carries joint k; true for k = j.
     """
-    if load.max() <= _FREE:
+    if load.max() <= FREE_LOAD:
         return limits
-    share = np.clip((_MOST - load) / (_MOST - _FREE), _SLOWEST, 1.0)
-    return replace(limits, v_limit=np.where(carried, share, 1.0).min(axis=1) * limits.v_limit)
+    share = np.clip((FULL_LOAD - load) / (FULL_LOAD - FREE_LOAD), SLOWEST_SHARE, 1.0)
+    return limits.with_velocities(np.where(carried, share, 1.0).min(axis=1) * limits.v_limit)

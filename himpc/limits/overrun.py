@@ -2,21 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
+from himpc.constants import LEAD, LEAST_WHILE_FASTER, MEAN_SECONDS
 from himpc.limits.limits import LimitsInForce
 
 Array = NDArray[np.float64]
-
-_SECONDS = 0.02
-"""Time constant of the mean velocity, whose distance from the velocity is a smooth acceleration."""
-_LEAD = 0.1
-"""s: the velocity is extrapolated over this time, and that velocity must be within its limit."""
-_LEAST = 0.5
-"""The lowest limit, as a share of the joint's own velocity limit."""
 
 
 def followed(before: Array, v: Array, T_s: float) -> Array:
@@ -27,7 +19,7 @@ def followed(before: Array, v: Array, T_s: float) -> Array:
         v: measured, (n,) rad/s.
         T_s: s.
     """
-    return before + min(1.0, T_s / _SECONDS) * (v - before)
+    return before + min(1.0, T_s / MEAN_SECONDS) * (v - before)
 
 
 def anticipated(limits: LimitsInForce, v: Array, mean: Array) -> LimitsInForce:
@@ -44,9 +36,9 @@ def anticipated(limits: LimitsInForce, v: Array, mean: Array) -> LimitsInForce:
         mean: see `followed`.
     """
     speed = np.abs(v)
-    gained = (_LEAD / _SECONDS) * (speed - np.abs(mean))
-    if (speed + gained <= _LEAST * limits.v_limit).all():
+    gained = (LEAD / MEAN_SECONDS) * (speed - np.abs(mean))
+    if (speed + gained <= LEAST_WHILE_FASTER * limits.v_limit).all():
         return limits
-    return replace(
-        limits, v_limit=np.maximum(limits.v_limit - np.maximum(gained, 0.0), _LEAST * limits.v_limit)
+    return limits.with_velocities(
+        np.maximum(limits.v_limit - np.maximum(gained, 0.0), LEAST_WHILE_FASTER * limits.v_limit)
     )

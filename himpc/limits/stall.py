@@ -3,36 +3,28 @@ progress."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from himpc.constants import (
+    BLOCKED,
+    CLOSE_ENOUGH,
+    DISTURBED,
+    INSIDE,
+    LEAST_SHARE,
+    PROGRESS,
+    PROGRESS_SHARE,
+    RECOVERY,
+    REST,
+    SLOWEST,
+    SLOWING,
+    STALLED,
+)
 from himpc.limits.limits import LimitsInForce
 
 Array = NDArray[np.float64]
-
-BLOCKED = 0.1
-"""m: only a robot with a pair that has less room than this can be stalled."""
-INSIDE = -0.03
-"""m: a robot that is farther inside must come out, and is not slowed down; one that is a little inside and
-does not come out is stalled too."""
-PROGRESS = 0.05
-"""m/s, rad/s: the least decrease of an error that counts as progress; a reference that is faster moves."""
-SHARE = 0.25
-"""1/s: the least decrease as a share of the error; tasks that nothing blocks are an order faster."""
-CLOSE_ENOUGH = 0.01
-"""m, rad: a task with a smaller error has reached its target."""
-SLOWING, RECOVERY = 0.1, 0.05
-"""s: time constants with which the joints become slow, and fast again."""
-DISTURBED = 0.03
-"""m, rad: a first task whose error grows by more was pushed away, and may come back."""
-STALLED, REST = 0.5, 0.02
-"""Shares below which a robot is stalled until something changes, and below which it has come to rest: errors
-that change while it brakes are neither progress nor a disturbance."""
-SLOWEST = 0.02
-"""rad/s: no joint becomes slower."""
 
 
 class Stall(NamedTuple):
@@ -75,7 +67,7 @@ def stalled(before: Stall, errors: Array, moves: bool, room: float, T_s: float) 
     if free or (first > before.least + DISTURBED and not brakes):
         due, least, slows = errors, first, False
     else:
-        decrease = (PROGRESS + SHARE * errors) * T_s
+        decrease = (PROGRESS + PROGRESS_SHARE * errors) * T_s
         due = np.minimum(errors, before.due - decrease)
         least = first if brakes else min(first, before.least)
         slows = brakes or rests or not bool((far & (errors <= due + CLOSE_ENOUGH)).any())
@@ -88,4 +80,4 @@ def slowed(limits: LimitsInForce, stall: Stall) -> LimitsInForce:
     if stall.share > 1.0 - 1e-6:
         return limits
     slow = np.minimum(limits.v_limit, SLOWEST)
-    return replace(limits, v_limit=slow + stall.share * (limits.v_limit - slow))
+    return limits.with_velocities(slow + max(stall.share, LEAST_SHARE) * (limits.v_limit - slow))

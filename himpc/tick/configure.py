@@ -21,7 +21,7 @@ from himpc.tasks.frame import AXES, FrameTask
 from himpc.tasks.joints import OnJoints
 from himpc.tick.kernel import kinematics
 from himpc.tick.kernel.arena import Arena
-from himpc.tick.kernel.arrays import PULL
+from himpc.tick.kernel.arrays import PULL, Array
 from himpc.tick.kernel.bounds import OFF, PAPER, VIABILITY
 from himpc.tick.kernel.references import EASED, SAMPLED, UNIFORM
 from himpc.tick.tables import LevelTable, given_of, sizes, write_effects, write_levels
@@ -129,6 +129,11 @@ def write_limits(arena: Arena, limits: LimitsInForce, paper: bool) -> None:
     q = limits.q_lower, limits.q_upper
     stops = q if paper else limits.stops
     arena.f["limits"][:] = limits.tau_lower, limits.tau_upper, limits.v_limit, *stops, limits.a_max, *q
+
+
+def write_velocity_limits(arena: Arena, v_limit: Array) -> None:
+    """Writes other velocity limits, (n,) rad/s; all else of `write_limits` remains."""
+    arena.f["limits"][2] = v_limit
 
 
 def write_preview(arena: Arena, place: int, span: slice, preview: Preview, reach: int) -> None:

@@ -10,12 +10,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from himpc.constants import WITHIN
+from himpc.constants import PROGRESS, WITHIN
 from himpc.kinematics.geometry import Geometry, geometry
 from himpc.limits.avoidance import Avoidance
-from himpc.limits.constraint import Directions
 from himpc.limits.distance import Near, row_count
-from himpc.limits.stall import PROGRESS
 from himpc.references.observed import NOTHING, Observed
 from himpc.tick.kernel.arena import Arena
 from himpc.tick.kernel.distance_rows import (
@@ -146,7 +144,7 @@ class Distances:
         # A joint without a limit counts as one that is as fast as the fastest of the others.
         limited = np.isfinite(robot.v_limit)
         self._fastest = np.where(limited, robot.v_limit, robot.v_limit[limited].max(initial=1.0))
-        self.carried = geometry(robot).moves[1:] > 0
+        self.carried = np.ascontiguousarray(geometry(robot).moves[1:] > 0)
         self.velocity_margin = avoidance.velocity_margin
         self._observed = NOTHING
         self._know(NOTHING)
@@ -211,8 +209,9 @@ class Distances:
         moving, share = self._moving[:count].copy(), self._share[:count].copy()
         return Near(pairs.distance[chosen], pairs.slopes[chosen], moving, share, self._named[:count])
 
-    def write(self, arena: Arena, block: int) -> Directions:
-        """Writes the rows of this tick to an arena that holds the measured state.
+    def write(self, arena: Arena, block: int) -> tuple[str, ...]:
+        """Writes the rows of this tick to an arena that holds the measured state; returns the name of each
+        row's pair, (n,).
 
         block: which set of directions is that of distances.
         """
@@ -223,7 +222,7 @@ class Distances:
             *(*arena.arguments, block, count, self._chosen, pairs.distance, pairs.slopes),
             *(self._moving, self._share, self._numbers),
         )
-        return Directions(arena.f["direction"][block].copy(), self._named)
+        return self._named
 
 
 def _kind(shape: WorldShape) -> tuple[object, ...]:

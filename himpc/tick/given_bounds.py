@@ -37,7 +37,8 @@ class GivenBounds:
         self.distances = Distances(robot, settings.limits.avoidance) if DISTANCE in constraints else None
 
     def write(self, rows: Rows, force: LimitsInForce, observed: Observed) -> Rows:
-        """Writes bounds and directions of this tick; returns the rows with the directions.
+        """Writes bounds and directions of this tick; returns the rows with the directions. Those of distances
+        are views of the arena, and change at the next tick.
 
         Args:
             rows: with the constraints of the arena.
@@ -51,7 +52,7 @@ class GivenBounds:
         for place, constraint in enumerate(self._given):
             if constraint is DISTANCE and self.distances is not None:
                 self.distances.observe(observed)
-                directions.append(self.distances.write(self._arena, place))
+                directions.append(Directions(f["direction"][place], self.distances.write(self._arena, place)))
                 continue
             now = now or self._moment(force)
             block = constraint.bounds(now)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from himpc.cascade.level import FALLBACKS, NO_ROWS, ActiveRows, LevelProblem, LevelSolution
+from himpc.cascade.level import FALLBACKS, NO_ROWS, ActiveRows, Fallback, LevelProblem, LevelSolution
 from himpc.limits.rows import Rows
 from himpc.tick.fallbacks import FallbackBudget, perform, solve_level
 from himpc.tick.kernel.arena import Arena, Snapshot
@@ -66,7 +66,8 @@ def increments_of(problem: LevelProblem, rows: Rows) -> Array | None:
 def solutions(names: Sequence[str], found: Snapshot) -> list[LevelSolution]:
     """Returns the evidence of all levels from the results of a tick."""
     U, cost, kkt, leak, left = (found(name) for name in ("U", "cost", "kkt", "leak", "left"))
-    fallbacks, times = [FALLBACKS[int(rung)] for rung in found("rung")], found("time_us").tolist()
+    fallbacks: list[Fallback] = [FALLBACKS[int(rung)] for rung in found("rung")]
+    times = found("time_us").tolist()
     return [
         LevelSolution(
             name,

@@ -19,7 +19,7 @@ from himpc.references import Preview
 from himpc.references.outlook import observed_by
 from himpc.tasks import Task
 from himpc.telemetry import Layout
-from himpc.tick.configure import arena_for, write_limits
+from himpc.tick.configure import arena_for, write_limits, write_velocity_limits
 from himpc.tick.distances import Distances
 from himpc.tick.fallbacks import FallbackBudget, perform
 from himpc.tick.gather import gathered
@@ -214,8 +214,11 @@ class CompiledTick:
         f = self.arena.f
         f["q"][:], f["v"][:], f["tau_0"][:] = q, v, tau_0
         if limits is not self._limits:
+            if self._limits is None or not limits.differs_in_velocity_only(self._limits):
+                write_limits(self.arena, limits, self._settings.limits.position == "paper")
+            else:
+                write_velocity_limits(self.arena, limits.v_limit)
             self._limits = limits
-            write_limits(self.arena, limits, self._settings.limits.position == "paper")
         self._writer.write(previews)
 
     def _solutions(self, found: Snapshot) -> list[LevelSolution]:
@@ -259,7 +262,12 @@ class CompiledTick:
                 task.name: R[place] if task.name in self._given.turning else value[span]
                 for place, task, span in self._spans
             },
-            rows=self._rows._replace(lower=found("lower"), upper=found("upper"), stopping=stopping),
+            rows=self._rows._replace(
+                lower=found("lower"),
+                upper=found("upper"),
+                stopping=stopping,
+                directions=tuple(each and each._replace(D=each.D.copy()) for each in self._rows.directions),
+            ),
         )
 
     def _at_once(self) -> AtOnce:

@@ -39,8 +39,14 @@ def test_an_arm_that_is_dragged_into_the_floor_stops_before_it_and_comes_to_rest
     assert blind["contact_depth"].max() > 0.0
 
 
+def by_theory(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Makes controllers use `StallGuard`, parts of which a test can replace, on the compiled route too."""
+    monkeypatch.setattr(stall_guard, "CompiledStallGuard", stall_guard.StallGuard)
+
+
 def test_without_the_stall_the_arm_would_not_come_to_rest(monkeypatch: pytest.MonkeyPatch) -> None:
     """The same drag, with joints that stay as fast as their limits allow: they move on above the floor."""
+    by_theory(monkeypatch)
     monkeypatch.setattr(stall_guard, "slowed", lambda limits, _: limits)
     found = run(replace(scene("iiwa14-hold", "avoidance.on=true"), events=DOWN), 4.0)
     assert float(np.abs(found["v"][-500:]).max()) > 0.2
@@ -68,6 +74,7 @@ def test_a_joint_that_others_accelerate_stays_within_its_velocity_limit(
         return float(np.abs(found["v"] / quick.robot.v_limit).max())
 
     assert fastest(0.08) < 1.0
+    by_theory(monkeypatch)
     monkeypatch.setattr(stall_guard, "anticipated", lambda limits, *_: limits)
     assert fastest(0.0) > 1.2
 

@@ -78,9 +78,7 @@ class TickArrays(NamedTuple):
         Array, "8 n", "N·m, rad/s, rad, rad/s²", "configure problems → gather finish_tick linearize"
     ]
     L: Annotated[Array, "b N", "1", "configure problems → distance_rows fallbacks solve_level tick"]
-    direction: Annotated[
-        Array, "g n n", "1", "distance_rows given_bounds problems → distances finish_tick solve_level"
-    ]
+    direction: Annotated[Array, "g n n", "1", "distance_rows given_bounds problems → finish_tick solve_level"]
     approach: Annotated[Array, "N", "1", "configure → distance_rows linearize"]
     scalars: Annotated[
         Array,
