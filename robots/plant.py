@@ -57,8 +57,8 @@ class Plant:
         robot = self.robot
         self._model = compiled(robot, settings, self.world)
         self.settings = settings
-        self._data = mujoco.MjData(self._model)
-        self._probe = mujoco.MjData(self._model)
+        self._data, self._probe = mujoco.MjData(self._model), mujoco.MjData(self._model)
+        self._q, self._v = self._data.qpos[: robot.n], self._data.qvel[: robot.n]
         self._fresh = False
         self._armature = self._model.dof_armature[: robot.n].copy()
         self._diagonal = settings.per_joint("diagonal_scale", robot.n)
@@ -82,12 +82,12 @@ class Plant:
     @property
     def q(self) -> np.ndarray:
         """(n,) rad, the true position."""
-        return self._data.qpos[: self.n].copy()
+        return self._q.copy()
 
     @property
     def v(self) -> np.ndarray:
         """(n,) rad/s, the true velocity."""
-        return self._data.qvel[: self.n].copy()
+        return self._v.copy()
 
     @property
     def tau(self) -> np.ndarray:
@@ -118,7 +118,7 @@ class Plant:
         velocity = np.zeros(self.n) if v is None else as_vector("v", v, self.n)
         torque = None if tau is None else as_vector("tau", tau, self.n)
         mujoco.mj_resetData(self._model, self._data)
-        self._data.qpos[: self.n], self._data.qvel[: self.n] = position, velocity
+        self._q[:], self._v[:] = position, velocity
         self._push, self._fresh, self.broken = (None, np.zeros(6)), False, False
         self._touch = Touch()
         torque = self.holding_torque() if torque is None else torque

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,8 +13,7 @@ _MEMORY_S = 1.5  # s of commands kept, more than the largest delay
 _SAMPLES_S = 0.3  # s of positions kept, more than any control period
 
 
-@dataclass(frozen=True)
-class PlantState:
+class PlantState(NamedTuple):
     """The measured state at time t: t in s; q (n,) rad; v (n,) rad/s."""
 
     t: float
@@ -108,6 +107,6 @@ def quantise(q: np.ndarray, resolution: np.ndarray) -> np.ndarray:
 def as_vector(name: str, value: np.ndarray, n: int) -> np.ndarray:
     """Returns a copy of n finite numbers. Raises ValueError, with the name, for any other value."""
     array = np.array(value, dtype=float)
-    if array.shape != (n,) or not (math.isfinite(array.sum()) or np.isfinite(array).all()):
+    if array.shape != (n,) or not (math.isfinite(array.dot(array)) or np.isfinite(array).all()):
         raise ValueError(f"{name} must be {n} finite numbers, not {array}")
     return array
