@@ -8,14 +8,15 @@ from himpc.telemetry import Layout
 
 
 class Places(NamedTuple):
-    """The indices of the fields that a session writes into a row; values that need the plant's M are
-    adjacent, as are depth and force of a contact, and a distance and what is kept of it."""
+    """The indices of the fields that a session writes into a row. `truth` is the first of three adjacent
+    values that need the plant's M; `touch` is the depth of a contact, and the force follows it; `near` is a
+    distance, and what is kept of it follows it."""
 
     t: int
     late: int
-    truth: slice
-    touch: slice
-    near: slice
+    truth: int
+    touch: int
+    near: int
     q: slice
     v: slice
     tau: slice
@@ -26,8 +27,5 @@ class Places(NamedTuple):
     def of(cls, layout: Layout) -> Places:
         """The indices in a layout."""
         fields = layout.fields
-        start, felt = fields["dynamic_leak"].start, fields["contact_depth"].start
-        joints = (fields[name] for name in cls._fields[5:])
-        near = fields["distance"].start
-        truth, touch, apart = slice(start, start + 3), slice(felt, felt + 2), slice(near, near + 2)
-        return cls(fields["t"].start, fields["late"].start, truth, touch, apart, *joints)
+        numbers = (fields[name].start for name in ("t", "late", "dynamic_leak", "contact_depth", "distance"))
+        return cls(*numbers, *(fields[name] for name in cls._fields[5:]))

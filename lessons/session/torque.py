@@ -213,14 +213,14 @@ class TorqueSession(Session):
         row[at.q], row[at.v] = q, v
         row[at.q_measured], row[at.v_measured] = state.q, state.v
         self.plan, self.given = plan, Given(state.q, state.v, ahead)
-        row[at.truth] = self._true(plan, q, ahead)
+        row[at.truth], row[at.truth + 1], row[at.truth + 2] = self._true(plan, q, ahead)
         if plan.notice is not None:
             self.failure = plan.notice
         late = settings.is_late(1e-3 * plan.step_us)
         row[at.late] = late
         row[at.tau] = plant.step(self._outbox.applied(plan.tau, late, tau), T_s)
-        row[at.touch] = plant.touch
-        row[at.near] = self.clearance.measure(q, settings.limits.avoidance)
+        row[at.touch], row[at.touch + 1] = plant.touch
+        row[at.near], row[at.near + 1] = self.clearance.measure(q, settings.limits.avoidance)
         self._ticks += 1
         if self.diverged_at is None:
             wild = self._is_wild(q, v)
@@ -251,8 +251,11 @@ class TorqueSession(Session):
 
     def _is_far(self, row: Array) -> bool:
         """Whether level 1 is lost."""
-        errors = (row[where] for where in self._hands)
-        return any(error.dot(error) > LOST_POSITION**2 for error in errors)
+        for where in self._hands:
+            error = row[where]
+            if error.dot(error) > LOST_POSITION**2:
+                return True
+        return False
 
     def _first_hands(self) -> tuple[slice, ...]:
         """Columns with the errors of the position tasks of the first enabled level."""
