@@ -82,7 +82,7 @@ def _surfaces(uris: list[str]) -> dict[str, np.ndarray]:
     """The points (V, 3), m, of mesh files."""
     if not uris:
         return {}
-    from robots.surfaces import mesh_pieces  # it loads trimesh, which most descriptions do not need
+    from robots.meshes.surfaces import mesh_pieces  # it loads trimesh, which most descriptions do not need
 
     return {
         uri: np.concatenate([vertices for _, vertices, _ in pieces])

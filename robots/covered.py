@@ -76,7 +76,7 @@ def _read(root: Element) -> dict[str, list[Array]]:
     uris = [mesh.get("filename", "") for mesh in root.iterfind("link/visual/geometry/mesh")]
     if not uris:
         return {}
-    from robots.surfaces import mesh_pieces  # it loads trimesh, which most descriptions do not need
+    from robots.meshes.surfaces import mesh_pieces  # it loads trimesh, which most descriptions do not need
 
     return {
         uri: [vertices[faces] for _, vertices, faces in pieces] for uri, pieces in mesh_pieces(uris).items()

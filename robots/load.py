@@ -15,7 +15,7 @@ from robots.cover import stored_cover
 from robots.errors import InputError, shortened, unknown_name
 from robots.importing import Import, bounds, import_robot
 from robots.mechanics.imported import with_cover, with_geometry
-from robots.meshes import has_meshes
+from robots.meshes.files import has_meshes
 from robots.processes.isolation import Fault, isolated
 from robots.report import Finding, ImportReport
 from robots.robot import Robot

@@ -95,7 +95,7 @@ REFERENCE = (
         ("robots/signals.py", "Commands are stored with their times"),
     )),
     Exempt("software", ROBOTS + "shapes.py::test_simplified_surfaces_stay_where_they_were", (
-        ("robots/simplify.py", "Vertices whose normals point to different sides"),
+        ("robots/meshes/simplify.py", "Vertices whose normals point to different sides"),
     )),
     Exempt("software", ROBOTS + "urdf.py::test_continuous_becomes_unbounded_with_one_coordinate", (
         ("robots/urdf/joints.py", "Rewrites every joint so that"),
