@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from robots.catalog import CATALOG, CatalogEntry
-from robots.collision_model import stored
-from robots.cover import stored_cover
 from robots.errors import InputError, shortened, unknown_name
+from robots.geometry.collision_model import stored
+from robots.geometry.cover import stored_cover
 from robots.importing import Import, bounds, import_robot
 from robots.mechanics.imported import with_cover, with_geometry
 from robots.meshes.files import has_meshes

@@ -21,8 +21,8 @@ REFERENCE = (
         ("lessons/session/session.py", "seed: seed of the run; all randomness comes from it"),
     )),
     Exempt("purpose", "", (
-        ("robots/capsules.py", "Returns vertices that are modelled along z"),
-        ("robots/capsules.py", "Returns the mesh with separate vertices for caps and mantle"),
+        ("robots/shapes/capsules.py", "Returns vertices that are modelled along z"),
+        ("robots/shapes/capsules.py", "Returns the mesh with separate vertices for caps and mantle"),
         ("himpc/formulation/forms.py", "All active levels, their rows stacked"),
         ("himpc/limits/rows.py", "All rows are in N·m"),
         ("himpc/references/square_wave.py", "s: a switch counts as reached this much earlier"),

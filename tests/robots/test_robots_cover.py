@@ -15,11 +15,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robots import CATALOG, Robot, load_robot, load_urdf_text
-from robots.cover import Cover, cover_as_json, cover_of, stored_cover
-from robots.covered import patches
-from robots.mechanics.covers import as_solid, made_cover
+from robots.covering.cover_of import cover_of
+from robots.covering.covered import patches
+from robots.covering.covers import as_solid, made_cover
+from robots.geometry.cover import Cover, cover_as_json, stored_cover
 from robots.mechanics.exclusions import touching
-from robots.shapes import link_shapes
+from robots.shapes.link_shapes import link_shapes
 
 ROUNDING = 1e-7  # m: drawn vertices are float32
 

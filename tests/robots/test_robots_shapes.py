@@ -14,7 +14,7 @@ from robots.importing import import_robot
 from robots.meshes.files import find_mesh, installed_mesh, installed_shares
 from robots.meshes.simplify import simplify
 from robots.meshes.surfaces import MAX_FACES, mesh_pieces
-from robots.shapes import MAX_TOTAL, Shape, link_shapes
+from robots.shapes.link_shapes import MAX_TOTAL, Shape, link_shapes
 
 
 def check(robot: Robot, shapes: list[Shape]) -> None:

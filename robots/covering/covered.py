@@ -12,9 +12,9 @@ from lxml.etree import _Element as Element
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from robots.collision_model import Solid
-from robots.collision_shapes import FARTHEST, SHAPES_PER_LINK, primitive
+from robots.geometry.collision_model import Solid
 from robots.robot import Robot
+from robots.shapes.collision_shapes import FARTHEST, SHAPES_PER_LINK, primitive
 from robots.urdf.read import Refusal, placement
 
 Array = NDArray[np.float64]

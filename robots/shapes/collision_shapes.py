@@ -11,9 +11,9 @@ import pinocchio as pin
 from lxml import etree
 from lxml.etree import _Element as Element
 
-from robots.collision_model import Point, Solid, SolidKind, Source
-from robots.limbs import limbs
+from robots.geometry.collision_model import Point, Solid, SolidKind, Source
 from robots.robot import Robot
+from robots.shapes.limbs import limbs
 from robots.truth import pose
 from robots.urdf.read import Refusal, placement
 
