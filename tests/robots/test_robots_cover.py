@@ -95,7 +95,7 @@ def test_few_capsules_are_far_apart_at_home(name: str) -> None:
 
 
 def test_the_stored_cover_is_the_generated_one() -> None:
-    """`python -m robots.mechanics.write` writes it."""
+    """`python -m robots.loading.write` writes it."""
     robot = load_robot("planar3")
     assert made_cover(robot, tries=2) == robot.cover
 

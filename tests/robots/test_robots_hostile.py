@@ -14,7 +14,7 @@ from lessons.events import MoveTarget
 from lessons.scenes.hold import _hold
 from lessons.session.torque import TorqueSession
 from robots import InputError, PlantSettings, Robot
-from robots.importing import import_robot
+from robots.loading.importing import import_robot
 from robots.meshes.surfaces import read_meshes
 from robots.shapes.link_shapes import MAX_TOTAL, link_shapes
 

@@ -10,7 +10,7 @@ import pytest
 from arms import INERTIAL, link, load, two_joint_arm
 
 from robots import CATALOG, Robot, load_robot
-from robots.importing import import_robot
+from robots.loading.importing import import_robot
 from robots.meshes.files import find_mesh, installed_mesh, installed_shares
 from robots.meshes.simplify import simplify
 from robots.meshes.surfaces import MAX_FACES, mesh_pieces

@@ -1,5 +1,5 @@
 """Writes the collision geometry and the cover of the robots of the catalog, from their meshes: python -m
-robots.mechanics.write
+robots.loading.write
 
 It takes about a minute and needs the extra `meshes`. Stored geometry makes contacts and distances the same
 with and without that extra, and a robot loads in milliseconds."""
@@ -10,7 +10,7 @@ from robots.catalog import CATALOG, CatalogEntry
 from robots.covering.covers import made_cover
 from robots.geometry.collision_model import CollisionModel, as_json
 from robots.geometry.cover import cover_as_json
-from robots.load import load_robot
+from robots.loading.load import load_robot
 from robots.mechanics.exclusions import collision_model
 from robots.shapes.collision_shapes import collision_solids
 
