@@ -24,8 +24,8 @@ from app.link.ring import Block
 from himpc.export.native import build
 from lessons.scenes.catalog import torque_scene
 from robots import Plant
-from robots.arm import Reading
-from robots.simulated_arm import SimulatedArm
+from robots.arms.arm import Reading
+from robots.arms.simulated_arm import SimulatedArm
 
 PATIENT = Tolerances(missed=10**9, missed_share=2.0, silent=math.inf)
 

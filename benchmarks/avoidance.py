@@ -38,7 +38,7 @@ from lessons.session.session import LOST_SPEED
 from lessons.session.torque import TorqueSession
 from lessons.settings.assignments import with_assignments
 from robots import Robot
-from robots.cover import cover_of
+from robots.covering.cover_of import cover_of
 from robots.world import Ball, Thing
 
 Array = NDArray[np.float64]

@@ -24,8 +24,8 @@ from lessons.events import MoveTarget
 from lessons.scenes.catalog import torque_scene
 from lessons.session.torque import TorqueSession
 from robots import Plant, PlantSettings, Robot, load_robot
+from robots.floor import standing_floor
 from robots.mechanics import model
-from robots.world import standing_floor
 
 LOW = {
     "iiwa14-hold": ("position", (0.6, 0.1, -0.3)),

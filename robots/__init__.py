@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from robots.collision import Ball, Box, Floor
     from robots.errors import InputError
     from robots.inertia import convergence_eigenvalues, convergence_gauge, suggest_M_bar
-    from robots.load import check_urdf, load_robot, load_urdf_text
+    from robots.loading.load import check_urdf, load_robot, load_urdf_text
     from robots.nominal import NominalModel, NominalSettings
     from robots.plant import Plant
     from robots.report import Finding, ImportReport
@@ -60,11 +60,11 @@ __getattr__ = lazily(
         "Robot": "robot",
         "VelocityPlant": "servo",
         "VelocityPlantSettings": "servo",
-        "check_urdf": "load",
+        "check_urdf": "loading.load",
         "convergence_eigenvalues": "inertia",
         "convergence_gauge": "inertia",
-        "load_robot": "load",
-        "load_urdf_text": "load",
+        "load_robot": "loading.load",
+        "load_urdf_text": "loading.load",
         "suggest_M_bar": "inertia",
     },
 )

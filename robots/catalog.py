@@ -32,7 +32,7 @@ class CatalogEntry:
 
     @property
     def collision_path(self) -> Path:
-        """Its collision geometry, written by `python -m robots.mechanics.write`."""
+        """Its collision geometry, written by `python -m robots.loading.write`."""
         return _HERE / self.name / "collision.json"
 
     @property

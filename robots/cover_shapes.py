@@ -11,7 +11,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from robots.collision import BALL, BOX, CAPSULE, FLOOR, Ball, Box, Floor, Surroundings, base_joint
-from robots.cover import Capsule, Cover
+from robots.geometry.cover import Capsule, Cover
 from robots.robot import Robot
 from robots.world import Post
 

@@ -9,9 +9,9 @@ from functools import cached_property
 import numpy as np
 import pinocchio as pin
 
-from robots.collision_model import CollisionModel
-from robots.cover import Cover
 from robots.errors import InputError, unknown_name
+from robots.geometry.collision_model import CollisionModel
+from robots.geometry.cover import Cover
 from robots.report import ImportReport
 
 

@@ -42,8 +42,8 @@ def covering_spheres(robot: Robot) -> tuple[Sphere, ...]:
 
     The generated ones follow the straight lines from each joint to the next and to the tip, in steps of their
     radius, a twentieth of the chain's length. They approximate the links, as in the HTMPC paper, and parts of
-    the links stand out of them; the capsules of `robots.cover.cover_of`, which distances at torque level use,
-    contain the links.
+    the links stand out of them. Distances at torque level use the capsules of `robots.covering.cover_of`,
+    which contain the links.
     """
     return _BY_ROBOT.get(robot.name) or _along_links(robot)
 

@@ -10,7 +10,6 @@ from typing import Annotated
 from robots.collision import Ball, Box, Floor, Point
 from robots.errors import InputError
 from robots.ranges import Range, check_fields
-from robots.robot import Robot
 
 __all__ = [
     "Ball",
@@ -20,8 +19,6 @@ __all__ = [
     "Thing",
     "World",
     "check_world",
-    "no_floor",
-    "standing_floor",
     "table",
 ]
 
@@ -102,26 +99,3 @@ def table(name: str, centre: tuple[float, float], size: tuple[float, float], hei
     m."""
     (x, y), (length, width) = centre, size
     return Thing(Box(name, (x, y, height - 0.5 * _TABLE_TOP), (length, width, _TABLE_TOP)))
-
-
-def standing_floor(robot: Robot) -> World:
-    """Returns the floor on which a robot stands, at the height 0; nothing for a robot that hangs, or whose
-    home or base is below that height, as for an arm that moves in a horizontal plane."""
-    return () if no_floor(robot) else (Thing(Floor()),)
-
-
-def no_floor(robot: Robot) -> str:
-    """Says why a robot does not stand on a floor; "" if it does."""
-    from robots.mechanics.exclusions import lowest  # needs MuJoCo
-
-    base, rest = lowest(robot)
-    if base is None:
-        return "its scene has no floor: the base has no shape that could stand on one"
-    if not -_SUNK < base < _SUNK:
-        return f"its scene has no floor: the lowest point of the base is at {base:.2f} m, and not at 0"
-    if rest is not None and rest <= 0.0:
-        return f"its scene has no floor: at home the arm reaches down to {rest:.2f} m"
-    return ""
-
-
-_SUNK = 0.03  # m by which a base may stand above or below the floor

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import tomllib
 from functools import cache
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -34,7 +35,7 @@ DOORS = {
     "jupyter_core": ("app/jupyter/frame.py",),
     "psutil": ("robots/processes/family.py",),
     "pyseccomp": ("lessons/exercises/inside/confine.py",),
-    "pylibfranka": ("robots/franka.py",),
+    "pylibfranka": ("robots/arms/franka.py",),
     "py_landlock": ("lessons/exercises/inside/confine.py",),
 }
 
@@ -236,6 +237,84 @@ def dotted(path: Path) -> str:
     return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
 
 
+ROBOTS = {
+    "errors": (),
+    "lazy": (),
+    "report": (),
+    "signals": (),
+    "runge_kutta": (),
+    "inertia": (),
+    "catalog": (),
+    "ranges": ("errors",),
+    "settings": ("ranges", "errors"),
+    "processes": ("errors",),
+    "meshes": ("processes", "report", "errors"),
+    "urdf": ("meshes", "inertia", "report", "errors"),
+    "geometry": (),
+    "robot": ("geometry", "report", "errors"),
+    "per_robot": ("robot",),
+    "reach": ("robot",),
+    "stretch": ("robot",),
+    "truth": ("robot", "settings"),
+    "nominal": ("truth", "robot", "inertia", "settings", "ranges"),
+    "spheres": ("robot",),
+    "collision": ("spheres", "robot", "errors"),
+    "world": ("collision", "ranges", "errors"),
+    "cover_shapes": ("world", "collision", "robot", "geometry"),
+    "shapes": ("truth", "robot", "geometry", "urdf", "meshes"),
+    "mechanics": ("world", "collision", "truth", "robot", "geometry", "inertia", "settings", "errors"),
+    "floor": ("mechanics", "world", "collision", "robot"),
+    "covering": ("mechanics", "shapes", "per_robot", "robot", "geometry", "urdf", "meshes"),
+    "plant": (*("mechanics", "world", "truth", "robot", "settings", "signals", "runge_kutta", "errors"),),
+    "servo": ("plant", "robot", "settings", "ranges", "signals"),
+    "arms": ("plant", "robot", "errors"),
+    "loading": (
+        *("plant", "covering", "floor", "mechanics", "shapes", "robot", "geometry", "urdf", "meshes"),
+        *("processes", "catalog", "inertia", "report", "errors"),
+    ),
+}
+"""The files and folders that each file or folder of robots/ may import beside itself. A robot contains its
+geometry as data; the plant and the geometry of an imported robot are made from the robot, above it."""
+
+
+@pytest.mark.parametrize("part", ROBOTS)
+def test_robots_are_built_in_one_direction(part: str) -> None:
+    """Imports go in the direction errors, urdf, geometry ← robot ← world, shapes ← mechanics ← covering,
+    plant ← loading, arms. Imports for types and inside functions count as well."""
+    files = [path for path in sources("robots") if part_of(path) == part]
+    assert files
+    wrong = {
+        f"{path.relative_to(ROOT)} imports {name}"
+        for path in files
+        for name in imports(path)
+        if within(name, "robots") and part_of(home_of(name)) not in (part, *ROBOTS[part])
+    }
+    assert not wrong
+
+
+def test_robots_have_no_other_parts() -> None:
+    """Every file belongs to one part, and every rule is used."""
+    files = sources("robots")
+    assert {path for path in files if not part_of(path)} == {ROOT / "robots" / "__init__.py"}
+    used = {
+        (part_of(path), part_of(home_of(name)))
+        for path in files
+        for name in imports(path)
+        if within(name, "robots")
+    }
+    assert {(part, each) for part, below in ROBOTS.items() for each in below} <= used
+
+
+@pytest.mark.parametrize("package", ["robots", "lessons"])
+def test_files_do_not_import_each_other(package: str) -> None:
+    """No file imports itself through others, also not for types or inside functions."""
+    below = {
+        path: {home_of(name) for name in imports(path) if within(name, package)} - {path}
+        for path in sources(package)
+    }
+    TopologicalSorter(below).prepare()  # raises CycleError
+
+
 HIMPC_ROOT = ("catalog", "constants", "qp", "rotation", "stack", "telemetry")
 """Files of himpc/ outside its folders; they have their place in the order as well."""
 THEORY = {
@@ -286,19 +365,17 @@ HIMPC = THEORY | COMPILED
 
 
 def part_of(path: Path) -> str:
-    """Returns the part of himpc/ that a file belongs to, or "" for the package itself."""
-    names = path.relative_to(ROOT / "himpc").with_suffix("").parts
-    return next(("/".join(names[:k]) for k in (2, 1) if "/".join(names[:k]) in HIMPC), "")
+    """Returns the part of robots/ or himpc/ that a file belongs to, or "" for the package itself."""
+    package, *names = path.relative_to(ROOT).with_suffix("").parts
+    parts = {"robots": ROBOTS, "himpc": HIMPC}.get(package, {})
+    return next(("/".join(names[:k]) for k in (2, 1) if "/".join(names[:k]) in parts), "")
 
 
 def home_of(name: str) -> Path:
-    """Returns the file that an imported name of himpc comes from."""
+    """Returns the file that an imported name comes from."""
     parts = name.split(".")
-    files = (
-        ROOT.joinpath(*parts[:k]).with_suffix(".py") if k > 0 else ROOT.joinpath(*parts[:-k], "__init__.py")
-        for length in range(len(parts), 0, -1)
-        for k in (length, -length)
-    )
+    places = (ROOT.joinpath(*parts[:k]) for k in range(len(parts), 0, -1))
+    files = (file for place in places for file in (place.with_suffix(".py"), place / "__init__.py"))
     return next(file for file in files if file.exists())
 
 
@@ -324,7 +401,7 @@ def test_himpc_has_no_other_parts() -> None:
     assert {path.stem for path in (ROOT / "himpc").glob("*.py")} == {"__init__", *HIMPC_ROOT}
     assert not {
         (a, b)
-        for table in (HIMPC, APP, LESSONS)
+        for table in (ROBOTS, HIMPC, APP, LESSONS)
         for a, below in table.items()
         for b in below
         if a in below_of(table, b)

@@ -8,7 +8,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.arm import Arm, Reading
+from robots.arms.arm import Arm, Reading
 
 Array = NDArray[np.float64]
 

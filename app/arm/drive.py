@@ -22,7 +22,7 @@ from app.arm.model import Model
 from app.arm.orders import Order, Orders
 from app.link.ring import Block
 from himpc.export.native import NativeController
-from robots.arm import Arm, ArmLimits
+from robots.arms.arm import Arm, ArmLimits
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.cascade.level import FALLBACKS
-from robots.arm import ArmLimits, Reading
+from robots.arms.arm import ArmLimits, Reading
 
 Array = NDArray[np.float64]
 

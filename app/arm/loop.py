@@ -16,7 +16,7 @@ from app.link.ring import Block
 from himpc.export.kernel.adjust import LIMITS, TARGET
 from himpc.export.native import NativeController
 from himpc.tick.kernel.arrays import PERIOD
-from robots.arm import Arm, ArmLimits, ArmLost, Reading
+from robots.arms.arm import Arm, ArmLimits, ArmLost, Reading
 
 Array = NDArray[np.float64]
 

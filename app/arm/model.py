@@ -11,9 +11,9 @@ from app.arm.loop import accepted
 from app.arm.orders import Order
 from himpc.export.kernel.adjust import LIMITS, TARGET
 from himpc.export.native import NativeController
-from robots.arm import ArmLimits
+from robots.arms.arm import ArmLimits
+from robots.arms.simulated_arm import SimulatedArm
 from robots.plant import Plant
-from robots.simulated_arm import SimulatedArm
 
 Array = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ from app.arm.model import Model
 from himpc.rotation import quaternion
 from himpc.telemetry import Layout
 from robots import Robot
-from robots.arm import ArmLimits
+from robots.arms.arm import ArmLimits
 
 Array = NDArray[np.float64]
 

@@ -17,7 +17,7 @@ from himpc.export.native import NativeController
 from lessons.scenes.torque_scene import TorqueScene
 from lessons.session.torque import TorqueSession
 from robots import InputError, Plant
-from robots.arm import ArmLimits
+from robots.arms.arm import ArmLimits
 
 Array = NDArray[np.float64]
 

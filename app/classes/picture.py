@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from robots import Robot
-from robots.cover import cover_of
+from robots.covering.cover_of import cover_of
 
 Shape = dict[str, Any]
 

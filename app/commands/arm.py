@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from app.arm.drive import Driven
     from himpc.export.image import Image
     from lessons.scenes.torque_scene import TorqueScene
-    from robots.arm import Arm
+    from robots.arms.arm import Arm
 
 SIMULATED = "simulated"
 _LONGEST_DELAY = 20
@@ -141,8 +141,8 @@ def _finish(driven: Driven, image: Image, npz: str | None, plot: str | None, how
 def _arm(scene: TorqueScene, robot: str, real_time: bool, start: Any) -> Arm:
     """The arm, not yet under control."""
     from robots import Plant
-    from robots.franka import Franka
-    from robots.simulated_arm import SimulatedArm
+    from robots.arms.franka import Franka
+    from robots.arms.simulated_arm import SimulatedArm
 
     if robot != SIMULATED:
         return Franka(robot, real_time)
@@ -153,8 +153,8 @@ def _arm(scene: TorqueScene, robot: str, real_time: bool, start: Any) -> Arm:
 
 def _found(scene: TorqueScene, robot: str, real_time: bool) -> tuple[Any, Any]:
     """The limits of the arm, and where it is."""
-    from robots.arm import ArmLost
-    from robots.franka import Franka
+    from robots.arms.arm import ArmLost
+    from robots.arms.franka import Franka
 
     if robot == SIMULATED:
         return _arm(scene, robot, real_time, scene.q_0).limits, scene.q_0

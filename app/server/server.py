@@ -256,7 +256,7 @@ def _load(choice: SceneChoice) -> None:
     """Loads what pages need while the first page connects: the panels, then the meshes, whose simplification
     takes a moment."""
     import_module("app.page.layout")
-    from robots.shapes import link_shapes
+    from robots.shapes.link_shapes import link_shapes
 
     link_shapes(choice.scene().robot)
 

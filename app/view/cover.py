@@ -5,8 +5,8 @@ from __future__ import annotations
 import viser
 
 from robots import Robot
-from robots.capsules import cover_parts
-from robots.cover import cover_of
+from robots.covering.cover_of import cover_of
+from robots.shapes.capsules import cover_parts
 
 _OPACITY = 0.35
 

@@ -12,7 +12,7 @@ from app.adapter import private
 from app.html.palette import RGB
 from app.view.camera import look, turn
 from robots import Robot
-from robots.shapes import link_shapes
+from robots.shapes.link_shapes import link_shapes
 
 _STILL = 1e-4  # m, and about the same number of rad: a tenth of a pixel
 _ARROW = 1.2

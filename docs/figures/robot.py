@@ -8,8 +8,8 @@ import numpy as np
 
 from docs.figures.pack import Pack, plain
 from robots import PlantSettings, Robot
-from robots.shapes import Shape, link_shapes
-from robots.simplify import simplify
+from robots.meshes.simplify import simplify
+from robots.shapes.link_shapes import Shape, link_shapes
 from robots.truth import inertial, joint_axis, true_model
 
 FACES = 16_000

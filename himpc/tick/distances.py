@@ -27,8 +27,8 @@ from himpc.tick.kernel.distance_rows import (
 from himpc.tick.kernel.near import near
 from robots import Robot
 from robots.collision import Surroundings
-from robots.cover import cover_of
 from robots.cover_shapes import WorldShape, cover_surroundings, placements
+from robots.covering.cover_of import cover_of
 from robots.per_robot import per_robot
 
 Array = NDArray[np.float64]

@@ -12,7 +12,7 @@ from himpc.tasks import FrameOrientation, FramePosition, Posture
 from lessons.scenes.torque_scene import TorqueScene
 from lessons.settings.torque import TorqueSettings
 from robots import Plant, PlantSettings, Robot, load_robot, load_urdf_text, suggest_M_bar
-from robots.world import standing_floor
+from robots.floor import standing_floor
 
 TOUCHING = PlantSettings(contacts=True, joint_stops=True)
 """The plant of a scene whose targets people drag: a robot that is pushed anywhere stops there."""

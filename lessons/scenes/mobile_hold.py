@@ -10,7 +10,7 @@ from lessons.scenes.hold import TOUCHING
 from lessons.scenes.torque_scene import TorqueScene
 from lessons.settings.torque import TorqueSettings
 from robots import load_robot
-from robots.world import standing_floor
+from robots.floor import standing_floor
 
 
 def ridgeback_hold() -> TorqueScene:

@@ -17,7 +17,7 @@ from lessons.scenes.hold import TOUCHING, gains
 from lessons.scenes.torque_scene import TorqueScene
 from lessons.settings.torque import TorqueSettings
 from robots import NominalSettings, Robot, load_robot
-from robots.world import standing_floor
+from robots.floor import standing_floor
 
 RIGHT, LEFT = "right_gripper", "left_gripper"
 SIDE = 0.12

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from robots.collision import base_joint
-from robots.collision_model import CollisionModel, Excluded, Solid, Why
+from robots.geometry.collision_model import CollisionModel, Excluded, Solid, Why
 from robots.inertia import sample_configurations
 from robots.mechanics.model import compiled
 from robots.robot import Robot

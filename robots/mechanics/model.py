@@ -7,8 +7,8 @@ import numpy as np
 import pinocchio as pin
 
 from robots.collision import base_joint
-from robots.collision_model import Excluded, Solid
 from robots.errors import InputError
+from robots.geometry.collision_model import Excluded, Solid
 from robots.robot import Robot
 from robots.settings import PlantSettings
 from robots.truth import inertial, joint_axis, pose, true_model

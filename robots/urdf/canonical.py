@@ -13,7 +13,7 @@ from lxml import etree
 from lxml.etree import _Element as Element
 
 from robots.errors import shortened
-from robots.meshes import localise
+from robots.meshes.files import localise
 from robots.report import Finding, ImportReport
 from robots.urdf.inertials import repair_inertials
 from robots.urdf.joints import normalise_joints

@@ -22,8 +22,8 @@ from himpc.export.native import build
 from lessons.scenes.catalog import torque_scene
 from lessons.scenes.torque_scene import TorqueScene
 from robots import Plant, PlantSettings
-from robots.arm import Arm, Reading
-from robots.simulated_arm import SimulatedArm
+from robots.arms.arm import Arm, Reading
+from robots.arms.simulated_arm import SimulatedArm
 from tests.commands.exported import needed
 
 T_S = 1e-3

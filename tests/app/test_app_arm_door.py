@@ -15,9 +15,9 @@ from himpc.export.native import build
 from lessons.scenes.catalog import load_scene, torque_scene
 from lessons.scenes.torque_scene import TorqueScene
 from robots import InputError, Plant
-from robots import franka as door
-from robots.arm import ArmLost
-from robots.simulated_arm import SimulatedArm
+from robots.arms import franka as door
+from robots.arms.arm import ArmLost
+from robots.arms.simulated_arm import SimulatedArm
 from tests.commands.exported import needed
 
 
@@ -84,7 +84,7 @@ def test_a_motion_that_begins_elsewhere_is_refused(bench: Bench, tmp_path: Path)
 
 
 class FakeLibrary:
-    """Replaces pylibfranka: the names that `robots.franka` uses, and one arm with given answers."""
+    """Replaces pylibfranka: the names that `robots.arms.franka` uses, and one arm with given answers."""
 
     class FrankaException(Exception):
         pass

@@ -18,7 +18,7 @@ from app.arm.drive import drive
 from app.arm.guard import ArmGuard, Tolerances
 from app.arm.loop import Ended
 from app.link.process import wait_until
-from robots.arm import ArmLost, Reading
+from robots.arms.arm import ArmLost, Reading
 
 
 def test_missed_periods_end_the_loop_gently(bench: Bench) -> None:

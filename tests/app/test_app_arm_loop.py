@@ -11,7 +11,7 @@ from app.arm.orders import Order, Orders
 from lessons.events import MoveTarget
 from lessons.recording.run import run as run_scene
 from lessons.scenes.run_spec import RunSpec
-from robots.arm import Reading
+from robots.arms.arm import Reading
 
 
 def test_without_gravity_nothing_has_to_be_commanded(bench: Bench) -> None:

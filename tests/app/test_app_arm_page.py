@@ -38,8 +38,8 @@ from app.worker.ghost import GhostBody
 from lessons.events import MoveTarget, Reset, Set
 from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.lesson import Ghost
+from robots.arms.simulated_arm import SimulatedArm
 from robots.processes.isolation import waited
-from robots.simulated_arm import SimulatedArm
 
 CHOICE = SceneChoice(RunSpec("panda-hold"))
 LONG = 60.0  # s

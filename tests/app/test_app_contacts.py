@@ -17,8 +17,8 @@ from app.worker.simulation import SimulationRunner
 from lessons.events import MoveTarget
 from lessons.scenes.run_spec import RunSpec
 from robots import Ball, Box, Floor, load_robot
-from robots.capsules import cover_parts
-from robots.cover import cover_of
+from robots.covering.cover_of import cover_of
+from robots.shapes.capsules import cover_parts
 from robots.world import Post as Pole
 from robots.world import Thing
 

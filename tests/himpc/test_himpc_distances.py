@@ -23,7 +23,8 @@ from himpc.references.observed import Observed
 from himpc.tick.distances import Distances
 from robots import Robot, load_robot
 from robots.collision import Ball, Box, Floor
-from robots.cover import Capsule, cover_of
+from robots.covering.cover_of import cover_of
+from robots.geometry.cover import Capsule
 from robots.world import Post
 
 WORLD = (

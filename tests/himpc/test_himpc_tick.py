@@ -18,7 +18,7 @@ from problems import Hierarchy, random_hierarchy, shifted
 from himpc import HIMPC, FrameOrientation, FramePosition, Level, Posture, Settings
 from himpc.references import Circle, FigureEight, Hold, Outlook, Phase, Reference, Sinusoid
 from robots import Robot, load_robot
-from robots.importing import import_robot
+from robots.loading.importing import import_robot
 
 INERTIAL = (
     '<inertial><mass value="1"/>'

@@ -21,8 +21,8 @@ REFERENCE = (
         ("lessons/session/session.py", "seed: seed of the run; all randomness comes from it"),
     )),
     Exempt("purpose", "", (
-        ("robots/capsules.py", "Returns vertices that are modelled along z"),
-        ("robots/capsules.py", "Returns the mesh with separate vertices for caps and mantle"),
+        ("robots/shapes/capsules.py", "Returns vertices that are modelled along z"),
+        ("robots/shapes/capsules.py", "Returns the mesh with separate vertices for caps and mantle"),
         ("himpc/formulation/forms.py", "All active levels, their rows stacked"),
         ("himpc/limits/rows.py", "All rows are in N·m"),
         ("himpc/references/square_wave.py", "s: a switch counts as reached this much earlier"),
@@ -95,7 +95,7 @@ REFERENCE = (
         ("robots/signals.py", "Commands are stored with their times"),
     )),
     Exempt("software", ROBOTS + "shapes.py::test_simplified_surfaces_stay_where_they_were", (
-        ("robots/simplify.py", "Vertices whose normals point to different sides"),
+        ("robots/meshes/simplify.py", "Vertices whose normals point to different sides"),
     )),
     Exempt("software", ROBOTS + "urdf.py::test_continuous_becomes_unbounded_with_one_coordinate", (
         ("robots/urdf/joints.py", "Rewrites every joint so that"),

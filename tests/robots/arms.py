@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from robots import Robot
-from robots.importing import import_robot
+from robots.loading.importing import import_robot
 
 INERTIAL = (
     '<inertial><origin xyz="0.1 0 0"/><mass value="1"/>'

@@ -14,13 +14,14 @@ from arms import robot as urdf
 from scipy.spatial import ConvexHull
 
 from robots import CATALOG, Ball, Box, Floor, InputError, Plant, PlantSettings, Robot, load_robot
-from robots.collision_model import as_json, stored
-from robots.importing import import_robot
+from robots.floor import standing_floor
+from robots.geometry.collision_model import as_json, stored
+from robots.loading.importing import import_robot
+from robots.loading.write import made
 from robots.mechanics.exclusions import touching
 from robots.mechanics.model import compiled
-from robots.mechanics.write import made
-from robots.shapes import link_shapes
-from robots.world import Post, Thing, World, standing_floor, table
+from robots.shapes.link_shapes import link_shapes
+from robots.world import Post, Thing, World, table
 
 TOUCHING = PlantSettings(contacts=True, joint_stops=True)
 

@@ -15,11 +15,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robots import CATALOG, Robot, load_robot, load_urdf_text
-from robots.cover import Cover, cover_as_json, cover_of, stored_cover
-from robots.covered import patches
-from robots.mechanics.covers import as_solid, made_cover
+from robots.covering.cover_of import cover_of
+from robots.covering.covered import patches
+from robots.covering.covers import as_solid, made_cover
+from robots.geometry.cover import Cover, cover_as_json, stored_cover
 from robots.mechanics.exclusions import touching
-from robots.shapes import link_shapes
+from robots.shapes.link_shapes import link_shapes
 
 ROUNDING = 1e-7  # m: drawn vertices are float32
 
@@ -94,7 +95,7 @@ def test_few_capsules_are_far_apart_at_home(name: str) -> None:
 
 
 def test_the_stored_cover_is_the_generated_one() -> None:
-    """`python -m robots.mechanics.write` writes it."""
+    """`python -m robots.loading.write` writes it."""
     robot = load_robot("planar3")
     assert made_cover(robot, tries=2) == robot.cover
 

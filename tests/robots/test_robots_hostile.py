@@ -14,9 +14,9 @@ from lessons.events import MoveTarget
 from lessons.scenes.hold import _hold
 from lessons.session.torque import TorqueSession
 from robots import InputError, PlantSettings, Robot
-from robots.importing import import_robot
-from robots.shapes import MAX_TOTAL, link_shapes
-from robots.surfaces import read_meshes
+from robots.loading.importing import import_robot
+from robots.meshes.surfaces import read_meshes
+from robots.shapes.link_shapes import MAX_TOTAL, link_shapes
 
 DOCUMENTS = hostile.documents()
 GROUPS = 8  # number of tests; one test per kind would be 400, most of them of a millisecond

@@ -167,7 +167,7 @@ def test_a_file_is_read_again_when_it_changed_or_names_a_mesh(monkeypatch, tmp_p
         read.append(work)
         return work(*told)
 
-    monkeypatch.setattr("robots.load.isolated", here)
+    monkeypatch.setattr("robots.loading.load.isolated", here)
     file, text = tmp_path / "arm.urdf", two_joint_arm()
     for comment, times in (("", 1), ("", 1), ("<!-- new -->", 2), ("<!-- mesh -->", 3), ("<!-- mesh -->", 4)):
         file.write_text(text.replace("</robot>", f"{comment}</robot>"))
@@ -177,8 +177,8 @@ def test_a_file_is_read_again_when_it_changed_or_names_a_mesh(monkeypatch, tmp_p
 
 def test_a_crash_while_loading_is_reported_and_refused(monkeypatch, tmp_path: Path) -> None:
     # A lambda cannot be sent to a process.
-    monkeypatch.setattr("robots.load.import_robot", lambda *_: None)
-    monkeypatch.setattr("robots.load.isolated", _faulty)
+    monkeypatch.setattr("robots.loading.load.import_robot", lambda *_: None)
+    monkeypatch.setattr("robots.loading.load.isolated", _faulty)
     file = tmp_path / "arm.urdf"
     file.write_text(two_joint_arm())
     assert "SIGBUS" in str(check_urdf(file).findings)

@@ -10,11 +10,11 @@ import pytest
 from arms import INERTIAL, link, load, two_joint_arm
 
 from robots import CATALOG, Robot, load_robot
-from robots.importing import import_robot
-from robots.meshes import find_mesh, installed_mesh, installed_shares
-from robots.shapes import MAX_TOTAL, Shape, link_shapes
-from robots.simplify import simplify
-from robots.surfaces import MAX_FACES, mesh_pieces
+from robots.loading.importing import import_robot
+from robots.meshes.files import find_mesh, installed_mesh, installed_shares
+from robots.meshes.simplify import simplify
+from robots.meshes.surfaces import MAX_FACES, mesh_pieces
+from robots.shapes.link_shapes import MAX_TOTAL, Shape, link_shapes
 
 
 def check(robot: Robot, shapes: list[Shape]) -> None:

@@ -11,8 +11,8 @@ import pytest
 from arms import INERTIAL, LIMIT, joint, link, load, robot, two_joint_arm
 
 from robots import InputError, Robot, check_urdf, load_robot
-from robots.importing import import_robot
-from robots.meshes import installed_shares
+from robots.loading.importing import import_robot
+from robots.meshes.files import installed_shares
 from robots.report import Kind
 
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robots import InputError, Plant
-from robots.importing import import_robot
+from robots.loading.importing import import_robot
 from robots.urdf.inertials import nearest_physical
 
 

@@ -12,9 +12,9 @@ import trimesh
 from lxml import etree
 from lxml.etree import _Element as Element
 
-from robots.capsules import body_capsules
+from robots.meshes.surfaces import Colour, Piece, joined, limited, mesh_pieces, split_creases
 from robots.robot import Robot
-from robots.surfaces import Colour, Piece, joined, limited, mesh_pieces, split_creases
+from robots.shapes.capsules import body_capsules
 from robots.urdf.read import Refusal, placement
 
 MAX_TOTAL = 400_000  # faces of a robot

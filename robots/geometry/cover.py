@@ -6,12 +6,8 @@ from __future__ import annotations
 import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from robots.collision_model import Excluded, Point, excluded_pairs, frozen
-
-if TYPE_CHECKING:
-    from robots.robot import Robot
+from robots.geometry.collision_model import Excluded, Point, excluded_pairs, frozen
 
 
 @dataclass(frozen=True)
@@ -47,16 +43,6 @@ class Cover:
         near = sum(pair.why == "neighbours" for pair in self.excluded)
         text = f"distances use {len(self.capsules)} capsules that contain the links"
         return f"{text}; left out are {near} pair(s) of neighbours{excluded_pairs(self.excluded)}"
-
-
-def cover_of(robot: Robot) -> Cover:
-    """Returns the cover of a robot: the stored one of a robot of the catalog, else the one that was made when
-    it was imported."""
-    if robot.cover is not None:
-        return robot.cover
-    from robots.mechanics.covers import made_cover  # it loads MuJoCo, which a stored cover does not need
-
-    return made_cover(robot)
 
 
 def stored_cover(path: Path) -> Cover:

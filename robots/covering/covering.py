@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.capsule_fit import Fit, quick_fits, reach, tight_fit
-from robots.cover import Capsule
-from robots.covered import Patch
-from robots.covered_body import Body, body_of
+from robots.covering.capsule_fit import Fit, quick_fits, reach, tight_fit
+from robots.covering.covered import Patch
+from robots.covering.covered_body import Body, body_of
+from robots.geometry.cover import Capsule
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 
-from robots.collision_model import CollisionModel, Excluded, Solid
-from robots.cover import Capsule, Cover
-from robots.covered import patches
-from robots.covering import covering
+from robots.covering.covered import patches
+from robots.covering.covering import covering
+from robots.geometry.collision_model import CollisionModel, Excluded, Solid
+from robots.geometry.cover import Capsule, Cover
 from robots.mechanics.exclusions import collision_model, touching_often
 from robots.per_robot import per_robot
 from robots.robot import Robot

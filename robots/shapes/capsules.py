@@ -11,8 +11,8 @@ import numpy as np
 import pinocchio as pin
 import trimesh
 
-from robots.cover import Cover
-from robots.limbs import BODY, DRUM, TIP, Colour, Limb, joint_radius, limbs
+from robots.geometry.cover import Cover
+from robots.shapes.limbs import BODY, DRUM, TIP, Colour, Limb, joint_radius, limbs
 from robots.truth import joint_axis
 
 COVER: Colour = (86, 140, 200)

@@ -12,9 +12,9 @@ from lxml.etree import _Element as Element
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from robots.collision_model import Solid
-from robots.collision_shapes import FARTHEST, SHAPES_PER_LINK, primitive
+from robots.geometry.collision_model import Solid
 from robots.robot import Robot
+from robots.shapes.collision_shapes import FARTHEST, SHAPES_PER_LINK, primitive
 from robots.urdf.read import Refusal, placement
 
 Array = NDArray[np.float64]
@@ -76,7 +76,7 @@ def _read(root: Element) -> dict[str, list[Array]]:
     uris = [mesh.get("filename", "") for mesh in root.iterfind("link/visual/geometry/mesh")]
     if not uris:
         return {}
-    from robots.surfaces import mesh_pieces  # it loads trimesh, which most descriptions do not need
+    from robots.meshes.surfaces import mesh_pieces  # it loads trimesh, which most descriptions do not need
 
     return {
         uri: [vertices[faces] for _, vertices, faces in pieces] for uri, pieces in mesh_pieces(uris).items()

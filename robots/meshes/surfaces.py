@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from robots.meshes import installed_mesh
+from robots.meshes.files import installed_mesh
+from robots.meshes.simplify import simplify
 from robots.processes.isolation import DEADLINE, Fault, isolated
-from robots.simplify import simplify
 
 MAX_FACES = 12_000  # faces per mesh: a browser on a laptop still rotates several robots smoothly
 MAX_BYTES = 100_000_000

@@ -1,5 +1,5 @@
 """Writes the collision geometry and the cover of the robots of the catalog, from their meshes: python -m
-robots.mechanics.write
+robots.loading.write
 
 It takes about a minute and needs the extra `meshes`. Stored geometry makes contacts and distances the same
 with and without that extra, and a robot loads in milliseconds."""
@@ -7,12 +7,12 @@ with and without that extra, and a robot loads in milliseconds."""
 from __future__ import annotations
 
 from robots.catalog import CATALOG, CatalogEntry
-from robots.collision_model import CollisionModel, as_json
-from robots.collision_shapes import collision_solids
-from robots.cover import cover_as_json
-from robots.load import load_robot
-from robots.mechanics.covers import made_cover
+from robots.covering.covers import made_cover
+from robots.geometry.collision_model import CollisionModel, as_json
+from robots.geometry.cover import cover_as_json
+from robots.loading.load import load_robot
 from robots.mechanics.exclusions import collision_model
+from robots.shapes.collision_shapes import collision_solids
 
 
 def made(entry: CatalogEntry) -> CollisionModel:

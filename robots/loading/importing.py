@@ -10,10 +10,10 @@ import numpy as np
 import pinocchio as pin
 
 from robots.errors import InputError, unknown_name
-from robots.home import choose_tip, find_home, sensible_a_max
 from robots.inertia import suggest_M_bar
-from robots.mechanics.imported import with_collision
-from robots.meshes import has_meshes
+from robots.loading.home import choose_tip, find_home, sensible_a_max
+from robots.loading.imported import with_collision
+from robots.meshes.files import has_meshes
 from robots.plant import Plant
 from robots.report import Finding, ImportReport
 from robots.robot import Robot

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from robots.collision_model import CollisionModel
-from robots.collision_shapes import collision_solids
-from robots.cover import Cover
-from robots.mechanics.covers import made_cover
+from robots.covering.covers import made_cover
+from robots.floor import no_floor
+from robots.geometry.collision_model import CollisionModel
+from robots.geometry.cover import Cover
 from robots.mechanics.exclusions import collision_model
 from robots.report import Finding
 from robots.robot import Robot
-from robots.world import no_floor
+from robots.shapes.collision_shapes import collision_solids
 
 
 def with_collision(robot: Robot, meshes: bool = True) -> Robot:

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from robots.capsule_fit import Fit, quick_fits, reach
-from robots.covered import Patch
+from robots.covering.capsule_fit import Fit, quick_fits, reach
+from robots.covering.covered import Patch
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

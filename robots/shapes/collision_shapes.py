@@ -11,9 +11,9 @@ import pinocchio as pin
 from lxml import etree
 from lxml.etree import _Element as Element
 
-from robots.collision_model import Point, Solid, SolidKind, Source
-from robots.limbs import limbs
+from robots.geometry.collision_model import Point, Solid, SolidKind, Source
 from robots.robot import Robot
+from robots.shapes.limbs import limbs
 from robots.truth import pose
 from robots.urdf.read import Refusal, placement
 
@@ -82,7 +82,7 @@ def _surfaces(uris: list[str]) -> dict[str, np.ndarray]:
     """The points (V, 3), m, of mesh files."""
     if not uris:
         return {}
-    from robots.surfaces import mesh_pieces  # it loads trimesh, which most descriptions do not need
+    from robots.meshes.surfaces import mesh_pieces  # it loads trimesh, which most descriptions do not need
 
     return {
         uri: np.concatenate([vertices for _, vertices, _ in pieces])

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from robots.arm import Arm, ArmLimits, ArmLost, Reading
+from robots.arms.arm import Arm, ArmLimits, ArmLost, Reading
 from robots.errors import InputError
 from robots.robot import Robot
 

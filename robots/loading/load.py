@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 
 from robots.catalog import CATALOG, CatalogEntry
-from robots.collision_model import stored
-from robots.cover import stored_cover
 from robots.errors import InputError, shortened, unknown_name
-from robots.importing import Import, bounds, import_robot
-from robots.mechanics.imported import with_cover, with_geometry
-from robots.meshes import has_meshes
+from robots.geometry.collision_model import stored
+from robots.geometry.cover import stored_cover
+from robots.loading.imported import with_cover, with_geometry
+from robots.loading.importing import Import, bounds, import_robot
+from robots.meshes.files import has_meshes
 from robots.processes.isolation import Fault, isolated
 from robots.report import Finding, ImportReport
 from robots.robot import Robot

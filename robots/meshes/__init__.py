@@ -1,0 +1,1 @@
+"""The mesh files that a description names: where they are, and their triangles."""
