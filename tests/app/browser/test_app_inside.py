@@ -45,10 +45,20 @@ def shared(browser: Browser, drawing: PageServer) -> Iterator[Page]:
 
 @pytest.fixture
 def sheet(shared: Page, drawing: PageServer) -> Page:
-    """The page in its initial state, with the picture drawn."""
+    """The page in its initial state, with the picture of the new run drawn. The picture of the run before is
+    still there when the new one begins."""
+    learner = learner_of(drawing)
+    assert eventually(shared, lambda: learner.status is not None)
+    before = 0 if learner.status is None else learner.status.resets
     press(shared, "Reset all")
     tab(shared, "Inside")
-    assert eventually(shared, lambda: point(shared, "optimum-1") is not None)
+
+    def shown() -> bool:
+        status = learner.status
+        inside = None if status is None or status.resets == before else status.inside
+        return inside is not None and inside.plane is not None and point(shared, "optimum-1") is not None
+
+    assert eventually(shared, shown)
     return shared
 
 
