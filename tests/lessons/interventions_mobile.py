@@ -25,7 +25,8 @@ MOBILE_ROWS = (
         of("error/ee", "m", "mean", 8.5), (1.625, 1.635), ("levels.base.enabled=false",), (0, 0.01),
     ),
     Intervention(
-        "first-hold-then-reach/1", "it is where no plan is left that makes $\\mathcal J_2$ smaller",
+        "first-hold-then-reach/1",
+        "It is where every plan that makes $\\mathcal J_2$ smaller also changes $\\mathcal J_1$.",
         of("error/base", "m", "mean", 7.0), (1.55, 1.7), ("order=base,ee",), (0, 0.05),
     ),
     # ---------------------------------------- how-strict-is-strict
