@@ -43,7 +43,6 @@ def measure(name: str, dragged: bool) -> str:
     """Runs both sessions in turns; returns one line with their times."""
     pair = sessions(torque_scene(name), dragged)
     steps: list[list[float]] = [[], []]
-    binding = 0
     for _ in range(TICKS):
         for times, session in zip(steps, pair, strict=True):
             session.tick()

@@ -281,21 +281,13 @@ geometry as data; the plant and the geometry of an imported robot are made from 
 def test_robots_are_built_in_one_direction(part: str) -> None:
     """Imports go in the direction errors, urdf, geometry ← robot ← world, shapes ← mechanics ← covering,
     plant ← loading, arms. Imports for types and inside functions count as well."""
-    files = [path for path in sources("robots") if part_of(path) == part]
-    assert files
-    wrong = {
-        f"{path.relative_to(ROOT)} imports {name}"
-        for path in files
-        for name in imports(path)
-        if within(name, "robots") and part_of(home_of(name)) not in (part, *ROBOTS[part])
-    }
-    assert not wrong
+    assert not against_the_order("robots", part)
 
 
 def test_robots_have_no_other_parts() -> None:
     """Every file belongs to one part, and every rule is used."""
     files = sources("robots")
-    assert {path for path in files if not part_of(path)} == {ROOT / "robots" / "__init__.py"}
+    assert outside_all_parts("robots") == {ROOT / "robots" / "__init__.py"}
     used = {
         (part_of(path), part_of(home_of(name)))
         for path in files
@@ -379,25 +371,34 @@ def home_of(name: str) -> Path:
     return next(file for file in files if file.exists())
 
 
+def against_the_order(package: str, part: str) -> set[str]:
+    """Returns the imports of a part of robots/ or himpc/ that its table does not list."""
+    files = [path for path in sources(package) if part_of(path) == part]
+    assert files
+    allowed = (part, *{"robots": ROBOTS, "himpc": HIMPC}[package][part])
+    return {
+        f"{path.relative_to(ROOT)} imports {name}"
+        for path in files
+        for name in imports(path)
+        if within(name, package) and part_of(home_of(name)) not in allowed
+    }
+
+
+def outside_all_parts(package: str) -> set[Path]:
+    """Returns the files of robots/ or himpc/ that belong to no part."""
+    return {path for path in sources(package) if not part_of(path)}
+
+
 @pytest.mark.parametrize("part", HIMPC)
 def test_himpc_is_built_in_one_direction(part: str) -> None:
     """Imports go in the direction references, kinematics, tasks, limits ← cascade ← formulation, plan ← tick
     ← controllers; htmpc."""
-    files = [path for path in sources("himpc") if part_of(path) == part]
-    assert files
-    wrong = {
-        f"{path.relative_to(ROOT)} imports {name}"
-        for path in files
-        for name in imports(path)
-        if within(name, "himpc") and part_of(home_of(name)) not in (part, *HIMPC[part])
-    }
-    assert not wrong
+    assert not against_the_order("himpc", part)
 
 
 def test_himpc_has_no_other_parts() -> None:
     """Every file belongs to one part, and the tables have no cycles."""
-    files = sources("himpc")
-    assert {path for path in files if not part_of(path)} == {ROOT / "himpc" / "__init__.py"}
+    assert outside_all_parts("himpc") == {ROOT / "himpc" / "__init__.py"}
     assert {path.stem for path in (ROOT / "himpc").glob("*.py")} == {"__init__", *HIMPC_ROOT}
     assert not {
         (a, b)
