@@ -28,11 +28,10 @@ from himpc.tick.given_bounds import GivenBounds
 from himpc.tick.kernel.arena import Snapshot
 from himpc.tick.kernel.arrays import Array
 from himpc.tick.kernel.control_period import (
+    ALL_PARTS,
     FINISH,
-    LEVELS,
-    LINEARIZE,
+    ITERATION,
     NOT_FINITE,
-    PERIOD,
     REMEMBER,
     control_period,
 )
@@ -181,7 +180,7 @@ class CompiledTick:
         self._take(q, v, previews, tau_0, limits)
         arena = self.arena
         change, iterations, unsolved, budget = math.inf, 0, 0, FallbackBudget()
-        parts = PERIOD if self._most == 1 else LINEARIZE + LEVELS + FINISH
+        parts = ALL_PARTS if self._most == 1 else ITERATION
         arena.f["budget"][:] = self.budget
         while iterations == 0 or (change > self._tolerance and iterations < self._most):
             if iterations:

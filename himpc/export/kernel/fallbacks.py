@@ -12,6 +12,7 @@ from himpc.tick.fallbacks import LEAK
 from himpc.tick.kernel.arrays import Array, TickArrays, Whole
 from himpc.tick.kernel.bounds import constraint_values
 from himpc.tick.kernel.cascade import ALONE, FIRST, KNOTS, LAST, SOFTENED
+from himpc.tick.kernel.control_period import LINEARIZE, NOT_FINITE, perform_parts
 from himpc.tick.kernel.evidence import cost_of
 from himpc.tick.kernel.goldfarb_idnani import TOLERANCE
 from himpc.tick.kernel.linear import copy_rows, dot
@@ -23,20 +24,23 @@ SOLVE, SOFTEN, FEASIBLE, PREVIOUS, INHERIT, BRAKE, HOLD = range(7)
 
 
 @inline_kernel
-def solve_with_fallbacks(
-    t: TickArrays, p: LoopArrays, data: Array, where: Whole, whole: Whole, whole_where: Whole
+def period_with_fallbacks(
+    t: TickArrays, p: LoopArrays, data: Array, where: Whole, whole: Whole, whole_where: Whole, parts: int
 ) -> int:
-    """Solves all levels; returns the last of the fallbacks that acted, SOLVE if none was needed."""
-    worst = SOLVE
-    for i in range(t.sizes[4]):
-        # If the solver fails at once, the point of an earlier tick must not be used as a direction.
-        t.U[i, 0, 0] = math.nan
-        found = SOLVE
-        if not solve_level(data, where, whole, whole_where, i, 0.0):
-            found = climb_down(t, p, data, where, whole, whole_where, i)
-        t.rung[i] = float(found)
+    """Performs parts of a control period, see `perform_parts`; a level without an optimum gets a fallback, as
+    in `himpc.tick.fallbacks.perform`. Returns the last of the fallbacks that acted, SOLVE if none was needed,
+    HOLD if the problems or the torque are not finite."""
+    worst, i = SOLVE, 0
+    while True:
+        reached = perform_parts(data, where, whole, whole_where, parts, i, 0.0)
+        if reached == NOT_FINITE:
+            return HOLD
+        if reached == t.sizes[4]:
+            return worst
+        found = climb_down(t, p, data, where, whole, whole_where, reached)
+        t.rung[reached] = float(found)
         worst = max(worst, found)
-    return worst
+        parts, i = parts & ~LINEARIZE, reached + 1
 
 
 @inline_kernel

@@ -7,7 +7,7 @@ import math
 
 from himpc.compilation.compiled import inline_kernel
 from himpc.export.kernel.adjust import adjust, arrange, fade, ramp, write_rows
-from himpc.export.kernel.fallbacks import HOLD, SOLVE, solve_with_fallbacks
+from himpc.export.kernel.fallbacks import HOLD, SOLVE, period_with_fallbacks
 from himpc.export.kernel.follow import follow, rest_at_targets
 from himpc.export.kernel.loop_arrays import (
     BUDGET,
@@ -22,9 +22,9 @@ from himpc.export.kernel.loop_arrays import (
 from himpc.tick.kernel.arrays import NOW, PERIOD, T_S, Array, TickArrays, Whole
 from himpc.tick.kernel.arrays_of import arrays_of
 from himpc.tick.kernel.cascade import finite
+from himpc.tick.kernel.control_period import ALL_PARTS, ITERATION
 from himpc.tick.kernel.finish_tick import finish_tick
 from himpc.tick.kernel.linear import copy, copy_rows
-from himpc.tick.kernel.linearize import linearize
 
 TICK, RESET = -2, -1
 """What is asked of `control`; else a setting, see `adjust`."""
@@ -133,10 +133,9 @@ def iterate(t: TickArrays, p: LoopArrays, data: Array, where: Whole, whole: Whol
                 copy(t.predicted[j - 1], t.path[j], t.q.size)
             for i in range(t.sizes[4]):
                 copy_rows(t.U[i], p.before[i])
-        if not linearize(data, where, whole, whole_where):
-            return HOLD
-        fallback = solve_with_fallbacks(t, p, data, where, whole, whole_where)
-        if not finish_tick(data, where, whole, whole_where, most == 1):
+        parts = ALL_PARTS if most == 1 else ITERATION
+        fallback = period_with_fallbacks(t, p, data, where, whole, whole_where, parts)
+        if fallback == HOLD:
             return HOLD
         if count:
             change = 0.0

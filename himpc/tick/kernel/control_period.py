@@ -1,4 +1,4 @@
-"""Entry: a whole control period, or parts of it."""
+"""A control period, or parts of it: what Python and an exported controller run."""
 
 from __future__ import annotations
 
@@ -24,8 +24,10 @@ from himpc.tick.kernel.solve_level import solve_level
 
 LINEARIZE, LEVELS, ONE_LEVEL, FINISH, REMEMBER = 1, 2, 4, 8, 16
 """Parts of a period; `parts` is their sum."""
-PERIOD = LINEARIZE + LEVELS + FINISH + REMEMBER
+ALL_PARTS = LINEARIZE + LEVELS + FINISH + REMEMBER
 """All parts of a period whose levels are solved once."""
+ITERATION = LINEARIZE + LEVELS + FINISH
+"""All parts of an iteration of a controller that solves its levels several times in a period."""
 NOT_FINITE = -1
 
 
@@ -45,8 +47,8 @@ _MONOTONIC = 6 if sys.platform == "darwin" else 1
 _clock = _monotonic_us if os.name == "posix" else _no_clock
 
 
-@kernel(VECTOR, INDICES, INDICES, INDICES, WHOLE, WHOLE, NUMBER)
-def control_period(
+@inline_kernel
+def perform_parts(
     data: Any, where: Whole, whole: Whole, whole_where: Whole, parts: int, i: int, room: float
 ) -> int:
     """Performs parts of a control period, in the order of their names.
@@ -80,3 +82,11 @@ def control_period(
     if parts & FINISH and not finish_tick(data, where, whole, whole_where, parts & REMEMBER):
         return NOT_FINITE
     return t.sizes[4]
+
+
+@kernel(VECTOR, INDICES, INDICES, INDICES, WHOLE, WHOLE, NUMBER)
+def control_period(
+    data: Any, where: Whole, whole: Whole, whole_where: Whole, parts: int, i: int, room: float
+) -> int:
+    """Python's entry to `perform_parts`; an exported controller calls the same function."""
+    return perform_parts(data, where, whole, whole_where, parts, i, room)
