@@ -67,7 +67,8 @@ def test_ticks_keep_nothing(scene: str) -> None:
 
 
 def test_scenes_that_were_left_keep_nothing() -> None:
-    """Four visits of a scene keep less than 100 kB each."""
+    """Four visits of a scene keep less than 100 kB each. What is loaded once may fall into a round; a leak
+    grows in every round."""
     server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
     try:
         with Viewers(server.link, "--clients", "1"):
@@ -79,8 +80,10 @@ def test_scenes_that_were_left_keep_nothing() -> None:
                 return allocated()
 
             visit(3)
-            before = visit(1)
-            assert visit(4) - before < 400_000
+            sizes = [visit(1)]
+            while len(sizes) < 4 and (len(sizes) < 2 or sizes[-1] - sizes[-2] >= 400_000):
+                sizes.append(visit(4))
+            assert sizes[-1] - sizes[-2] < 400_000, sizes
     finally:
         server.close()
 
