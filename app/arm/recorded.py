@@ -12,10 +12,13 @@ from himpc.export.image import Image
 
 
 def arrays(driven: Driven, image: Image) -> dict[str, Any]:
-    """Returns one array per field, a row per period: `t` (s, the arm's clock), `q`, `v` (rad, rad/s), `tau_0`
-    and `tau` (N·m without gravity: acting before, set now), `missed` (periods before), `us` (µs for the
-    controller and its guard), `fallback`, `ending` (whether the torque is being taken away), `error/TASK` (m
-    or rad), and `q_model` and `tau_model` of the simulated robot; also `joint_names`."""
+    """Returns one array per field, with one row per period.
+
+    - `t`: the arm's clock, s; `q`, `v`: rad and rad/s.
+    - `tau_0` and `tau`: the torque before this period and the new one, N·m without gravity.
+    - `missed`: periods that were missed before this one; `us`: time of the controller and its guard, µs.
+    - `fallback`; `ending`: whether the arm is being stopped; `error/TASK`: m or rad.
+    - `q_model`, `tau_model`: of the simulated robot; `joint_names`."""
     manifest = image.manifest
     at = Columns.of(len(manifest["joints"]), sum(task["rows"] for task in manifest["tasks"]))
     rows, found = driven.rows, {}

@@ -165,13 +165,16 @@ class ConnectionGuard:
 
 
 class GuardedConnection(ServerConnection):
-    """A connection that counts messages before decoding them, and passes on only messages that a page may
-    send.
+    """A connection that counts messages before it decodes them. It passes on only the messages that a page
+    may send.
 
-    `uploads` are the uploads of the page that it serves, `refuse` shows a refusal to the user,
-    `is_owners` is true if the person who started the server opened the page, `teaches` if it was opened with
-    the owner's secret on any machine, and `account` is the name with which its user signed in at the proxy;
-    `serves` replaces viser for a page of a class.
+    Attributes:
+        uploads: of the page.
+        refuse: shows a refusal to the user.
+        is_owners: whether the person who started the server opened the page.
+        teaches: whether the page was opened with the owner's secret, on any machine.
+        account: the name with which the user signed in at the proxy.
+        serves: replaces viser for a page of a class.
     """
 
     def __init__(self, *of: Any, guard: ConnectionGuard, **more: Any) -> None:

@@ -50,8 +50,8 @@ _LONGEST = 100_000  # characters that we read of each stored value
 
 
 class Visit:
-    """One visit. Its steps (admitting, closing) run one after the other on a thread of its own, and its
-    callbacks run on a few other threads, so that they never block viser's loop."""
+    """One visit of a browser. Each visit has a thread that admits and closes it. Callbacks run on a few other
+    threads. Therefore no visit blocks viser's loop."""
 
     def __init__(
         self,

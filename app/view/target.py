@@ -21,8 +21,8 @@ _INVITATION = "drag an arrow"
 
 
 class TargetGizmo:
-    """Arrows along the world's axes for a position task, and rings for an orientation task of the same frame;
-    the rings rotate with the target.
+    """The control of a target: arrows along the world's axes for a position task, rings for an orientation
+    task of the same frame. The rings rotate with the target.
 
     The ball is at the dragged position. If that is out of reach, the ball becomes a transparent red one, and
     a ball in the task's colour with a line to it marks the position that the controller gets instead.

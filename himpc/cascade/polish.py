@@ -57,10 +57,10 @@ def polished(solution: QPSolution, c: Array, A: Array, low: Array, high: Array) 
 def descended(solution: QPSolution, c: Array, A: Array, low: Array, high: Array) -> QPSolution | None:
     """Finds the optimum from x = 0 by the primal active-set method; None if x = 0 is not feasible.
 
-    If there is hardly another feasible point, as below a level that has used up nearly all freedom, a solver
-    that starts from an infeasible point takes rounding errors for a contradiction. A row that blocks the way
-    depends on none of those held; after steps of no length the first row in order is taken or given back
-    (Bland), so no set of rows comes twice.
+    Below a level that uses nearly all freedom, the feasible set is almost a point. A solver that starts from
+    an infeasible point then takes rounding errors for a contradiction; this one starts from a feasible point.
+    A row that blocks a step is linearly independent of the active rows. After a step of length zero, the
+    first row in order enters or leaves (Bland's rule): no active set occurs twice.
     """
     if not ((low <= 0.0) & (high >= 0.0)).all():
         return None

@@ -35,10 +35,11 @@ class WhiteLevel(NamedTuple):
 def white(problem: LevelProblem, U_above: Array, upper: Sequence[Array], Z: Array) -> WhiteLevel:
     """Problem i, (32) or (34), from its least-squares form ‖Q^½ e‖² + ‖R^½ U‖².
 
-    H = GᵀQG + R is never formed: where weights or inertias are far apart its condition is 10¹⁷ and R is lost
-    in its rounding. Instead, knot by knot, √R ∘ U is turned into directions that the level feels and those
-    that it does not (by less than _FELT of the size of its rows, which is rounding; and
-    only bounds need them here); a QR factorisation of what is felt makes the rest of it.
+    H = GᵀQG + R is never computed: if weights or inertias differ greatly, its condition number is 10¹⁷ and R
+    is lost in rounding. Instead, at each knot √R ∘ U is rotated into directions that change the level's
+    residual and directions that do not. A direction belongs to the second group if its effect is below _FELT
+    of the size of the rows, which is rounding; only bounds need these directions. The first group is
+    reduced by a QR factorisation.
 
     Args:
         problem: the level's data.

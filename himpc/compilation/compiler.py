@@ -1,8 +1,8 @@
 """Compiles functions in a process of its own, so that all other processes run the code that is on disk.
 
-The code that a compiling process holds in memory differs in the last digit from the code that it writes to
-disk, because the parts are linked once more in between. Processes that load the code from disk all run the
-same code; the process that compiled it would not.
+A process that compiles links the parts once more before it writes them to disk. Its own code in memory
+therefore gives results that differ in the last digit. All processes that load the code from disk run the same
+code.
 """
 
 from __future__ import annotations

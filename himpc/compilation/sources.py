@@ -22,9 +22,10 @@ def digest_of(function: Callable[..., Any]) -> bytes:
 
 
 def sources_of(function: Callable[..., Any]) -> list[Path]:
-    """Returns the file of a function and all files that it imports, directly or through others, from this
-    package, from its own package and from the packages of the inline kernels that it calls: they define these
-    kernels and constants. The files of the tool chain, which sets the compiler's options, are included."""
+    """Returns the file of a function and all files that it imports, directly or through others. These files
+    define the inline kernels and constants that the function uses. Only files of this package, of the
+    function's package and of the packages of its inline kernels count. The files of the tool chain are
+    included: they set the compiler's options."""
     pieces = (getattr(each, "py_func", None) for each in function.__globals__.values())
     packages = {each.__module__.partition(".")[0] for each in (function, *filter(None, pieces))} | {_PACKAGE}
     files = {Path(function.__code__.co_filename)}

@@ -11,14 +11,14 @@ from himpc.export.kernel.whole_tick import RESET, TICK, control
 ARRAYS = ("data", "where", "whole", "whole_where", "loop", "loop_where")
 """The arrays of a controller, in the order of the arguments of `control`."""
 MAGIC, LAYOUT, SIZE, JOINTS, FIRST = range(5)
-"""What the words at the beginning of a controller's memory hold: a sign, which kernel it is for, the number
-of bytes and of joints, and from FIRST on, for each of ARRAYS, where it begins (bytes) and how many numbers it
-has."""
+"""Indices of the words at the beginning of a controller's memory: a constant that marks such a memory, the
+number of the kernel's layout, the number of bytes, and the number of joints. From FIRST on, each array of
+ARRAYS has two words: the byte at which it begins and its number of elements."""
 WORDS = 32
 """Number of these words, 8 bytes each."""
 SIGN = struct.unpack("<q", b"himpclab")[0]
 EXPORTED = ("himpc_tick", "himpc_reset", "himpc_set", "himpc_check")
-"""The functions of the object."""
+"""The functions of the object file."""
 _TYPES = (VECTOR, INDICES, INDICES, INDICES, VECTOR, INDICES, WHOLE, WHOLE, VECTOR, VECTOR, VECTOR, VECTOR)
 _ARRAY = "ptr, ptr, i64, i64, ptr, i64, i64"
 

@@ -30,9 +30,9 @@ def shifted(before: Motion, s: float, N: int, dt: float, bounds: MotionBounds) -
     """Returns the inputs (N, n) of the previous plan from s seconds after its start on, on a new grid of N
     times dt.
 
-    Each is the mean of the old input over the new interval, so the velocities at the new knots are the old
-    plan's at those times, for every control rate and even if N or dt has changed. Beyond its end the old plan
-    brakes: constant velocity there would make hard limits infeasible for all later steps.
+    Each input is the mean of the old input over the new interval. Therefore the velocities at the new knots
+    are those of the old plan at the same times, for every control rate, also after a change of N or dt.
+    After its end the old plan brakes: with constant velocity, hard limits would become infeasible.
     """
     reach = s + N * dt
     length = len(before.U) * before.dt

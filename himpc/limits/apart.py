@@ -17,8 +17,8 @@ _FAINT = 1e-5
 
 
 def kept_apart(rows: Rows, joints: int, U: Array) -> Array:
-    """Returns increments (N, n), N·m: U with another torque of the first knot, which brings the rows behind
-    those of joints closest to being met, by least squares, and keeps what U meets of the joints' own rows.
+    """Returns U, (N, n) N·m, with a changed first increment. The change minimises the violation of the rows
+    that are not rows of joints, by least squares. Rows of joints that U satisfies stay satisfied.
 
     A step of torque moves a row in proportion to L[:, 0]. With one number x per joint, the joints' own rows
     are bounds on x, which 0 meets, and rows of a direction D_c are one bound on D_c·x: the tightest of all

@@ -43,14 +43,18 @@ def named(
     how: dict[str, Any],
     events: Iterable[tuple[float, Event]] | None = None,
 ) -> dict[str, Any]:
-    """Every field of telemetry by its name, and the data that reproduce the run. A field per joint that does
-    not exist for this kind of run is NaN, such as torque bounds at velocity level.
+    """Returns every field of telemetry by its name, and the data that reproduce the run. A field that does
+    not exist for this kind of run, such as torque bounds at velocity level, is NaN.
 
-    For an independent replay there are also: `q_measured` and `v_measured` (the measurements of the
-    controller), `tau_0` (the torque, at velocity level the command, that acted until the tick), the `tip`'s
-    frame, `a_max` (n,), and the constants of the position bound: `position_margin` (rad), `position_reaction`
-    (s) and `position_return_rate` (1/s) of `himpc.limits.viability`, NaN where it is not in force. x_d, v_d
-    and a_d at the next knot are those of the next row.
+    More fields, for an independent replay:
+
+    - `q_measured`, `v_measured`: the state that the controller got;
+    - `tau_0`: the torque until the tick; at velocity level, the command;
+    - `tip`: the name of the frame; `a_max`: (n,);
+    - `position_margin` (rad), `position_reaction` (s), `position_return_rate` (1/s): the constants of
+      `himpc.limits.viability`, NaN if it is not in force.
+
+    x_d, v_d and a_d at the next knot are those of the next row.
 
     Args:
         robot, settings: those at the end of the run.

@@ -50,11 +50,11 @@ def iiwa14_circle() -> TorqueScene:
 def iiwa14_circle_paper() -> TorqueScene:
     """`iiwa14-circle-paper`: the same reference, stack and weights as section VI most likely simulated them.
 
-    The paper leaves open what its plant was. A weightless robot without friction or armature, started with
-    the reference's velocity, under no velocity limit and with the position rows (32d) as printed gives its q₁
-    error to a thousandth (8.768°, paper 8.773), and joints 5 and 7 at their limits from 3.5 s on, as section
-    VI-B says of [3.8, 4] s. There three QPs have no solution: their position rows give
-    way, and `solver.unsolved` counts them. With `limits.position=viability`, this lab's default
+    The paper does not describe its plant. We take a weightless robot without friction or armature. It starts
+    with the reference's velocity, has no velocity limits, and keeps the position rows (32d) as printed. The
+    error of q₁ is then 8.768° (paper: 8.773°), and joints 5 and 7 are at their limits from 3.5 s on (section
+    VI-B: in [3.8, 4] s). Three QPs have no solution: their position rows give way, and `solver.unsolved`
+    counts them. With `limits.position=viability`, this lab's default
     elsewhere, no QP fails and q₁ is 9.15°. Everything stays settable: `plant.gravity=true`,
     `limits.velocity=true`.
 

@@ -22,9 +22,9 @@ class Handover:
     """Runs two controllers and changes the torque from one to the other: τ = (1 − s) τ_old + s τ_new.
 
     s = 3x² − 2x³ rises from 0 to 1 in HANDOVER_SECONDS. The torques of two controllers differ, for example by
-    the error of a model; the blend spreads this step over time. Both see the measured
-    state and the torque that really acted, so each closes its own loop all the time, and their blend lies
-    within the torque bounds if both torques do. Evidence and prediction are the new controller's.
+    the error of a model; the blend spreads this step over time. Both controllers get the measured state and
+    the torque that acted. If both torques lie within the torque bounds, the blend does as well. Evidence and
+    prediction are those of the new controller.
     """
 
     def __init__(self, old: Controller, new: Controller) -> None:

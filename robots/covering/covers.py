@@ -40,8 +40,8 @@ _CLOSE = 2.5
 def made_cover(robot: Robot, meshes: bool = True, tries: int = 1) -> Cover:
     """Makes the cover of a robot from its URDF and its solids.
 
-    Left out are the pairs that the plant leaves out, pairs whose capsules are nearer than 10 mm at home,
-    and pairs whose capsules touch in many postures in which the solids do not.
+    A pair is left out if the plant leaves it out, if its capsules are nearer than 10 mm at home, or if its
+    capsules touch in many postures in which the solids do not.
 
     Args:
         robot: it has its collision geometry.

@@ -45,10 +45,13 @@ class Excluded:
     """Two bodies whose contact is left out: first < second, Pinocchio indices of their joints, 0 for the
     base.
 
-    names: a link of each. why: "neighbours" (a joint connects them), "home" (they touch at home), "always"
-    (they touch in nearly every posture), "hollow" (their hulls, which fill the hollows of the real links,
-    touch in postures in which the links do not) or, in a cover, "cover" (only their capsules touch, in many
-    postures).
+    names: one link of each body. why: the reason, one of these words:
+
+    - "neighbours": a joint connects them;
+    - "home": they touch at home;
+    - "always": they touch in nearly every posture;
+    - "hollow": their hulls fill the hollows of the links and touch in postures in which the links do not;
+    - "cover": only their capsules touch, in many postures.
     """
 
     first: int

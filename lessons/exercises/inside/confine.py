@@ -177,9 +177,9 @@ def hide_the_lab() -> None:
 
 
 def refuse(places: Sequence[Path], refused: RefusedCalls) -> None:
-    """Makes Python itself refuse, in every thread, to open files that no import reads, to start programs, to
-    send signals and to use the network, because the operating system may not refuse them. This alone does not
-    stop hostile code.
+    """Makes Python refuse four things in every thread: to open files that no import reads, to start programs,
+    to send signals, and to use the network. It is needed where the operating system does not refuse them. It
+    does not stop hostile code alone.
 
     Args:
         places: places that imports may read.

@@ -3,8 +3,8 @@
     himpc-lab grade FILE.py
     himpc-lab --scene iiwa14-table --controller FILE.py    # then set "Keep distances"
 
-∇dᵀ q̇ at the next knot at least −v_stop(d − d_safe), for each of the nearest pairs, with
-v_stop(s) = a (√(t² + 2s/a) − t), the speed from which s is enough to stop.
+For each of the nearest pairs, ∇dᵀ q̇ at the next knot must be at least −v_stop(d − d_safe).
+v_stop(s) = a (√(t² + 2s/a) − t) is the speed from which the pair can stop within s.
 """
 
 import numpy as np
