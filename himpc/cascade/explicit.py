@@ -103,9 +103,9 @@ def solve_explicit(
 def _judged(
     solution: QPSolution, level: WhiteLevel, A: Array, low: Array, high: Array, length: Array, U_above: Array
 ) -> QPSolution:
-    """Returns the solution with its residual. The residual is the larger of two numbers: the distance by which
-    a Newton step on the active rows moves an increment, as a share of 1 N·m or of the increment, and the
-    violation of the rows, N·m."""
+    """Returns the solution with its residual. The residual is the larger of two numbers: the distance by
+    which a Newton step on the active rows moves an increment, as a share of 1 N·m or of the increment, and
+    the violation of the rows, N·m."""
     x, multipliers = solution.x, solution.multipliers
     if not (np.isfinite(x).all() and np.isfinite(multipliers).all()):
         return replace(solution, kkt_residual=float("inf"))

@@ -60,7 +60,7 @@ def descended(solution: QPSolution, c: Array, A: Array, low: Array, high: Array)
     Below a level that uses nearly all freedom, the feasible set is almost a point. A solver that starts from
     an infeasible point then takes rounding errors for a contradiction; this one starts from a feasible point.
     A row that blocks a step is linearly independent of the active rows. After a step of length zero, the
-    first row in order enters or leaves (Bland's rule): no active set occurs twice.
+    first row in order enters or leaves (Bland's rule). Therefore no active set occurs twice.
     """
     if not ((low <= 0.0) & (high >= 0.0)).all():
         return None

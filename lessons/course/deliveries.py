@@ -32,10 +32,9 @@ PLOTS = (PLACE, HAND, WAY)
 OVERLAP = Step(
     title="Begin the next, finish this",
     text=r"""
-    A round to three people is a list of tasks that alternate: the base drives to a place near the
-    person, the hand stays at the person's hand for one second, the base drives to the next place, …
-    The controller gets a window of $L$ tasks of this list, $[\mathcal T_{l_0}, \ldots, \mathcal
-    T_{l_0+L-1}]$. When
+    A round to three people is a list of tasks that alternate: base to a place near the person, hand
+    to the person's hand for one second, base to the next place, … The controller gets a window of
+    $L$ tasks of this list, $[\mathcal T_{l_0}, \ldots, \mathcal T_{l_0+L-1}]$. When
     $\mathcal T_{l_0}$ is done the window moves on by one. The ghost has $L = 1$: it drives, reaches,
     waits, drives. Here $L = 2$: the task of now ranks first, the next one second. For both a task
     of the hand is done when it was within 2 cm of its goal for a second, and one of the base as

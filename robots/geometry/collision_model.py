@@ -45,7 +45,7 @@ class Excluded:
     """Two bodies whose contact is left out: first < second, Pinocchio indices of their joints, 0 for the
     base.
 
-    names: one link of each body. why: the reason, one of these words:
+    names: one link of each body. why: one of these words:
 
     - "neighbours": a joint connects them;
     - "home": they touch at home;

@@ -61,7 +61,7 @@ REFERENCE = (
         ("himpc/controllers/hqp.py", "This form needs no inverse of a product of Jacobians"),
     )),
     Exempt("mathematics", HTMPC + "equations.py::test_the_shifted_plan_has_the_old_plans_velocities", (
-        ("himpc/htmpc/continuing.py", "Each is the mean of the old input over the new interval"),
+        ("himpc/htmpc/continuing.py", "Therefore the velocities at the new knots"),
     )),
     Exempt("mathematics", HTMPC + "equations.py::test_prediction_is_the_integral_of_the_inputs", (
         ("himpc/htmpc/prediction.py", "The input is constant between knots"),
@@ -115,7 +115,7 @@ REFERENCE = (
         ("himpc/cascade/null_space.py", "Where the rank differs between knots"),
     )),
     Exempt("software", HIMPC + "cascade.py::test_corners_that_many_bounds_make_are_found", (
-        ("himpc/cascade/polish.py", "A row that blocks the way depends on none of those held"),
+        ("himpc/cascade/polish.py", "Therefore no active set occurs twice"),
     )),
     Exempt("software", HIMPC + "controller.py::test_the_controller_sees_no_mass", (
         ("himpc/kinematics/configuration.py", "Only geometry is used, no inertia or gravity"),
@@ -142,7 +142,7 @@ REFERENCE = (
         ("lessons/replay/script.py", "Measured computing times changed the run"),
     )),
     Exempt("software", LESSONS + "switch.py::test_the_torque_goes_from_one_controller_to_the_other", (
-        ("lessons/session/bumpless.py", "Both see the measured state and the torque"),
+        ("lessons/session/bumpless.py", "Therefore the blend lies within the torque bounds"),
     )),
     Exempt("software", LESSONS + "deadline.py::test_always_late_is_one_tick_of_delay", (
         ("lessons/session/deadline.py", "So one late tick costs one tick of holding"),
