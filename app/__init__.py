@@ -1,4 +1,4 @@
-"""The page: one simulation process per browser, the 3D view and the panels. The only door to viser.
+"""The page: one simulation process per browser, the 3D view and the panels. No other package imports viser.
 
 The way down, of a dragged target from the browser to the tick:
 1. The browser sends the pose of the gizmo. `server/guard` counts the bytes, `page/inlet` refuses values that

@@ -1,2 +1,1 @@
-"""Access to viser's private attributes, wrapped in functions, for what viser's public interface does not
-offer."""
+"""Functions that use viser's private attributes, where viser's public interface lacks a function."""

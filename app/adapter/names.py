@@ -53,7 +53,7 @@ ROW = ".mantine-Flex-root"
 ICON_BUTTON, CLOSES_NOTICE = ".mantine-ActionIcon-root", ".mantine-Notification-closeButton"
 SCROLLS = ".mantine-ScrollArea-viewport"
 STORED = "viser-user:"
-"""What viser puts before the keys of values that a browser stores."""
+"""The prefix that viser adds to the keys of values that a browser stores."""
 OF_THE_PAGE = (
     ("MessageHandler.tsx", f'LOCAL_STORAGE_PREFIX = "{STORED}"'),
     ("components/common.tsx", '<Flex align="center">'),
@@ -69,7 +69,7 @@ OF_THE_PAGE = (
 
 
 def check_names() -> None:
-    """Raises InputError if viser lacks one of the names that it has before a server is made."""
+    """Checks the names that exist before a server is made. Raises InputError if viser lacks one of them."""
     for place, names in OF_VISER.items():
         for name in names:
             require(reaches(viser, f"{place}.{name}"), name)

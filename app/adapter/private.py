@@ -37,24 +37,24 @@ except ImportError as error:
     ) from None
 
 Guard = Callable[[Mapping[str, Any]], dict[str, Any]]
-"""From the arguments viser gives to websockets' `serve`, its handler among them, to those that we give
-instead."""
+"""Takes the arguments that viser passes to `serve` of websockets, and returns the arguments that replace
+them."""
 
 _SERVING = threading.Lock()
 _NEEDED = ("process_request", "max_size")
 
 _UNSENT = 32_000
-"""Bytes that may wait in the socket's send buffer; the usual size, megabytes, holds seconds of old
-pictures."""
+"""Size of the socket's send buffer, B. The usual size, megabytes, can contain pictures that are seconds
+old."""
 
 
 def open_server(host: str, port: int, guard: Guard) -> viser.ViserServer:
     """Starts a viser server that checks every connection with `guard`, opens no public tunnel, and whose
     senders always wake up. Raises InputError, without listening, if `guard` cannot be installed."""
     self_test(guard)
-    # Malformed requests of strangers are not logged on the terminal.
+    # Malformed requests of unknown clients are not logged on the terminal.
     warnings.filterwarnings("ignore", r"\[viser\]", UserWarning)
-    # viser prints a greeting of its own, but the command promises exactly one line of output.
+    # viser would print its own greeting, but the command prints exactly one line.
     with _silent(), _guarded(guard) as served:
         server = viser.ViserServer(host=host, port=port, label="himpc-lab", verbose=False)
     try:
@@ -135,8 +135,8 @@ def _guarded(guard: Guard) -> Iterator[list[bool]]:
 
 
 def _keep_awake(server: viser.ViserServer) -> None:
-    """Replaces the wake-up events of viser's senders before they first wait: one sender serves all clients,
-    and each client has its own, which then sends at once, so that a picture arrives in one piece."""
+    """Replaces the wake-up events of viser's senders before they first wait. One sender serves all clients,
+    and each client also has a sender. A client's sender then sends a whole picture at once."""
     websockets, loop = server._websock_server, server.get_event_loop()
     websockets._broadcast_buffer.message_event = ThreadSafeEvent(loop)
 
@@ -231,8 +231,8 @@ Inlet = Callable[[Any, Callable[[Any], Awaitable[None]]], Awaitable[None]]
 
 
 def intercept(client: viser.ClientHandle, take: Inlet) -> None:
-    """Passes every message of this browser to `take` first. Exceptions of callbacks return to `take`, too;
-    viser would only print those of the 3D view."""
+    """Passes every message of this browser to `take` first. `take` also gets the exceptions of callbacks, of
+    which viser would only print those of the 3D view."""
     connection, scene = client._websock_connection, client.scene
     plain = connection._handle_incoming_message
 
@@ -247,8 +247,8 @@ Kind = Literal["write", "upload", "other"]
 
 
 def kind_of(message: Any) -> Kind:
-    """The kind of a message: it writes to a control (`uuid`, `updates`), begins an upload (for the control
-    `source_component_uuid`), or does anything else."""
+    """The kind of a message: one that writes to a control (`uuid`, `updates`), one that begins an upload (for
+    the control `source_component_uuid`), or another one."""
     match message:
         case _messages.GuiUpdateMessage():
             return "write"

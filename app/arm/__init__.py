@@ -1,2 +1,2 @@
-"""A real arm under an exported controller: a process of its own runs the loop, and whoever watches can only
-read its rows and give it orders, which it picks up when it has time."""
+"""A real arm under an exported controller. A separate process runs the loop. Other processes only read its
+rows and send it orders, and the loop reads the orders when it has time."""

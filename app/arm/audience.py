@@ -14,15 +14,15 @@ Array = NDArray[np.float64]
 
 
 class Audience(Protocol):
-    """A page that shows a drive and can drag its targets. No method may wait: the arm is stopped if the
-    process that watches it is silent."""
+    """A page that shows a drive and can drag its targets. No method may block: the arm is stopped if the
+    watching process is silent."""
 
     def look(self) -> list[Order]:
         """Returns the targets that were dragged since the last call. It is called continually."""
         ...
 
     def wish(self) -> str | None:
-        """Returns why the drive should end; None if it should go on."""
+        """Returns the reason why the drive should end; None if it should continue."""
         ...
 
     def given(self, order: Order) -> None:

@@ -13,13 +13,13 @@ from robots.arms.arm import Arm, Reading
 Array = NDArray[np.float64]
 
 STUCK = 5.0
-"""s after which a call of the arm that does not return ends the process; the arm then stops by itself."""
+"""Time, s, after which a call that has not returned ends the process. The arm then stops by itself."""
 
 
 @final
 class Bounded(Arm):
-    """Passes everything on to another arm. A library may wait for an answer that never comes, in code that
-    no exception reaches: then the system ends the process."""
+    """Passes all calls on to another arm. If the arm's library waits forever in compiled code, where no
+    exception can end it, the operating system ends the process."""
 
     def __init__(self, arm: Arm, stuck: float = STUCK) -> None:
         """stuck: s, see STUCK."""

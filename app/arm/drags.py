@@ -1,4 +1,4 @@
-"""The drags of a command line: at which time which target moves how far."""
+"""The drags of a command line: the time, the target and the distance of each."""
 
 from __future__ import annotations
 
@@ -76,7 +76,8 @@ def _task(session: TorqueSession, name: str) -> Any:
 
 
 def _place(task: Any, raw: Array) -> Array:
-    """Returns three coordinates with those of `raw` in their places; the kernel uses only these."""
+    """Returns three coordinates, with those of `raw` at the controlled axes; the kernel uses only these
+    axes."""
     full = np.zeros(3)
     full[_components(task, raw)] = raw
     return full

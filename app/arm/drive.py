@@ -31,7 +31,7 @@ _LOOK = 0.02
 _AT_ONCE = 100  # rows between two looks at the page
 _PRIORITY = 50
 _PATIENCE = 4.0
-"""s that a loop gets to end after it was told to; its own end takes at most 2."""
+"""Time, s, within which a loop must end after a request; it needs at most 2 s."""
 
 
 class Drag(NamedTuple):
@@ -153,7 +153,7 @@ class _Watcher:
                 break
 
     def _attend(self) -> None:
-        """Does what the audience wishes."""
+        """Performs the requests of the audience."""
         if self._audience is None:
             return
         for order in self._audience.look():
@@ -163,7 +163,7 @@ class _Watcher:
             self.ask(wish, True)
 
     def ask(self, why: str, wanted: bool = False) -> None:
-        """Asks the loop to end gently; wanted: whether nothing is wrong."""
+        """Asks the loop to end gently. wanted: whether this is a normal end, without a fault."""
         if self._asked is None:
             self._asked, self._wanted = why, wanted
             self._orders.stop()
@@ -267,7 +267,8 @@ def hurry(priority: int) -> None:
 
 
 def _work(plan: Drive, controller: NativeController, orders: Orders, block: Block, pipe: Any) -> None:
-    """The process of the loop. Interrupts are for the watcher, who then asks the loop to end gently."""
+    """The process of the loop. It ignores interrupts: the watcher gets them and asks the loop to end
+    gently."""
     signal.set_wakeup_fd(-1)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, lambda *_: orders.stop())

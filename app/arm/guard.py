@@ -1,4 +1,4 @@
-"""What ends the control of an arm."""
+"""The conditions that end the control of an arm."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _HOLD = FALLBACKS.index("hold")
 
 @dataclass(frozen=True)
 class Tolerances:
-    """What is still accepted.
+    """The limits of what is accepted.
 
     Attributes:
         missed: periods that may be missed one after another.
@@ -39,7 +39,7 @@ class Tolerances:
 
 @final
 class ArmGuard:
-    """Looks at every period of a loop; after `check` has given a reason, the loop must end."""
+    """Checks every period of a loop. After `check` has returned a reason, the loop must end."""
 
     def __init__(self, limits: ArmLimits, tolerances: Tolerances, period: float) -> None:
         """period: s."""
@@ -50,7 +50,7 @@ class ArmGuard:
     def check(
         self, reading: Reading, missed: int, hurried: bool, fallback: int, beats: int, now: float
     ) -> str | None:
-        """Returns why the control must end, None if it need not.
+        """Returns the reason why the control must end; None if it can continue.
 
         Args:
             reading: of this period.

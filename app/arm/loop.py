@@ -21,11 +21,11 @@ from robots.arms.arm import Arm, ArmLimits, ArmLost, Reading
 Array = NDArray[np.float64]
 
 RAMP_SECONDS = 0.5
-"""In this time the torque at the end is taken away."""
+"""Time, s, in which the torque is reduced to zero at the end."""
 MOST_SECONDS = 1.5
-"""After this time the end is over, whether or not the arm stands still."""
+"""Time, s, after which the loop ends, also if the arm still moves."""
 ASKED = "the watcher asked for it"
-"""Why a loop ended, if that was the watcher's wish."""
+"""The reason of an end that the watcher requested."""
 _STILL = 0.02  # rad/s
 _CALMING = 0.3  # share of the largest torque that acts against the largest velocity
 _MOVED = 0.02  # rad, between the first look at the arm and the loop's beginning
@@ -78,8 +78,8 @@ def run(
     period: float,
     delay: int = 0,
 ) -> Ended:
-    """Drives an arm until it is told to stop, or the guard finds a reason; then the torque is taken away
-    gently and the arm holds its position by itself.
+    """Drives an arm until it gets an order to stop or the guard finds a reason. The torque is then reduced to
+    zero smoothly, and the arm holds its position by itself.
 
     Args:
         arm: the arm, not yet under control.
@@ -135,11 +135,11 @@ class _Cycle:
         self._t: float | None = None
 
     def begin(self, start: Array) -> str | None:
-        """Takes the arm over; returns why that cannot be done."""
+        """Takes control of the arm; returns the reason if this is impossible, else None."""
         limits = self._limits
         self._controller.set(LIMITS, 0, [*limits.tau, *limits.v, *limits.q_lower, *limits.q_upper])
         reading = self._next()
-        # What acts is known without gravity: the controller's increments start from that torque.
+        # The acting torque is known without gravity. The controller's increments start from it.
         self._tau = reading.tau
         self._controller.reset(reading.tau)
         moved = np.abs(reading.q - start).max()

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 @final
 class Model:
-    """Follows the clock of the arm, so that missed periods pass here, too.
+    """Simulates up to the arm's clock, including periods that the arm missed.
 
     Attributes:
         q, tau: of the simulated robot, (n,) rad and N·m (without gravity).

@@ -1,7 +1,7 @@
-"""Shared memory between the loop of an arm and its watcher: orders go down, and nobody waits.
+"""Shared memory for the orders of a watcher to the loop of an arm. Neither process waits for the other.
 
-The watcher writes targets and a beat that says that it is still there. The loop looks once per period; if the
-watcher is writing at that moment, the loop looks again in the next period.
+The watcher writes targets, and a counter that shows that it is still running. The loop looks once per period;
+if the watcher is writing at that moment, the loop looks again in the next period.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Orders:
     # ---------------------------------------------------------------- the watcher
 
     def beat(self) -> None:
-        """Says that the watcher is there."""
+        """Shows that the watcher is still running."""
         self._head[_BEAT] += 1
 
     def stop(self) -> None:
@@ -62,17 +62,17 @@ class Orders:
 
     @property
     def beats(self) -> int:
-        """How often the watcher has said that it is there."""
+        """Number of times that the watcher has called `beat`."""
         return int(self._head[_BEAT])
 
     @property
     def stopped(self) -> bool:
-        """Whether the loop shall end."""
+        """Whether the loop must end."""
         return bool(self._head[_STOP])
 
     @property
     def taken(self) -> int:
-        """How many orders `news` has returned or replaced by later ones."""
+        """Number of orders that `news` has returned, or that later orders have replaced."""
         return int(self._taken.sum())
 
     def news(self) -> list[Order]:

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 @final
 class PageRows:
-    """Fills rows with what is known of an arm; the rest is NaN. Torques are those without gravity."""
+    """Fills rows of telemetry with the data of an arm. Unknown fields are NaN. Torques exclude gravity."""
 
     def __init__(
         self, layout: Layout, manifest: dict[str, Any], robot: Robot, limits: ArmLimits, period: float

@@ -22,7 +22,7 @@ from robots.arms.arm import ArmLimits
 Array = NDArray[np.float64]
 
 _NEAR = 0.05
-"""m or rad, how far from its reference a task may be when the arm is taken over."""
+"""Largest error of a task, m or rad, at which the controller may take over the arm."""
 
 
 class Prepared(NamedTuple):

@@ -1,4 +1,5 @@
-"""A server that follows a class on another one: it leads its own learners and tells about them."""
+"""A server that belongs to a class whose teacher uses another server. It brings its own learners to the
+class's steps and reports about them."""
 
 from __future__ import annotations
 
@@ -51,8 +52,8 @@ class Branch(Room):
     # ---------------------------------------------------------------- the link
 
     def linked(self) -> None:
-        """Called when the class's server has let this one in: everything will be told again, as soon as that
-        server has told the state of the class."""
+        """Called when the class's server has accepted this server. As soon as the state of the class arrives,
+        this server reports all its learners again."""
         with self._lock:
             self._told, self._linked = {}, False
 
@@ -64,7 +65,8 @@ class Branch(Room):
             self._keep()
 
     def hear(self, now: ClassNow) -> None:
-        """Takes the state of the class, and leads the learners there. Raises InputError if it cannot be."""
+        """Takes the state of the class, and brings the learners to its step. Raises InputError for an
+        impossible state."""
         if now.place is not None and now.place[0] not in (each["name"] for each in self.course):
             nowhere = {"place": None, "is_open": None, "rounds": [], "running": False, "truth": None}
             now = msgspec.structs.replace(now, **nowhere)  # a lesson of the teacher's own
@@ -149,5 +151,6 @@ class Branch(Room):
 
 
 def _lasting(told: LearnerNow) -> LearnerNow:
-    """What is told again whenever it changes; that the class goes on is no news of a learner who has left."""
+    """The data that are reported whenever they change. For a learner who has left, the step of the class does
+    not count."""
     return told if told.here else msgspec.structs.replace(told, visit=0, answer=None)

@@ -108,8 +108,8 @@ class Gathering:
         return replace(self, running=False, truth=truth)
 
     def guess(self) -> Answer | None:
-        """The prediction with which a robot runs whose learner made none: the class's favourite. None if the
-        step asks for none."""
+        """The prediction that is used for a learner without one: the most frequent answer of the class. None
+        if the step asks for no prediction."""
         prediction = None if self.place is None else _prediction(self.place)
         match prediction:
             case None:
@@ -203,8 +203,8 @@ class Gathering:
         answer: object,
         since: float,
     ) -> Gathering:
-        """The class after another server told of a learner; as `seen`. answer: their prediction; since: when
-        they last did anything, s."""
+        """The class after a report of another server about a learner, see `seen`. answer: the learner's
+        prediction; since: the time of the learner's last action, s."""
         known = self.members[who]
         member = replace(known, at=at, done={**known.done, **done}, since=since)
         return self._with(who, member)._expecting(who, answer, since)

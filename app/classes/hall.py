@@ -23,7 +23,7 @@ from robots import InputError
 
 SERVERS = 20
 """Largest number of other servers of a class."""
-_LETTERS = "abcdefghjkmnpqrstuvwxyz23456789"  # that are not taken for one another
+_LETTERS = "abcdefghjkmnpqrstuvwxyz23456789"  # characters that cannot be confused with each other
 _CODE = 6
 
 
@@ -100,7 +100,8 @@ class Hall(Room):
             self._keep()
 
     def who(self, number: int) -> str:
-        """The identity of the member with this number. Raises InputError if they have no robot, or left."""
+        """The identity of the member with this number. Raises InputError if the member has no robot or has
+        left."""
         found = ((one, each) for one, each in self.state.members.items() if each.number == number)
         who, member = next(found, ("", None))
         if member is None or member.kind != "robot" or not member.here:

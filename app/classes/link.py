@@ -37,7 +37,7 @@ class _Direct(connect):
 
 
 class Link:
-    """Connects to the class, again and again, and passes on what both sides tell."""
+    """Connects to the class, tries again after a failure, and passes on the messages of both sides."""
 
     def __init__(self, branch: Branch, address: str, key: str) -> None:
         """address: of the class's server, as `as_origin` returns it; key: the key of the class."""
@@ -80,7 +80,7 @@ class Link:
                 self._report(f"{self._address} {ended}; {_AGAIN}")
             except (OSError, TimeoutError, WebSocketException, InputError):
                 self._report(f"{self._address} cannot be reached; {_AGAIN}")
-            except Exception as error:  # without the link, nothing of this server would reach the class
+            except Exception as error:  # without the link, the class would get no data of this server
                 self._report(f"the link to {self._address} failed ({type(error).__name__}); {_AGAIN}")
             finally:
                 self._branch.cut_off()
@@ -106,7 +106,7 @@ class Link:
         )
 
     async def _talk(self, line: ClientConnection) -> None:
-        """Tells and hears until the connection ends. Raises an error when it does."""
+        """Sends and receives until the connection ends. Then it raises an error."""
         await line.send(msgspec.json.encode(Join(self._branch.server)), text=True)
         self._branch.linked()
         both = [asyncio.ensure_future(each) for each in (self._tell(line), self._hear(line))]
@@ -152,5 +152,5 @@ class Link:
 
 
 def _plain(reason: str) -> str:
-    """What can be printed of a reason, without the full stop."""
+    """The printable characters of a reason, without the full stop."""
     return "".join(each for each in reason if each.isprintable()).strip().rstrip(".")

@@ -9,7 +9,7 @@ PATIENCE = 10.0
 
 
 class BuildQueue:
-    """Who waits for a robot at the class's step, and whose robot is being built."""
+    """The learners who wait for a robot at the class's step, and those whose robot is being built."""
 
     def __init__(self, at_once: int) -> None:
         """at_once: the number of robots that are built at the same time."""
@@ -18,8 +18,8 @@ class BuildQueue:
         self._building: dict[str, float] = {}  # when it began, s
 
     def clear(self) -> None:
-        """Nobody waits any more, except for those whose robots are being built for a step that is no longer
-        the class's: they come first."""
+        """Removes all who wait. Learners whose robots are being built for an earlier step of the class stay,
+        and come first."""
         self._waiting, self._building = list(self._building), {}
 
     def enter(self, who: str) -> None:
@@ -34,11 +34,12 @@ class BuildQueue:
             self._waiting.remove(who)
 
     def has(self, who: str) -> bool:
-        """Whether somebody waits for a robot, or for its being ready."""
+        """Whether somebody waits for a robot to be built or to become ready."""
         return who in self._building or who in self._waiting
 
     def next(self, ready: Collection[str], now: float) -> list[str]:
-        """Whose robots are to be built now. ready: those whose robots are at the class's step; now: s."""
+        """The learners whose robots must be built now. ready: the learners whose robots are at the class's
+        step; now: s."""
         self._building = {
             who: since for who, since in self._building.items() if who not in ready and now - since < PATIENCE
         }
@@ -48,7 +49,7 @@ class BuildQueue:
         return chosen
 
     def before(self) -> dict[str, int]:
-        """By learner, how many others come first; 0 for those whose robot is being built."""
+        """For each learner the number of learners before them; 0 while the robot is being built."""
         return {
             **dict.fromkeys(self._building, 0),
             **{who: len(self._building) + k for k, who in enumerate(self._waiting)},

@@ -1,5 +1,6 @@
-"""What the servers of one class tell each other: data with bounds, of which nothing is run or shown as HTML.
-The server with the teacher's page tells the state of the class; the others tell about their learners."""
+"""The messages between the servers of one class. The server with the teacher's page sends the state of the
+class; the other servers send the states of their learners. The data have bounds, and nothing of them is run
+or shown as HTML."""
 
 from __future__ import annotations
 

@@ -18,10 +18,10 @@ from app.link.messages import Told
 from robots import InputError
 
 RATE = 5.0
-"""Looks at the learners, Hz."""
+"""Rate at which the learners are checked, Hz."""
 BUILDS = 2 * (os.cpu_count() or 1)
 """Robots that are built at once when the class goes to another step; the others wait for their turn."""
-_TURN = 0.05  # s between two checks whose turn it is
+_TURN = 0.05  # s between two checks of the queue
 _LOADING = 30.0  # s after which a step that was not loaded is loaded again
 
 
@@ -43,8 +43,8 @@ class Room(ABC):
         self._state = Gathering(named)
         self._lock = threading.RLock()
         self._led: dict[str, tuple[Lecture | None, float]] = {}
-        """By learner: the run that was reported before the class brought them to its step, None if they were
-        there already, and when."""
+        """For each learner: the run that was reported before the class brought the learner to its step (None
+        if the learner was there already), and the time."""
         self._builds = BuildQueue(BUILDS)
         self._due: set[str] = set()
         """The learners whose robots run the step as soon as it is loaded."""
@@ -243,4 +243,4 @@ def begin(learner: SimulationClient, lecture: Lecture | None, state: Gathering) 
 
 
 def _nothing() -> None:
-    """Used until somebody wants to hear."""
+    """Does nothing: used until a listener is set."""

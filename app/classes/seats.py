@@ -10,7 +10,7 @@ from app.classes.views import View, for_all
 
 
 class Seats:
-    """What shows a view on each learner's page, and the view that it shows now."""
+    """For each learner's page the function that shows a view, and the view that is shown now."""
 
     def __init__(self, vote: str) -> None:
         """vote: the page on which watchers vote; "" if learners have robots of their own."""

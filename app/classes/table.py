@@ -20,8 +20,8 @@ COLUMNS = (
 
 
 def table(gathering: Gathering) -> str:
-    """One line per person and step that they voted on or ran; a person who did neither has one line without a
-    step. Without names, there is no such column."""
+    """One line for each person and each step on which the person voted or which the person ran. A person
+    without such a step has one line without a step. A class without names has no column for them."""
     columns = COLUMNS if gathering.named else tuple(each for each in COLUMNS if each != "name")
     text = io.StringIO()
     writer = csv.DictWriter(text, columns, extrasaction="ignore", lineterminator="\n")

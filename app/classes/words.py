@@ -1,4 +1,4 @@
-"""What the pages of a class may send; everything else is refused."""
+"""The messages that the pages of a class may send; all others are refused."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A scene that was requested and that the simulation has not reported yet."""
+"""A requested scene that the simulation has not reported yet."""
 
 from __future__ import annotations
 

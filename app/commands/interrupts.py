@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 PATIENCE = 4.5
 """Time, s, that a command has to end by itself."""
-_AGAIN = 0.05  # s after which a swallowed interrupt is raised again
+_AGAIN = 0.05  # s after which an interrupt that a library ignored is raised again
 _LATER = 0.02  # s after which it is raised if that happens while the swallowed one is still being reported
 
 Interrupted = threading.Event

@@ -32,8 +32,8 @@ def print_hints(all_hints: tuple[str, ...], count: int) -> None:
 
 
 def check_exercise(file: Path, seed: int, hints: int, json: str | None) -> int:
-    """Shows and tests the exercise of a teacher's file. Exit code 0: it can be used; 1: something is to be
-    mended."""
+    """Shows and tests the exercise of a teacher's file. Exit code 0: the exercise can be used; 1: the report
+    names errors."""
     from lessons.exercises.own import exercise_in
     from lessons.exercises.prove import prove
     from lessons.parallel import on_cores

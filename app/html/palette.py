@@ -9,7 +9,7 @@ RGB = tuple[int, int, int]
 WHITE: RGB = (255, 255, 255)
 BLACK: RGB = (0, 0, 0)
 LIGHT_PAGE, DARK_PAGE = WHITE, (36, 36, 36)
-"""What stands behind lists and plots; the 3D view is white, or darker than the page."""
+"""Backgrounds of lists and plots; the 3D view is white, or darker than the page."""
 
 BAD: RGB = (215, 38, 38)
 GOOD: RGB = (22, 158, 100)

@@ -117,8 +117,8 @@ def spawned(worker: str, theirs: socket.socket) -> Spawned:
 
 
 def forked_here(work: Callable[[Wire], object], theirs: socket.socket) -> Spawned:
-    """Returns a fork of this process, which has in memory all that it needs; to be called before there are
-    threads. Unlike other children it does not end with this process.
+    """Returns a fork of this process, which shares all loaded data. Call this before threads start. Unlike
+    other children it does not end with this process.
 
     Args:
         work: what the child does with its end of the socket.

@@ -45,7 +45,7 @@ class Process:
 
     @property
     def preparing(self) -> str | None:
-        """What the child waits for before it starts; None afterwards."""
+        """The reason, as a sentence, why the child has not started yet; None afterwards."""
         child = self._child
         return child.doing if child.pid is None and not self._ended.is_set() else None
 

@@ -13,7 +13,7 @@ from app.link.process import Process
 
 
 class Spares:
-    """Keeps one child process started in advance."""
+    """Starts one child process in advance, for the next browser."""
 
     def __init__(self, worker: str, lent: ForkServer | None = None) -> None:
         """

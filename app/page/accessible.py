@@ -1,5 +1,5 @@
-"""What viser's page lacks for WCAG 2.1 AA, added in the browser: names of its inputs and buttons, the
-language, and colours with enough contrast."""
+"""Adds to viser's page what WCAG 2.1 AA requires: names of inputs and buttons, the language, and colours with
+enough contrast."""
 
 from __future__ import annotations
 

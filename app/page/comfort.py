@@ -1,4 +1,4 @@
-"""What a page does for people who do not see it, or who do not bear motion."""
+"""Help for people who use a screen reader, or whom motion on the screen disturbs."""
 
 from __future__ import annotations
 
@@ -36,7 +36,8 @@ ASK_WINDOW = """try {
 """Stores the size of the window under a key: the scene of a page that connects again is narrower, as its
 panels are docked."""
 
-# A screen reader says changes of a region that was there before, so the region outlives the page's scenes.
+# A screen reader announces changes of a region that existed before. The region therefore stays when a scene
+# is replaced.
 _BEGIN = """(() => {
   const line = document.getElementById(%(line)s) ?? document.createElement("div");
   line.id = %(line)s;

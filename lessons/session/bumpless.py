@@ -23,8 +23,7 @@ class Handover:
 
     s = 3x² − 2x³ rises from 0 to 1 in HANDOVER_SECONDS. The torques of two controllers differ, for example by
     the error of a model; the blend spreads this step over time. Both controllers get the measured state and
-    the torque that acted. Therefore the blend lies within the torque bounds if
-    both torques do. Evidence and
+    the torque that acted. Therefore the blend lies within the torque bounds if both torques do. Evidence and
     prediction are those of the new controller.
     """
 
