@@ -31,7 +31,7 @@ from lessons.scenes.names import ALL_SCENES
 if TYPE_CHECKING:
     from app.page.layout import Stage
 
-NARROW = 1000  # pixels with no room for panels at both sides, as in the cell of a notebook
+NARROW = 1000  # px: a narrower window, as in the cell of a notebook, has no room for panels at both sides
 _BROKEN = (
     "This page cannot be shown: {}. Start again loads the scene anew; if that does not help, reload the page "
     "and choose another scene."
@@ -68,7 +68,7 @@ class Page:
         self._event_loop = loop
         self._notebook, self._comfort = notebook, comfort
         self._phone = self._narrow = False
-        self._seen: tuple[str | None, ...] | None = None  # the scene to which the camera was turned
+        self._seen: tuple[str | None, ...] | None = None  # the scene for which the camera was turned
         self._stage: Stage | None = None
         self._built: Ready | None = None
         self._trouble: Trouble | None = None

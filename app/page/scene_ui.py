@@ -23,8 +23,8 @@ from lessons.events import Event
 
 @dataclass(frozen=True, eq=False)
 class Context:
-    """What a face needs from its page. in_view: what the browser shows; bindings: for the settings of this
-    kind; theme: called with each new theme, True for dark."""
+    """The data of a page that its user interface needs. in_view: what the browser shows; bindings: for the
+    settings of this kind; theme: called with each new theme, True for dark."""
 
     client: viser.ClientHandle
     in_view: InView

@@ -79,7 +79,7 @@ class TorqueFace:
         self._start.on_recall = self._recall
 
     def open_plots(self, plots: viser.PanelHandle | viser.GuiTabGroupHandle) -> None:
-        # A QP of one knot is small enough to be looked at first, so its tab precedes the others.
+        # The QP of one knot is small enough for a beginning; its tab comes first.
         if self._context.settings.horizon == 1:
             self._inside_tab = plots.add_tab("Inside")
 
@@ -126,7 +126,7 @@ class TorqueFace:
         context, ready = self._context, self._context.ready
         tip = self._tip()
         self._frames = TargetFrames(scene)
-        self._frames.desired(tip[:3], tip[[4, 5, 6, 3]])  # until the first tick is reported
+        self._frames.desired(tip[:3], tip[[4, 5, 6, 3]])  # valid until the first tick is reported
         self._add_targets(scene)
         self._links = LinkPicker(robot, ready.robot, self._tasks.choose)
         self._ellipsoids = EllipsoidView(scene, ready.robot, context.colours)

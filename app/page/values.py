@@ -13,7 +13,7 @@ LONGEST = 200_000
 
 
 class NotAllowed(Exception):
-    """Raised with a sentence that says what is refused and why."""
+    """A value is refused; the message says which value and why."""
 
 
 def allowed(handle: viser.GuiInputHandle[Any], updates: Any) -> Any:

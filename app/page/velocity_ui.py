@@ -167,8 +167,8 @@ class VelocityFace:
         self._put(name, (x, y, z))
 
     def _add_obstacle(self) -> None:
-        """Adds a ball in front of the hand, as seen from the base: close enough to have an effect, but not
-        yet in the way."""
+        """Adds a ball in front of the hand, as seen from the base. It is close enough to have an effect, but
+        it does not block the hand."""
         poses = self._context.poses()
         if poses is None:
             return

@@ -27,8 +27,8 @@ _ENTRY = 1024  # B of memory that each part of an upload needs in addition to it
 
 @dataclass
 class Bucket:
-    """A token bucket that fills at `rate` and holds `size`. An amount that exceeds the content is owed, and
-    `take` says how long to wait until the debt is paid."""
+    """A token bucket that fills at `rate` up to `size`. `take` may take more than the content: it returns the
+    time until the bucket is no longer negative."""
 
     rate: float
     size: float
@@ -40,7 +40,7 @@ class Bucket:
         self.left, self.at = self.size, self.now()
 
     def take(self, amount: float) -> float:
-        """Takes an amount; returns the time in s until the bucket has paid for it."""
+        """Takes an amount; returns the time, s, until the content is no longer negative."""
         now = self.now()
         self.left = min(self.size, self.left + self.rate * (now - self.at)) - amount
         self.at = now

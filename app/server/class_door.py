@@ -1,5 +1,5 @@
-"""Who may open the pages of a class: the owner's secret opens the teacher's page, the class's code gives only
-the right to vote and to watch, and the key of the class lets other servers take part."""
+"""Access control for the pages of a class. The owner's secret opens the teacher's page. The class's code
+gives the right to vote and to watch. The key of the class lets other servers take part."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class ClassDoor:
                 return NO_CLASS
             return _page("phone", host, self.sockets.phone)
         if QUERY in request.path and not is_upgrade(request):
-            return door.judge(request, who) or _NOT_THE_TEACHER  # it puts the secret into a cookie
+            return door.judge(request, who) or _NOT_THE_TEACHER  # the response puts the secret into a cookie
         if door.role(request, who) != "owner":
             return _NOT_THE_TEACHER
         if plain == _TEACHER:

@@ -22,7 +22,7 @@ ELSEWHERE = frozenset({"websocket", "playbackPath"})
 NAME = "page"
 """The page's name below a path of another site, see `app.server.prefix`."""
 SELF = "'self'"
-"""In place of an origin: that of the page itself, behind a proxy that serves other pages as well."""
+"""Used in place of an origin: the origin of the page itself, for a proxy that also serves other pages."""
 _NO_FRAMES = {"Content-Security-Policy": "frame-ancestors 'none'", "X-Frame-Options": "DENY"}
 _ON_EVERY_ANSWER = {
     "X-Content-Type-Options": "nosniff",
@@ -84,7 +84,8 @@ class Door:
         if not is_upgrade(request) and _is_embedded(headers, bool(self.embedders)):
             return _foreign("A page of another site embeds this page.")
         if self.proxy_only and not _PLAIN.fullmatch(request.path.partition("?")[0]):
-            # The proxy may take //v/x for /v/x, where it asks for no password, and we would not.
+            # A proxy may treat //v/x as /v/x, for which it asks no password, while this server treats them as
+            # different.
             return _foreign("Its address is written in an unusual way.")
         if _leads_away(request) and urlsplit(request.path).path != f"/{NAME}":
             return _foreign("Its address would connect the page to another server.")
@@ -110,7 +111,8 @@ class Door:
                 headers[name] = value
 
     def not_by_the_proxy(self, request: Request) -> Answer | None:
-        """The response to a request that came past the only proxy that is let in, else None."""
+        """With a single permitted proxy, the response to a request that did not pass through it; else
+        None."""
         if not self.proxy_only or self.passes.in_header(request.headers):
             return None
         return Answer(HTTPStatus.FORBIDDEN, "Not by this way", _ELSEHOW, _NOT_KEPT)

@@ -17,7 +17,8 @@ _INSTRUCTOR = "instructor's token:"
 
 
 def greeting(server: PageServer, host: str, origins: Sequence[str]) -> Iterator[str]:
-    """One line for a user who works alone; otherwise a block of addresses that says for whom each one is."""
+    """One line for a user who works alone; otherwise a list of addresses, each with the people who should use
+    it."""
     yield f"himpc-lab ready at {server.link}"
     shared = server.public or server.hall is not None or _has_an_instructor(server)
     if shared:

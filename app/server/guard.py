@@ -26,7 +26,7 @@ from app.server.prefix import under_its_name
 from app.server.uploads import TRANSFER, Uploads
 from app.server.words import refusal
 
-if TYPE_CHECKING:  # a class computes: the server listens before that is loaded
+if TYPE_CHECKING:  # loaded only for a class: the server listens before these modules are loaded
     from app.server.class_door import ClassDoor
 
 HANDSHAKE = 5.0
@@ -38,7 +38,7 @@ _SLICE = 4096  # B that are parsed between two checks of the limits
 
 
 class ConnectionGuard:
-    """The guard that `open_server` installs. It refuses every request until it is opened."""
+    """The guard that `open_server` installs. It refuses every request until `open` is called."""
 
     def __init__(self, door: Door) -> None:
         self.crowd = ConnectionLimits()
@@ -126,7 +126,7 @@ class ConnectionGuard:
 
     def _to_class(self, of: ClassDoor, connection: ServerConnection, request: Request) -> Response | None:
         """The answer to a request for a page of the class; None for an upgrade that is let in."""
-        # Another server of the class shows its key instead, and may know this one by any name.
+        # Another server of the class sends the key instead, and may use any name for this server.
         refused = None if of.is_for_servers(request.path) else self._door.refuses(request)
         answer = self._not_open(connection, request) or refused
         found = answer or of.answer(self._door, request, _user(connection))
@@ -276,7 +276,7 @@ def _user(connection: ServerConnection) -> str:
 
 
 def _nothing_said(_: str) -> None:
-    """Used while no page is attached that could show the sentence."""
+    """Used while no page can show the sentence."""
 
 
 def _nothing(_: ServerConnection, __: Request) -> Response | None:

@@ -57,7 +57,8 @@ class Load:
 
     @property
     def full(self) -> bool:
-        """Whether a newcomer would have to wait, and nobody could come back to a place of theirs."""
+        """Whether a new learner would have to wait, and no place is reserved for a learner who may come
+        back."""
         return 0 < self.maximum <= self.attached
 
     @property

@@ -102,7 +102,7 @@ class Passes:
         return len(given) == 1 and _same(given[0], self.token)
 
     def account(self, headers: Headers) -> str:
-        """The name of the visitor, as the proxy says that sent the token with it; "" if it says none."""
+        """The name of the visitor that the proxy sent together with the token; "" if it sent none."""
         given = headers.get_all(USER_HEADER)
         if len(given) != 1 or not self.in_header(headers):
             return ""

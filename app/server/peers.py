@@ -1,4 +1,4 @@
-"""The other end of a connection: whether it is on this machine, and which of its users it belongs to."""
+"""The other end of a connection: whether it is on this machine, and to which user it belongs."""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
-"""Where a page is, kept in its browser: another server of the same address goes on from there.
+"""The place of a page (its scene or step), stored in the browser. Another server at the same address
+continues from there.
 
-Every tab has a storage of its own, which outlives a reload and the server. viser reads only the storage that
-all tabs share, so a script copies the value there, under a key that this visit alone uses.
+Every tab has its own storage, which remains after a reload and after the end of the server. viser reads only
+the storage that all tabs share; a script copies the value there, under a key of this visit.
 """
 
 from __future__ import annotations
@@ -46,11 +47,11 @@ def written(choice: SceneChoice, settings: SceneSettings, start: SceneChoice) ->
     try:
         return json.dumps({**place, "code": code_of(Told(choice, settings, (), 0.0))})
     except InputError:
-        return ""  # e.g. an uploaded robot: another server begins anew
+        return ""  # e.g. an uploaded robot: another server starts with its own scene
 
 
 def read(text: str | None, start: SceneChoice) -> SceneChoice | None:
-    """The choice that a tab kept; None if there is none that can be loaded. The text may be anybody's."""
+    """The choice that a tab stored; None if it cannot be loaded. The text is not trusted."""
     try:
         found = json.loads(text or "{}")
         if not isinstance(found, dict) or found.get("start") != _digest(start):

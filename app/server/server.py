@@ -142,7 +142,7 @@ class PageServer:
 
     @property
     def guest_link(self) -> str:
-        """The link for everybody else, with the token if one is needed."""
+        """The link for all other people, with the token if one is needed."""
         return self.passes.link(self.url, "guest")
 
     @property

@@ -1,4 +1,4 @@
-"""Serving until a signal ends it: what `himpc-lab` without a command does."""
+"""Serves the page until a signal arrives, for `himpc-lab` without a command."""
 
 from __future__ import annotations
 

@@ -43,8 +43,8 @@ STORAGE = 5.0
 _TOKENS = "himpc-lab-sessions"
 _DARK = "himpc-lab-dark"
 _PROGRESS = "himpc-lab-lessons"
-_ELSEWHERE = 3.0  # s that a page is shown that there is no place, until it looks elsewhere
-_PERIOD = 1.0  # s between two looks whether the page is somewhere else
+_ELSEWHERE = 3.0  # s for which a page says that all places are taken, before it connects again
+_PERIOD = 1.0  # s between two checks of the page's place
 _GOES_ON = ("You go on where you were", "Your robot begins anew, with the settings or the step that you had.")
 _LONGEST = 100_000  # characters that we read of each stored value
 
@@ -286,7 +286,7 @@ class Visit:
             self._then(tokens, kept)
 
     def _send_on(self) -> None:
-        """Ends a connection for which there was no place: the page then connects again by itself."""
+        """Ends a connection for which all places were taken: the page then connects again by itself."""
         connection = private.connection_of(self._server, self._client)
         if self._page is None and connection is not None:
             connection.transport.abort()

@@ -58,7 +58,8 @@ def look(camera: viser.CameraHandle, points: np.ndarray, phone: bool, direction:
     if direction is None:
         here = np.asarray(camera.position, float) - np.asarray(camera.look_at, float)
         level = float(np.linalg.norm(here[:2]))
-        # A vertical viewing direction has no up; this steep direction looks nearly the same.
+        # For a vertical viewing direction the upward direction is undefined; this steep direction looks
+        # nearly the same.
         below = np.array([0.0, 0.05 * abs(here[2]), 0.0])
         direction = here if level > 0.02 * abs(float(here[2])) else here - below
     if not np.linalg.norm(direction) > 0.0:

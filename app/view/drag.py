@@ -28,7 +28,7 @@ _PATIENCE = 0.05
 """Time, s, that a drag waits for the reachability check, which takes a millisecond for reachable targets."""
 _PAUSED, _LESSON_PAUSED = "paused: press Space or Run to continue", "paused: press P or Run this step"
 Later = Callable[[float, Callable[[], None]], object]
-"""Calls a function after a time, s."""
+"""Calls a function after a delay, s."""
 
 
 class Hand:
@@ -91,7 +91,7 @@ class Hand:
     def _moved(self, position: np.ndarray, rotation: np.ndarray | None) -> None:
         gizmo, judge = self._gizmo, self._judge
         if gizmo is None or judge is None:
-            return  # a drag that arrives while the gizmo is replaced for another stack
+            return  # a drag can arrive while the gizmo is replaced for another stack
         self._dragged()
         self._moved_at = time.monotonic()
         waits = self._clamp()

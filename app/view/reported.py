@@ -1,5 +1,4 @@
-"""Obstacles that are reported to the controller where they are not: an outline at the reported place, and a
-name at both places."""
+"""Obstacles whose reported place is wrong: an outline at the reported place, and a name at both places."""
 
 from __future__ import annotations
 
@@ -21,7 +20,7 @@ Pair = tuple[Ball | Box, Ball | Box]
 
 
 class ReportedObstacles:
-    """Exists on the page only while a report differs from the truth."""
+    """The elements exist on the page only while a report differs from the true place."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
         self._scene = scene
@@ -29,7 +28,7 @@ class ReportedObstacles:
         self._nodes: list[viser.SceneNodeHandle] = []
 
     def show(self, obstacles: tuple[Obstacle, ...], reported: tuple[Obstacle, ...]) -> None:
-        """obstacles: as they are; reported: as the controller is told, under the same names."""
+        """obstacles: the true ones; reported: those that the controller gets, under the same names."""
         true = {each.name: each for each in obstacles if not isinstance(each, Floor)}
         told = [each for each in reported if not isinstance(each, Floor) and each.name in true]
         pairs = [(true[each.name], each) for each in told if true[each.name] != each]

@@ -1,4 +1,4 @@
-"""The objects that a robot can touch, and the forces with which it does."""
+"""The objects that a robot can touch, and the contact forces."""
 
 from __future__ import annotations
 

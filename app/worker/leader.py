@@ -21,8 +21,8 @@ class Leader:
         self._t = math.nan
 
     def begin(self, choice: SceneChoice, session: Session) -> None:
-        """The session was just reset and the ghost begins here. The simulation waits until the ghost has
-        started."""
+        """Called when the session was just reset and the ghost begins. The simulation waits until the ghost
+        has started."""
         self.on, self.until = True, 0.0
         self._begin = Begin(choice, session.settings)
         self._told = len(session.log)

@@ -62,8 +62,8 @@ def main(wire: Wire) -> None:
 
 
 def _let_ticks_end() -> None:
-    """Lets a tick finish before another simulation gets the core, if there are more simulations than cores:
-    with eight simulations on two cores, a third fewer ticks take too long."""
+    """Lets a tick finish before another simulation gets the core. With eight simulations on two cores, a
+    third fewer ticks are late."""
     if hasattr(os, "SCHED_BATCH"):  # only on Linux
         with suppress(OSError):  # forbidden in some containers
             os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))

@@ -49,7 +49,7 @@ class Pacer:
         return now - self._capped_at < _MEMORY
 
     def real_time_factor(self, now: float) -> float:
-        """Simulated over real seconds, averaged over about a second."""
+        """Returns simulated over real seconds, averaged over about a second."""
         start, ran = self._window
         if now - start >= 0.5 * _MEMORY:
             self._factor = (self._ran - ran) / (now - start)

@@ -22,7 +22,7 @@ from lessons.settings.torque import TorqueSettings
 
 
 class InsidePanel:
-    """A tab of the panel of plots. It requests only data that the browser shows."""
+    """A tab of the left panel. It requests only the data that the browser shows."""
 
     def __init__(
         self,

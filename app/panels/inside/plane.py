@@ -78,7 +78,7 @@ class PlanePanel:
 
     @property
     def wish(self) -> InsideRequest:
-        """The data to request from the simulation; empty while the picture is not visible."""
+        """The data that are requested from the simulation; empty while the picture is not visible."""
         if not self._picture.in_view:
             return InsideRequest()
         through = str(self._through.value)

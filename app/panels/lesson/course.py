@@ -33,7 +33,7 @@ class Course:
         loop: asyncio.AbstractEventLoop,
         offered: bool = True,
     ) -> None:
-        """exercise: the active one, if there is one; offered: whether lessons can be begun here."""
+        """exercise: the active one, if there is one; offered: whether this page can begin lessons."""
         self._gui, self._learner, self._notebook = gui, learner, notebook
         self._exercise = exercise
         self._choose, self._settings, self._loop = choose, settings, loop

@@ -115,7 +115,7 @@ Axis = tuple[float, float, bool]  # low, high, logarithmic
 
 
 class _Frame(NamedTuple):
-    """The axes of a picture over time, 0 … until s, and what stands in them."""
+    """The axes of a picture over time, 0 … until s, and the elements in them."""
 
     axis: Axis
     until: float

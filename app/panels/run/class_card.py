@@ -1,4 +1,4 @@
-"""The top of a learner's page in a class: what the class does now, and the learner's name."""
+"""The top of a learner's page in a class: the present activity of the class, and the learner's name."""
 
 from __future__ import annotations
 

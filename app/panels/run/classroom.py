@@ -14,8 +14,8 @@ BETWEEN = 1.0
 
 
 class Guesses:
-    """The attempts of one page: at most one every BETWEEN s; of all attempts in between only the last one
-    counts."""
+    """The attempts of one page. At most one every BETWEEN s is checked; of several attempts within this time
+    only the last one counts."""
 
     def __init__(self, give: Callable[[str], bool]) -> None:
         self._give = give

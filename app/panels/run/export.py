@@ -48,7 +48,7 @@ class ExportPanel:
         button = gui.add_button(label, hint=hint)
 
         @button.on_click
-        def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:  # on a thread: it takes a while
+        def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:  # on a thread, as it takes seconds
             client = event.client
             if client is None:
                 return

@@ -1,4 +1,4 @@
-"""Sentences about what just happened, for people who do not see it."""
+"""Sentences about the latest events, for people who use a screen reader."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ if TYPE_CHECKING:  # the server listens before anything that computes is loaded
 AT_MOST_EVERY = 2.0
 """Time, s, between two sentences."""
 _STEADY = 0.1
-"""Share by which an error may change between two looks and still counts as steady."""
+"""An error counts as steady if it changes by less than this share between two checks."""
 _WORTH = 2.0
-"""Factor by which an error must differ from the last one that was told."""
+"""An error is announced again if it has changed by at least this factor."""
 _SMALL = {"m": 1e-3, "rad": math.radians(0.5)}
-"""Errors below this are not told apart."""
+"""Errors below this value count as equal."""
 _QUIET = 10.0
-"""Time, s, during which the same active limit is not told again."""
+"""Time, s, during which the same active limit is not announced again."""
 
 
 @dataclass(frozen=True)
 class Facts:
-    """One look at a session.
+    """The state of a session at one check.
 
     Attributes:
         running: whether simulated time passes.
@@ -65,7 +65,7 @@ def facts_of(now: SessionSnapshot[SceneSettings]) -> Facts:
 
 
 class Narration:
-    """Compares each look with the one before, and collects sentences until the next one may be said."""
+    """Compares each check with the previous one, and collects sentences until the next announcement."""
 
     def __init__(self, clock: Callable[[], float]) -> None:
         """clock: time, s."""
@@ -77,7 +77,7 @@ class Narration:
         self._next = -math.inf
 
     def look(self, now: Facts) -> str:
-        """The sentence that is due, "" if there is none; it joins all that happened since the last one."""
+        """The sentence that is due, with all events since the last one; "" if none is due."""
         before, self._before = self._before, now
         if before is None:
             self._told = {name: error for name, (error, _) in now.errors.items() if math.isfinite(error)}
@@ -94,14 +94,14 @@ class Narration:
         return said[0].upper() + said[1:] + "."
 
     def _reached(self, now: Facts) -> list[str]:
-        """Limits that are active now and have not been told for a while."""
+        """Active limits that were not announced recently."""
         t = self._clock()
         new = [each for each in sorted(now.limits) if t - self._limits.get(each, -math.inf) > _QUIET]
         self._limits.update(dict.fromkeys(now.limits, t))
         return [f"{kind} limit of {joint} is met" for kind, joint in new]
 
     def _arrived(self, before: Facts, now: Facts) -> list[str]:
-        """Errors that no longer change and differ from what was told last."""
+        """Steady errors that differ from the last announced ones."""
         found = []
         for name, (error, unit) in now.errors.items():
             was, least = before.errors.get(name, (math.nan, unit))[0], _SMALL.get(unit, 0.0)

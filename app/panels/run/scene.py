@@ -150,7 +150,7 @@ class RobotPanel:
 
     def _wait(self, answer: viser.GuiHtmlHandle) -> None:
         """Shows that a request is in progress. `answer` is the text above the control that was used; a text
-        below it could be out of sight."""
+        below the control could be outside the visible part."""
         if self._answer is not None:
             self._answer.visible = False
         self._answer, self._waits = answer, True

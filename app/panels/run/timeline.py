@@ -20,8 +20,8 @@ _LEAST = 0.2  # s: the slider is shown for a longer history only
 
 
 class TimeLine:
-    """The time line. `past` is the moment to show, None for now. When simulated time continues, by running, a
-    step or a reset, the view returns to now."""
+    """The time line. `past` is the moment that is shown; None: the present. When simulated time continues, by
+    running, a step or a reset, the view returns to now."""
 
     def __init__(self, gui: viser.GuiApi, learner: SimulationClient, loop: asyncio.AbstractEventLoop) -> None:
         self.past: float | None = None

@@ -21,9 +21,9 @@ _DISTANCE = (0.0, 250.0)  # mm
 
 
 class LevelPlots:
-    """Plots with logarithmic axes of fixed range, which show an error of a micrometre and the large error of
-    a level without control. The curves of a ghost are dashed; the page's loop rebuilds the charts when a
-    ghost starts or ends."""
+    """Plots with logarithmic axes of fixed range. They show an error of a micrometre as well as the large
+    error of a level without control. The curves of a ghost are dashed; the page's loop rebuilds the charts
+    when a ghost starts or ends."""
 
     def __init__(
         self,

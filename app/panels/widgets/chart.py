@@ -20,7 +20,7 @@ from app.panels.widgets.in_view import InView
 _NUDGE = 10
 """Number of updates after which the curves are sent even if they have not changed, with an invisible change
 of the time axis. Without it, a chart that was laid out while its panel had no width would never get ticks."""
-_AROUND = 60  # px of a chart's height that the title and the time axis take
+_AROUND = 60  # px: height of the title and the time axis
 _FINE = 0.35  # px: a point that is closer to a curve counts as a point of the curve
 _TOP = 30_000.0
 """The largest value of every axis as it is sent, in two bytes per value; the smallest is 0. No screen has

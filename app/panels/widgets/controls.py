@@ -44,7 +44,8 @@ class Controls(Generic[S]):
         read: Callable[[S], Any] | None = None,
         make: Callable[[float], Any] | None = None,
     ) -> None:
-        """Adds a control as an entry describes it; the entry may differ from the one of the table.
+        """Adds a control as an entry describes it. The entry may differ from the setting's entry in the
+        table.
 
         Args:
             entry: its path must be a setting's.

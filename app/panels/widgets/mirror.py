@@ -16,9 +16,9 @@ from app.client.pending_edit import HOLD, Send
 from lessons.events import Event
 
 REMIND = 2.0
-"""Time, s, between two times that the values of all controls are sent again. viser sends at most one change
-per 50 ms and tab and drops all but the latest: if two controls change at once (or while the browser is busy),
-one change may be lost, and the control would go on showing a wrong value."""
+"""Period, s, after which the values of all controls are sent again. viser sends at most one change per 50 ms
+and tab and drops all but the latest: if two controls change at once (or while the browser is busy), one
+change may be lost, and the control would go on showing a wrong value."""
 
 S = TypeVar("S")
 
@@ -85,7 +85,7 @@ class Bindings(Generic[S]):
             self._reminded = now
         touched = max((mirror.touched for mirror in self._mirrors), default=0.0)
         if present is self._written and not remind and self._wrote - touched > HOLD:
-            return  # nothing can have changed since
+            return  # no setting has changed since then
         self._written, self._wrote = present, now
         for mirror in self._mirrors:
             if now - mirror.touched > HOLD:

@@ -147,8 +147,8 @@ class Lecturer:
         return True
 
     def _foreign_change(self) -> str:
-        """A sentence if an attempt at a challenge cannot count, because a setting that is not one of its
-        knobs differs, or a knob is outside its range; "" otherwise."""
+        """A sentence if an attempt at a challenge cannot count: a setting outside the challenge differs, or a
+        setting of the challenge is outside its range. "" otherwise."""
         assert isinstance(self._part, Challenge)
         now = self._session.settings
         allowed = self._own
@@ -218,7 +218,7 @@ class Lecturer:
         return "Your run: you changed or moved something during it." if self._touched else ""
 
     def _weigh_prediction(self) -> None:
-        """Grades the prediction, which is about the lesson's own run and is measured in it."""
+        """Grades the prediction with the values of the lesson's own run."""
         prediction = self._part.prediction if isinstance(self._part, Step) else None
         if prediction is None or self.answer is None:
             return
