@@ -9,11 +9,12 @@ RETURN_RATE = 5.0
 WITHIN = 0.25
 """m: pairs of links or objects that are farther apart have no row."""
 FADE = 0.05
-"""m: over this distance before WITHIN a bound loosens to none; a pair that enters has no bound yet."""
+"""m: over the last part of this length before WITHIN, a bound fades out. A pair that comes nearer than WITHIN
+has no bound at first."""
 RETREAT = 0.2
 """m/s: the fastest retreat that a row of a distance asks for."""
 TURN_PULL = 5.0
-"""rad/m: how much larger than that of a position the error is on which a task of angles acts at most."""
+"""rad/m: ratio between the largest error on which a task of angles acts and that of a task of positions."""
 
 AT_TORQUE, AT_VELOCITY, AT_POSITION = 1, 2, 4
 """Bits of telemetry's `at_bound`: which limits bind. Velocity rows that impose a position limit count as
@@ -24,41 +25,44 @@ APPROACH_RATE = 6.0
 VELOCITY_RATE = 36.0
 """1/s: rate at which its velocity approaches the desired velocity."""
 STILL = 1e-9
-"""Below this distance and speed the target is set to rest; it must not drift for ever."""
+"""Below this distance and speed the target is set to rest: it must not drift."""
 
 LOAD_SECONDS = 0.1
-"""Time constant of the mean load of a motor: a short peak of torque slows nothing down."""
+"""s: time constant of the mean load of a motor. A short peak of torque does not slow the robot down."""
 FREE_LOAD, FULL_LOAD = 0.55, 0.95
-"""Shares of the torque limit: below the first, a motor slows nothing down; above the second, its joints have
-their lowest velocity limit."""
+"""Shares of the torque limit. Below the first, a motor does not slow its joints down. Above the second, its
+joints have their lowest velocity limit."""
 SLOWEST_SHARE = 0.03
 """The lowest velocity limit of a joint whose motor is loaded, as a share of its own limit."""
 HEAVY_LOAD = 0.85
 """If a motor has at least this load and the tasks make no progress, the robot counts as stalled."""
 
 MEAN_SECONDS = 0.02
-"""Time constant of the mean velocity, whose distance from the velocity is a smooth acceleration."""
+"""s: time constant of the mean velocity. The difference between velocity and mean velocity is a smooth
+measure of the acceleration."""
 LEAD = 0.1
 """s: the velocity is extrapolated over this time, and that velocity must be within its limit."""
 LEAST_WHILE_FASTER = 0.5
 """The lowest velocity limit of a joint that accelerates, as a share of its own limit."""
 
 BLOCKED = 0.1
-"""m: only a robot with a pair that has less room than this can be stalled."""
+"""m: a robot counts as stalled only if the distance of a pair is less than this above d_safe."""
 INSIDE = -0.03
-"""m: a robot that is farther inside must come out, and is not slowed down. A robot that is a little inside
-and does not come out is stalled, too."""
+"""m: a pair that is nearer than d_safe by more than this must move apart, and the robot is not slowed down. A
+robot with a smaller violation that does not decrease counts as stalled."""
 PROGRESS = 0.05
 """m/s, rad/s: the least decrease of an error that counts as progress. A reference that is faster than this
 counts as moving."""
 PROGRESS_SHARE = 0.25
-"""1/s: the least decrease as a share of the error; tasks that nothing blocks are ten times as fast."""
+"""1/s: the least decrease as a share of the error. The errors of tasks without an obstacle decrease ten times
+as fast."""
 CLOSE_ENOUGH = 0.01
 """m, rad: a task with a smaller error has reached its target."""
 SLOWING, RECOVERY = 0.1, 0.05
 """s: time constants with which the joints of a stalled robot become slow, and fast again."""
 DISTURBED = 0.03
-"""m, rad: a first task whose error grows by more was pushed away, and may come back."""
+"""m, rad: if the error of the first task grows by more, a disturbance moved the robot, and the robot may move
+back."""
 STALLED, REST = 0.5, 0.02
 """Shares of the velocity limits. Below the first, a robot stays stalled until something changes. Below the
 second, it has come to rest. Between the two, it brakes, and errors that change are neither progress nor a

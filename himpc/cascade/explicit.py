@@ -21,11 +21,11 @@ Array = NDArray[np.float64]
 _BINDING = 1e-9
 """N·m: a row closer than this to its bound is active."""
 _NOISE = 1e-11
-"""A row whose projection on the free directions of (33) is a smaller share of it is rounding noise: its joint
-is not free any more."""
+"""If the projection of a row on the free directions of (33) is a smaller share of the row, it is rounding
+noise: its joint is no longer free."""
 _ROOM = 1e-9
-"""N·m by which bounds are widened for a last attempt; the rows that are then active are tried with their
-exact bounds."""
+"""N·m by which bounds are widened for a last attempt. The rows that are active in it are then solved with
+their exact bounds."""
 _ACCURATE = 1e-9
 """Points with a larger residual of their optimality conditions are refined."""
 
@@ -112,7 +112,7 @@ def _judged(
     gradient, value = x + level.c + A.T @ multipliers, A @ x
     held = multipliers != 0.0
     missing = np.where(multipliers > 0, high, low)[held] - value[held]
-    # The part of the remaining gradient along the active rows only changes their multipliers.
+    # The part of the gradient along the active rows only changes their multipliers.
     step = np.linalg.lstsq(A[held], missing + A[held] @ gradient)[0] - gradient
     size = np.maximum(1.0, np.abs(U_above.ravel()[: len(level.P)] + level.P @ x))
     moved = float((np.abs(level.P @ step) / size).max(initial=0.0))
@@ -152,7 +152,8 @@ def _point(
 ) -> Point:
     value = rows.values(U).ravel()
     slack = np.where(multipliers > 0, upper - value, value - lower)
-    # An interior-point-like solver leaves tiny multipliers everywhere: binding means both.
+    # Some solvers leave tiny multipliers at all rows: a row is active if it is near its bound and has a
+    # multiplier.
     active = np.flatnonzero((np.abs(multipliers) > _BINDING) & (slack < 1e3 * _BINDING))
     row, joint = np.divmod(active, U.shape[1])
     return Point(

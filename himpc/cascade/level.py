@@ -58,11 +58,10 @@ class LevelProblem(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ActiveRows:
-    """Rows of `Rows` that bind: indices of row and column, multiplier and slack (N·m in the rows' scaling).
-    A column is a joint, but for constraints with directions of their own.
-
-    A positive multiplier pushes back from an upper bound, a negative one from a lower bound. Twice it is
-    what the cost (32a) or (34a) would save per N·m of further room.
+    """The active rows of `Rows`: indices of row and column, multiplier and slack (N·m in the rows' scaling).
+    A column is a joint, or a direction of a constraint that has its own directions. A multiplier is positive
+    at an upper bound and negative at a lower bound. If a bound is moved outwards by 1 N·m, the cost (32a) or
+    (34a) decreases by twice the multiplier.
     """
 
     row: NDArray[np.intp]

@@ -15,14 +15,14 @@ Array = NDArray[np.float64]
 _NEAR = 1e-3
 """A point with a larger residual does not show which rows are active."""
 _LEFT = 1e-12
-"""A multiplier that is a smaller share of the largest one is a residue of the solver."""
+"""A multiplier that is a smaller share of the largest one counts as an error of the solver."""
 _BEYOND = 1e-9
 """A row that violates its bound by no more than this counts as satisfied."""
 _WRONG = 1e-12
 """A multiplier of the wrong sign that is a smaller share of the largest one counts as zero."""
 _ALONG = 1e-11
-"""A row whose slope along the step is smaller than this share of the step's length is parallel to it: it
-depends on the rows held."""
+"""A row whose slope along the step is smaller than this share of the step's length is parallel to the step:
+it is linearly dependent on the active rows."""
 _STILL = 1e-9
 """A step that is a smaller share of the unconstrained optimum counts as zero."""
 _CHANGES = 30
@@ -31,8 +31,8 @@ active."""
 
 
 def polished(solution: QPSolution, c: Array, A: Array, low: Array, high: Array) -> QPSolution | None:
-    """From the rows that a solver's point says bind; None where it says nothing, or where these rows and few
-    others do not lead to the optimum."""
+    """Finds the optimum from the rows that are active at a solver's point. None if the point is too
+    inaccurate, or if these rows and a few others do not lead to the optimum."""
     multipliers = solution.multipliers
     if not (np.isfinite(multipliers).all() and solution.kkt_residual <= _NEAR):
         return None

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 _FELT = 1e-13
 """The effect of a direction on a level is rounding if it is smaller than this share of the level's rows."""
 _APART = 1e-6
-"""Singular values that are a smaller share of the one before belong to directions that rows do not fix."""
+"""A singular value that is a smaller share of the previous one belongs to a direction that no row fixes."""
 
 
 class WhiteLevel(NamedTuple):
@@ -72,8 +72,8 @@ def white(problem: LevelProblem, U_above: Array, upper: Sequence[Array], Z: Arra
 
 
 def _free(rows: Array | None, root_R: Array, Z: Array) -> Array:
-    """An orthonormal basis of √R ∘ span Z, (n, d): where R weighs joints far apart it is taken from the rows
-    (33) that leave it, since in Z the digits of what is weighed less are gone."""
+    """An orthonormal basis of √R ∘ span Z, (n, d). If the weights R of the joints differ greatly, it is
+    computed from the rows (33) instead of Z, since Z has lost the digits of joints with small weights."""
     Z = Z[:, Z.any(axis=0)]
     rank = len(root_R) - Z.shape[1]
     if rows is not None and len(rows) >= rank:

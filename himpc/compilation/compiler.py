@@ -15,7 +15,7 @@ from importlib import import_module
 
 from robots.processes.orphans import end_with
 
-_COMPILES = "HIMPC_LAB_COMPILES"  # set in the environment of a compiling process
+_COMPILES = "HIMPC_LAB_COMPILES"  # variable that is set in the environment of a compiling process
 
 
 def compiles_here() -> bool:

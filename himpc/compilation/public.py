@@ -78,5 +78,5 @@ def intermediate(function: Function, arguments: tuple[Any, ...]) -> tuple[str, l
 
 
 def kept(function: Function, key: str, make: Callable[[], bytes]) -> bytes:
-    """See `compiled`; this tool chain keeps nothing."""
+    """See `compiled`; this tool chain stores nothing."""
     return make()

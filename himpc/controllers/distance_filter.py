@@ -32,8 +32,7 @@ class Filtered(NamedTuple):
     Attributes:
         tau: (n,) N·m.
         rows: the bounds of the torque and of the distances at the next knot.
-        active: which of them bind; the slack of a row is by how much it could not be met, N·m.
-        met: whether all rows are met.
+        active: the active rows; the slack of a row is its violation, N·m. met: whether all rows are met.
     """
 
     tau: Array
@@ -137,8 +136,8 @@ def _closest(A: Array, lower: Array, M: Array, box: tuple[Array, Array]) -> tupl
 
 
 def _given_way(D: Array, lower: Array, box: tuple[Array, Array]) -> Array:
-    """By how much the rows D δ ≥ lower are missed at least, in the sense of least squares, (r,) N·m, for
-    changes δ of the torque within the box."""
+    """The least violation of the rows D δ ≥ lower, by least squares, (r,) N·m, for changes δ of the torque
+    within the box."""
     r, n = D.shape
     H = np.diag(np.concatenate([np.full(n, _FAINT), np.ones(r)]))
     rows = np.block([[D, np.eye(r)], [np.eye(n), np.zeros((n, r))]])

@@ -22,16 +22,14 @@ from himpc.references.outlook import observed_by
 Array = NDArray[np.float64]
 
 FILTER = "filter"
-"""What the filter is called where levels are listed."""
+"""The name of the filter in lists of levels."""
 
 
 @final
 class FilteredHIMPC(HIMPC):
-    """HIMPC whose levels know of no distance, and a `DistanceFilter` that changes their torque, as
-    control-barrier filters do (for example OSCBF, arXiv 2503.06736).
-
-    With `avoidance.on` false it is HIMPC. The levels see the torque that acted: they start from what the
-    filter left of their last plan.
+    """HIMPC without rows of distances in its levels, and a `DistanceFilter` that changes its torque.
+    Control-barrier filters work in the same way (for example OSCBF, arXiv 2503.06736). With `avoidance.on`
+    false it is HIMPC. The levels get the torque that acted, which is the filtered one.
     """
 
     def reset(self, tau_0: Array) -> None:
@@ -48,7 +46,7 @@ class FilteredHIMPC(HIMPC):
     def step(
         self, q: Array, v: Array, previews: Mapping[str, Preview], tau_applied: Array | None = None
     ) -> Plan:
-        """Computes one control period, see `HIMPC.step`; a plan's `behind` is what the filter did."""
+        """Computes one control period, see `HIMPC.step`; `behind` of a plan is the result of the filter."""
         plan = super().step(q, v, previews, tau_applied)
         if self._filter is None:
             return plan
@@ -103,7 +101,7 @@ class FilteredHIMPC(HIMPC):
 
 
 def _with_filter(done: AtOnce, increment: Array) -> AtOnce:
-    """The increments of the levels, the last of which is what was applied."""
+    """The increments of the levels; the last ones are those that were applied."""
     if not len(done.increments):
         return done
     return AtOnce(np.vstack([done.increments[:-1], increment]), done.jacobians)

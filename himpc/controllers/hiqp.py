@@ -1,4 +1,4 @@
-"""HIQP: HIMPC with a horizon of one knot, the local optimum the paper compares with in section V."""
+"""HIQP: HIMPC with a horizon of one knot, the local optimum with which section V of the paper compares."""
 
 from __future__ import annotations
 

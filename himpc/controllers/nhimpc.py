@@ -58,7 +58,7 @@ class NHIMPC(HIMPC):
         found = super()._search(tick)
         iterations = 1
         while found is not None and _solved(found) and iterations < self.max_iterations:
-            # A level that fades in advances once per tick, not once per iteration.
+            # The share of a level that fades in grows once per tick, not once per iteration.
             self._weight = dict(fading)
             again = self._solve(tick, found.predicted_q[1:-1])
             iterations += 1

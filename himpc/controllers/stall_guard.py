@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 @final
 class StallGuard:
-    """Remembers how far its controller's robot is stalled.
+    """Contains the degree to which the robot of a controller is stalled.
 
     Attributes:
         errors: (T,) the lengths of the tasks' errors at the last tick, m or rad; None before the first one.
@@ -41,8 +41,8 @@ class StallGuard:
         self.mean: Array | None = None
 
     def limits(self, limits: LimitsInForce, tau: Array, v: Array, distances: Distances) -> LimitsInForce:
-        """The limits in force at this tick, with lower velocities while the robot is stalled, and of joints
-        that accelerate or have little torque left.
+        """Returns the limits in force at this tick. Velocity limits are lower while the robot is stalled, and
+        for joints that accelerate or have little torque left.
 
         Args:
             limits: without that.

@@ -36,7 +36,7 @@ def entries_text(control_name: str, layout: int) -> str:
         layout: the number that a controller's memory must have for this kernel.
     """
     return (
-        # The times of the levels are zero: an exported controller asks no clock.
+        # An exported controller reads no clock: the times of its levels are zero.
         "define i32 @clock_gettime(i32 %clock, i64 %stamp) {\n  ret i32 -1\n}\n"
         f"declare i32 @{control_name}(ptr, ptr, "
         f"{', '.join([_ARRAY] * 6)}, i64, i64, {', '.join([_ARRAY] * 4)})\n"
@@ -100,7 +100,7 @@ def _entry(
     what: tuple[str, str],
     given: list[tuple[str, str]],
 ) -> str:
-    """A function that calls `control`; 6, the sign of a held torque, if that ends with a fault."""
+    """Returns a function that calls `control`. It returns 6 (HOLD) if `control` ends with a fault."""
     body, passed = _word(JOINTS, "n"), []
     for place, array in enumerate(ARRAYS):
         body += _word(FIRST + 2 * place, f"{array}.offset") + _word(FIRST + 2 * place + 1, f"{array}.count")

@@ -46,7 +46,7 @@ def header(manifest: dict[str, Any], torques: Sequence[float]) -> str:
 
 
 def _plain(name: str) -> str:
-    """A name inside a comment, which it must not end."""
+    """Returns a name for a comment, without characters that would end the comment."""
     return "".join(each if each.isalnum() or each in "_-. +" else "?" for each in name)
 
 

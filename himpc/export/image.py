@@ -1,4 +1,4 @@
-"""The memory of an exported controller: all its numbers, and what they mean."""
+"""The memory of an exported controller: all its numbers, and their description."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ from robots import InputError, Robot
 _LINE = 64
 """Arrays begin at multiples of so many bytes."""
 _MOST_LEVELS = 10
-"""Every choice of levels that are on has an entry in a table."""
+"""A table has an entry for every set of levels that are on."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,7 @@ class Image:
 
     Attributes:
         memory: the bytes that a program copies to have a controller.
-        manifest: what they mean, as JSON.
+        manifest: the description of the bytes, as JSON.
     """
 
     memory: bytes
@@ -193,7 +193,7 @@ def _write_reference(
 
 
 def _joined(arena: Arena, loop: Array, loop_where: Array, n: int) -> tuple[bytes, dict[str, int]]:
-    """All arrays one after another behind the words that say where they are."""
+    """Returns the words with the places of the arrays, followed by all arrays."""
     given = (*arena.arguments, loop, loop_where)
     words, offsets, end = np.zeros(WORDS, np.int64), {}, 8 * WORDS
     pieces = []
@@ -209,7 +209,7 @@ def _joined(arena: Arena, loop: Array, loop_where: Array, n: int) -> tuple[bytes
 def _listed(
     arena: Arena, f: dict[str, Array], loop_where: Array, offsets: dict[str, int]
 ) -> list[dict[str, Any]]:
-    """Every array: name, type, shape, unit and at which byte it begins."""
+    """Returns the name, type, shape, unit and first byte of every array."""
     tick = get_type_hints(TickArrays, include_extras=True)
     own = get_type_hints(LoopArrays, include_extras=True)
     found = []

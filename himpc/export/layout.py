@@ -1,4 +1,4 @@
-"""Which kernel a controller's memory is for."""
+"""The number of the kernel for which a controller's memory was made."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Settings that change while the robot moves: what they mean for the arrays of a tick."""
+"""Writes settings that change while the robot moves to the arrays of a tick."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from himpc.tick.kernel.linear import copy, copy_rows, dot
 from himpc.tick.tables import ACCURACY
 
 TARGET, M_BAR, GAINS, WEIGHT_Q, WEIGHT_R, LIMITS, ENABLED, ORDER = range(8)
-"""What can be set."""
+"""The kinds of settings."""
 _MODE = 9
-"""Where `sizes` holds how position limits are kept."""
+"""Index in `sizes` of the kind of position limits."""
 
 
 @inline_kernel
@@ -83,7 +83,7 @@ def adjust(t: TickArrays, p: LoopArrays, what: int, index: int, values: Array, c
 
 @inline_kernel
 def set_limits(p: LoopArrays, values: Array, n: int) -> int:
-    """Sets the limits that are wanted; those in force close in on them, see `close_in`."""
+    """Sets the wanted limits. The limits in force approach them, see `close_in`."""
     for a in range(n):
         torque, speed, low, high = values[a], values[n + a], values[2 * n + a], values[3 * n + a]
         if not (torque > 0.0 and speed > 0.0 and low < high):
@@ -96,8 +96,8 @@ def set_limits(p: LoopArrays, values: Array, n: int) -> int:
 
 @inline_kernel
 def write_rows(t: TickArrays, p: LoopArrays, first: int, last: int) -> None:
-    """Writes √Q, its effect coefficients and the coefficients of the free motion of some rows, from their
-    gains, their Q and how far they have faded in; see `himpc.prediction.task.residual_model`."""
+    """Writes √Q, the effect coefficients and the coefficients of the free motion of some rows. They depend on
+    the gains, on Q, and on the share of Q that is in force; see `himpc.prediction.task.residual_model`."""
     N, T_s = len(t.fixed), t.scalars[T_S]
     for i in range(first, last):
         K, K_p, K_v = t.row_knots[i], t.K_p[i], t.K_v[i]
@@ -152,8 +152,8 @@ def switch(t: TickArrays, p: LoopArrays, index: int, on: bool) -> None:
 
 @inline_kernel
 def reorder(t: TickArrays, p: LoopArrays, values: Array) -> int:
-    """Gives the levels another order; returns 0, or NOT_USABLE for what is none. What each level found goes
-    with it, see `himpc.tick.tick.CompiledTick.recall`."""
+    """Gives the levels another order; returns 0, or NOT_USABLE for an invalid order. The last solution of
+    each level moves with the level, see `himpc.tick.tick.CompiledTick.recall`."""
     r, moved = len(p.order), False
     for k in range(r):
         count = 0

@@ -14,7 +14,7 @@ from himpc.tick.kernel.arrays import PERIOD, T_S, Array, TickArrays
 from himpc.tick.kernel.bounds import LevelBounds, constraint_values
 
 _ROUNDING = 1e-14
-"""A row that is missed by less than this share of what adds up to it is met."""
+"""A row is satisfied if its violation is less than this share of the sum of the magnitudes of its terms."""
 
 
 @inline_kernel
@@ -25,8 +25,9 @@ def clamp(x: float, low: float, high: float) -> float:
 
 @inline_kernel
 def braking(t: TickArrays, p: LoopArrays, U: Array) -> None:
-    """Increments (N, n) that meet the torque rows always, and torque and velocity rows whenever any do; of
-    position rows they see the next one only. The rows are `lower` and `upper` of the tick."""
+    """Increments (N, n) that always satisfy the torque rows, and that satisfy the velocity rows as well if
+    this is possible. Of the position rows they use the next one only. The rows are `lower` and `upper` of the
+    tick."""
     N, n = U.shape
     T_s, kinds = t.scalars[T_S], len(t.L) // N
     for a in range(n):
@@ -53,7 +54,7 @@ def braking(t: TickArrays, p: LoopArrays, U: Array) -> None:
             position += before
         gained = 0.0
         for j in range(N):
-            # The steps of the steps of w.
+            # Returns the second differences of w.
             step = p.w[j, a] - (p.w[j - 1, a] if j else 0.0)
             U[j, a] = step - gained
             gained = step
@@ -86,7 +87,8 @@ def bounds_of(t: TickArrays, value: Array) -> LevelBounds:
 
 @inline_kernel
 def soften(t: TickArrays, p: LoopArrays) -> bool:
-    """Widens the state's rows by the least slack that makes them feasible; False if they need none."""
+    """Widens the rows of velocity and position by the least slack that makes them feasible; False if they are
+    feasible."""
     N, n = p.trial.shape
     braking(t, p, p.trial)
     missed(t, p, p.trial)

@@ -1,5 +1,5 @@
-"""What acts when a level has no optimum within its budget: `himpc.tick.fallbacks` without the routes that
-need a general QP solver."""
+"""The fallbacks of a level without an optimum within its budget: those of `himpc.tick.fallbacks` that need no
+general QP solver."""
 
 from __future__ import annotations
 
@@ -47,7 +47,8 @@ def period_with_fallbacks(
 def climb_down(
     t: TickArrays, p: LoopArrays, data: Array, where: Whole, whole: Whole, whole_where: Whole, i: int
 ) -> int:
-    """Finds increments of level i that meet all rows whenever any do; returns the fallback that gave them."""
+    """Finds increments of level i that satisfy all rows if the rows are feasible; returns the fallback that
+    gave them."""
     if i > 0 and not t.level[i, ALONE]:
         # If U_{i−1} is almost the only feasible point, a small slack separates the rows.
         if solve_level(data, where, whole, whole_where, i, TOLERANCE):

@@ -115,5 +115,5 @@ def to_rotation(quaternion: Array, R: Array) -> bool:
 
 
 FIXED, MISFIT, NOT_USABLE, NO_HIERARCHY = -1, -2, -3, -4
-"""What is wrong with a setting: the task follows a fixed motion; no such index, or a wrong number of values;
-a value is not finite or out of range; the controller has no strict hierarchy."""
+"""The faults of a setting: the task follows a fixed motion; the index or the number of values is wrong; a
+value is not finite or out of range; the controller has no strict hierarchy."""

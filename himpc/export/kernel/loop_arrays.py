@@ -11,7 +11,7 @@ from himpc.tick.kernel.arrays import Array, TickArrays, Whole
 
 class LoopArrays(NamedTuple):
     """Settings that can change while the robot moves, targets, and scratch of the fallbacks; each annotation
-    says the shape, the unit and what the array is.
+    contains the shape, the unit and a description.
 
     Sizes: as for `TickArrays`, where r counts all levels, also those that are off; D = 2ʳ choices of levels;
     V numbers of a target's value, W of a sample, K of its caps, see `himpc.tick.kernel.target.roll`.
@@ -54,12 +54,12 @@ SHAPES: dict[str, str] = {
 """Every array and its shape, in the order in which they stand."""
 
 MOST, TOLERANCE, ON_ACCELERATION, LEVELS, DAMPS, BUDGET, SIMPLE = range(7)
-"""What `setup` holds: largest number of iterations and where they end (N·m), see `NHIMPC`; whether R weighs
+"""Indices of `setup`: largest number of iterations and their tolerance (N·m), see `NHIMPC`; whether R weighs
 M̄⁻¹Δτ; number of levels and whether the last one is the damping level; multiplications that a tick may use;
 whether levels form a strict hierarchy, and can be switched."""
 STARTED, TICKS, FADING = range(3)
-"""What `state` holds: whether the tick before is remembered, number of ticks since the reset, and whether
-rows fade in."""
+"""Indices of `state`: whether the previous tick is stored, number of ticks since the reset, and whether rows
+fade in."""
 DRAGGABLE, ROWS, WIDTH, KNOWN = range(4)
 """Columns of `target`. KNOWN is 0 for a target at rest."""
 

@@ -27,7 +27,7 @@ from himpc.tick.kernel.finish_tick import finish_tick
 from himpc.tick.kernel.linear import copy, copy_rows
 
 TICK, RESET = -2, -1
-"""What is asked of `control`; else a setting, see `adjust`."""
+"""The request to `control`; all other values are settings, see `adjust`."""
 
 
 @inline_kernel
@@ -45,7 +45,7 @@ def control(
     tau_applied: Array,
     tau: Array,
 ) -> int:
-    """Does what is asked of a controller.
+    """Performs a request to a controller.
 
     Args:
         data, where, whole, whole_where: of the arena of a tick.
@@ -96,7 +96,7 @@ def whole_tick(
     """
     if measured and finite(tau_applied):
         take_torque(t, p, tau_applied)
-    hold(t, p)  # whatever happens further on, this torque is one that may be applied
+    hold(t, p)  # if the period fails, this torque can be applied
     copy(t.tau, tau, tau.size)
     p.state[TICKS] += 1.0
     if not (finite(q) and finite(v)):
@@ -170,7 +170,7 @@ def hold(t: TickArrays, p: LoopArrays) -> None:
 
 @inline_kernel
 def forget(t: TickArrays, p: LoopArrays) -> int:
-    """Ends a period without a usable state: its torque acts from now on, and nothing is remembered."""
+    """Ends a period without a usable state: its torque acts from now on, and the memory is cleared."""
     copy(t.tau, t.tau_0, t.q.size)
     p.state[STARTED] = 0.0
     return HOLD
