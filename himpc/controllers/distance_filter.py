@@ -32,7 +32,8 @@ class Filtered(NamedTuple):
     Attributes:
         tau: (n,) N·m.
         rows: the bounds of the torque and of the distances at the next knot.
-        active: the active rows; the slack of a row is its violation, N·m. met: whether all rows are met.
+        active: the active rows; the slack of a row is its violation, N·m.
+        met: whether all rows are met.
     """
 
     tau: Array

@@ -19,7 +19,7 @@ from robots.errors import InputError, unknown_name
 
 @dataclass(frozen=True)
 class Target:
-    """What code can be made for.
+    """A target of the code.
 
     Attributes:
         triple: as LLVM calls it.
@@ -49,7 +49,7 @@ TARGETS: dict[str, Target] = {
     "aarch64-macos": Target("arm64-apple-macosx11.0.0"),
     "x86_64-windows": Target("x86_64-pc-windows-msvc", ending="obj", compiler="clang"),
 }
-"""By the names that the command knows."""
+"""The targets by the names that the command accepts."""
 
 MATHEMATICS = frozenset({"sin", "cos", "tan", "atan2", "hypot", "exp", "expm1", "log", "sqrt", "pow"})
 """Functions of libm that the code may use."""
@@ -93,8 +93,8 @@ def _portable() -> str:
     """Returns the text of all functions for all targets; it is kept on disk.
 
     Numba's text is for pointers of eight bytes. Here all calls that pass structures with pointers are
-    inlined and the structures taken apart: what is left is the same on a target with other pointers. Loops
-    stay as they are; each target has its own vectors.
+    inlined, and the structures are replaced by their elements. The resulting text is the same for targets
+    with other pointers. Loops are not vectorised here: each target has its own vectors.
     """
 
     def make() -> bytes:

@@ -1,4 +1,4 @@
-"""What cannot be exported, each told in a sentence."""
+"""Refuses what cannot be exported, with one sentence for each reason."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from robots import InputError
 
 
 def check(controller: Controller, settings: Settings) -> None:
-    """Raises InputError if an exported controller cannot do what this one does."""
+    """Raises InputError if an exported controller lacks something that this controller uses."""
     if type(controller) not in (HIMPC, HIQP, NHIMPC, Weighted):
         raise InputError(
             f"the controller {type(controller).__name__} is not compiled: export takes himpc, hiqp, nhimpc "

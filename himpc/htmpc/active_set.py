@@ -25,7 +25,7 @@ _STATUS = ("optimal", CONTRADICTION, "limit")
 
 
 class ActiveSetSolver:
-    """One Hessian, and the active rows of the last solution, with which the next QP begins."""
+    """One Hessian and the active rows of the last solution. The next QP begins with these rows."""
 
     def __init__(self) -> None:
         self._room(0)
@@ -48,7 +48,7 @@ class ActiveSetSolver:
 
         Args:
             g: (k,). rows: of k columns.
-            same: number of the first rows that are the same as in the QP before.
+            same: number of the first rows that are equal to those of the previous QP.
         """
         started = perf_counter_ns()
         if (self._held[0, : self._count] >= same).any():

@@ -39,7 +39,7 @@ class Clearances:
 
     @property
     def pair(self) -> Indices:
-        """(r,) which pair each distance belongs to, see `CollisionModel.named`."""
+        """(r,) index of the pair of each distance, see `CollisionModel.named`."""
         return self.shape * len(self.links) + self.sphere
 
     @property
@@ -67,7 +67,7 @@ class CollisionModel:
         return not self._around.names
 
     def named(self, pair: int) -> str:
-        """What a pair is called: its link, and the obstacle or the other link."""
+        """The names of a pair: its link, and the obstacle or the other link."""
         shape, sphere = divmod(pair, len(self.links))
         return f"{self.links[sphere]} – {self._around.names[shape]}"
 

@@ -24,7 +24,7 @@ def evidence(
     level: Tracking, solved: Solved, final: Iterate, named: Callable[[int], str] | None = None
 ) -> LevelEvidence:
     """Builds the evidence of a level from the result of `solve_level`; `final` holds the inputs after all
-    levels, and `named` says what a pair is called, see `CollisionModel.named`."""
+    levels, and `named` gives the names of a pair, see `CollisionModel.named`."""
     best = solved.at.errors(level)
     return LevelEvidence(
         name=level.name,

@@ -19,7 +19,7 @@ Whole = NDArray[np.int64]
 
 class Felt(NamedTuple):
     """Active constraint rows: kind, knot and part as in `ConstraintRows`, and the multipliers, all (r,); and
-    what each is called if it is the distance of a pair, else ""."""
+    the name of each row that is the distance of a pair, "" for other rows."""
 
     kind: Whole
     knot: Whole

@@ -1,4 +1,4 @@
-"""The tree of joints of a robot as arrays: geometry only, without masses."""
+"""The tree of joints of a robot as arrays: geometry without masses."""
 
 from __future__ import annotations
 

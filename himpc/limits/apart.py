@@ -1,4 +1,5 @@
-"""What rows of distances can still get where they cannot be met: the nearest to it, by least squares."""
+"""Increments for rows of distances that cannot be satisfied: their violation is minimised by least
+squares."""
 
 from __future__ import annotations
 
@@ -13,7 +14,7 @@ Array = NDArray[np.float64]
 _ITERATIONS = 100
 """Largest number of iterations of the QP, which has one unknown for each joint and each direction."""
 _FAINT = 1e-5
-"""Weight of the torque that is used for it."""
+"""Weight of the change of torque."""
 
 
 def kept_apart(rows: Rows, joints: int, U: Array) -> Array:

@@ -14,7 +14,7 @@ MOST = 8
 
 @dataclass(frozen=True)
 class Avoidance:
-    """Whether and how distances are kept: between links, and between links and objects.
+    """Settings of the distances that are kept between links, and between links and objects.
 
     Attributes:
         on: whether distances have rows.

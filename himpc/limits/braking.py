@@ -55,13 +55,14 @@ def braking(rows: Rows) -> Array:
 
 
 def _own(rows: Rows) -> int:
-    """The number of constraints, from the first on, whose rows couple no two joints and are known here."""
+    """The number of constraints, counted from the first, whose rows couple no joints and can be handled
+    here."""
     known = list(map(is_, rows.constraints, (TORQUE, VELOCITY, POSITION)))
     return next((place for place, each in enumerate(known) if not each), len(known))
 
 
 def _first(rows: Rows, count: int) -> Rows:
-    """The rows of the first constraints alone."""
+    """The rows of the first constraints."""
     end = count * rows.L.shape[1]
     return rows._replace(
         L=rows.L[:end],
@@ -82,7 +83,8 @@ def missed(rows: Rows, U: Array) -> Array:
 
 
 def least_slack(rows: Rows) -> Array:
-    """How far the state rows must give way so that some increments satisfy all rows; none if some do.
+    """The least slack of the rows of velocity and position so that some increments satisfy all rows; zero if
+    the rows are feasible.
 
     Returns:
         slack, (r, n) ≥ 0 N·m (in the rows' scaling), zero on torque rows.
@@ -95,7 +97,8 @@ def least_slack(rows: Rows) -> Array:
 
 
 def _walk(rows: Rows, rest: Array) -> Array:
-    """w that meets torque and velocity rows, (N, n); of position rows it sees the next one only."""
+    """Returns w that satisfies the torque and velocity rows, (N, n). Of the position rows only the next one
+    is used."""
     N = len(rest)
     least, most = rows.lower[:N], rows.upper[:N]
     low, high = viable(rows.lower[N : 2 * N], rows.upper[N : 2 * N], least, most)
@@ -111,7 +114,8 @@ def _walk(rows: Rows, rest: Array) -> Array:
 
 
 def _closest(rows: Rows, joint: int, rest: Array) -> Array | None:
-    """w of one joint that meets all rows and is closest to `rest`, (N,); None if there is none."""
+    """Returns w of one joint that satisfies all rows and is closest to `rest`, (N,); None if the rows are
+    infeasible."""
     N = rest.size
     sums = np.tril(np.ones((N, N)))
     A = np.vstack([np.eye(N) - np.eye(N, k=-1), np.eye(N), sums[: N - 1]])
@@ -123,7 +127,7 @@ def _closest(rows: Rows, joint: int, rest: Array) -> Array | None:
     met = bool(((value <= upper + MET) & (value >= lower - MET)).all())
     if not met:
         return None
-    # The torque rows hold exactly: what the solver leaves of them is taken off.
+    # The torque rows hold exactly: violations by the solver are removed.
     w, before = np.empty(N), 0.0
     for j in range(N):
         before = w[j] = min(max(found.x[j], before + rows.lower[j, joint]), before + rows.upper[j, joint])

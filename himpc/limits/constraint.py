@@ -1,4 +1,4 @@
-"""The type of a constraint, and what its bounds depend on."""
+"""The type of a constraint, and the data on which its bounds depend."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 
 class Moment(NamedTuple):
-    """What the bounds of one tick depend on.
+    """The data on which the bounds of one tick depend.
 
     Attributes:
         state: measured joint state, (n,) each.
@@ -47,7 +47,7 @@ class Directions(NamedTuple):
 
     Attributes:
         D: (n, n), one direction of length one per row; rows of zeros are not used, and are never bounded.
-        names: (n,), what each direction is called.
+        names: (n,), the name of each direction.
     """
 
     D: Array
@@ -94,5 +94,5 @@ class Constraint:
 
 
 def lags(N: int) -> Array:
-    """How many knots row j lies behind increment s, j − s, (N, N)."""
+    """Number of knots between increment s and row j, j − s, (N, N)."""
     return np.subtract.outer(np.arange(N), np.arange(N)).astype(float)

@@ -17,7 +17,7 @@ CONSTRAINTS: tuple[Constraint, ...] = (
     TORQUE_RATE,
     DISTANCE,
 )
-"""In the order of their rows. Place k has bit 2ᵏ in telemetry's `at_bound`."""
+"""All constraints, in the order of their rows. Index k has bit 2ᵏ in telemetry's `at_bound`."""
 
 
 def imposed(limits: Limits) -> tuple[Constraint, ...]:

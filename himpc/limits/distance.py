@@ -41,8 +41,8 @@ def row_count(n: int) -> int:
 
 def least_rates(near: Near, avoidance: Avoidance) -> Array:
     """The least ∇d·q̇, (r,) m/s, from which d_safe can still be kept: −v_stop(d − d_safe), with the margin
-    added to d_safe. Within the margin d must not shrink, and below d_safe it must grow. What the motion of an
-    object takes is added."""
+    added to d_safe. Within the margin d must not decrease, and below d_safe it must increase. The velocity of
+    an object is taken into account."""
     t, a = avoidance.reaction, avoidance.deceleration
     d_safe = near.share * avoidance.d_safe
     room = near.distance - d_safe - near.share * avoidance.margin

@@ -1,4 +1,4 @@
-"""Lower velocity limits for joints that accelerate towards them."""
+"""Lowers the velocity limits of joints that accelerate towards these limits."""
 
 from __future__ import annotations
 
@@ -23,12 +23,11 @@ def followed(before: Array, v: Array, T_s: float) -> Array:
 
 
 def anticipated(limits: LimitsInForce, v: Array, mean: Array) -> LimitsInForce:
-    """The limits in force with lower velocities of joints that become faster.
-
-    The rows of velocity are those of a joint whose acceleration follows its torque at once. With time-delay
-    estimation it follows with a time constant of T_s times true over assumed inertia, 0.07 s for the third
-    joint of a panda: all rows are met, and the joint that the motion of others accelerates overruns its limit
-    by 36 %. Its limit is lower here until it has stopped becoming faster.
+    """Returns the limits in force, with lower velocity limits for joints that become faster. The rows of
+    velocity assume that a joint's acceleration follows its torque at once. With time-delay estimation the
+    acceleration follows with a time constant of T_s times the ratio of true to assumed inertia, 0.07 s for
+    the third joint of a panda. All rows are then satisfied, but a joint that the motion of others accelerates
+    overruns its limit by 36 %. Its limit is lowered here until its speed no longer increases.
 
     Args:
         limits: in force.

@@ -46,11 +46,12 @@ class Rows(NamedTuple):
     directions: tuple[Directions | None, ...] = ()
 
     def values(self, U: Array) -> Array:
-        """What the rows bound, L U Dᵀ, (r, n) N·m."""
+        """The bounded values L U Dᵀ, (r, n) N·m."""
         return self._turned(self.L @ U, absolute=False)
 
     def sizes(self, U: Array) -> Array:
-        """The sums of the sizes of what adds up to `values`, (r, n) N·m: their rounding is a share of it."""
+        """The sums of the magnitudes of the terms of `values`, (r, n) N·m; the rounding error of `values` is
+        a share of these sums."""
         return self._turned(self.L @ np.abs(U), absolute=True)
 
     def _turned(self, value: Array, absolute: bool) -> Array:
@@ -69,7 +70,7 @@ class Rows(NamedTuple):
 
     @property
     def is_hard(self) -> NDArray[np.bool_]:
-        """Which rows are hard constraints, which never give way, (r,)."""
+        """Whether each row is hard, (r,): hard rows never give way."""
         return np.repeat([each.hard for each in self.constraints], self.L.shape[1])
 
     def directions_of(self, row: int) -> Directions | None:
@@ -82,7 +83,7 @@ class Rows(NamedTuple):
         return (column,) if directions is None else tuple(np.flatnonzero(directions.D[column]).tolist())
 
     def constraint(self, row: int, column: int, upper: bool) -> Constraint:
-        """Which constraint is met at the upper or lower end of a row."""
+        """The constraint that a row's upper or lower bound imposes."""
         constraint = self.constraints[row // self.L.shape[1]]
         stops = constraint is VELOCITY and self.stopping is not None and self.stopping[int(upper), column]
         return POSITION if stops else constraint

@@ -1,5 +1,4 @@
-"""Slows the joints down where a robot presses against what it must keep away from and its tasks make no
-progress."""
+"""Slows the joints down while a robot is at the bound of a distance and its tasks make no progress."""
 
 from __future__ import annotations
 
@@ -28,10 +27,10 @@ Array = NDArray[np.float64]
 
 
 class Stall(NamedTuple):
-    """How far a robot is stalled.
+    """The degree to which a robot is stalled.
 
     Attributes:
-        share: 1: it is not; 0: wholly.
+        share: 1 if it is not stalled, 0 if it is completely stalled.
         due: (T,) the errors, m or rad, that its tasks should have reached by now.
         least: the smallest error of the first task since then.
     """
@@ -76,7 +75,7 @@ def stalled(before: Stall, errors: Array, moves: bool, room: float, T_s: float) 
 
 
 def slowed(limits: LimitsInForce, stall: Stall) -> LimitsInForce:
-    """The limits in force with the velocities that the stall leaves."""
+    """Returns the limits in force with the velocity limits of the stall."""
     if stall.share > 1.0 - 1e-6:
         return limits
     slow = np.minimum(limits.v_limit, SLOWEST)

@@ -21,5 +21,5 @@ def _bounds(now: Moment) -> Block:
     return Block(lower, upper)
 
 
-# Rows are there if the limits are off, too: without bounds.
+# If the limits are off, the rows exist without bounds.
 TORQUE = Constraint("torque", summed, first_knot=0, hard=True, is_on=lambda _: True, bounds=_bounds)

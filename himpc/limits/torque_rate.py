@@ -1,4 +1,4 @@
-"""A limit on how fast each joint's torque changes, as drives and robot interfaces have it."""
+"""A limit on the rate of each joint's torque, which drives and robot interfaces impose."""
 
 from __future__ import annotations
 

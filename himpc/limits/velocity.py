@@ -25,7 +25,8 @@ def reaction(limits: Limits, T_s: float) -> float:
 
 @lru_cache(maxsize=64)
 def approached(N: int, share: float) -> Array:
-    """Share of the distance to a velocity bound that may be gone at knots 1 … N, (N, 1); 1 for share 0."""
+    """Largest share of the distance to a velocity bound that a joint may use up to knots 1 … N, (N, 1); 1 for
+    share 0."""
     return 1.0 - np.asarray((1.0 - min(1.0, share or 1.0)) ** np.arange(1.0, N + 1)[:, None], np.float64)
 
 

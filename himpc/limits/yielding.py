@@ -1,5 +1,5 @@
-"""Increments for rows of any constraints, also such as couple joints: inside all rows if any increments are,
-and else inside the hard ones, while the others give way by least squares."""
+"""Increments for rows of any constraints, including rows that couple joints. They satisfy all rows if the
+rows are feasible. Otherwise they satisfy the hard rows, and the other rows give way by least squares."""
 
 from __future__ import annotations
 
@@ -25,7 +25,8 @@ _ITERATIONS = 300
 _WORK = 40_000
 """Largest product of unknowns and rows, over all QPs. Longer plans move at fewer knots."""
 _ROWS = 1000
-"""Joints that depend on each other and have more rows brake within torque and its rate alone."""
+"""Largest number of rows of coupled joints; with more rows, only torque and its rate are bounded while the
+joints brake."""
 _FAINT = 1e-5
 """Weight of coming to rest while rows give way by least squares."""
 
@@ -77,7 +78,7 @@ def closest_to_rest(rows: Rows, rest: Array) -> Array:
 
 
 def groups(rows: Rows, n: int) -> list[list[int]]:
-    """The joints, those together that some bounded direction couples."""
+    """Groups of joints; joints are in one group if a bounded direction couples them."""
     found = [{joint} for joint in range(n)]
     N = rows.L.shape[1]
     bounded = np.isfinite(rows.lower) | np.isfinite(rows.upper)
@@ -124,7 +125,8 @@ def _rank(constraint: Constraint) -> int:
 
 
 def _closest(part: _Part, rest: Array) -> Array | None:
-    """x that meets all rows and whose velocity rows are closest to `rest`, (N, c); None if there is none."""
+    """Returns x that satisfies all rows and whose velocity rows are closest to `rest`, (N, c); None if the
+    rows are infeasible."""
     c = rest.shape[1]
     H = np.asarray(np.kron(part.G.T @ part.G, np.eye(c)), np.float64)
     found = solve_qp(H, -(part.G.T @ rest).ravel(), part.A, part.lower, part.upper, "daqp", _ITERATIONS)
@@ -133,7 +135,7 @@ def _closest(part: _Part, rest: Array) -> Array | None:
 
 
 def _up_to(part: _Part, rank: int) -> _Part:
-    """The rows of this rank and those before."""
+    """The rows of this rank and of all ranks before it."""
     counted = part.ranks <= rank
     return part._replace(
         A=part.A[counted],
@@ -144,8 +146,8 @@ def _up_to(part: _Part, rank: int) -> _Part:
 
 
 def _given_way(part: _Part, rank: int) -> _Part:
-    """The rows of a rank widened by the least squares of what they miss, while those of lower ranks hold and
-    those of higher ones do not count."""
+    """Returns the rows of a rank, widened by their violation in the sense of least squares. Rows of lower
+    ranks hold, and rows of higher ranks do not count."""
     counted = _up_to(part, rank)
     A, lower, upper = counted.A, counted.lower, counted.upper
     yields = np.flatnonzero(counted.ranks == rank)

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 
 class Binding(NamedTuple):
-    """An active constraint: its level, its joint (or what its direction is called), bound and multiplier."""
+    """An active constraint: its level, its joint (or the name of its direction), bound and multiplier."""
 
     level: str
     joint: str
@@ -52,7 +52,7 @@ class AtOnce(NamedTuple):
 
 
 class Behind(NamedTuple):
-    """What a filter behind the levels did to their torque.
+    """The effect of a filter behind the levels on their torque.
 
     Attributes:
         solution: its step from τ₀, the bounds at which it stops, and its leak into the levels.

@@ -36,7 +36,7 @@ def write_plan(row: Array, layout: Layout, plan: Plan, ahead: Mapping[str, Previ
 
 
 def _write_behind(row: Array, layout: Layout, plan: Plan) -> None:
-    """Writes what a filter behind the levels changes in a row of the levels."""
+    """Writes the data of a filter behind the levels into a row of the levels."""
     fields, behind = layout.fields, plan.behind
     assert behind is not None
     row[fields["tau_demand"]], row[fields["delta_tau"]] = plan.tau, plan.tau - plan.tau_0

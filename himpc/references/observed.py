@@ -1,4 +1,4 @@
-"""What a controller knows of the objects around the robot."""
+"""The objects around the robot, as a controller knows them."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ class Observed(NamedTuple):
     """The objects around the robot, as a controller knows them at a tick; the truth may be different.
 
     Attributes:
-        shapes: where they are now.
-        velocity: of their middles, (B, 3) m/s; None: they are at rest.
+        shapes: the objects at their present places.
+        velocity: of their centres, (B, 3) m/s; None: they are at rest.
     """
 
     shapes: tuple[WorldShape, ...] = ()
@@ -25,4 +25,4 @@ class Observed(NamedTuple):
 
 
 NOTHING = Observed()
-"""No object is known."""
+"""A state without known objects."""

@@ -1,4 +1,4 @@
-"""What `StallGuard` does, by the compiled kernel."""
+"""`StallGuard` by the compiled kernel."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ _NONE = np.empty(0)
 
 @final
 class CompiledStallGuard:
-    """Remembers how far its controller's robot is stalled. Its attributes are those of `StallGuard`."""
+    """Contains the degree to which the robot of a controller is stalled. Its attributes are those of
+    `StallGuard`."""
 
     def __init__(self, tasks: int, T_s: float) -> None:
         self._T_s = T_s

@@ -1,4 +1,4 @@
-"""The nearest pairs of a robot's links and of what is around it, by the compiled kernel."""
+"""The nearest pairs of links, and of links and objects, by the compiled kernel."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ Indices = NDArray[np.intp]
 _AT_HOME = 0.5
 """Share of their distance at home that links keep at most: d_safe must not forbid the posture at home."""
 _GRID = 15
-"""Postures of a joint that stands between two links."""
+"""Number of postures of a joint between two links that are checked."""
 _NEVER = 0.03
 """m: links with at most two joints between them that are farther apart in all postures need no row."""
 
@@ -76,8 +76,8 @@ class _Pairs:
 
 
 class _Links(NamedTuple):
-    """What is checked between the links of a robot, (S, S) each: which pairs of capsules, and the largest
-    distance, m, that they have to keep."""
+    """The checks between the links of a robot, (S, S) each: the pairs of capsules, and the largest distance,
+    m, that each pair must keep."""
 
     meets: NDArray[np.bool_]
     kept: Array
@@ -141,7 +141,7 @@ class Distances:
         self._numbers = np.array(
             (avoidance.d_safe, avoidance.margin, avoidance.reaction, avoidance.deceleration)
         )
-        # A joint without a limit counts as one that is as fast as the fastest of the others.
+        # A joint without a limit gets the largest limit of the other joints.
         limited = np.isfinite(robot.v_limit)
         self._fastest = np.where(limited, robot.v_limit, robot.v_limit[limited].max(initial=1.0))
         self.carried = np.ascontiguousarray(geometry(robot).moves[1:] > 0)
@@ -213,7 +213,7 @@ class Distances:
         """Writes the rows of this tick to an arena that holds the measured state; returns the name of each
         row's pair, (n,).
 
-        block: which set of directions is that of distances.
+        block: index of the set of directions for distances.
         """
         pairs = self._pairs
         place_joints(*arena.arguments)
@@ -226,6 +226,6 @@ class Distances:
 
 
 def _kind(shape: WorldShape) -> tuple[object, ...]:
-    """What stays when an object moves."""
+    """The data that stay constant when an object moves."""
     fixed = (value for name, value in vars(shape).items() if name not in ("centre", "foot", "yaw"))
     return type(shape), *fixed

@@ -1,1 +1,1 @@
-"""What Numba compiles: the theory of one tick, a file per subject, on one arena of numbers."""
+"""The compiled functions of one tick, one file per subject. All of them work on one arena of numbers."""

@@ -1,5 +1,5 @@
-"""Rows taken as equalities: an orthonormal account of them, their multipliers, and the point they hold, for
-HIMPC's levels and HTMPC's QPs."""
+"""The active rows, which hold as equalities: an orthonormal basis of them, their multipliers, and the point
+that they determine. HIMPC's levels and HTMPC's QPs use it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from himpc.tick.kernel.arrays import Array, Whole
 from himpc.tick.kernel.linear import backward, close_gap, copy, dot, forward, split, subtract
 
 _DEPENDENT = 1e-10
-"""A row of which less than this share is new depends on those taken before."""
+"""A row is linearly dependent on the active rows if less than this share of it is orthogonal to them."""
 
 
 class Quadratic(NamedTuple):
@@ -32,7 +32,7 @@ class Quadratic(NamedTuple):
 
 
 class ActiveSet(NamedTuple):
-    """Rows a'x ≤ b that hold the point as equalities, k of room for many.
+    """The active rows a'x ≤ b, k of them, with room for more.
 
     Attributes:
         row, joint, side: which they are, and whether the upper (1) or the lower bound (−1); 0 is a row that
@@ -86,13 +86,13 @@ def resolve(active: ActiveSet, index: int, D: int, budget: Array) -> float:
         active.orthonormal_basis[index],
     )
     length, whole = math.sqrt(left), math.sqrt(dot(scaled_normal, scaled_normal, D))
-    # D rows span all there is: what rounding leaves of one more must not become a row without room.
+    # D rows span the whole space: the rounding error of one more row must not count as a new direction.
     return length if index < D and length > _DEPENDENT * whole and length > 1e-14 else 0.0
 
 
 @inline_kernel
 def fix(active: ActiveSet, index: int, length: float, D: int) -> None:
-    """Makes what `resolve` found for row `index` part of the orthonormal rows."""
+    """Adds the direction that `resolve` found for row `index` to the orthonormal basis."""
     active.cholesky_factor[index, index] = length
     for c in range(D):
         active.orthonormal_basis[index, c] /= length
@@ -113,7 +113,8 @@ def move(active: ActiveSet, source: int, to: int, D: int) -> None:
 
 @inline_kernel
 def without(active: ActiveSet, index: int, k: int, D: int, budget: Array) -> None:
-    """Lets row `index` of k go; those behind it move up, and rotations make `cholesky_factor` triangular."""
+    """Removes row `index` of k. The rows behind it move up, and rotations make `cholesky_factor` triangular
+    again."""
     budget[0] -= 6.0 * D * (k - index)
     for p in range(index, k - 1):
         move(active, p + 1, p, D)
@@ -149,8 +150,8 @@ def unscale(cost: Quadratic, z: Array, x: Array) -> None:
 
 @inline_kernel
 def evaluate(active: ActiveSet, x: Array, k: int, D: int, slope: Array) -> tuple[float, float]:
-    """Adds the multipliers' part to the gradient of the cost at a point, and writes by how much k rows are
-    missed there; returns the largest of these, and the largest of them times its multiplier."""
+    """Adds the multipliers' part to the gradient of the cost at a point, and writes the violations of k rows.
+    Returns the largest violation, and the largest product of a violation and its multiplier."""
     violation = worth = 0.0
     for p in range(k):
         subtract(-active.multiplier[p], active.normal[p], slope, D)

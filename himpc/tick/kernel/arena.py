@@ -1,5 +1,5 @@
-"""One array of numbers and one of whole numbers hold all that a tick reads and writes; names and shapes are
-data."""
+"""An arena: one array of real numbers and one of integers with all data that a tick reads and writes. Names
+and shapes of its parts are data."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from himpc.tick.kernel.arrays import AT, NUMBERS, WHOLE_AT, WHOLES, Array, Whole
 
 _LINE = 8
-"""Arrays begin at multiples of so many numbers: a line of the processor's cache."""
+"""Arrays begin at multiples of this number of elements: a line of the processor's cache."""
 
 
 class Arena:
@@ -34,7 +34,7 @@ class Arena:
         self._found = slice(begin, end), slice(whole_begin, whole_end)
 
     def snapshot(self) -> Snapshot:
-        """What this tick found, which stays when the next one comes."""
+        """A copy of the results of this tick, which the next tick does not change."""
         numbers, wholes = self._found
         return Snapshot(self, self.data[numbers].copy(), self.whole[wholes].copy())
 
@@ -48,7 +48,7 @@ class Arena:
 
 
 class Snapshot(NamedTuple):
-    """A copy of what a tick found."""
+    """A copy of the results of a tick."""
 
     arena: Arena
     data: Array

@@ -26,7 +26,7 @@ class TickArrays(NamedTuple):
     that can hold its point, one of them about to be replaced.
     """
 
-    # What a tick is given.
+    # The input of a tick.
     q: Annotated[
         Array,
         "n",
@@ -47,7 +47,7 @@ class TickArrays(NamedTuple):
     given: Annotated[Array, "N1 G n", "m, 1", "given → linearize"]
     curve: Annotated[Array, "M 4", "m, rad", "configure → linearize"]
     pace: Annotated[Array, "T 2", "rad/s, rad", "configure → linearize"]
-    # What is remembered from the tick before.
+    # The memory of the previous tick.
     q_was: Annotated[Array, "n", "rad", "finish_tick tick → given linearize"]
     v_was: Annotated[
         Array, "n", "rad/s", "finish_tick tick → distance_rows fallbacks given given_bounds linearize"
@@ -93,7 +93,7 @@ class TickArrays(NamedTuple):
     axis: Annotated[Array, "J 3", "1", "configure → distance_rows linearize"]
     frame_rotation: Annotated[Array, "F 3 3", "1", "configure → linearize"]
     frame_translation: Annotated[Array, "F 3", "m", "configure → linearize"]
-    # What a tick finds; one piece, so that a plan takes its copy at once.
+    # The results of a tick. They are adjacent: a plan copies them in one operation.
     tau: Annotated[Array, "n", "N·m", "finish_tick → gather tick"]
     U: Annotated[
         Array, "r N n", "N·m", "control_period fallbacks solve_level → finish_tick problems tables tick"
@@ -117,7 +117,7 @@ class TickArrays(NamedTuple):
     leak: Annotated[Array, "r", "m/s²", "finish_tick → gather problems"]
     multiplier: Annotated[Array, "r k", "1/N·m", "fallbacks solve_level → finish_tick problems"]
     slack: Annotated[Array, "r k", "N·m", "fallbacks solve_level → problems"]
-    # What else telemetry tells of it; nothing is NaN.
+    # Further data for telemetry; NaN stands for missing data.
     quaternion: Annotated[Array, "T 4", "1", "finish_tick → gather"]
     quaternion_d: Annotated[Array, "T 4", "1", "finish_tick → gather"]
     delta_tau: Annotated[Array, "n", "N·m", "finish_tick → gather"]
@@ -172,7 +172,7 @@ class TickArrays(NamedTuple):
         "1",
         "configure tables → control_period distance_rows fallbacks finish_tick linearize solve_level",
     ]
-    # What is remembered, and whether `x_dot_was` and `U_was` are known.
+    # The memory, and whether `x_dot_was` and `U_was` are known.
     known: Annotated[Whole, "2", "1", "finish_tick linearize kinematics problems tick → fallbacks given"]
     warm_row: Annotated[Whole, "r k", "1", "finish_tick solve_level problems → itself"]
     warm_joint: Annotated[Whole, "r k", "1", "finish_tick solve_level problems → itself"]

@@ -9,7 +9,7 @@ from himpc.tick.kernel.arrays import AT, WHOLE_AT, Array, TickArrays, Whole
 
 @always_inline_kernel
 def arrays_of(data: Array, where: Whole, whole: Whole, whole_where: Whole) -> TickArrays:
-    """All arrays of an arena, as views; a compiled function pays only for those that it uses."""
+    """Returns all arrays of an arena as views. Views that a compiled function does not use cost no time."""
     s = vector(whole, whole_where[WHOLE_AT.sizes], 12)
     n, N, M, r, T, F, b, w, G = s[0], s[1], s[2], max(s[4], 1), s[5], s[6], s[7], s[8], s[10]
     g = max(s[11], 1)

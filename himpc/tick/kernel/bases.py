@@ -1,4 +1,5 @@
-"""What (33) leaves free at each knot: orthonormal coordinates in which the cascade is triangular."""
+"""The directions that (33) leaves free at each knot: orthonormal coordinates in which the cascade is
+triangular."""
 
 from __future__ import annotations
 
@@ -12,7 +13,7 @@ from himpc.tick.kernel.linear import dot, subtract
 
 @inline_kernel
 def no_directions(Q: Array) -> None:
-    """Q (n, n) of a knot before any level took part: the identity."""
+    """Sets Q (n, n) of a knot to the identity, its value before the first level."""
     Q[:] = 0.0
     for a in range(len(Q)):
         Q[a, a] = 1.0
@@ -68,7 +69,7 @@ def take_directions(
     size = 0.0
     for i in range(first, last):
         size += dot(projected_jacobian[i], projected_jacobian[i], n)
-    # Each row once: a row that was taken has nothing left beyond its direction but rounding.
+    # Each row counts once: after its direction is taken, only rounding errors are left of it.
     for _ in range(min(last - first, n - count)):
         best, most = first, -1.0
         for i in range(first, last):

@@ -1,4 +1,5 @@
-"""A level's rows of bounds: their coefficients, how long these are, and which violated row comes next."""
+"""The rows of bounds of a level: their coefficients, their lengths, and the choice of the next violated
+row."""
 
 from __future__ import annotations
 
@@ -12,7 +13,7 @@ from himpc.tick.kernel.level import LevelQP
 from himpc.tick.kernel.linear import dot, forward, subtract
 
 _SHORT = 1e-9
-"""Share of the longest row: a shorter one is as far away as one of this length."""
+"""Share of the longest row: a shorter row is treated as if it had this length."""
 
 
 @inline_kernel
@@ -65,7 +66,7 @@ def normal_of(level: LevelQP, active: ActiveSet, index: int, bounds: LevelBounds
 
 @inline_kernel
 def lengths(level: LevelQP, active: ActiveSet, k: int, bounds: LevelBounds, budget: Array) -> None:
-    """How long the scaled coefficients of all rows are, into `bounds.length`; row k is scratch."""
+    """Writes the lengths of the scaled coefficients of all rows into `bounds.length`; row k is scratch."""
     N, n = level.fixed.shape
     d, D, share = level.cost.d, level.cost.D, level.cost.share
     length, plain = bounds.length, bounds.plain
@@ -109,7 +110,7 @@ def lengths(level: LevelQP, active: ActiveSet, k: int, bounds: LevelBounds, budg
 
 @inline_kernel
 def most_violated(value: Array, low: Array, high: Array) -> tuple[float, int, int, int]:
-    """The row that is violated most: by how much, row, joint and side. What is not a number is violated."""
+    """Returns the most violated row: violation, row, joint and side. NaN counts as violated."""
     most, row, joint, side = 0.0, -1, -1, 0
     for r in range(len(value)):
         for a in range(value.shape[1]):
@@ -127,7 +128,8 @@ def most_violated(value: Array, low: Array, high: Array) -> tuple[float, int, in
 def farthest(
     value: Array, low: Array, high: Array, length: Array, least: float
 ) -> tuple[float, int, int, int]:
-    """The row, violated by more than `least`, to which it is farthest; returns what `most_violated` does."""
+    """Returns the row with the largest distance among those that are violated by more than `least`; the
+    result is that of `most_violated`."""
     most, excess, row, joint, side = 0.0, 0.0, -1, -1, 0
     for r in range(len(value)):
         for a in range(value.shape[1]):

@@ -1,4 +1,4 @@
-"""The bounds (32d)–(32f) over the horizon, and what increments make of them."""
+"""The bounds (32d)–(32f) over the horizon, and the values that increments give to their rows."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from himpc.tick.kernel.arrays import Array
 from himpc.tick.kernel.linear import dot
 
 VIABILITY, PAPER, OFF = range(3)
-"""How position limits are kept."""
+"""The kinds of position limits."""
 
 
 class LevelBounds(NamedTuple):
@@ -121,7 +121,9 @@ def constraint_values(U: Array, bounds: LevelBounds) -> None:
         for c in range(n):
             for j in range(N):
                 value[first + j, c] = dot(D[c], U[j], n)
-            for j in range(N - 1, -1, -1):  # the last knot first: it needs the increments of those before
+            for j in range(
+                N - 1, -1, -1
+            ):  # from the last knot to the first: each knot needs the increments of earlier knots
                 total = 0.0
                 for s in range(j + 1):
                     total += bounds.L[first + j, s] * value[first + s, c]

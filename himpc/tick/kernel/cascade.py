@@ -1,4 +1,4 @@
-"""From Problem 1 to Problem r: each level within what (33) leaves of those above."""
+"""From Problem 1 to Problem r: each level uses the directions that (33) leaves free."""
 
 from __future__ import annotations
 
@@ -34,7 +34,8 @@ def own_directions(
     above = 0 if levels[index, ALONE] else index
     afresh = above == 0 or levels[index, AFRESH]
     first, last = levels[index, FIRST], levels[index, LAST]
-    # What the last level leaves nobody needs: if it may want all that is left, it takes part as it is.
+    # No level needs the directions that the last level leaves. If the last level can use all remaining
+    # directions, its rows need no factorisation.
     whole = index == len(levels) - 1 or levels[index, ALONE]
     for j in range(N):
         if afresh:
@@ -63,8 +64,8 @@ def own_directions(
 
 @inline_kernel
 def keep_above(level: LevelQP, U_above: Array, knots: int) -> None:
-    """What (33) fixes of U_{i−1}, (N, n): its part in the directions of the levels above; all of it beyond
-    the level's own horizon (Remark 8)."""
+    """The part of U_{i−1}, (N, n), that (33) fixes: its components along the directions of the levels above,
+    and all of it beyond the level's own horizon (Remark 8)."""
     N, n = U_above.shape
     fixed, Q, metric = level.fixed, level.Q, level.metric
     for j in range(N):
@@ -80,7 +81,8 @@ def keep_above(level: LevelQP, U_above: Array, knots: int) -> None:
 
 @inline_kernel
 def count_coordinates(knots: int, n: int, count: Whole, start: Whole, offset: Whole, rest: Whole) -> int:
-    """Where own coordinates and those beyond stand, see `LevelQP`; returns how many there are."""
+    """Writes the indices of the level's own coordinates and of those beyond, see `LevelQP`; returns their
+    number."""
     N = len(start)
     offset[0] = 0
     for j in range(N):
@@ -148,5 +150,5 @@ def predict(
 
 @inline_kernel
 def finite(x: Array) -> bool:
-    """Finite, and small enough that its squares and the bounds' differences stay so."""
+    """Whether all numbers are finite, and small enough for finite squares and differences of bounds."""
     return dot(x, x, x.size) < 1e18
