@@ -96,7 +96,7 @@ class Plant:
 
     @property
     def touch(self) -> Touch:
-        """How the robot touched itself or the world during the last step."""
+        """The contacts of the robot with itself or the world during the last step."""
         return self._touch
 
     @property
@@ -237,8 +237,8 @@ class Plant:
         return self._data.qvel[self.n :].reshape(-1, 6)[:, :3].copy()
 
     def carry(self, place: int, position: np.ndarray, velocity: np.ndarray) -> None:
-        """Puts the free object of a place in `objects` at a position, (3,) m, with a velocity, (3,) m/s, as
-        if a hand carried it; it needs `contacts`."""
+        """Moves the free object with this index in `objects` to a position, (3,) m, with a velocity, (3,)
+        m/s, as if a hand carried it; it needs `contacts`."""
         q, v = self._data.qpos[self.n :].reshape(-1, 7), self._data.qvel[self.n :].reshape(-1, 6)
         q[place, :3], v[place, :3], self._fresh = position, velocity, False
 
@@ -279,11 +279,11 @@ class Plant:
 
     @property
     def _seen(self) -> mujoco.MjData:
-        """Where the last stage of the last step left its contacts."""
+        """MuJoCo's data at the last stage of the last step, with its contacts."""
         return self._probe if self._altered else self._data
 
     def _feel(self) -> None:
-        """Takes note of the contacts, as the last stage of an internal step sees them."""
+        """Records the contacts at the last stage of an internal step."""
         if self._seen.ncon:
             now = touch_of(self._model, self._seen, self.robot)
             self._touch = Touch(max(self._touch.depth, now.depth), max(self._touch.force, now.force))

@@ -1,4 +1,4 @@
-"""`PlantSettings`: how the simulated plant differs from its nominal description."""
+"""`PlantSettings`: the differences between the simulated plant and its nominal description."""
 
 from __future__ import annotations
 

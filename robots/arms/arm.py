@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 
 class Reading(NamedTuple):
-    """What an arm says once per period.
+    """The reading of an arm, once per period.
 
     Attributes:
         q, v: measured joint positions, (n,) rad, and velocities, (n,) rad/s.
@@ -32,7 +32,7 @@ class Reading(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ArmLimits:
-    """What an arm accepts.
+    """The limits of an arm.
 
     Attributes:
         tau: largest torque without gravity, (n,) N·m.
@@ -48,8 +48,8 @@ class ArmLimits:
     q_upper: Array
 
     def with_robot(self, robot: Robot) -> ArmLimits:
-        """Returns what both this arm and the description of a robot accept. Raises InputError if the two
-        differ in their number of joints, or have no common range of a joint."""
+        """Returns the limits that this arm and the description of a robot have in common. Raises InputError
+        if the two differ in their number of joints, or have no common range of a joint."""
         if len(self.tau) != robot.n:
             raise InputError(
                 f"the arm has {len(self.tau)} joints and the scene's robot '{robot.name}' has {robot.n}: "
@@ -67,15 +67,13 @@ class ArmLimits:
 
 
 class ArmLost(Exception):
-    """The arm does not answer any more, or has stopped by itself. The message says what it told."""
+    """The arm no longer answers, or has stopped by itself. The message contains the arm's own message."""
 
 
 class Arm(ABC):
-    """An arm that compensates its own gravity: a torque of zero keeps it where it is, if nothing is wrong
-    with the load that it was told.
-
-    Torques are always those without gravity. An arm that did not compensate its gravity would need g(q) added
-    to what is written, and subtracted from what is read.
+    """An arm that compensates its own gravity: with a torque of zero it stays where it is, if its load is set
+    correctly. All torques exclude gravity. For an arm without compensation, g(q) must be added to written
+    torques and subtracted from torques that are read.
     """
 
     limits: ArmLimits

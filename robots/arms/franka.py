@@ -1,4 +1,4 @@
-"""A Franka arm through pylibfranka, the only door to it."""
+"""A Franka arm. No other module imports pylibfranka."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from robots.robot import Robot
 
 Array = NDArray[np.float64]
 
-# Given by Franka's documentation of its control interface ("Robot limits"): torques and their rates, and of
-# the ranges and speeds of Panda and FR3 the narrower ones.
+# Given by Franka's documentation of its control interface ("Robot limits"): torques and their rates; for
+# ranges and speeds the narrower ones of Panda and FR3.
 _TAU = (87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0)  # N·m
 _TAU_RATE = 990.0  # N·m/s; the arm stops itself above 1000
 _V = (2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61)  # rad/s
@@ -28,8 +28,8 @@ _ASIDE, _FARTHEST = 0.01, 0.2
 
 @final
 class Franka(Arm):
-    """A Franka arm under torque control. The arm adds the torques that its gravity and the load that it was
-    told need; `Reading.tau` is its `tau_J_d`, the torque without gravity that was commanded last."""
+    """A Franka arm under torque control. The arm adds the torques for gravity and for the load that is set;
+    `Reading.tau` is its `tau_J_d`, the torque without gravity that was commanded last."""
 
     def __init__(self, address: str, real_time: bool = False) -> None:
         """Connects; the arm does not move before the first `read`.
@@ -117,5 +117,5 @@ def _library() -> Any:
 
 
 def _told(error: Exception) -> str:
-    """What libfranka says, in one line."""
+    """The message of libfranka in one line."""
     return " ".join(str(error).split()).removeprefix("libfranka: ").rstrip(".")

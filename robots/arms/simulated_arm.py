@@ -20,16 +20,14 @@ TAU_RATE = 1000.0
 
 @final
 class SimulatedArm(Arm):
-    """A robot in MuJoCo that compensates the gravity of its description: a payload that the description does
-    not have pulls it down, as it does with a real arm.
-
-    Like a real arm in step with the clock, it moves on whether or not a torque arrives: who is late finds
-    that the clock has moved by several periods, during which the last torque acted.
+    """A robot in MuJoCo that compensates the gravity of its description. A payload that the description lacks
+    pulls it down, as it does with a real arm. With `in_step` the robot also moves if no torque arrives: for a
+    late caller several periods have passed, in which the last torque acted.
     """
 
     def __init__(self, plant: Plant, period: float = 1e-3, in_step: bool = True) -> None:
-        """plant: the robot, where it starts; period: s; in_step: whether time passes as on the wall, else a
-        period passes with every read."""
+        """plant: the robot, where it starts; period: s; in_step: whether simulated time follows real time;
+        otherwise each read takes one period."""
         robot = plant.robot
         rate = np.full(robot.n, TAU_RATE)
         self.limits = ArmLimits(

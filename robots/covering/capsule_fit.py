@@ -45,8 +45,8 @@ class Fit(NamedTuple):
 
 
 def reach(points: Array, swell: Array, fit: Fit) -> Array:
-    """How far balls stand out of capsules, (…, V) m, below 0 inside. points: their middles (V, 3), m; swell:
-    their radii (V,), m."""
+    """Returns the distance by which balls stand out of capsules, (…, V) m; negative inside. points: centres
+    of the balls (V, 3), m; swell: their radii (V,), m."""
     axis = (fit.end - fit.start)[..., None, :]
     offset = points - fit.start[..., None, :]
     length = np.maximum((axis**2).sum(axis=-1), 1e-300)

@@ -1,4 +1,4 @@
-"""The surfaces that a cover contains: triangles of what one sees and of what the plant collides with."""
+"""The surfaces that a cover contains: triangles of the visual shapes and of the solids of the plant."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def _read(root: Element) -> dict[str, list[Array]]:
 
 
 def _of_solid(solid: Solid) -> Patch:
-    """The surface of a solid; round ones are contained, not met."""
+    """The surface of a solid. Round solids lie inside their triangles."""
     if solid.kind == "hull":
         corners, swell = _hull(np.array(solid.points)), 0.0
         return Patch(solid.joint, solid.link, corners, swell)
@@ -109,7 +109,7 @@ def _cylinder(solid: Solid) -> Array:
 
 
 def _hull(points: Array) -> Array:
-    """The triangles of the hull of points, none without a volume."""
+    """The triangles of the convex hull of points; none if the hull has no volume."""
     from scipy.spatial import ConvexHull, QhullError  # their import takes long, and only hulls need them
 
     try:

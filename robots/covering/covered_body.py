@@ -1,4 +1,4 @@
-"""A body of a robot as triangles, and how far capsules stand out of it."""
+"""A body of a robot as triangles, and the distance by which capsules stand out of it."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Body:
 
     @cached_property
     def sample(self) -> Indices:
-        """Triangles by which groups are found, evenly over the area."""
+        """The triangles with which groups are found, evenly spread over the area."""
         return self._drawn(_SAMPLE)
 
     @cached_property
@@ -73,13 +73,13 @@ class Body:
         return quick_fits(self.middles, self.swell, group == np.arange(group.max() + 1)[:, None])
 
     def excess(self, fits: Fit) -> float:
-        """How far capsules stand out, m: the mean of the squares over their outer surface, rooted."""
+        """The distance by which capsules stand out, m: the root mean square over their outer surface."""
         gaps, areas = self.gaps(fits, _SURFACE)
         return float(np.sqrt(np.average(gaps**2, weights=areas)))
 
     def gaps(self, fits: Fit, count: int) -> tuple[Array, Array]:
-        """Distances, m, from points of the capsules' surfaces that lie in no other one to the triangles, and
-        the areas that the points stand for, m²."""
+        """Returns distances to the triangles, m, of points on the outer surface of the capsules, and the area
+        for each point, m²."""
         every = [surface(fits.chosen(k), count) for k in range(len(fits.radius))]
         outer = np.concatenate(
             [

@@ -19,9 +19,9 @@ from robots.geometry.cover import Capsule
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 PER_BODY = 2.6
-"""Capsules of a robot, divided by the number of its bodies, at most."""
+"""Largest mean number of capsules per body of a robot."""
 MOST = 6
-"""Capsules of a link, at most, and of a body whose links are not told apart."""
+"""Largest number of capsules of a link, and of a body whose links are treated as one."""
 _LINKS = 4  # of a body: more are not told apart
 _CUTS = (0.25, 0.4, 0.6, 0.75)  # of the extent along a principal axis
 _SMALL = 0.03  # of a usual body's size: one whose cover stands out less gets no more capsules
@@ -39,14 +39,15 @@ class Cut(NamedTuple):
 
 
 class Groups(NamedTuple):
-    """Cuts that make groups, and how far capsules around those of the sample stand out, m."""
+    """Cuts that make groups, and the distance, m, by which capsules around the groups of the sample stand
+    out."""
 
     cuts: tuple[Cut, ...]
     excess: float
 
 
 class Found(NamedTuple):
-    """Cuts, the capsules around their groups, and how far these stand out, m."""
+    """Cuts, the capsules around their groups, and the distance, m, by which the capsules stand out."""
 
     cuts: tuple[Cut, ...]
     capsules: list[Capsule]
@@ -68,7 +69,7 @@ def grouped(points: Array, cuts: tuple[Cut, ...]) -> Indices:
 def covering(surfaces: Iterable[Patch], weights: Mapping[int, float]) -> tuple[Capsule, ...]:
     """Returns capsules that contain surfaces: each triangle lies wholly in one capsule of its body.
 
-    weights: for each joint how much it matters that its capsules stand out.
+    weights: for each joint the weight of the distance by which its capsules stand out.
     """
     ordered = sorted(surfaces, key=lambda patch: (patch.joint == 0, patch.joint))
     bodies = [body for _, own in groupby(ordered, lambda patch: patch.joint) for body in _parts(list(own))]
@@ -119,8 +120,8 @@ def _extent(capsule: Capsule) -> float:
 
 
 def _with_more(body: Body, before: Found, most: int) -> Found | None:
-    """Capsules for up to `most` more groups that stand out less; None if there are none. The ways whose
-    capsules around the sample stand out less for each group come first."""
+    """Returns capsules for up to `most` additional groups that stand out less; None if no capsules stand out
+    less. Ways with the larger reduction per group, measured with the sample, are tried first."""
     start = body.excess(body.fits(grouped(body.middles, before.cuts)))
     tried = [_divided(body, before, more) for more in range(1, most + 1)]
     ways = [each for each in tried if each is not None]
@@ -130,7 +131,7 @@ def _with_more(body: Body, before: Found, most: int) -> Found | None:
 
 
 def _divided(body: Body, before: Found, more: int) -> Groups | None:
-    """The best of several ways to make a number of groups more; None if there is none."""
+    """The best of several ways to add a number of groups; None if there is no way."""
     count = before.groups + more
     ways = [*_refinements(body, before, more), *_slabs(body.middles, count, 0, 0)]
     masks = np.array([grouped(body.middles, way) for way in ways])[:, None, :] == np.arange(count)[:, None]
@@ -146,7 +147,7 @@ def _divided(body: Body, before: Found, more: int) -> Groups | None:
 
 
 def _refinements(body: Body, groups: Found, more: int) -> Iterator[tuple[Cut, ...]]:
-    """One of the groups is cut into slabs, those of two into unequal ones too."""
+    """Cuts one of the groups into slabs; two slabs may be unequal."""
     labels = grouped(body.middles, groups.cuts)
     for k in range(groups.groups):
         points = body.middles[labels == k]

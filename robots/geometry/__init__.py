@@ -1,1 +1,1 @@
-"""The geometry of a robot as data: the solids that touch, and the capsules whose distances are kept."""
+"""The geometry of a robot as data: the solids for contacts, and the capsules for distances."""

@@ -1,5 +1,5 @@
-"""The cover of a robot: capsules on its bodies that contain what one sees and what the plant collides with.
-Distances for collision avoidance are distances between capsules."""
+"""The cover of a robot: capsules on its bodies that contain its visual shapes and its solids. Distances for
+collision avoidance are distances between capsules."""
 
 from __future__ import annotations
 

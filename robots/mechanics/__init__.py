@@ -1,1 +1,2 @@
-"""The door to MuJoCo besides the plant itself: its model of a robot and a world, and the contacts in it."""
+"""MuJoCo's model of a robot and a world, and the contacts in it. Only this package and the plant import
+MuJoCo."""

@@ -14,10 +14,9 @@ from robots.world import World
 
 
 class Touch(NamedTuple):
-    """How a robot touched something during a step of the plant, its own links included.
-
-    depth: m, the deepest penetration. force: N, the largest force between two links, or a link and an object.
-    Both are the largest of the internal steps, as the last stage of each sees them, and 0 without a contact.
+    """The contacts of a robot during a step of the plant, with itself or with objects. depth: m, the deepest
+    penetration. force: N, the largest force between two links, or a link and an object. Both are the largest
+    values at the last stages of all internal steps, and 0 without a contact.
     """
 
     depth: float = 0.0
@@ -26,8 +25,8 @@ class Touch(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """One point of contact: the names of the two links, or of an object and a link; position (3,) m in the
-    world; force (3,) N, world axes, on the second of them; depth m."""
+    """One point of contact: the names of two links, or of an object and a link; position (3,) m in the world;
+    force (3,) N on the second one, world axes; depth m."""
 
     between: tuple[str, str]
     position: np.ndarray

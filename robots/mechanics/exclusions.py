@@ -84,8 +84,8 @@ def _touches(robot: Robot, postures: np.ndarray, margin: float = 0.0) -> Iterato
 
 
 def lowest(robot: Robot) -> tuple[float | None, float | None]:
-    """Heights, m, of the lowest points at home: of what stands (the base, or a mobile base), and of all
-    else; None where there is no solid."""
+    """Heights, m, of the lowest points at home: of the base or the mobile base, and of all other bodies; None
+    without a solid."""
     model = compiled(robot, PlantSettings(contacts=True))
     data = mujoco.MjData(model)
     data.qpos[:] = robot.home

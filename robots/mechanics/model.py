@@ -201,6 +201,6 @@ def _gyration(thing: Thing) -> tuple[float, float, float]:
 
 
 def label(robot: Robot, world: World, geom: int) -> str:
-    """Name of the link or object that a geometry of the model belongs to."""
+    """Name of the link or object to which a geometry of the model belongs."""
     solids: tuple[Solid, ...] = robot.collision.solids
     return solids[geom].link if geom < len(solids) else world[geom - len(solids)].shape.name

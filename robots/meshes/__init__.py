@@ -1,1 +1,1 @@
-"""The mesh files that a description names: where they are, and their triangles."""
+"""The mesh files that a description names: their places and their triangles."""

@@ -1,1 +1,1 @@
-"""The shapes of a robot: those that are seen, and the solids that touch, from its description."""
+"""The shapes of a robot from its description: visual shapes, and solids for contacts."""
