@@ -37,9 +37,7 @@ class Robot:
     M_bar: np.ndarray  # (n,) kg·m², suggested diagonal of M̄
     urdf_text: str  # canonical URDF
     report: ImportReport
-    collision: CollisionModel = field(
-        default_factory=CollisionModel
-    )  # solids for contacts, and excluded pairs
+    collision: CollisionModel = field(default_factory=CollisionModel)  # solids, and excluded pairs
     cover: Cover | None = None  # made by `cover_of` if it is not given
 
     def __post_init__(self) -> None:

@@ -17,7 +17,7 @@ from himpc.tick.kernel.references import SAMPLED
 
 @final
 class PreviewWriter:
-    """Remembers which references the arena of a tick holds already."""
+    """Records the references that the arena of a tick already contains."""
 
     def __init__(self, arena: Arena, given: GivenRows, settings: Settings) -> None:
         self._arena, self._given, self._T_s = arena, given, settings.T_s
@@ -26,7 +26,7 @@ class PreviewWriter:
         self._read: dict[int, Reference | Preview | None] = {}
 
     def write(self, previews: Mapping[str, Preview]) -> None:
-        """Writes what is new in the previews of all tasks, or the coefficients of the references."""
+        """Writes the changed previews of all tasks, or the coefficients of the references."""
         f = self._arena.f
         references: Mapping[str, Reference] = {}
         t = 0.0

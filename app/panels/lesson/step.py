@@ -116,9 +116,7 @@ class LessonPanel:
                 self._fast = bool(self._hurry.value)
 
         @self._second.on_update
-        def _(
-            event: viser.GuiEvent[viser.GuiCheckboxHandle],
-        ) -> None:  # on a thread: starting and ending processes takes a moment
+        def _(event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:  # on a thread: it starts processes
             if event.client is not None:
                 self._beside = bool(self._second.value)
                 self._show_ghost()

@@ -1,4 +1,5 @@
-"""One QP of HTMPC: its rows, and which one is violated most, for the dual method of `goldfarb_idnani`."""
+"""One QP of HTMPC: its rows, and the choice of the most violated row, for the dual method of
+`goldfarb_idnani`."""
 
 from __future__ import annotations
 
@@ -25,9 +26,9 @@ SOLVED, CONTRADICTION, LIMIT = range(3)
 VECTORS = 8
 """Number of rows of the vectors of `solve`."""
 _STEPS = 600
-"""One QP may take as many multiplications as this many rows that are added or removed: it bounds the time."""
+"""Budget of one QP: the multiplications for this many added or removed rows. It bounds the computing time."""
 _ROUGH = 1e-8
-"""A point that is not refined may seem to miss a row by as much."""
+"""A smaller violation at a point without refinement may be a rounding error."""
 _CLOSE = 0.05
 """Rows whose bound is nearer to x = 0 than this share of their range, or of one unit, are checked first."""
 
@@ -196,7 +197,8 @@ def solve(
             count = release(active, cost, count, budget)
             point_from_multipliers(active, cost, count, z)
         unscale(cost, z, x)
-        exact = not met  # a point that is not refined may only seem to miss a row that depends on others
+        # At a point without refinement the violation of a linearly dependent row may be a rounding error.
+        exact = not met
         if exact:
             refine(active, cost, count, H, g, slope, z, x)
     for p in range(count):

@@ -1,4 +1,4 @@
-"""The rows that keep distances, see `limits.distance`: which pairs have one, their directions and bounds."""
+"""The rows that keep distances, see `limits.distance`: the choice of pairs, their directions and bounds."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from himpc.tick.kernel.kinematics import forward_kinematics
 
 @kernel(VECTOR, INDICES, INDICES, INDICES)
 def place_joints(data: Any, where: Whole, whole: Whole, whole_where: Whole) -> None:
-    """Computes where the joints are at the measured positions, into `placed` and `axis_now`."""
+    """Computes the placements of the joints at the measured positions into `placed` and `axis_now`."""
     t = arrays_of(data, where, whole, whole_where)
     forward_kinematics(t.q, t.parent, t.is_revolute, t.rotation, t.translation, t.axis, t.placed, t.axis_now)
 

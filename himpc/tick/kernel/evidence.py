@@ -1,4 +1,4 @@
-"""What is told of a tick: costs, leaks, which bounds bind, orientations as quaternions."""
+"""The evidence of a tick: costs, leaks, active bounds, and orientations as quaternions."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def bounds_met(
     plain: int,
     at_bound: Array,
 ) -> None:
-    """Adds the bits of the rows that hold a level's point to those of the joints, (n,) whole numbers.
+    """Adds the bits of a level's active rows to those of the joints, (n,) integers.
 
     Args:
         count, row, column, multiplier: the active rows.
@@ -81,7 +81,8 @@ def quaternions(task: Whole, R: Array, out: Array) -> None:
 
 @inline_kernel
 def quaternion(R: Array, out: Array) -> None:
-    """x y z w of a rotation, w ≥ 0: its largest component comes from a root."""
+    """Returns the quaternion x y z w of a rotation, w ≥ 0. Its largest component is computed by a square
+    root."""
     xx, yy, zz = R[0, 0], R[1, 1], R[2, 2]
     w, x, y, z = 1.0 + xx + yy + zz, R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
     if w < 1.0:

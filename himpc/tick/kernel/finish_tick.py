@@ -24,7 +24,7 @@ from himpc.tick.kernel.residual import add_effects, effects
 
 @always_inline_kernel
 def remember(t: TickArrays, r: int) -> None:
-    """Keeps for the next tick what this one measured and found; r levels were solved."""
+    """Stores the measured state and the results for the next tick; r levels were solved."""
     copy(t.q, t.q_was, t.q.size)
     copy(t.v, t.v_was, t.v.size)
     copy(t.x_dot, t.x_dot_was, t.x_dot.size)
@@ -35,7 +35,7 @@ def remember(t: TickArrays, r: int) -> None:
     t.known[1] = 1
     for i in range(r):
         if t.rung[i] > SOFTENED:
-            continue  # what the attempt left is there already
+            continue  # the active rows of a failed attempt are stored already
         t.warm_count[i] = t.active_count[i]
         for p in range(t.active_count[i]):
             t.warm_row[i, p], t.warm_joint[i, p] = t.active_row[i, p], t.active_joint[i, p]
@@ -44,8 +44,8 @@ def remember(t: TickArrays, r: int) -> None:
 
 @inline_kernel
 def finish_tick(data: Any, where: Whole, whole: Whole, whole_where: Whole, keep: int) -> bool:
-    """Evidence of all levels, the torque τ₀ + Δτ within its bounds, and the prediction (18). False if the
-    torque is not finite; else the tick is remembered, if it is to be kept."""
+    """Computes the evidence of all levels, the torque τ₀ + Δτ within its bounds, and the prediction (18).
+    Returns False if the torque is not finite. keep: whether the tick is stored for the next one."""
     t = arrays_of(data, where, whole, whole_where)
     r, m = t.sizes[4], t.sizes[3]
     N, n = t.fixed.shape

@@ -1,9 +1,9 @@
 """The dual active-set method of Goldfarb and Idnani (1983): its steps, which HIMPC's levels and HTMPC's QPs
 share.
 
-The method keeps a point that is optimal under the rows taken so far, as equalities whose multipliers push the
-right way, and takes one violated row after the other; the cost only grows, so no set comes twice and it ends.
-A row that depends on those taken replaces the one it relieves.
+The method keeps a point that is optimal under the active rows, which hold as equalities with multipliers of
+the right sign. It adds violated rows one after another. The cost only increases, so that no active set occurs
+twice and the method ends. A row that is linearly dependent on the active rows replaces one of them.
 """
 
 from __future__ import annotations
@@ -16,21 +16,23 @@ from himpc.tick.kernel.arrays import Array
 from himpc.tick.kernel.linear import backward, subtract
 
 TOLERANCE = 1e-9
-"""A row violated by less counts as met; like the one below, N·m in HIMPC, in HTMPC the unit of the row."""
+"""A row with a smaller violation counts as satisfied. The unit, also of the next constant, is N·m in HIMPC
+and that of the row in HTMPC."""
 ROUNDED = 1e-7
-"""A row that nothing can move any more and that is violated by less is met, up to rounding."""
+"""A row that no free direction can change counts as satisfied if its violation is smaller, which is
+rounding."""
 _NOISE = 1e-12
-"""Multipliers that change by less than this share of the one that changes most do not change."""
+"""A multiplier counts as constant if its change is below this share of the largest change of a multiplier."""
 _HARD = 0.5
-"""Share of the hardest pull from which a row is let go together with that one."""
+"""Rows whose multiplier has the wrong sign are removed together if their multipliers exceed this share of the
+largest one."""
 
 
 @inline_kernel
 def release(active: ActiveSet, cost: Quadratic, k: int, budget: Array) -> int:
-    """Lets rows go until the multipliers of all that stay push the right way; returns how many stay.
-
-    Those that pull hardest go first: where a row goes, the multipliers of its neighbours often turn, and rows
-    that all go at once have to be taken again one by one.
+    """Removes rows until all multipliers have the right sign; returns the number of remaining rows. The rows
+    with the largest multipliers of the wrong sign are removed first: after that, multipliers of neighbouring
+    rows often change their sign. If all such rows were removed at once, many would have to be added again.
     """
     while True:
         wrong = -1.0
@@ -51,9 +53,9 @@ def release(active: ActiveSet, cost: Quadratic, k: int, budget: Array) -> int:
 
 @inline_kernel
 def take(active: ActiveSet, k: int, excess: float, z: Array, D: int, budget: Array) -> tuple[bool, int]:
-    """Takes the row at place k, violated by `excess`, as an equality: the dual step, which moves the point z
-    (D,), in scaled coordinates. Returns whether a point meets this row and the others, within the budget, and
-    how many rows are taken then."""
+    """Adds the row at index k, whose violation is `excess`, to the active rows: the dual step, which moves
+    the point z (D,), in scaled coordinates. Returns whether a point satisfies this row and the others within
+    the budget, and the number of active rows."""
     side = float(active.side[k])
     active.multiplier[k] = 0.0
     length = resolve(active, k, D, budget)
@@ -65,7 +67,7 @@ def take(active: ActiveSet, k: int, excess: float, z: Array, D: int, budget: Arr
         for q in range(k):
             change[q] = active.cholesky_factor[k, q]
         backward(active.cholesky_factor, change, k)
-        # How far until the first multiplier is used up, and how far until the row is met.
+        # The step to the first zero of a multiplier, and the step at which the row is satisfied.
         first, reach, noise = -1, math.inf, 0.0
         for q in range(k):
             noise = max(noise, _NOISE * abs(change[q]))
@@ -89,7 +91,7 @@ def take(active: ActiveSet, k: int, excess: float, z: Array, D: int, budget: Arr
         excess -= step * length * length
         active.multiplier[first] = 0.0
         if length > 0.0:
-            # The rotations that close the gap turn this row, too: nothing has to be resolved anew.
+            # The rotations that close the gap are also applied to this row: it need not be resolved again.
             without(active, first, k + 1, D, budget)
             k -= 1
             length = active.cholesky_factor[k, k]

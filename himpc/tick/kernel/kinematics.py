@@ -9,7 +9,7 @@ from himpc.tick.kernel.arrays import Array, Whole
 from himpc.tick.kernel.linear import copy
 
 POSITION, ORIENTATION, JOINTS, DAMPING, GIVEN = range(5)
-"""Kinds of tasks; rows of a GIVEN one are handed in, with its value and error."""
+"""Kinds of tasks. The rows, the value and the error of a GIVEN task are input."""
 
 
 @inline_kernel
@@ -23,8 +23,8 @@ def forward_kinematics(
     placed: Array,
     z: Array,
 ) -> None:
-    """Where all joints are at q: `placed` (n+1, 12), the rotation row by row, then the point, world axes; the
-    world first. z (n+1, 3) are the joints' axes in the world.
+    """Computes the placements of all joints at q: `placed` (n+1, 12), the rotation row by row, then the
+    origin, world axes; index 0 is the world. z (n+1, 3) are the joints' axes in the world.
 
     Args:
         q: (n,) rad or m.
@@ -77,7 +77,7 @@ def jacobian(
     given: Array,
     J: Array,
 ) -> None:
-    """J_i of (3) of all tasks, one below the other, (M, n), world axes at the frames' origins.
+    """Computes J_i of (3) of all tasks, one below another, (M, n), in world axes at the frames' origins.
 
     Args:
         task: (T, 4) kind, frame, first row and number of rows of each task.
@@ -113,7 +113,7 @@ def jacobian(
 
 @inline_kernel
 def rotation_of_frame(on: Array, rotation: Array, R: Array) -> None:
-    """R of a frame in the world, (3, 3); `on` is the place of the joint that carries it."""
+    """Computes R of a frame in the world, (3, 3); `on` is the index of the joint that carries the frame."""
     for a in range(3):
         for b in range(3):
             R[a, b] = (
@@ -187,7 +187,8 @@ def leans(R: Array, D: Array, f: int, out: Array) -> None:
 def turned_away(R: Array, D: Array, out: Array) -> None:
     """log₃(R Dᵀ), (3,) rad: the residual of an orientation task.
 
-    By way of the quaternion whose largest component comes from a root: it is accurate at every angle up to π.
+    It uses a quaternion whose largest component is computed by a square root, and is accurate at every angle
+    up to π.
     """
     E = (
         (dot3(R[0], D[0]), dot3(R[0], D[1]), dot3(R[0], D[2])),
@@ -197,7 +198,7 @@ def turned_away(R: Array, D: Array, out: Array) -> None:
     xx, yy, zz = E[0][0], E[1][1], E[2][2]
     w, x, y, z = 1.0 + xx + yy + zz, E[2][1] - E[1][2], E[0][2] - E[2][0], E[1][0] - E[0][1]
     if w < 1.0:
-        # More than 90°: the vector part is large, and the angle's sine is not what to divide by.
+        # Above 90° the vector part is large; a division by the sine of the angle would be inaccurate.
         if xx >= yy and xx >= zz:
             w, x, y, z = x, 1.0 + xx - yy - zz, E[0][1] + E[1][0], E[0][2] + E[2][0]
         elif yy >= zz:

@@ -1,4 +1,4 @@
-"""One level of the cascade in its own coordinates: the quadratic that (34a) is there, and its optimum."""
+"""One level of the cascade in its own coordinates: the quadratic cost (34a), and its optimum."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from himpc.tick.kernel.residual import add_effects, effects, gather, gather_effe
 class LevelQP(NamedTuple):
     """min ½ρ‖x‖² + ½ρ‖x'‖² + ½‖e₀ + G x‖², where U_j = fixed_j + metric ∘ Q_j (0, x_j, x'_j).
 
-    Coordinates of a knot stand in this order: those of the levels above, which (33) keeps; the level's own x,
-    which move its residual; and those beyond, x', which it does not feel and bounds may need. All own
-    coordinates stand side by side, knot by knot, then all of those beyond.
+    The order of the coordinates of a knot is: those of the levels above, which (33) fixes; the level's own x,
+    which change its residual; and the others, x', which do not change its residual but may be needed for
+    bounds. In the arrays all own coordinates come first, knot by knot, followed by all others.
 
     Attributes:
         first, last: its rows among all.
@@ -69,7 +69,8 @@ class LevelQP(NamedTuple):
 
 @inline_kernel
 def prepare(level: LevelQP) -> bool:
-    """e₀, and F and `ideal` of the cost. False if the Hessian is not positive: nothing is finite then."""
+    """Computes e₀, and F and `ideal` of the cost. Returns False if the Hessian is not positive definite,
+    which happens if numbers are not finite."""
     first, last = level.first, level.last
     N = len(level.start)
     total = 0.0

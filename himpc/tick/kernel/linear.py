@@ -1,7 +1,7 @@
 """The linear algebra of small dense matrices, compiled: at these sizes a call costs more than the work.
 
-Rows that a point is held by are kept as cholesky_factor · orthonormal_basis: a lower triangle times
-orthonormal rows. Rows come and go one by one.
+The active rows are stored as cholesky_factor · orthonormal_basis, a lower triangular matrix times orthonormal
+rows. Rows are added and removed one by one.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from himpc.compilation.compiled import inline_kernel
 from himpc.tick.kernel.arrays import Array
 
 _ENOUGH = 0.5
-"""A second round of `split` removes what rounding left, unless this share of ‖row‖² is left."""
+"""`split` has a second round against rounding errors, unless more than this share of ‖row‖² is left."""
 
 
 @inline_kernel
@@ -33,7 +33,7 @@ def subtract(share: float, x: Array, y: Array, n: int) -> None:
 
 @inline_kernel
 def copy(x: Array, y: Array, n: int) -> None:
-    """y ← x over the first n. (`y[:] = x` would be compiled with all that it takes to word an error.)"""
+    """y ← x over the first n. (`y[:] = x` would also be compiled with code for error messages.)"""
     for i in range(n):
         y[i] = x[i]
 
@@ -83,7 +83,7 @@ def factorise(H: Array, d: int) -> bool:
 
 @inline_kernel
 def forward(F: Array, x: Array, d: int) -> None:
-    """x ← F⁻¹ x, F lower triangular; what is zero at the beginning stays zero."""
+    """x ← F⁻¹ x, F lower triangular; leading zeros stay zero."""
     first = 0
     while first < d and x[first] == 0.0:
         first += 1
@@ -106,7 +106,7 @@ def split(row: Array, orthonormal_basis: Array, count: int, n: int, share: Array
     Args:
         row, orthonormal_basis, count, n: see there.
         share: the coefficients, (count,).
-        rest: what is left, (n,).
+        rest: the remainder, (n,).
 
     Returns:
         ‖rest‖².
@@ -128,8 +128,8 @@ def split(row: Array, orthonormal_basis: Array, count: int, n: int, share: Array
 
 @inline_kernel
 def close_gap(cholesky_factor: Array, orthonormal_basis: Array, index: int, count: int, n: int) -> None:
-    """Takes row `index` out of `count` rows; those behind it move up, and rotations make `cholesky_factor`
-    lower triangular again."""
+    """Removes row `index` of `count` rows. Later rows move up, and rotations make `cholesky_factor` lower
+    triangular again."""
     for p in range(index, count - 1):
         for q in range(p + 2):
             cholesky_factor[p, q] = cholesky_factor[p + 1, q]

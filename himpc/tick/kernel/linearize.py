@@ -28,7 +28,7 @@ from himpc.tick.kernel.references import curves
 from himpc.tick.kernel.residual import free_motion
 
 _MODE = 9
-"""Where `sizes` holds how position limits are kept, see `bounds`."""
+"""Index in `sizes` of the kind of position limits, see `bounds`."""
 
 
 @always_inline_kernel
@@ -71,10 +71,9 @@ def errors(t: TickArrays) -> None:
 
 @inline_kernel
 def linearize(data: Any, where: Whole, whole: Whole, whole_where: Whole) -> bool:
-    """The measured state and the references as the data of all QPs: kinematics along the last prediction
-    (30), residuals, free motion (15) and bounds (32d)–(32f). False if they are not finite.
-
-    The knots q*_{k+j|k−1} are the last prediction re-rooted at the measured q.
+    """Computes the data of all QPs from the measured state and the references: kinematics along the last
+    prediction (30), residuals, free motion (15) and bounds (32d)–(32f). Returns False if they are not finite.
+    The knots q*_{k+j|k−1} are the last prediction, shifted to begin at the measured q.
     """
     t = arrays_of(data, where, whole, whole_where)
     M, m = t.sizes[2], t.sizes[3]
@@ -85,7 +84,8 @@ def linearize(data: Any, where: Whole, whole: Whole, whole_where: Whole) -> bool
         for i in range(M):
             t.x_dot_was[i] = dot(t.B[0, i], t.v_was, n)
         t.known[0] = 1
-    for j in range(N - 1, -1, -1):  # the measured state last: places and axes are then its own
+    # The measured state comes last: placements and axes are then those of this state.
+    for j in range(N - 1, -1, -1):
         for a in range(n):
             t.z[a] = t.path[1 + j, a] + (t.q[a] - t.path[1, a]) if j else t.q[a]
         jacobian_at(t, t.z[:n], t.given[j], t.B[j])

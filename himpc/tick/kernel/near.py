@@ -1,5 +1,5 @@
-"""Compiled signed distances between capsules and shapes, with gradients. A capsule is all that is nearer than
-its radius to a segment; a sphere is a capsule whose segment has length 0."""
+"""Compiled signed distances between capsules and shapes, with gradients. A capsule contains all points that
+are nearer than its radius to a segment; a sphere is a capsule whose segment has length 0."""
 
 from __future__ import annotations
 

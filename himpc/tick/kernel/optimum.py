@@ -27,17 +27,17 @@ from himpc.tick.kernel.residual import add_effects, apply, gather, gather_effect
 _ROUNDS = 4
 """The normal equations lose digits on long horizons; refinement brings them back."""
 _ROUNDING = 2e-14
-"""A gradient below this share of ‖G‖‖e‖ is rounding: no better point can be told from this one."""
+"""A gradient below this share of ‖G‖‖e‖ is rounding error: a better point cannot be distinguished."""
 _MET = 1e-11
-"""N·m: how exactly rows that are taken as equalities are met."""
+"""N·m: largest violation of the active rows."""
 _WORTH = 1e-8
-"""What the cost may gain by what they are missed by."""
+"""Largest change of the cost by the violations of the active rows."""
 _ROUGH = 1e-6
-"""N·m: a point that is not refined may seem to miss a row by as much. Where many rows meet, rows taken for
-that come and go, the same ones again and again, until the budget is spent."""
+"""N·m: a smaller violation at a point without refinement may be a rounding error. If such rows were added
+near a vertex of many rows, the same rows would be added and removed until the budget is used up."""
 _MANY = 12
-"""Rows taken in one attempt from which on it pays to know how far away each violated row is: whoever goes for
-the farthest takes fewer in all than whoever goes for the one that is missed by most newton metres."""
+"""Number of added rows in one attempt after which the distance of each violated row is computed. Adding the
+farthest row needs fewer rows in total than adding the row with the largest violation in N·m."""
 
 FAILED = -1.0
 
@@ -53,7 +53,8 @@ def warm_start(
     multiplier: Array,
     budget: Array,
 ) -> int:
-    """Takes the rows that pressed a tick ago, but for those that depend on others; returns how many."""
+    """Adds the rows that were active in the previous tick, without linearly dependent ones; returns their
+    number."""
     d, D = level.cost.d, level.cost.D
     enough = 0.5 * budget[0]
     k = 0
@@ -74,10 +75,9 @@ def warm_start(
 
 @inline_kernel
 def refine(level: LevelQP, active: ActiveSet, k: int) -> float:
-    """The optimum with the first k rows as equalities, from a point and multipliers near it. Returns its KKT
-    residual, −1 if there is none within reach.
-
-    Iterative refinement: the conditions are evaluated afresh and the factors correct what they miss.
+    """Computes the optimum with the first k rows as equalities, from a point and multipliers near it, by
+    iterative refinement: it evaluates the optimality conditions and corrects their residuals with the
+    factors. Returns the KKT residual, −1 if the refinement fails.
     """
     first, last, rho = level.first, level.last, level.rho
     N = len(level.start)
@@ -119,8 +119,9 @@ def optimum(
     U: Array,
     budget: Array,
 ) -> tuple[float, int]:
-    """The level's optimum under its bounds: its KKT residual and how many rows hold it; FAILED if none was
-    found, and how many rows it got to within the budget, 0 if more of it would be of no help.
+    """Computes the level's optimum under its bounds. Returns its KKT residual and the number of active rows.
+    Without an optimum it returns FAILED and the number of active rows at the end of the budget, or 0 if a
+    larger budget would not help.
 
     Args:
         level: prepared.
@@ -186,7 +187,7 @@ def optimum(
                 point_from_multipliers(active, level.cost, k, level.z)
             unscale(level.cost, level.z, level.x)
             if not met and not exact:
-                break  # at a vertex the rounding of a point that is not refined looks like an excess
+                break  # at a vertex, rounding errors of a point without refinement look like a violation
             increments(level, U)
             constraint_values(U, bounds)
             excess, r, a, side = most_violated(value, low, high)

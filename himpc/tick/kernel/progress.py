@@ -1,5 +1,5 @@
-"""Entry: how far tasks are from their targets, and how fast these move. A robot without progress is
-stalled."""
+"""Entry: the distances of tasks from their targets, and the velocities of the targets. A robot without
+progress is stalled."""
 
 from __future__ import annotations
 

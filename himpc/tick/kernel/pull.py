@@ -1,4 +1,4 @@
-"""How hard tasks pull while distances are kept, see `Avoidance.pull`."""
+"""Limits the errors on which tasks act while distances are kept, see `Avoidance.pull`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""References that are numbers: x̄_d = col(x_d, ẋ_d, ẍ_d) of (28) over the horizon."""
+"""References as numbers: x̄_d = col(x_d, ẋ_d, ẍ_d) of (28) over the horizon."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from himpc.compilation.compiled import inline_kernel
 from himpc.tick.kernel.arrays import Array, Whole
 
 SAMPLED, UNIFORM, EASED = range(3)
-"""Where a task's reference comes from: samples that Python wrote, or a curve whose phase is φ = ωt + φ₀ or
-φ = ωt − sin ωt + φ₀."""
+"""The source of a task's reference: samples that Python wrote, or a curve whose phase is φ = ωt + φ₀ or φ =
+ωt − sin ωt + φ₀."""
 
 
 @inline_kernel

@@ -98,9 +98,8 @@ def hessian(
     rho: float,
     H: Array,
 ) -> float:
-    """H = ρ + GᵀG of a level in its own coordinates, upper triangle; returns the trace of GᵀG.
-
-    G is never built. Since C is Toeplitz, the block of knots j and l is Σ_i S_i[j, l] b_ji b_liᵀ with
+    """Computes H = ρ + GᵀG of a level in its own coordinates, upper triangle; returns the trace of GᵀG. G
+    itself is not computed. Since C is Toeplitz, the block of knots j and l is Σ_i S_i[j, l] b_ji b_liᵀ with
     S_i = Σ_k Q c_{k−j} c_{k−l}, which only the settings change.
 
     Args:

@@ -23,13 +23,13 @@ from himpc.tick.kernel.level import LevelQP, prepare
 from himpc.tick.kernel.optimum import FAILED, optimum, warm_start
 
 _SHARE = 0.75
-"""What one attempt at a level may take of what is left, so that levels below it get theirs; the last one may
-take all."""
+"""Share of the remaining budget that one attempt at a level may use. The rest is left for lower levels; the
+last level may use all."""
 
 
 @always_inline_kernel
 def active_set_of(t: TickArrays) -> ActiveSet:
-    """The scratch of the rows that hold a level's point."""
+    """Returns scratch arrays for the active rows of a level."""
     return ActiveSet(
         *(t.held_row, t.held_joint, t.held_side, t.normal, t.scaled_normal, t.orthonormal_basis),
         *(t.cholesky_factor, t.target, t.trial_multiplier, t.violation, t.change),
@@ -49,11 +49,11 @@ def level_of(t: TickArrays, i: int) -> LevelQP:
 
 @inline_kernel
 def solve_level(data: Any, where: Whole, whole: Whole, whole_where: Whole, i: int, room: float) -> bool:
-    """Problem i of the cascade, those above it known; False if no optimum was found within what is left of
-    the tick's budget.
+    """Solves Problem i of the cascade after the problems above it; returns False if no optimum was found
+    within the remaining budget of the tick.
 
-    room: N·m by which bounds give way where the levels above leave none. Positive only to try a level once
-        more: its directions stand from the first attempt and would else count as those of a level above.
+    room: N·m by which bounds are widened if the levels above leave no room. It is positive only for a second
+    attempt at a level, which uses the directions of the first attempt.
     """
     t = arrays_of(data, where, whole, whole_where)
     levels = t.level
@@ -75,7 +75,7 @@ def solve_level(data: Any, where: Whole, whole: Whole, whole_where: Whole, i: in
             kkt, held = optimum(level, active, bounds, held, t.U[i], t.budget)
     t.budget[0] += spared
     if kkt == FAILED:
-        # The next attempt, now or a tick later, goes on from where this one got.
+        # The next attempt, in this tick or the next one, begins with the active rows of this attempt.
         t.warm_count[i] = held
         for p in range(held):
             t.warm_row[i, p], t.warm_joint[i, p] = active.row[p], active.joint[p]

@@ -1,4 +1,5 @@
-"""Entry: the filter of a dragged target, see `references.target`; `references.filter` has it as formulas."""
+"""Entry: the filter of a dragged target, see `references.target`. `references.filter` contains the same
+formulas in Python."""
 
 from __future__ import annotations
 
@@ -47,11 +48,10 @@ def jerked(
     m: int,
     change: Array,
 ) -> None:
-    """How the acceleration changes in one period towards the one wanted, within the jerk cap.
-
-    Speeding up must end at the speed cap: along the motion the acceleration stays below √(jerk · speed left),
-    half of what a straight line would allow: in a curve speed also grows by itself. If it is above
-    already, coming down has the first claim on the jerk.
+    """Returns the change of the acceleration in one period towards the wanted one, within the jerk cap. The
+    speed must not exceed its cap: along the motion the acceleration stays below √(jerk · speed left). A
+    straight line would allow twice that, but in a curve the speed also grows by itself. If the acceleration
+    is above this limit, the jerk is used for its decrease first.
     """
     budget = caps[2] * T_s
     if speed == 0.0:
@@ -77,7 +77,7 @@ def jerked(
 
 @inline_kernel
 def following(now: Array, then: Array, raw: Array, caps: Array, T_s: float, m: int, width: int) -> None:
-    """The sample after this one: one period under one acceleration within the caps."""
+    """Returns the next sample: one period of constant acceleration within the caps."""
     velocity, acceleration = now[width : width + m], now[width + m : width + 2 * m]
     away, change, along = caps[3 : 3 + m], caps[3 + m : 3 + 2 * m], caps[3 + 2 * m : 3 + 3 * m]
     rests = now[width + 3 * m] > 0.0
@@ -92,7 +92,8 @@ def following(now: Array, then: Array, raw: Array, caps: Array, T_s: float, m: i
         copy(away, then[width + 2 * m :], m)
         then[width + 3 * m] = 1.0
         return
-    # Never faster than a stop with half the acceleration cap allows; linear close to the goal.
+    # The speed allows a stop with half the acceleration cap; near the goal it is proportional to the
+    # distance.
     wanted = min(caps[0], APPROACH_RATE * distance, math.sqrt(caps[1] * distance))
     for a in range(m):
         goal = away[a] * (wanted / distance) if distance > 0.0 else 0.0
@@ -117,7 +118,7 @@ def following(now: Array, then: Array, raw: Array, caps: Array, T_s: float, m: i
 
 @kernel(MATRIX, WHOLE, VECTOR, VECTOR, NUMBER, GIVEN_MATRICES)
 def roll(samples: Array, known: int, raw: Array, caps: Array, T_s: float, out: Array) -> None:
-    """Rolls the filter forward with the raw target frozen, and gathers its preview.
+    """Advances the filter with a constant raw target, and collects its preview.
 
     Args:
         samples: (…, w + 3m + 1) value, velocity, acceleration, way from the sample before, and whether it
