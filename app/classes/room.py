@@ -7,6 +7,7 @@ import threading
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import Protocol
 
 from app.classes.gathering import Gathering
@@ -78,10 +79,13 @@ class Room(ABC):
     # ---------------------------------------------------------------- the learners
 
     def recognise(self, who: str, before: Sequence[str], account: str = "") -> None:
-        """Gives a learner who comes back with another robot their votes and progress. before: the identities
-        that their browser had; account: with which they signed in."""
+        """Adds a learner to the class before their page is built, so that the name that they type there is
+        stored. A learner who comes back with another robot gets their votes and progress. before: the
+        identities that their browser had; account: with which they signed in."""
         with self._lock:
             self._state = self._state.succeeded(who, before, account)
+            with suppress(InputError):  # the class is full
+                self._state = self._state.entered(who, "robot", time.monotonic(), account)
 
     def call(self, who: str, name: str) -> None:
         """Stores the name that a member typed."""

@@ -20,6 +20,7 @@ from browsing.browser_actions import (
     eventually,
     is_drawn,
     open_page,
+    pick,
     position,
     press,
     row,
@@ -101,8 +102,7 @@ def load(page: Page, learner: SimulationClient, scene: str) -> None:
     if learner.ready is not None and learner.ready.choice.run.scene == scene:
         return
     tab(page, "Robot")
-    row(page, "Scene").locator("input").first.click()
-    page.get_by_role("option", name=scene, exact=True).click()
+    pick(page, "Scene", scene)
     press(page, "Load scene")
     assert eventually(page, lambda: learner.ready is not None and learner.ready.choice.run.scene == scene)
     assert eventually(page, lambda: learner.status is not None and learner.status.mission is not None)
@@ -264,4 +264,4 @@ def test_a_crate_is_outlined_where_it_is_reported(page: Page, learner: Simulatio
     tab(page, "Mission")
     row(page, "Reported wrongly").locator("input").click()
     assert eventually(page, lambda: not is_drawn(page, "/reported/0"))
-    assert latest(learner, "clearance") == latest(learner, "clearance_reported")
+    assert eventually(page, lambda: latest(learner, "clearance") == latest(learner, "clearance_reported"))

@@ -9,7 +9,7 @@ from playwright.sync_api import Page, expect
 
 from app.link.messages import Post
 from app.server.server import PageServer
-from browsing.browser_actions import eventually, is_drawn, key, position, press, row, tab
+from browsing.browser_actions import eventually, is_drawn, key, pick, position, press, tab
 from lessons.events import MoveTarget
 
 
@@ -18,8 +18,7 @@ def test_a_ghost_a_look_back_and_a_file(page: Page, server: PageServer) -> None:
     tab(page, "Compare")
     press(page, "Start the ghost")
     expect(page.get_by_text("Choose another controller or a setting")).to_be_attached()
-    row(page, "Difference 1").locator("input").first.click()
-    page.get_by_role("option", name="M̄ scale", exact=True).click()
+    pick(page, "Difference 1", "M̄ scale")
     press(page, "Start the ghost")
 
     assert eventually(page, lambda: learner.ghost is not None and learner.ghost.status is not None)
