@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from robots.robot import Robot
 
@@ -86,6 +85,8 @@ class ReachJudge:
         return [np.clip(q, self._lower, self._upper) for q in (seed, *others)]
 
     def _from(self, start: Array, index: int, position: Array, rotation: Array | None) -> ReachResult:
+        from scipy.optimize import least_squares  # its import takes long, and few programs need it
+
         model, data = self.robot.model, self._data
 
         def errors(q: Array) -> Array:

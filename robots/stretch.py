@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
-from scipy.optimize import minimize
 
 from robots.robot import Robot
 
@@ -20,6 +19,8 @@ def horizontal_reach(robot: Robot, first: int) -> float:
         first: index of the arm's first joint; the joints before it are the base's. 0: the robot has no
             base, and the axis is that of the first joint.
     """
+    from scipy.optimize import minimize  # its import takes long, and few programs need it
+
     model, data, tip = robot.model, robot.model.createData(), robot.frame_id(robot.tip)
 
     def nearness(arm: np.ndarray) -> float:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
+import scipy.optimize  # noqa: F401  `ReachJudge` needs it: loaded before the server listens, not at the first drag
 
 from robots import Robot
 from robots.reach import ReachJudge

@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -188,6 +187,8 @@ def _refined(points: Array, swell: Array, fit: Fit, axis: Array) -> Fit:
         if top < bottom:
             top = bottom = 0.5 * (top + bottom)
         return math.pi * radius**2 * (top - bottom + 4.0 / 3.0 * radius), at, turned, bottom, top, radius
+
+    from scipy.optimize import minimize  # its import takes long, and only this fit needs it
 
     least = max(float(fit.volume), 1e-30)
     simplex = np.vstack([np.zeros(5), np.diag([0.15, 0.15, 0.05, 0.05, 0.1])])

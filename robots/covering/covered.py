@@ -10,7 +10,6 @@ import pinocchio as pin
 from lxml import etree
 from lxml.etree import _Element as Element
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, QhullError
 
 from robots.geometry.collision_model import Solid
 from robots.robot import Robot
@@ -111,6 +110,8 @@ def _cylinder(solid: Solid) -> Array:
 
 def _hull(points: Array) -> Array:
     """The triangles of the convex hull of points; none if the hull has no volume."""
+    from scipy.spatial import ConvexHull, QhullError  # their import takes long, and only hulls need them
+
     try:
         return points[ConvexHull(points).simplices]
     except (QhullError, ValueError):

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from robots.covering.capsule_fit import Fit, quick_fits, reach
 from robots.covering.covered import Patch
+
+if TYPE_CHECKING:
+    from scipy.spatial import KDTree
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -61,6 +64,8 @@ class Body:
 
     @cached_property
     def _nearby(self) -> KDTree:
+        from scipy.spatial import KDTree  # its import takes long, and only new covers need it
+
         return KDTree(self.corners[self._drawn(_NEAR)].mean(axis=1))
 
     def fits(self, group: Indices) -> Fit:
