@@ -66,6 +66,7 @@ class LevelPlots:
         errors, step, leaks, near = (
             [*lines, *of_ghost(lines, ghost)] for lines in (errors, step, leaks, near)
         )
+        leaks = leaks[2:] if self._only_simulated(ghost) else leaks
         kept = ChartLine("bound: no closer", BAD, dashed=True, fill=0.12)
         # An area over the whole height: the time in which the robot touches something.
         errors += [ChartLine("contact", BAD, fill=0.12, width=0.0)] if contacts else []
@@ -92,9 +93,14 @@ class LevelPlots:
         error, *distance, step, leak = self._charts
         error.show(window, lambda: self._errors_and_contacts(window, windows))
         step.show(window, lambda: [*(_times(each) for each in windows), np.full(2 * BUCKETS, 1e3 * T_s)])
-        leak.show(window, lambda: [curve for each in windows for curve in self._leaks(each, window)])
+        simulated = windows[1:] if self._only_simulated(ghost is not None) else windows
+        leak.show(window, lambda: [curve for each in simulated for curve in self._leaks(each, window)])
         for near in distance:
             near.show(window, lambda: _distances(window, windows))
+
+    def _only_simulated(self, ghost: bool) -> bool:
+        """Whether the leaks are those of the simulation alone: a measured arm has none."""
+        return self._measured and ghost
 
     def _errors_and_contacts(self, window: PlotWindow, windows: list[PlotWindow]) -> list[np.ndarray]:
         curves = [curve for each in windows for curve in self._errors(each)]
@@ -112,7 +118,7 @@ class LevelPlots:
         ]
 
     def _leaks(self, window: PlotWindow, first: PlotWindow) -> list[np.ndarray]:
-        """Returns the leaks of the robot (the first window) or its ghost; those of a measured arm are NaN."""
+        """Returns the leaks of a simulated robot or ghost; those of a measured arm (first window) are NaN."""
         if self._measured and window is first:
             return [np.full(2 * BUCKETS, np.nan)] * 2
         return _leaks(window)

@@ -35,7 +35,8 @@ def said(program: subprocess.Popen[str], words: str) -> str:
 
 def test_an_arm_and_its_simulation_on_a_page(browser: Browser, program: subprocess.Popen[str]) -> None:
     """Run takes the arm over; the ghost is drawn, both have errors; a moved target moves both; the status
-    line tells the missed periods; closing the page stops the arm gently and ends the program."""
+    line tells the missed periods; leaks are drawn of the simulation alone; closing the page stops the arm
+    gently and ends the program."""
     page = open_page(browser, said(program, "ready at").split()[-1])
     expect(page.get_by_text("at rest: Run takes it over")).to_be_visible()
     expect(page.get_by_text("Start lesson 1")).to_have_count(0)
@@ -52,6 +53,12 @@ def test_an_arm_and_its_simulation_on_a_page(browser: Browser, program: subproce
         return bool(np.allclose([tip[1], ghost[1]], 0.08, atol=2e-3))
 
     assert eventually(page, moved)
+    leaks = page.get_by_text("Leak into higher levels")
+    leaks.scroll_into_view_if_needed()
+    expect(page.get_by_text("priority (own model), ghost")).to_be_visible()
+    expect(page.get_by_text("priority (own model)", exact=True)).to_have_count(0)
+    page.wait_for_timeout(3000)  # more than after which an empty chart is explained
+    expect(page.get_by_text("No tick has run yet").locator("visible=true")).to_have_count(0)
     page.context.close()
     assert said(program, "ended: ") == "ended: the page was closed; it came to rest under control\n"
     assert program.wait(60.0) == 0
