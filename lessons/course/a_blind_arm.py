@@ -38,11 +38,12 @@ UNSEEN = Step(
     """,
     do="Switch to OSF with time-delay estimation (tdeosf). Halve M̄. What makes the force grow?",
     why=r"""
-    The force grows by more than 200 N per second. The table is part of the estimate, so its push is made
-    up for, as the weight was that nobody had told of. On top of that, every millisecond the torque grows
-    by what the last centimetre still asks for. OSF without a horizon, but with time-delay estimation,
-    presses as hard, so MPC is not to blame. Half of $\bar M$ presses half as hard. The ghost acts like a
-    spring: one centimetre asks for 4 N, and no more.
+    The force grows by more than 200 N per second. The estimate contains the push of the table, so the
+    controller compensates it like the unknown weight of lesson *No model needed*. On top of that, every
+    millisecond the torque grows by what the last centimetre still asks for. OSF without a horizon, but
+    with time-delay estimation, presses as hard, so MPC is not the cause. With half of $\bar M$ the arm
+    presses half as hard. The ghost acts like a spring: for an error of one centimetre it presses with 4
+    N.
     """,
     prediction=Choice(
         "The target lies 1 cm inside the table. Two seconds after the drag the arm presses with …",
@@ -91,8 +92,8 @@ BOUND = Step(
     The torque grows until joints 2 and 4 are at their bounds, and so does the force. Stiffness does not
     limit it: with half of $K_p$ both bounds are reached, too, up to 0.9 s later and at the same force. With
     all its torque the arm presses with 650 N after 4 s, and joint 2 is at its bound again. A bound of
-    the torque is no cheap bound of a force: it also limits what the arm may carry, and how fast it may
-    stop.
+    the torque cannot replace a bound of the force: it also limits what the arm may carry, and how fast
+    it may stop.
     """,
     prediction=Value(
         "With a quarter of the torque: how hard does the arm press at the end, in N?",
@@ -134,9 +135,9 @@ SEEN = Step(
     """,
     do="Lower d_safe to 0 mm. Can the arm be made to touch the table lightly?",
     why=r"""
-    The arm stops above the table and its motors have nothing to push against. What is kept is a distance,
-    and no force: this arm cannot press at all, also where it should. An arm that must wipe a table needs
-    to feel it.
+    The arm stops above the table and its motors have nothing to push against. The bound keeps a
+    distance and controls no force: this arm cannot press at all, not even where it should. An arm that
+    must wipe a table needs to feel it.
     """,
     claims=(
         Claim(

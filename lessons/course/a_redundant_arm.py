@@ -32,9 +32,9 @@ FOLLOW = Step(
     """,
     do="Drag the target. Turn it, too.",
     why=r"""
-    All seven joints take part, although three would be enough to place a point, and six to keep it
-    upright as well. No joint is *for* anything: the controller only compares where the hand is, and
-    which way it looks, with what it should be.
+    All seven joints take part, although three joints are enough to place a point, and six are enough to
+    keep the hand upright as well. No joint has a role of its own: the controller only compares the
+    position and the orientation of the hand with their targets.
     """,
     prediction=Choice(
         "The hand moves aside and stays upright. How many of the seven joints turn by more than 1°?",
@@ -128,12 +128,12 @@ COUNT = Step(
     title="Count the freedom",
     text=r"""
     The hand may now turn as it likes: the orientation level is off. Three coordinates are left for
-    seven joints, $7 - 3 = 4$ free motions instead of one. The same wish for joint 3. The ghost
+    seven joints, $7 - 3 = 4$ free motions instead of one. Joint 3 is asked for the same turn. The ghost
     keeps its orientation.
     """,
     do="Switch levels on and off and feel how stiff the elbow becomes.",
     why=r"""
-    Joint 3 gets further, and the hand pays with a tilt nobody objects to. The hand is still where it
+    Joint 3 gets further, and the hand tilts, which no level forbids. The hand is still where it
     was. Every level takes away at most as many free motions as it has coordinates. It takes away fewer
     if levels above have taken some already, or in a singular pose. The next level has to do with the
     rest.

@@ -28,12 +28,12 @@ PLOTS = (HAND, LATE, Signal("torque share", "%"))
 ONE_MORE = Step(
     title="One knot more",
     text=r"""
-    So far time stood still while the controller computed. Now it does not: measure, solve, apply, all
-    within $T_s = 1$ ms. If the torque is not ready when it is due, the motors hold the previous one,
-    and the late torque acts at the next tick. The computer of this lesson needs 0.1 ms for each of the
-    $N$ knots, on every machine the same. (That is an assumption, and a slow computer: this lab's own
-    step takes about 0.01 ms a knot.) $N = 10$ is just in time; now $N = 11$. The target moves by 13 cm
-    in half a second.
+    So far the simulation waited while the controller computed. Now it does not wait: the controller
+    must measure, solve and apply within $T_s = 1$ ms. If the torque is not ready when it is due, the
+    motors hold the previous one, and the late torque acts at the next tick. The computer of this lesson
+    needs 0.1 ms for each of the $N$ knots, on every machine the same. (That is an assumption, and a
+    slow computer: this lab's own step takes about 0.01 ms a knot.) $N = 10$ is just in time; now $N =
+    11$. The target moves by 13 cm in half a second.
     """,
     do="Where is the edge if the deadline is 2 ms? And what happens beyond it, at N = 20, N = 30?",
     why=r"""
@@ -140,9 +140,9 @@ REPAIR = Step(
     """,
     do="How far does this go: 2.5, 3? And what if the computer becomes fast again, N = 10?",
     why=r"""
-    The late controller now errs as little as the one in time, to the third digit. It pays with the
-    margin: the cliff is where it was, between 2 and 2.5 times the old $\bar M$, and noise counts
-    double.
+    The late controller now errs as little as the one in time, to the third digit. The price is the
+    margin: the stability limit is where it was, between 2 and 2.5 times the old $\bar M$, and noise has
+    twice the effect.
     """,
     prediction=Choice(
         "Always one tick late, but M̄ doubled. Compared with an arm in time the error is …",

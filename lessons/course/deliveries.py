@@ -36,7 +36,7 @@ OVERLAP = Step(
     to the person's hand for one second, base to the next place, … The controller gets a window of
     $L$ tasks of this list, $[\mathcal T_{l_0}, \ldots, \mathcal T_{l_0+L-1}]$. When
     $\mathcal T_{l_0}$ is done the window moves on by one. The ghost has $L = 1$: it drives, reaches,
-    waits, drives. Here $L = 2$: the task of now ranks first, the next one second. For both a task
+    waits, drives. Here $L = 2$: the present task ranks first, the next one second. For both a task
     of the hand is done when it was within 2 cm of its goal for a second, and one of the base as
     soon as it comes within 80 cm of its place.
     """,
@@ -161,11 +161,10 @@ WAIT = Step(
     """,
     do="Release the ball yourself, early or late. Can you see in advance how long the rest will take?",
     why=r"""
-    It goes to the edge of what the arm allows and waits there, stretched like somebody with one
-    foot out of the door. The moment the ball is gone the window moves on, and the rest of the way is
-    short: three seconds to the second person, where the ghost, which had nothing but the hand to
-    think of, needs nearly seven. Nobody had to plan for the duration of the wait: there is none in the
-    problem.
+    It goes to the edge of what the arm allows and waits there with the arm stretched. When the ball is
+    gone the window moves on, and the rest of the way is short: three seconds to the second person. The
+    ghost, whose only task was the hand, needs nearly seven. The duration of the wait is not a part of
+    the problem, and nobody had to know it.
     """,
     prediction=Choice(
         "From 5 s until the ball is taken, how far does the base drive?",
@@ -223,8 +222,8 @@ MOVES = Step(
     why=r"""
     At 8 s the base, waiting at the edge for the old place, goes along the edge to where it is nearest
     to the new one. At 16.5 s the hand turns to the new spot, and a second later it is there within two
-    centimetres. Twice a goal changed, and nothing but the references was told to the controller. What
-    is fixed is only what the people want, in the space in which they move.
+    centimetres. Twice a goal changed, and nothing but the references was told to the controller. Only
+    the goals are given, in the space in which the people move.
     """,
     prediction=Choice(
         "At 16.5 s the goal jumps by 36 cm, when the hand is all but there. One second later it is …",

@@ -46,8 +46,8 @@ BOTH = Step(
     why=r"""
     Hundredths of a millimetre. The base drives off, and the arm takes back at every instant what
     the base does to the hand. With the base first (the ghost) both tasks end at their goals too, but
-    on the way the hand swings out by 12 cm. Even where everybody gets what they want, priorities
-    say who may be disturbed meanwhile.
+    on the way the hand swings out by 12 cm. Even where both tasks reach their goals, the priorities
+    decide which one may be disturbed on the way.
     """,
     prediction=Choice(
         "While the base drives 64 cm away under it: how far is the hand ever off?",

@@ -1,6 +1,6 @@
 """How strict is strict
 
-A priority that gives way by nothing at all: could anybody below it ever move?
+A priority that gives way by nothing at all: could any task below it ever move?
 
 Minutes: 12
 You need: lesson "first-hold-then-reach"
@@ -34,7 +34,7 @@ NOTHING = Step(
 
     $$h_i \le \delta_i \quad (13)$$
 
-    Here $\delta = 0$: the hand must not be off by more than its best, not by a hair.
+    Here $\delta = 0$: the error of the hand must not exceed the smallest possible one at all.
     """,
     do="What is the smallest δ with which the base moves at all?",
     why=r"""
@@ -85,7 +85,7 @@ LITTLE = Step(
     centimetre more than its best, at any knot of the coming second. (13) was made to put a number on
     it: how much may the first task be compromised to improve the second?
     """,
-    do="Watch the hand while δ goes from 1 mm to 5 cm. Does the base thank you for it?",
+    do="Watch the hand while δ goes from 1 mm to 5 cm. Does the base get closer to its target?",
     why=r"""
     The hand uses less than a tenth of $\delta$. It is the *plan* that $\delta$ bounds at every knot,
     not what the robot does. How much of it is used depends on how often a new plan is made. One plan for
@@ -145,16 +145,16 @@ SUM = Step(
     or of each error, (12). Every plan that keeps (12) keeps (11) as well: (12) is the stricter one.
     Here is (11), with a $\delta$ that allows the cost of 1 cm at every knot. The ghost has (12).
     """,
-    do="Give (11) more δ until the base is as fast as the ghost. What does the hand say?",
+    do="Give (11) more δ until the base is as fast as the ghost. How far is the hand off then?",
     why=r"""
-    The looser rule makes the slower robot: the line search cuts the step to a fortieth. One would blame
-    the flat cost: at its best the hand's error is nearly zero, and there $\mathcal J_1$, a sum of
-    squares, has hardly a slope. We tested that. If level 1 also pays for its effort, with the same
-    $Q = 10$ (`formulation=paper` and `Q=10`), its best leaves an error and the cost has a slope, but the
-    steps are as short as before. So the missing slope is not the reason. A smaller $Q$ makes them
-    longer: with $Q = 1$ they are 2.3 times as long, still far shorter than with (12). What makes them
-    so short we do not know. The paper finds the same, (12) "permitting larger step sizes", and for the
-    hand 3.07 and 3.42 mm at low and high $\delta$ against 3.24 and 6.25 mm.
+    The looser rule makes the slower robot: the line search cuts the step to a fortieth. One would
+    expect that the flat cost matters: at its best the hand's error is nearly zero, and there $\mathcal
+    J_1$, a sum of squares, has hardly a slope. We tested that. If level 1 also pays for its effort,
+    with the same $Q = 10$ (`formulation=paper` and `Q=10`), its best leaves an error and the cost has a
+    slope, but the steps are as short as before. So the missing slope is not the reason. A smaller $Q$
+    makes them longer: with $Q = 1$ they are 2.3 times as long, still far shorter than with (12). What
+    makes them so short we do not know. The paper finds the same, (12) "permitting larger step sizes",
+    and for the hand 3.07 and 3.42 mm at low and high $\delta$ against 3.24 and 6.25 mm.
 
     In the formulation as printed (`formulation=paper`, which brings our $Q = 1$) it depends on $Q$ which
     of the two is better for the hand, and the paper does not print $Q$. With our $Q = 1$ the hand is
@@ -212,11 +212,11 @@ EFFORT = Step(
     why=r"""
     The hand is off by more than $\delta$. The arm must move to hold the hand while the base drives, and
     that now costs level 1 something: its own best plan lets the hand slip a little. (12) allows level 2
-    the same slip, $\delta$ comes on top, and the next plan starts from there. It is mostly the charge
-    for speed: with a thousandth of it 6 mm remain. A very large $Q$ does not protect the hand either:
-    with $Q = 1000$ it is off by 40 mm. There it is the bounds on speed: without them 5.4 mm remain.
-    A hierarchy protects what
-    a level *asks for*. If it asks for a compromise, that is what is protected.
+    the same slip, $\delta$ comes on top, and the next plan starts from there. Most of this comes from
+    the cost of speed: with a thousandth of it 6 mm remain. A very large $Q$ does not protect the hand
+    either: with $Q = 1000$ it is off by 40 mm. There it is the bounds on speed: without them 5.4 mm
+    remain. A hierarchy protects what a level *asks for*. If it asks for a compromise, the hierarchy
+    protects the compromise.
     """,
     prediction=Choice(
         "Same δ, same constraint (12), effort paid on both levels: the hand is off by at most …",
@@ -247,8 +247,8 @@ EFFORT = Step(
 
 CHALLENGE = Challenge(
     text=r"""
-    (11) with $\delta = 5$ cm: the base hurries, the hand pays 18 mm. Keep the hand within 4 mm, and
-    the base's mean error over the 8 s below 1.15 m.
+    (11) with $\delta = 5$ cm: the base is fast, and the hand is off by 18 mm. Keep the hand within 4
+    mm, and the base's mean error over the 8 s below 1.15 m.
     """,
     goals=(
         Claim("The hand stays within 4 mm.", Measure(HAND), "at most", 4.0),

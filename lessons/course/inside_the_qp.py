@@ -41,10 +41,10 @@ LINE = Step(
     do="Drag the target to and fro: line, valley and both discs move along. Pause, and go tick by tick (T).",
     why=r"""
     Blue would like to be at the ring "2 alone", the middle of its ellipses. It may only choose on
-    the line, and takes the point where one of its ellipses just touches it. The wrist arrives and
-    blue pays with 14 degrees, for good: seen from the line there is no better point by blue's weights,
-    which count joint 1 four times as much as joint 2. With equal weights it pays 12 degrees. At rest both
-    discs lie at zero, "leave the torque as it is", and the ring stays outside.
+    the line, and takes the point where one of its ellipses just touches it. The wrist arrives, and the
+    joints stay 14 degrees off: on the line there is no better point by the weights of level 2, which
+    count joint 1 four times as much as joint 2. With equal weights they stay 12 degrees off. At rest
+    both discs lie at zero, "leave the torque as it is", and the ring stays outside.
     """,
     prediction=Choice(
         "The wrist goes 10 cm aside, and both joints want to stay. In the end the joints are off by …",

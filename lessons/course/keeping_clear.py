@@ -43,11 +43,11 @@ BELOW = Step(
     The hand is sent 1 cm into the table again. Level 2 is a task that keeps the hand's distance from
     the table's surface, $x = n^\top p - d$. Level 1 is the hand's position.
     """,
-    do="Before you read on: put the distance first. Who goes without now?",
+    do="Before you read on: put the distance first. Which level is not satisfied now?",
     why=r"""
-    Level 2 goes without. The position fixes the hand's height, so nothing is left for the distance,
-    and the table is pressed as if there were no task of a distance. A wish that ranks below another one
-    protects nobody.
+    Level 2 is not satisfied. The position fixes the hand's height, so nothing is left for the distance,
+    and the arm presses on the table as if there were no task of a distance. A task that ranks below
+    another one protects nothing.
     """,
     prediction=Choice(
         "The distance is the task right below the hand's position. At the end the table is pressed with …",
@@ -85,8 +85,9 @@ FIRST_TASK = Step(
     do="Drag the target sideways, then up. What may the hand still do?",
     why=r"""
     The hand stays where it is, 15 cm above a target that is perfectly safe. What was meant is an
-    inequality, at least so far; a task takes away the whole direction, also where there is room. It
-    takes only one frame's distance from one plane as well: the elbow and the post are no part of it.
+    inequality, a distance of at least so much. A task takes away the whole direction, also where there
+    is room. It also holds the distance of one frame from one plane only: it does not contain the elbow
+    and the post.
     """,
     claims=(
         Claim(
@@ -128,7 +129,7 @@ INSIDE = Step(
     why=r"""
     The bound is shared by all levels, and the order decides who pays for it. The hand comes first: its
     target is reached, and the hand's orientation gives way by 28°. With the orientation first it is the
-    other way round: then the hand stays 6 cm away. Where there is room, nobody pays anything.
+    other way round: then the hand stays 6 cm away. Where there is room, no level loses anything.
     """,
     prediction=Choice(
         "The straight way is blocked by the post. At the end the hand …",
@@ -191,10 +192,10 @@ BEHIND = Step(
     why=r"""
     The filter is as safe: nothing is touched. But it does not know who comes first. Orientation and
     posture pull the elbow towards the post, the filter takes the sum of all pulls and changes it as
-    little as it can, and the hand goes without: it stops 27 cm before its target. That is the lower
-    levels' doing: with both of them switched off the hand is 5 cm away by then, and comes closer. One of
-    them is enough to hold it back: without the posture alone 23 cm are left, without the orientation
-    alone 19 cm. An order that is decided before the bounds are known does not hold.
+    little as it can, and the hand loses: it stops 27 cm before its target. That is the lower levels'
+    doing: with both of them switched off the hand is 5 cm away by then, and comes closer. One of them
+    is enough to hold it back: without the posture alone 23 cm are left, without the orientation alone
+    19 cm. An order that is decided before the bounds are known does not hold.
     """,
     prediction=Choice(
         "The same rows, but behind the levels. At the end the hand …",

@@ -136,7 +136,7 @@ FURTHER = Step(
     guarantees that the errors stay bounded if $\lVert I - M^{-1} \bar M \rVert < 1$. For four times
     $\bar M$ this norm is 1.21 where the arm begins.
     """,
-    do="Which of the two numbers changes its mind first on the way up from 1, norm or radius?",
+    do="Which of the two numbers turns upwards first on the way up from 1, norm or radius?",
     why=r"""
     The error is less than a fifth, and nothing trembles. A norm below 1 is sufficient, but it is not
     necessary: it requires that *no* error grows, not even for a single step. In the long run the
@@ -187,10 +187,11 @@ LARGE = Step(
     do="Reset, go up from 4 in small steps, and read the gauge each time before you let it run.",
     why=r"""
     The smallest $1 - \lambda$ has passed −1: each correction is more than twice too large, and every
-    millisecond the error comes back half as large again, with the opposite sign. Chatter, full
-    torque, gone. At × 6 the gauge read 0.91, less than ever: the slowest component had 0.91, the
-    fastest −0.89. From there on the fastest one leads, to −1.21 at × 7. So start small, go up in
-    small steps, and take a gauge that turns upwards for the edge of the cliff.
+    millisecond the error comes back half as large again, with the opposite sign. The arm chatters,
+    takes its full torque, and is lost. At × 6 the gauge read 0.91, less than ever: the slowest
+    component had 0.91, the fastest −0.89. From there on the fastest one leads, to −1.21 at × 7. So
+    start small, go up in small steps, and stop where the gauge turns upwards: the stability limit is
+    near.
     """,
     prediction=Choice(
         "M̄ × 2, × 4, × 6: always better. What does × 8 do?",

@@ -116,7 +116,7 @@ PRICE = Step(
     do="Raise R further. From which value on can you see a difference?",
     why=r"""
     Almost nothing happens. The torque that holds the arm costs nothing, only its change from one
-    millisecond to the next does. And a small change goes a long way: $e$ moves by $J \bar M^{-1}
+    millisecond to the next does. And a small change has a large effect: $e$ moves by $J \bar M^{-1}
     \Delta\tau$ with $\bar M^{-1} = 30$ here, so that $Q \lVert J \bar M^{-1} \Delta\tau \rVert^2$
     outweighs $R$ by far. Only around $R = 10^5$ both terms count alike.
     """,
@@ -160,14 +160,14 @@ FREE = Step(
     """,
     do="Take the speed limits away and push again: which way does the elbow go? Then switch damping on.",
     why=r"""
-    Nothing asks that direction to stop, so the elbow still moves when the hand has long been home.
-    Which way it moves is decided by a bound. The push drives joint 2 to its speed limit, and the
-    torques change to hold it there. When the push ends, the part of the torques along the free motion
-    stays as it is, and it turns joint 2 round. 0.2 s later joint 2 does 80°/s the other way. Without
-    speed limits joint 2 goes on the way it was pushed, with more than 300°/s. It turns round only
-    0.75 s after the push, where the held hand lets it go no further: the last link then lies on the
-    line from joint 1 to the hand. A last level that wants $\ddot q + K_V \dot q = 0$ brings it to rest;
-    the hand hardly notices.
+    Nothing asks that direction to stop, so the elbow still moves long after the hand is back on its
+    target. Which way it moves is decided by a bound. The push drives joint 2 to its speed limit, and
+    the torques change to hold it there. When the push ends, the part of the torques along the free
+    motion stays as it is, and it turns joint 2 round. 0.2 s later joint 2 does 80°/s the other way.
+    Without speed limits joint 2 goes on the way it was pushed, with more than 300°/s. It turns round
+    only 0.75 s after the push, where the held hand lets it go no further: the last link then lies on
+    the line from joint 1 to the hand. A last level that wants $\ddot q + K_V \dot q = 0$ brings it to
+    rest; the hand hardly notices.
     """,
     prediction=Choice(
         "The hand is held. What does the elbow do after the push?",

@@ -34,7 +34,7 @@ EARLY = Step(
     """,
     do="Let N grow from 1 to 20. When does the base set out?",
     why=r"""
-    More than half a metre of the way back is done when the clock strikes eight. A base that leaves
+    More than half a metre of the way back is done at 8 s. A base that leaves
     early errs more at the end of Part 1 and less at the beginning of Part 2. Summed over all knots of
     the plan, leaving early is cheaper. The mean error of Part 2 is about a quarter of the ghost's. The
     hand does not notice either way: whatever level 2 foresees, (12) holds.
@@ -181,20 +181,20 @@ GAINS = Step(
     """,
     do="Is there a pair of gains that is good to both, hand and base? Try [5, 2] and [20, 2].",
     why=r"""
-    The base is quick now, and the hand pays with 2 cm although it ranks first. A velocity is held for
+    The base is quick now, and the hand is off by 2 cm although it ranks first. A velocity is held for
     the 20 ms until the next one is asked for. Meanwhile base and arm move on, and velocities that kept
     the hand in place at the beginning no longer do: the faster base and arm move, the further the hand
     drifts. It drifts most at the edge of the arm's reach, 20 mm, where the arm's joints turn fastest.
-    It drifts nearly as far on the way home, 16 mm, where the base is at full speed. With
-    a peak that the arm can just reach the hand is off by 14 mm, with a near one by 4 mm. Asked for a
-    hundred times a second it drifts half as far. At two hundred times the hand is off by 8 mm, not 5: on
-    the way home a part of the error is due to the limits on acceleration and its change, and does not
-    shrink with the period. Without these limits 4.5 mm are left. The hand's error is brought back in
-    proportion to $K$: with 5 1/s for the hand it is off by half, with 20 1/s by 3 mm, and the base is
-    as quick as before. The limits act both ways: without those on acceleration and its change the hand
-    is off by 18.5 mm, without those on speed by 28 mm, without any by 37 mm. A good pair exists, and
-    has to be found. The paper says (given, not tried here) that HTIDKC would need its parameters
-    scheduled, where one set of weights serves HTMPC in both parts.
+    It drifts nearly as far on the way home, 16 mm, where the base is at full speed. With a peak that
+    the arm can just reach the hand is off by 14 mm, with a near one by 4 mm. Asked for a hundred times
+    a second it drifts half as far. At two hundred times the hand is off by 8 mm, not 5: on the way home
+    a part of the error is due to the limits on acceleration and its change, and does not shrink with
+    the period. Without these limits 4.5 mm are left. The hand's error is brought back in proportion to
+    $K$: with 5 1/s for the hand it is off by half, with 20 1/s by 3 mm, and the base is as quick as
+    before. The limits act both ways: without those on acceleration and its change the hand is off by
+    18.5 mm, without those on speed by 28 mm, without any by 37 mm. A good pair exists, and has to be
+    found. The paper says (given, not tried here) that HTIDKC would need its parameters scheduled, where
+    one set of weights serves HTMPC in both parts.
     """,
     prediction=Choice(
         "Gains four and seven times as high. The largest error of the hand, in the first task, …",

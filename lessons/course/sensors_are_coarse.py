@@ -79,7 +79,7 @@ SQUARE = Step(
     The digit stays as coarse as it is. The period becomes $T_s = 2$ ms instead of 1 ms; the ghost
     keeps 1 ms. We know that a slower loop follows less well. What does it do to the noise?
     """,
-    do="Go to 4 ms. Then try M̄ instead: how much of it buys the same?",
+    do="Go to 4 ms. Then try M̄ instead: which M̄ has the same effect?",
     why=r"""
     $\bar M \delta / T_s^2$ has the period squared: twice the time, a quarter of the noise, while
     the error grows by little more than half. Faster is not better when sensors are coarse. $\bar M$

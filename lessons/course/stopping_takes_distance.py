@@ -40,8 +40,8 @@ PRINTED = Step(
 
     $$q_{\min} \le q_{k+j+1} \le q_{\max}, \qquad j = 0 \dots N-1,$$
 
-    with $N = 5$ steps of a millisecond. In 5 ms the joint turns by 0.3°. That is where the
-    controller first hears of the limit.
+    with $N = 5$ steps of a millisecond. In 5 ms the joint turns by 0.3°. Only there does the limit
+    first appear in the controller's problem.
     """,
     do="Watch the torque of joint 2 at the moment it gets there.",
     why=r"""
@@ -141,17 +141,18 @@ VIABLE = Step(
     with $a$. For that $q_s$ lies 0.4° before the limit; beyond $q_s$ the joint must come back, at a
     speed of five times the excess per second. Again $N = 5$.
     """,
-    do="Let it close in faster, at 60 and 200 1/s. What is won, and what does the torque say?",
+    do="Let it close in faster, at 60 and 200 1/s. What is gained, and what happens to the torque?",
     why=r"""
-    Now the very next step already knows the whole braking distance. At 5° before the limit $t = T_s$
-    would allow 106°/s, $t = 0.33$ s only 13.5°/s. The arm does 18: it follows the falling bound a little
-    late. The rows on speed are the reason, not the estimate: with twice the $\bar M$ the arm does 18 as
-    well. Without the rows on speed ($t = T_s$) the estimate's lateness shows: the joint brakes with 28
-    instead of 20 rad/s² and passes $q_s$ by 0.002°. With twice the $\bar M$ it brakes with 24 rad/s².
-    With 0.3 of the $\bar M$ it takes all the torque and passes $q_s$ by 0.03°. So 0.4° are more than
-    enough for the estimate. An even stop before the limit would never take more than 1.5 of the 20
-    rad/s², and every QP has a solution. The price is time: the last degrees are crept. What a short
-    horizon cannot see must be put into its bounds. It is this lab's default and a deliberate departure
+    Now the bound of the very next step contains the whole braking distance. At 5° before the limit $t =
+    T_s$ would allow 106°/s, $t = 0.33$ s only 13.5°/s. The arm does 18: it follows the falling bound a
+    little late. The rows on speed are the reason, not the estimate: with twice the $\bar M$ the arm
+    does 18 as well. Without the rows on speed ($t = T_s$) the estimate's lateness shows: the joint
+    brakes with 28 instead of 20 rad/s² and passes $q_s$ by 0.002°. With twice the $\bar M$ it brakes
+    with 24 rad/s². With 0.3 of the $\bar M$ it takes all the torque and passes $q_s$ by 0.03°. So 0.4°
+    are more than enough for the estimate. An even stop before the limit would never take more than 1.5
+    of the 20 rad/s², and every QP has a solution. The price is time: the joint creeps through the last
+    degrees. What a short horizon cannot see must be put into its bounds. It is this lab's default and a
+    deliberate departure
     from (32d).
     """,
     prediction=Choice(

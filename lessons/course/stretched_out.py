@@ -64,10 +64,10 @@ INVERSE = Step(
 REGULAR = Step(
     title="A softer question",
     text=r"""
-    HIMPC asks a softer question: which $\Delta\tau$ makes $Q \lVert e \rVert^2 + R \lVert
-    \Delta\tau \rVert^2$ small? Where $J$ loses a direction, the first term does not care and the
-    second says: then do nothing there. The Hessian $\bar B^\top \bar Q \bar B + \bar R$ is positive
-    definite whatever $J$ is (Lemma 1).
+    HIMPC asks another question: which $\Delta\tau$ makes $Q \lVert e \rVert^2 + R \lVert
+    \Delta\tau \rVert^2$ small? Where $J$ loses a direction, the first term does not depend on it, and
+    the second makes the torque change zero there. The Hessian $\bar B^\top \bar Q \bar B + \bar R$ is
+    positive definite whatever $J$ is (Lemma 1).
     """,
     do="Make R smaller by a factor of a million. Is it still calm?",
     why=r"""
@@ -113,16 +113,16 @@ REGULAR = Step(
 BLAME = Step(
     title="Who is to blame?",
     text=r"""
-    There was an error of some millimetres right at the start. Is the singularity to blame, or the
-    reference, which starts with a jump of its velocity to 0.08 m/s? Now the same circle starts
-    gently, at the same singular pose. The ghost starts with the jump.
+    There was an error of some millimetres right at the start. Is the singularity the cause, or the
+    reference, which starts with a jump of its velocity to 0.08 m/s? Now the same circle starts gently,
+    at the same singular pose. The ghost starts with the jump.
     """,
     do="Look at 8 s: straight again, and the circles change there.",
     why=r"""
-    Nearly all of it was the jump. How far the hand gets off then is mostly the wish's doing: (4) comes
-    back softly. With four times the $K_P$ and twice the $K_V$ the jump costs 1.7 mm. In a singular pose
-    HIMPC follows what can be followed. Where an experiment has two possible causes at once, it does not
-    show which one acts; so take one of them away.
+    Nearly all of it was the jump. How far the hand then gets off is mostly decided by (4), which brings
+    it back slowly. With four times the $K_P$ and twice the $K_V$ the jump costs 1.7 mm. In a singular
+    pose HIMPC follows what can be followed. Where an experiment has two possible causes at once, it
+    does not show which one acts; so take one of them away.
     """,
     prediction=Choice(
         "Same singular pose, gentle start. The largest error becomes …",

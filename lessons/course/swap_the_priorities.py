@@ -34,8 +34,8 @@ LAST = Step(
     do="Ask for a turn of joint 1 or 3 instead: that has a part in the free direction.",
     why=r"""
     Nothing moves at all. Level 3 may only use torques that satisfy (33), and among those none
-    brings it nearer. A strict hierarchy is not polite: the posture's error of 32° counts for
-    nothing.
+    brings it nearer. In a strict hierarchy the posture's error of 32° has no weight against the levels
+    above.
     """,
     prediction=Choice(
         "The posture asks for 32° in all, as the last level. How far does the hand move?",
@@ -79,8 +79,8 @@ FIRST = Step(
     """,
     do="Put the posture in the middle. Who gets what?",
     why=r"""
-    All seven joints are now spoken for by level 1: it is served to a hundredth of a degree.
-    Position and orientation, an instant ago inviolable, get nothing.
+    Level 1 now determines all seven joints: its error falls to a hundredth of a degree. Position and
+    orientation, which had priority an instant ago, get nothing.
     """,
     prediction=Value(
         "The posture ranks first from 1.2 s on. How far is the hand from its target at the end?",

@@ -32,8 +32,8 @@ EXACTLY = Step(
     text=r"""
     OSF computes its torque from a model, $\tau = M_n \ddot q_{ref} + N_n$. Here it is told the
     exact masses, inertias and viscous friction, and the dry friction is taken out of the arm. Its
-    model (19) is the arm. The ghost is HIMPC, which has no model and lives on what happened a
-    millisecond ago.
+    model (19) is the arm. The ghost is HIMPC, which has no model and uses what happened a millisecond
+    ago.
     """,
     do="Put a little dry friction back in.",
     why=r"""
@@ -78,8 +78,8 @@ REALITY = Step(
     do="Remove the friction, then correct the masses. Which of the two errors mattered?",
     why=r"""
     The springs of (4) must hold against whatever the model does not explain; here that is mostly
-    the friction. HIMPC never had an opinion about friction: it has measured what the torque of a
-    millisecond ago did.
+    the friction. HIMPC assumes nothing about friction: it has measured the effect of the torque of a
+    millisecond ago.
     """,
     prediction=Value(
         "Model 20 % light, friction unknown: how many times larger is OSF's error than HIMPC's?",
@@ -108,9 +108,9 @@ REALITY = Step(
 HEAVIER = Step(
     title="Half as heavy again",
     text=r"""
-    HIMPC, and every link 50 % heavier than before. Nothing is told, nothing is retuned; $\bar M$
-    stays. Table V of the paper disturbs the inertias by ±20 % and finds level 1 changed by about 2
-    % at most. The ghost has the old links.
+    HIMPC, and every link 50 % heavier than before. The controller is not told, and nothing is retuned;
+    $\bar M$ stays. Table V of the paper disturbs the inertias by ±20 % and finds level 1 changed by
+    about 2 % at most. The ghost has the old links.
     """,
     do="Go down to half the mass: which way do error and gauge go? Then back, M̄ up, and friction off.",
     why=r"""
@@ -118,7 +118,7 @@ HEAVIER = Step(
     part of the error that comes of inertia grows by half, as the mass does. To see this part alone,
     take the friction away. But three quarters of the error are friction's, which does not grow with the
     mass. A larger $\bar M$ makes the whole error as small as before. Lighter links make corrections
-    faster and the error smaller. They do not lead to the cliff, since the inertia of the motors is
+    faster and the error smaller. They do not lead to instability, since the inertia of the motors is
     left: with links of a twentieth the gauge reads 0.47. It passes 1 only if the motors are lighter,
     too, 0.01 kg·m² each. As long as $\lVert I - M^{-1}\bar M \rVert$ is below 1 errors stay bounded
     (Remark 4). That is sufficient, not necessary: in the long run the spectral radius decides, the
@@ -149,7 +149,7 @@ HEAVIER = Step(
             "at most",
             1.0,
             fails_with=("M_bar_scale=4",),
-            because="for links of this weight so large an M̄ is beyond the cliff",
+            because="for links of this weight so large an M̄ is beyond the stability limit",
         ),
         Claim(
             "The hand stays within 0.3 mm.",

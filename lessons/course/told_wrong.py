@@ -110,12 +110,12 @@ THERE = Step(
     do="How late may the report be corrected? Find the last time at which 5 cm are kept.",
     why=r"""
     It drives 40 cm into the crate; until 7 s its base is never more than 3 mm from its line. The bound
-    keeps clear of what is reported; what is there does not enter it. How early the truth arrives decides.
-    At 5 s nothing is lost: 5 cm are kept and the hand stays on its line. At 5.4 s it is nearly too
-    late: 2 cm are left. The hand swings out by 12 cm meanwhile: (7c) bounds level 1, too. At 5.6 s it is
-    too late: the robot overlaps the crate by 7 cm. A larger margin helps against small errors of a
-    report. The authors of HTMPC keep a map instead, and infer with Bayes' rule from what is seen which
-    objects still stand where the map has them (given, not measured here).
+    keeps clear of what is reported; what is there does not enter it. The time at which the truth
+    arrives decides. At 5 s nothing is lost: 5 cm are kept and the hand stays on its line. At 5.4 s it
+    is nearly too late: 2 cm are left. The hand swings out by 12 cm meanwhile: (7c) bounds level 1, too.
+    At 5.6 s it is too late: the robot overlaps the crate by 7 cm. A larger margin helps against small
+    errors of a report. The authors of HTMPC keep a map instead, and infer with Bayes' rule from what is
+    seen which objects still stand where the map has them (given, not measured here).
     """,
     prediction=Choice(
         "The crate is reported beside the way until 7 s. The least distance to it is …",

@@ -1,6 +1,6 @@
 """Torque has a limit
 
-When the motors cannot do it all, who goes without?
+When the motors cannot do it all, which task loses?
 
 Minutes: 8
 You need: lesson "two-tasks"
@@ -77,12 +77,12 @@ SHORT = Step(
     """,
     do="Open the list of active bounds: which level feels the torque limit? Then take the friction away.",
     why=r"""
-    Level 2 goes without: joint 1 falls behind by half a degree while the hand does not notice. That is
-    the order's doing. With joint 1 first it is the hand that goes without, by 1.6 mm, and joint 1 does
-    not notice. An order helps where both need what is scarce. If joint 1 swings to the other side, by
-    60°, only the motor of joint 1 is short of torque. The hand does not need it, so the order makes no
-    difference. The torque is scarce because of friction, dry and viscous together: without the dry one
-    both wishes together need 77 % of what there is, and without either joint 1 does not fall behind.
+    Level 2 loses: joint 1 falls behind by half a degree, and the hand is hardly affected. The order
+    decides this. With joint 1 first the hand loses, by 1.6 mm, and joint 1 is hardly affected. An order
+    helps where both need what is scarce. If joint 1 swings to the other side, by 60°, only the motor of
+    joint 1 is short of torque. The hand does not need it, so the order makes no difference. The torque
+    is scarce because of friction, dry and viscous together: without the dry one both wishes together
+    need 77 % of what there is, and without either joint 1 does not fall behind.
     """,
     prediction=Choice(
         "Both tasks together need more torque than there is. The hand's largest error …",

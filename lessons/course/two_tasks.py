@@ -28,7 +28,7 @@ BOTH = Step(
     title="Enough for both",
     text=r"""
     Level 1: the hand follows a circle, two coordinates. Level 2: joint 1 swings by 20°, one
-    coordinate. Three joints, three wishes: it works out exactly.
+    coordinate. Three joints for three coordinates: both tasks can be done exactly.
     """,
     do="Let joint 1 swing further, degree by degree, until one of the errors grows. Which one is it?",
     why=r"""
@@ -129,7 +129,7 @@ STRICT = Step(
 
     Level 2 is granted what is left. The ghost is the weighted controller.
     """,
-    do="Set Q of level 2 to 1000. Does the hand notice? And with the weighted controller?",
+    do="Set Q of level 2 to 1000. Does the hand's error change? And with the weighted controller?",
     why=r"""
     Joint 1 pays: it goes no further than the circle lets it. The hand keeps its circle to a millimetre,
     and with $Q_2 = 1000$ it does so as well: a heavy level 2 takes nothing from it. Without level 2 the

@@ -1,6 +1,6 @@
 """When tasks fight
 
-Two tasks that are fine alone meet where they cannot both be had: why does that break some controllers?
+Two tasks can each be done alone, but not both together: why does that break some controllers?
 
 Minutes: 10
 You need: lesson "two-tasks"; the null space of a matrix
@@ -88,8 +88,8 @@ BETTER_MODEL = Step(
     """,
     do="Let joint 1 swing by 20° only and compare OSF with TDEOSF.",
     why=r"""
-    It knows the arm better and fails at the same place, and so does OSF with an exact model. The model
-    is not the trouble. The inverse asks for more than the arm can do and knows no bound. With a damped
+    It knows the arm better and fails at the same place, and so does OSF with an exact model: the model
+    is not the cause. The inverse asks for more than the arm can do and knows no bound. With a damped
     inverse TDEOSF comes through, with less than four times the speed limit. With a damped inverse OSF
     does not: a joint passes six times its limit. A controller without any inverse is lost as well if
     nothing bounds it: HIMPC is, with all its bounds off.

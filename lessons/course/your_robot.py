@@ -31,7 +31,7 @@ HEAVY = ("plant.mass_scale=1.5", "plant.inertia_scale=1.5")
 LOAD = Step(
     title="Load it",
     text=r"""
-    This is a desk lamp, `lamp.urdf`, a file as they are found in the field. `himpc-lab robots
+    This is a desk lamp, `lamp.urdf`, a file with the usual gaps. `himpc-lab robots
     --check lamp.urdf` says what is missing: a joint without end stops, a head without inertia, a
     joint without a speed limit. What is filled in is reported, what cannot be is refused. The stack
     is made for any robot: position, then orientation, then posture. $\bar M$ is suggested from the
@@ -41,8 +41,8 @@ LOAD = Step(
     do="Load a URDF of your own: Robot, Load URDF, or himpc-lab --urdf FILE.",
     why=r"""
     Five joints for six coordinates of the head: no freedom is left, one coordinate is even missing.
-    The hierarchy settles it without being asked: the position is reached, the orientation as far as
-    five joints can, the posture goes without. A weighted sum gives up the position instead.
+    The hierarchy decides by itself: the position is reached, the orientation as far as five joints can,
+    and the posture is given up. A weighted sum gives up the position instead.
     """,
     prediction=Choice(
         "The head is moved by 11 cm. It has five joints. In the end …",
@@ -86,8 +86,8 @@ WRONG = Step(
     do="Try 0.7 times and twice the mass, with both controllers.",
     why=r"""
     Nothing in HIMPC depended on those masses but the suggestion for $\bar M$, and that had room.
-    The ghost believes the file: what it does not know of the weight, the springs must carry, and
-    the head hangs low for good.
+    The ghost believes the file: its springs must carry the weight that the file does not contain, and
+    the head stays too low.
     """,
     prediction=Choice(
         "The lamp is half as heavy again as its file says. Where is the head in the end?",

@@ -27,7 +27,7 @@ FIFTH_ROWS = (
     ),
     *(
         Intervention("stretched-out/2", says, HAND, (4.3, 4.8), QUICKER, (1.6, 1.8), of=("smooth=false",))
-        for says in ("mostly the wish's doing", "twice the $K_V$ the jump costs 1.7 mm")
+        for says in ("mostly decided by (4)", "twice the $K_V$ the jump costs 1.7 mm")
     ),
     Intervention(
         "when-tasks-fight/0", "without them it also demands a hundred times more",

@@ -24,11 +24,11 @@ LIMIT_ROWS = (
     ),
     Intervention(
         "torque-has-a-limit/1",
-        "That is the order's doing. With joint 1 first it is the hand that goes without, by 1.6 mm",
+        "The order decides this. With joint 1 first the hand loses, by 1.6 mm",
         HAND, (0, 0.1), ("order=q1,position",), (1.55, 1.7),
     ),
     Intervention(
-        "torque-has-a-limit/1", "joint 1 does not notice",
+        "torque-has-a-limit/1", "joint 1 is hardly affected",
         Q1, (0.45, 0.65), ("order=q1,position",), (0, 0.05),
     ),
     Intervention(
@@ -66,21 +66,21 @@ LIMIT_ROWS = (
         JOINT_2, (149.8, 150.0), ("horizon=5",), (150.5, 150.8),
     ),
     Intervention(
-        "stopping-takes-distance/2", "The price is time: the last degrees are crept",
+        "stopping-takes-distance/2", "The price is time: the joint creeps through the last degrees",
         of("q", "deg", "mean", 1.6, 1.7, column=1), (147.5, 148.7), ("limits.velocity_approach=0",),
         (149.5, 149.7),
     ),
     # ---------------------------------------- a-blind-arm
     Intervention(
-        "a-blind-arm/0", "so its push is made up for",
+        "a-blind-arm/0", "so the controller compensates it",
         FORCE, (360, 390), ("controller=osf",), (3, 5),
     ),
     Intervention(
-        "a-blind-arm/0", "so MPC is not to blame",
+        "a-blind-arm/0", "so MPC is not the cause",
         FORCE, (360, 390), ("controller=tdeosf",), (360, 400), stays=True,
     ),
     Intervention(
-        "a-blind-arm/0", "Half of $\\bar M$ presses half as hard",
+        "a-blind-arm/0", "With half of $\\bar M$ the arm presses half as hard",
         FORCE, (360, 390), ("M_bar_scale=0.5",), (180, 205),
     ),
     Intervention(
@@ -98,7 +98,7 @@ LIMIT_ROWS = (
         FORCE, (280, 300), ("levels.distance.enabled=false",), (280, 300), stays=True,
     ),
     Intervention(
-        "keeping-clear/1", "a task takes away the whole direction",
+        "keeping-clear/1", "A task takes away the whole direction",
         AT_THE_END, (145, 150), ("levels.distance.enabled=false",), (0, 1),
     ),
     Intervention(
@@ -152,7 +152,7 @@ LIMIT_ROWS = (
         (7, 15),
     ),
     Intervention(
-        "deadlines/2", "noise counts double",
+        "deadlines/2", "noise has twice the effect",
         of("delta_tau", "N·m", "rms"), (1.1, 1.6), ("M_bar_scale=1",), (0.5, 0.8),
         of=("plant.encoder_resolution_deg=0.001",), seconds=0.3,
     ),
@@ -217,7 +217,7 @@ LIMIT_ROWS = (
         of=("plant.mass_scale=0.05", "plant.inertia_scale=0.05"), seconds=0.05,
     ),
     Intervention(
-        "the-model-is-wrong/2", "for links of this weight so large an M̄ is beyond the cliff",
+        "the-model-is-wrong/2", "for links of this weight so large an M̄ is beyond the stability limit",
         RADIUS, (1.5, 4), ("plant.mass_scale=10", "plant.inertia_scale=10"), (0.5, 0.98),
         of=("M_bar_scale=4",), seconds=0.05,
     ),

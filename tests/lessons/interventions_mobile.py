@@ -17,7 +17,7 @@ KEPT = (0.045, 0.055)
 MOBILE_ROWS = (
     # ---------------------------------------- first-hold-then-reach
     Intervention(
-        "first-hold-then-reach/0", "priorities say who may be disturbed meanwhile",
+        "first-hold-then-reach/0", "the priorities decide which one may be disturbed on the way",
         EE, (0, 0.1), ("order=base,ee",), (100, 140),
     ),
     Intervention(
@@ -164,7 +164,7 @@ MOBILE_ROWS = (
         TILT, (11, 12), ("levels.position.enabled=false",), (0, 1), on="your-robot/0",
     ),
     Intervention(
-        "your-robot/0", "the posture goes without",
+        "your-robot/0", "the posture is given up",
         of("error/posture", "deg", "last"), (20, 30),
         ("levels.position.enabled=false", "levels.orientation.enabled=false"), (0, 1),
     ),
@@ -174,7 +174,7 @@ MOBILE_ROWS = (
         of=("controller=weighted",),
     ),
     Intervention(
-        "your-robot/1", "what it does not know of the weight, the springs must carry",
+        "your-robot/1", "its springs must carry the weight that the file does not contain",
         of("error/position", "mm", "last"), (10, 100),
         ("nominal.mass_scale=1.5", "nominal.inertia_scale=1.5"),
         (0, 0.2), of=("controller=hqp",), seconds=0.3,

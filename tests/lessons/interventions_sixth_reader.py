@@ -110,7 +110,8 @@ SIXTH_ROWS = (
     ),
     # ---------------------------------------- how-strict-is-strict
     Intervention(
-        "how-strict-is-strict/3", "It is mostly the charge for speed: with a thousandth of it 6 mm remain",
+        "how-strict-is-strict/3",
+        "Most of this comes from the cost of speed: with a thousandth of it 6 mm remain",
         EE, (15.5, 15.9), ("velocity_effort=0.001",), (5.8, 6.1),
     ),
     Intervention(
