@@ -1,4 +1,4 @@
-"""Told wrong: the effect of a wrong report on a distance, and of a late correction on the braking distance."""
+"""Told wrong: the effect of a wrong report on a distance, and of a late correction on braking."""
 
 from __future__ import annotations
 
