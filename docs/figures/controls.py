@@ -53,7 +53,7 @@ def controls(scene: dict[str, Any], robot: Robot, reach: float, horizons: Iterab
                 '<label class="hl-check">N '
                 + _choice("N", {str(N): str(N) for N in known}, str(scene["horizon"]), path="horizon")
                 + "</label>",
-                _small("other N: in himpc-lab" if len(known) > 1 else "one N only in this figure"),
+                _small("himpc-lab has more values of N" if len(known) > 1 else "this figure has one N only"),
                 _scale("M_bar_scale", "M̄ scale", (0.1, 8.0), scene["M_bar_scale"]),
             ),
             _group(

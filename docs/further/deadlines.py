@@ -37,7 +37,7 @@ def _bought(rng: np.random.Generator) -> tuple[float, float]:
 
 
 def _cliff(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Whether errors vanish, without and with delay (columns), below and above μ = 2 (rows)."""
+    """Returns whether errors vanish, without and with delay (columns), below and above μ = 2 (rows)."""
     alive = [[abs(_run(mu, 4000, late)[-1]) < 1e-3 for late in (0, 1)] for mu in (1.98, 2.02)]
     return np.array(alive, float), np.array([[1.0, 1.0], [0.0, 0.0]])
 

@@ -24,8 +24,8 @@ def _serial(rng: np.random.Generator) -> tuple[float, float]:
 
 
 def _overlapped(rng: np.random.Generator) -> tuple[float, float]:
-    """The round as a sequence of events: base and hand start at the same time, and the next delivery begins
-    when both have finished."""
+    """Returns both sides for a round as a sequence of events: base and hand start at the same time, and the
+    next delivery begins when both have finished."""
     drive, reach, wait = rng.uniform(1, 9, 3)
     ready = 0.0
     for _ in range(4):

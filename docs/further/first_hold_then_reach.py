@@ -14,15 +14,15 @@ LEFT = measured("first-hold-then-reach", "The hand pays")
 
 
 def _integrated(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """(4) and (5) with G = I over one knot, by the matrix exponential and as printed."""
+    """Returns (4) and (5) with G = I over one knot, by the matrix exponential and as printed."""
     dt, q, v, u = 0.1, *rng.normal(size=3)
     A = np.array([[0, 1, 0], [0, 0, 1], [0, 0, 0.0]])  # acts on (q, v, u)
     return (expm(A * dt) @ np.array([q, v, u]))[:2], np.array([q + v * dt + 0.5 * u * dt**2, v + u * dt])
 
 
 def _lexicographic(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """min J₂ over the minimisers of J₁, and the minimiser of a weighted sum in which J₁ counts a million
-    times."""
+    """Returns the minimiser of a weighted sum in which J₁ has the weight 1e8, and the minimiser of J₂ over the
+    minimisers of J₁."""
     a, b = rng.normal(size=(1, 3)), rng.normal(size=(2, 3))
     r, s = rng.normal(size=1), rng.normal(size=2)
     rows = np.vstack([1e4 * a, b])
@@ -39,7 +39,7 @@ def _held(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _nearest(rng: np.random.Generator) -> tuple[float, float]:
-    """The least distance from the goal to a grid of points in the circle around the hand, and the formula."""
+    """Returns the least distance from the goal to a grid of points around the hand, and the formula."""
     goal = np.array([3.5, 0.0])
     reach = rng.uniform(1.0, 2.0)
     r, angle = np.meshgrid(np.linspace(0, reach, 400), np.linspace(0, 2 * np.pi, 721))

@@ -21,7 +21,7 @@ def first_left(N: int, Q: float, R: float, g: float) -> float:
 
 
 def _printed(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """(15) with its own matrices, N times, and the sums of c_l."""
+    """Returns the result of (15) with its own matrices, N times, and the sums of c_l."""
     T, N, K_p, K_v = 1e-3, 6, 100.0, 20.0
     A_11 = np.array([[1, T, 0], [0, 2, 0], [0, 0, 1.0]])
     A_12 = np.diag([0.0, -1.0, 0.0])

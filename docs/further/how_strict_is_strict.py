@@ -10,7 +10,7 @@ from docs.further.kit import Further, Line, Question, planar
 
 
 def _inner(rng: np.random.Generator) -> tuple[float, float]:
-    """The amount by which plans that satisfy (12) violate (11), which is zero."""
+    """Returns the amount by which plans that satisfy (12) violate (11), which is zero."""
     Q, best = rng.uniform(0.1, 3, size=(11, 3)), rng.normal(size=(11, 3))
     worst = 0.0
     for _ in range(200):

@@ -39,8 +39,8 @@ def _touching(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _cut(rng: np.random.Generator) -> tuple[float, float]:
-    """The decrease of level 2's cost per unit by which a bound is relaxed, and the bound's multiplier; the
-    bound cuts the line before its optimum."""
+    """Returns the decrease of level 2's cost per unit by which a bound is relaxed, and the multiplier of that
+    bound, which cuts the line before its optimum."""
     _, H, slope, Z, first, second = _level_2(rng)
     z = Z[:, 0]
     joint = int(np.argmax(np.abs(z)))

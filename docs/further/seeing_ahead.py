@@ -19,8 +19,8 @@ def shortest(d: float) -> float:
 
 
 def _preview(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """The number of knots k = 1 … 10 whose reference is already the new one at a time before the jump,
-    counted and by the formula."""
+    """Returns the number of knots k = 1 … 10 whose reference is already the new one at a time before the
+    jump, counted and by the formula."""
     before = np.round(rng.uniform(0.05, 1.0, 20), 3)
     knots = np.arange(1, 11)
     counted = [(8.0 - t + 0.1 * knots >= 8.0 - 1e-9).sum() for t in before]

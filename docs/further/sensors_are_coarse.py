@@ -25,7 +25,7 @@ def _differences(rng: np.random.Generator) -> tuple[float, float]:
 
 
 def _spread(rng: np.random.Generator) -> tuple[float, float]:
-    """The RMS over independent rounding errors, and δ/(√2 T_s²)."""
+    """Returns the RMS over independent rounding errors, and δ/(√2 T_s²)."""
     delta = rng.uniform(1e-5, 1e-3)
     errors = rng.uniform(-0.5 * delta, 0.5 * delta, size=(400_000, 3))
     a = errors @ np.array([1.0, -2.0, 1.0]) / T_S**2

@@ -13,7 +13,7 @@ G = 0.6 / 0.033
 
 
 def _hessian(rng: np.random.Generator) -> tuple[float, float]:
-    """The least eigenvalue of the Hessian, and its bound, for a Jacobian of rank 1."""
+    """Returns the least eigenvalue of the Hessian, and its bound, for a Jacobian of rank 1."""
     B = np.outer(rng.normal(size=4), rng.normal(size=5))
     Q, R = np.diag(rng.uniform(1, 9, 4)), 3.0
     return float(np.linalg.eigvalsh(B.T @ Q @ B + R * np.eye(5))[0]), R

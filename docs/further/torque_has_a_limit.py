@@ -35,7 +35,7 @@ def _rows(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _inherited(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """The effects on levels 1 and 2 of level 3's candidate Δτ₂*, and the effects that (33) requires."""
+    """Returns the effects on levels 1 and 2 of level 3's candidate Δτ₂*, and those that (33) requires."""
     G_1, G_2, first = rng.normal(size=(2, 7)), rng.normal(size=(2, 7)), rng.normal(size=7)
     second = first + null_space(G_1) @ rng.normal(size=5)
     return np.concatenate([G_1 @ second, G_2 @ second]), np.concatenate([G_1 @ first, G_2 @ second])

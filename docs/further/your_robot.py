@@ -54,7 +54,7 @@ def _worst() -> float:
 
 
 def _least_inertia(rng: np.random.Generator) -> tuple[float, float]:
-    """The torque over the acceleration of joint 1 while the other joints are free, and 1/(M⁻¹)₁₁."""
+    """Returns the torque over the acceleration of joint 1 while the other joints are free, and 1/(M⁻¹)₁₁."""
     M = inertia(rng, 4)
     tau = np.array([1.0, 0, 0, 0])
     return 1.0 / float(np.linalg.solve(M, tau)[0]), 1.0 / float(np.linalg.inv(M)[0, 0])
