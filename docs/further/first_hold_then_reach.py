@@ -21,8 +21,8 @@ def _integrated(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _lexicographic(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the minimiser of a weighted sum in which J₁ has the weight 1e8, and the minimiser of J₂ over the
-    minimisers of J₁."""
+    """Returns the minimiser of a weighted sum in which J₁ has the weight 1e8, and the minimiser of J₂ over
+    the minimisers of J₁."""
     a, b = rng.normal(size=(1, 3)), rng.normal(size=(2, 3))
     r, s = rng.normal(size=1), rng.normal(size=2)
     rows = np.vstack([1e4 * a, b])
