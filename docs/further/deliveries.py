@@ -72,8 +72,8 @@ FURTHER = Further(
             1e-5,
         ),
         Line(
-            r"If the goal moves, this place moves along the edge. If the direction to the goal turns by "
-            r"$\varphi$, the base drives",
+            r"If the goal moves, this place moves along the edge of that circle. If the direction to the "
+            r"goal turns by $\varphi$, the base drives",
             r"s = \rho\, \varphi",
             _along,
             1e-6,

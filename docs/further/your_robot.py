@@ -107,8 +107,8 @@ FURTHER = Further(
             5e-3,
         ),
         Line(
-            "so that a real lamp may be 13 % lighter than its file says before the edge is reached in that "
-            "pose:",
+            "so that a real lamp may be 13 % lighter than its file says before the stability limit is "
+            "reached in that pose:",
             r"\max_q \lambda_{\max}\left( (0.87\, M)^{-1} \bar M \right) \approx 2",
             _lighter,
             5e-3,
