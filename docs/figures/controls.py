@@ -12,7 +12,7 @@ from robots import Robot
 
 _AXES = ("x", "y", "z")
 _STEPS = 200
-"""Places of a slider."""
+"""Number of positions of a slider."""
 
 
 def controls(scene: dict[str, Any], robot: Robot, reach: float, horizons: Iterable[int], wide: bool) -> str:
@@ -23,7 +23,7 @@ def controls(scene: dict[str, Any], robot: Robot, reach: float, horizons: Iterab
         robot: gives the links that can be pushed.
         reach: m, see `docs.figures.robot.mechanics`.
         horizons: N that can be chosen.
-        wide: whether there is room for the groups that are used most to be open at first.
+        wide: whether there is room to open the most used groups at first.
     """
     strict, plant, limits = scene["controller"] != "weighted", scene["plant"], scene["limits"]
     known = sorted({scene["horizon"], *horizons})
@@ -53,7 +53,7 @@ def controls(scene: dict[str, Any], robot: Robot, reach: float, horizons: Iterab
                 '<label class="hl-check">N '
                 + _choice("N", {str(N): str(N) for N in known}, str(scene["horizon"]), path="horizon")
                 + "</label>",
-                _small("other N: in himpc-lab" if len(known) > 1 else "one N only in this figure"),
+                _small("himpc-lab has more values of N" if len(known) > 1 else "this figure has one N only"),
                 _scale("M_bar_scale", "M̄ scale", (0.1, 8.0), scene["M_bar_scale"]),
             ),
             _group(
@@ -83,7 +83,7 @@ def controls(scene: dict[str, Any], robot: Robot, reach: float, horizons: Iterab
 
 
 def _weights(scene: dict[str, Any], place: int, strict: bool) -> str:
-    """Q and R of a level, and the gains of its tasks."""
+    """Returns the controls of Q and R of a level, and of the gains of its tasks."""
     level, path = scene["levels"][place], f"levels.{scene['levels'][place]['name']}"
     found = [_slider("Q", "", (1.0, 2000.0), level["Q"], log=True, path=f"{path}.Q")]
     if strict:
@@ -121,7 +121,7 @@ def _small(words: str) -> str:
 
 
 def _told(**given: str) -> str:
-    """What a control is for: `path` of a setting, or the `axis` of the target of a `task`."""
+    """Returns what a control changes: `path` of a setting, or the `axis` of the target of a `task`."""
     return "".join(f' data-{name}="{escape(value)}"' for name, value in given.items())
 
 
@@ -145,7 +145,7 @@ def _scale(path: str, words: str, ends: tuple[float, float], value: float) -> st
 def _slider(
     words: str, unit: str, ends: tuple[float, float], value: Any, *, log: bool = False, **given: str
 ) -> str:
-    """A slider, whose value is a power of ten with `log`. Of several values the first one is shown."""
+    """Returns a slider; with `log` its value is a power of ten. Of several values it shows the first one."""
     first = float(value[0] if isinstance(value, list | tuple) else value)
     low, high, at = ((math.log10(max(each, 1e-9)) if log else each) for each in (*ends, first))
     told = f"{float(f'{first:.3g}'):g} {unit}".strip()

@@ -30,14 +30,14 @@ PROGRAM = ROOT / "docs" / "browser"
 TRIED = ("iiwa14-hold", "panda-hold", "planar3-hold")
 """The scenes of the page *Try it*."""
 HORIZONS = (1, 2, 5, 10, 20)
-"""N of that page."""
+"""The horizons N of that page."""
 
 
 def missing() -> str | None:
-    """Says in a sentence what live figures need and this machine lacks; None if nothing is missing."""
+    """Returns a sentence about what live figures need and this machine lacks; None if nothing is missing."""
     for program in ("node", "npm"):
         if shutil.which(program) is None:
-            return f"live figures need {program}, which is not here: the site has recordings instead"
+            return f"live figures need {program}, which is not installed: the site has recordings instead"
     try:
         check_linker()
     except InputError as error:

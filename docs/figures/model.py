@@ -20,7 +20,7 @@ KINDS = {
     int(mujoco.mjtGeom.mjGEOM_PLANE): "plane",
 }
 OBJECTS = "<!-- objects -->"
-"""A mark before and after the objects, which are left out if there are no contacts."""
+"""A mark before and after the objects. The objects are left out if there are no contacts."""
 
 
 def model_of(robot: Robot, world: World) -> mujoco.MjModel:
@@ -100,7 +100,8 @@ def _joint(model: mujoco.MjModel, joint: int, k: int) -> str:
 
 
 def _geom(model: mujoco.MjModel, robot: Robot, geom: int) -> str:
-    """A hull has the coordinates of its body; MuJoCo moves those of its model to the hull's middle."""
+    """Returns a geom as text. A hull has the coordinates of its body; MuJoCo moves those of its model to the
+    centre of the hull."""
     solids = robot.collision.solids
     told: dict[str, object] = {"name": model.geom(geom).name, "priority": model.geom_priority[geom]}
     told |= {"friction": model.geom_friction[geom], "solref": model.geom_solref[geom]}
@@ -113,7 +114,7 @@ def _geom(model: mujoco.MjModel, robot: Robot, geom: int) -> str:
 
 
 def _tag(name: str, /, **given: object) -> str:
-    """The beginning of an element; numbers with all their digits."""
+    """Returns the beginning of an element; its numbers have all their digits."""
 
     def told(value: object) -> str:
         if isinstance(value, str):

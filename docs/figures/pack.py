@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import Any
 
 _LINE = 8
-"""Pieces begin at multiples of so many bytes."""
+"""Pieces begin at multiples of this number of bytes."""
 
 
 class Pack:
@@ -21,7 +21,7 @@ class Pack:
         self._pieces = bytearray()
 
     def add(self, piece: bytes) -> tuple[int, int]:
-        """Adds a piece; returns what refers to it."""
+        """Adds a piece and returns the reference to it."""
         self._pieces += bytes(-len(self._pieces) % _LINE)
         start = len(self._pieces)
         self._pieces += piece

@@ -13,9 +13,9 @@ from robots.shapes.link_shapes import Shape, link_shapes
 from robots.truth import inertial, joint_axis, true_model
 
 FACES = 16_000
-"""Triangles of a robot, at most."""
+"""Largest number of triangles of a robot."""
 _GRID = 1e-4
-"""m: coordinates of what is drawn are multiples of it."""
+"""m: the coordinates of drawn shapes are multiples of this length."""
 
 
 def robot_script(robot: Robot, name: str) -> str:

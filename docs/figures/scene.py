@@ -37,7 +37,7 @@ def scene_data(
         wide: whether its page has room for controls.
 
     Raises:
-        InputError: its controller cannot be exported.
+        InputError: the scene's controller cannot be exported.
     """
     settings, robot = scene.settings, scene.robot
     references = TorqueSession(replace(scene, events=()), 0).references
@@ -130,7 +130,7 @@ def _event(robot: Robot, event: Event) -> dict[str, Any]:
 
 
 def _poses(scene: TorqueScene) -> list[float]:
-    """Position and quaternion x y z w of each body at the start, for the first picture."""
+    """Returns position and quaternion x y z w of each body at the start, for the first picture."""
     model = scene.robot.model
     data = model.createData()
     pin.forwardKinematics(model, data, scene.q_0)
@@ -142,7 +142,7 @@ def _poses(scene: TorqueScene) -> list[float]:
 
 
 def _objects(scene: TorqueScene) -> list[dict[str, Any]]:
-    """What is drawn of the objects, in the order of their bodies; a floor is part of every picture."""
+    """Returns the shapes of the objects, in the order of their bodies; a floor is part of every picture."""
     model = model_of(scene.robot, scene.world)
     found = []
     for place, thing in enumerate(scene.world):
@@ -156,7 +156,7 @@ def _objects(scene: TorqueScene) -> list[dict[str, Any]]:
 
 
 def _told(image: Image, pack: Pack) -> dict[str, Any]:
-    """The memory, and what of its manifest the page needs."""
+    """Returns the memory, and those parts of its manifest that the page needs."""
     manifest = image.manifest
     kept = [{key: each[key] for key in ("name", "type", "shape", "offset")} for each in manifest["arrays"]]
     told = {key: manifest[key] for key in ("joints", "tasks", "levels")}

@@ -52,7 +52,7 @@ _DERIVED += (
 
 @cache
 def _bare(scene: str, urdf: str | None) -> Scene:
-    """The scene without assignments; the import of a robot from a file takes a second."""
+    """Returns the scene without assignments. It is cached: importing a robot from a file takes a second."""
     return RunSpec(scene, urdf).loaded()
 
 
@@ -63,7 +63,7 @@ def _prepared(run: RunSpec) -> Scene:
 
 @cache
 def why_not(name: str, place: int) -> str | None:
-    """Says in one sentence why a step (0 is the first) has no live figure; None if it has one."""
+    """Returns a sentence on why a step (0 is the first) has no live figure; None if it has one."""
     lesson = load_lesson(name)
     try:
         refuse(_scene_of(lesson.run_of(lesson.steps[place])))
@@ -80,7 +80,7 @@ def told_settings(lesson: Lesson, step: Step) -> list[str]:
 
 
 def robot_of(lesson: Lesson, step: Step) -> str:
-    """Returns the name under which the page knows the robot of a step."""
+    """Returns the page's name for the robot of a step."""
     return scene_of_step(lesson, step).robot.name
 
 
@@ -101,7 +101,7 @@ def lesson_script(lesson: Lesson) -> str | None:
 
 
 def robots_of(lesson: Lesson) -> dict[str, Any]:
-    """Returns the robots of the live steps by the names under which the page knows them."""
+    """Returns the robots of the live steps by the page's names for them."""
     return {
         scene.robot.name: scene.robot
         for place, step in enumerate(lesson.steps)
@@ -150,7 +150,7 @@ def _ghost_told(step: Step, missing: str | None) -> str:
 
 
 def _asking(name: str, step: Step, with_ghost: bool) -> str:
-    """The prediction before the run, and the list of claims, as HTML; `name` is that of the radio buttons."""
+    """Returns the prediction before the run and the list of claims as HTML; `name`: of the radio buttons."""
     claims = "".join(
         f"<li>{escape(claim.text)}{'' if judged(claim.measure, with_ghost) else _NOT_HERE}</li>"
         for claim in step.claims
@@ -179,7 +179,7 @@ def _question(name: str, asked: Prediction | None) -> str:
 
 
 def judged(measure: Measure, with_ghost: bool) -> bool:
-    """Whether a browser can measure it."""
+    """Returns whether a browser can measure the claim."""
     name, _, of = measure.signal.name.partition("/")
     known = (
         name in FIELDS or measure.signal.name in _DERIVED or (bool(of) and name in ("error", "x", "active"))

@@ -1,4 +1,4 @@
-"""A blind arm: what time-delay estimation takes a table for, and how the force grows."""
+"""A blind arm: the effect of a table on time-delay estimation, and the growth of the force."""
 
 from __future__ import annotations
 
@@ -49,20 +49,20 @@ FURTHER = Further(
     derivation=(
         Line(
             "The arm moves by $M \\ddot q + n = \\tau - J^\\top f$, where $f$ is the force with which the "
-            "hand presses. What time-delay estimation takes for the arm's own dynamics is",
+            "hand presses. Time-delay estimation attributes the following torque to the arm's own dynamics:",
             r"\tau_0 - \bar M \ddot q_0 = (M - \bar M)\, \ddot q_0 + n + J^\top f",
             _estimate,
         ),
         Line(
-            "At rest on the table nothing moves, and the wish is $\\ddot x = -K_p \\tilde x$. An increment "
-            "that would fulfil it, with $\\bar\\Lambda = (J \\bar M^{-1} J^\\top)^{-1}$, is "
-            "$\\Delta\\tau = J^\\top \\bar\\Lambda \\ddot x$:",
+            "At rest on the table nothing moves, and the desired acceleration is $\\ddot x = -K_p \\tilde "
+            "x$. An increment that would produce this acceleration, with $\\bar\\Lambda = (J \\bar M^{-1} "
+            "J^\\top)^{-1}$, is $\\Delta\\tau = J^\\top \\bar\\Lambda \\ddot x$:",
             r"J \bar M^{-1} (J^\top \bar\Lambda\, \ddot x) = \ddot x",
             _increment,
         ),
         Line(
-            "But the table does not move. The increment goes into the force, and at the next tick the wish "
-            "is the same. After $k$ ticks",
+            "But the table does not move. The increment is added to the force, and at the next tick the "
+            "desired acceleration is the same. After $k$ ticks the force is",
             r"f_k = f_0 + k\, \bar\Lambda\, \ddot x",
             _growth,
         ),
@@ -75,12 +75,11 @@ FURTHER = Further(
     ),
     questions=(
         Question(
-            "The hand's $K_p$ is 56.2 1/s². Which mass does the force's growth in the last half second "
-            "belong to?",
-            r"One centimetre asks for ⟨asked⟩ m/s². The force grows by ⟨rate⟩ N per second, "
-            r"⟨tick⟩ N per millisecond. With "
-            r"$\bar\Lambda\, \ddot x$ that is a mass of ⟨mass⟩ kg: $\bar M$ is small, and still the force "
-            r"grows without end.",
+            "The hand's $K_p$ is 56.2 1/s². Which mass corresponds to the growth of the force in the last "
+            "half second?",
+            r"One centimetre asks for ⟨asked⟩ m/s². The force grows by ⟨rate⟩ N per second, ⟨tick⟩ N per "
+            r"millisecond. With $\bar\Lambda\, \ddot x$ this corresponds to a mass of ⟨mass⟩ kg: $\bar M$ "
+            r"is small, and still the force grows without end.",
             {
                 "asked": (ASKED, ".2f"),
                 "rate": (GROWTH, ".0f"),
@@ -89,13 +88,14 @@ FURTHER = Further(
             },
         ),
         Question(
-            "The ghost presses with a constant force. How heavy is the hand for it?",
+            "The ghost presses with a constant force. Which mass of the hand corresponds to this force?",
             r"$f = \Lambda\, \ddot x$ with ⟨asked⟩ m/s² and ⟨force⟩ N: ⟨mass⟩ kg.",
             {"asked": (ASKED, ".2f"), "force": (SPRING, ".1f"), "mass": (SPRING / ASKED, ".1f")},
         ),
         Question(
             "Which $K_p$ would make the ghost press with 50 N at one centimetre?",
-            r"$K_p = f / (\Lambda\, |\tilde x|) = ⟨K_p⟩$ 1/s², more than thirteen times its own.",
+            r"$K_p = f / (\Lambda\, |\tilde x|) = ⟨K_p⟩$ 1/s², more than thirteen times the ghost's own "
+            r"$K_p$.",
             {"K_p": (50.0 / (SPRING / ASKED * 0.01), ".0f")},
         ),
     ),

@@ -47,29 +47,29 @@ FURTHER = Further(
             _all_solutions,
         ),
         Line(
-            r"makes the hand move as asked, whatever $z$ is. $I - J^+ J$ projects onto the null space. Its "
-            "trace is the number of motions that are left over; a coordinate that repeats another one costs "
-            "none:",
+            "makes the hand move as asked, whatever $z$ is. $I - J^+ J$ projects onto the null space. Its "
+            "trace is the number of motions that are left over; a coordinate that repeats another one does "
+            "not reduce it:",
             r"\operatorname{tr}(I - J^+ J) = n - \operatorname{rank} J",
             _freedoms,
         ),
         Line(
-            r"The controller decides on torques. By (13) a change of torque moves the hand by $J \bar M^{-1} "
-            r"\Delta\tau$, so what leaves the hand alone is",
+            r"The controller decides on torques. By (13) a change of torque moves the hand by $J \bar "
+            r"M^{-1} \Delta\tau$. The changes that do not move the hand are",
             r"\Delta\tau = \bar M (I - J^+ J)\,z \quad\Rightarrow\quad J \bar M^{-1} \Delta\tau = 0",
             _torques,
         ),
     ),
     questions=(
         Question(
-            "A seven-joint arm holds a glass: its place counts, and that it stands upright, but not how "
-            "it is turned about its own axis. How many motions are left over? And if *upright* is asked "
-            "for twice, on two levels?",
-            "Three coordinates and two: $7 - 5 = 2$. Asked for twice it still takes away two: what counts is "
-            "the rank of all rows together, not their number.",
+            "A seven-joint arm holds a glass. The tasks control the place of the glass and keep it upright; "
+            "its rotation about its own axis is free. How many motions are left over? And how many if "
+            "*upright* is asked for twice, on two levels?",
+            "The place has three coordinates and *upright* has two: $7 - 5 = 2$. If *upright* is asked for "
+            "twice, it still removes two motions: the rank of all rows together counts, not their number.",
         ),
         Question(
-            "The planar arm has three links of 0.3 m. It lies straight along $x$. What is its Jacobian, what "
+            "The planar arm has three links of 0.3 m. It lies straight along $x$. What are its Jacobian and "
             "its rank, and which joint velocities leave the hand at rest?",
             r"No joint moves the hand along $x$; sideways the levers are ⟨l1⟩, ⟨l2⟩ and ⟨l3⟩ m. The rank is "
             "⟨rank⟩, so two motions are free, one more than in any bent pose: for example the velocities "
@@ -84,11 +84,12 @@ FURTHER = Further(
             },
         ),
         Question(
-            "In *Drag the elbow*, joint 3 is asked to turn by 60°. How far does it get, and what happened to "
-            "the rest of the wish?",
-            "It turns by ⟨turn⟩°, ⟨share⟩ % of the wish. The posture asks all joints to stay except joint "
-            "3, and that is seven wishes for one free motion: level 3 goes along it as far as this makes "
-            "the sum of the seven errors smaller. There what it wants is perpendicular to what it may do.",
+            "In *Drag the elbow*, joint 3 is asked to turn by 60°. How far does it turn, and why does it "
+            "not turn further?",
+            "It turns by ⟨turn⟩°, ⟨share⟩ % of the desired angle. The posture asks joint 3 to turn and all "
+            "other joints to stay; these are seven targets for one free motion. Level 3 moves along this "
+            "free motion as long as the sum of the seven errors becomes smaller. There the remaining error "
+            "is perpendicular to the free motion.",
             {"turn": (ELBOW, ".0f"), "share": (100 * ELBOW / 60, ".0f")},
         ),
     ),

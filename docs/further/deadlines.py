@@ -37,7 +37,7 @@ def _bought(rng: np.random.Generator) -> tuple[float, float]:
 
 
 def _cliff(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Whether errors vanish, without and with delay (columns), below and above μ = 2 (rows)."""
+    """Returns whether errors vanish, without and with delay (columns), below and above μ = 2 (rows)."""
     alive = [[abs(_run(mu, 4000, late)[-1]) < 1e-3 for late in (0, 1)] for mu in (1.98, 2.02)]
     return np.array(alive, float), np.array([[1.0, 1.0], [0.0, 0.0]])
 
@@ -46,15 +46,15 @@ FURTHER = Further(
     derivation=(
         Line(
             r"Take one mode of *No model needed* with the eigenvalue $\mu$ of $M^{-1} \bar M$, and a "
-            r"constant wish. In time, each torque corrects what the one before it did:",
+            r"constant desired acceleration. If each torque acts in time, it corrects the error of the "
+            r"previous torque:",
             r"\varepsilon_{k+1} = (1 - \mu)\,\varepsilon_k \quad\Rightarrow\quad "
             r"\varepsilon_k = (1 - \mu)^k\, \varepsilon_0",
             _in_time,
         ),
         Line(
-            r"One tick late, $\tau_{k+2} = \tau_k + \bar M (a - \ddot q_k)$: it corrects what the last "
-            r"but one did. The even "
-            "and the odd ticks are two sequences that know nothing of each other:",
+            r"One tick late, $\tau_{k+2} = \tau_k + \bar M (a - \ddot q_k)$: it corrects the error of the "
+            r"torque before the previous one. The even and the odd ticks are two independent sequences:",
             r"\varepsilon_{k+2} = (1 - \mu)\,\varepsilon_k \quad\Rightarrow\quad "
             r"\varepsilon_k = (1 - \mu)^{\lfloor k/2 \rfloor}\, \varepsilon_0",
             _late,
@@ -66,8 +66,8 @@ FURTHER = Further(
             _bought,
         ),
         Line(
-            r"But the edge is where it was, at $\mu = 2$, in time and late, and doubling $\bar M$ goes "
-            r"half of the way to it:",
+            r"But the stability limit is $\mu = 2$ in both cases, and doubling $\bar M$ goes half of the "
+            r"way to it:",
             r"\varepsilon_k \to 0 \quad\Leftrightarrow\quad 0 < \mu < 2",
             _cliff,
         ),
@@ -84,11 +84,11 @@ FURTHER = Further(
             },
         ),
         Question(
-            r"The same mode, one tick late, $\bar M$ doubled. How long now? And what does the doubling "
-            r"cost in the largest mode of this arm, if its $\mu$ is 0.8?",
-            r"$(1 - 0.1 - 0.1)^k = 0.01$ at $k = ⟨k⟩$, so ⟨ms⟩ ms: what was lost is back. The largest "
-            r"mode goes from $\mu = 0.8$ to $⟨mu⟩$: it now changes its sign at every correction, and "
-            r"there are $⟨room⟩$ left to the edge at 2.",
+            r"The same mode, one tick late, $\bar M$ doubled. How long does it take now? And which "
+            r"disadvantage has the doubling for the largest mode of this arm, if its $\mu$ is 0.8?",
+            r"$(1 - 0.1 - 0.1)^k = 0.01$ at $k = ⟨k⟩$, so ⟨ms⟩ ms: the loss is compensated. The largest "
+            r"mode goes from $\mu = 0.8$ to $⟨mu⟩$: its error now changes its sign at every correction, and "
+            r"the distance to the stability limit 2 is $⟨room⟩$.",
             {
                 "k": (float(math.ceil(math.log(0.01) / math.log(1 - 2 * MU))), ".0f"),
                 "ms": (2.0 * math.ceil(math.log(0.01) / math.log(1 - 2 * MU)), ".0f"),
@@ -97,10 +97,11 @@ FURTHER = Further(
             },
         ),
         Question(
-            "A computer needs 0.1 ms for each knot. How many knots can it afford with 1 ms, 2 ms and 5 "
-            "ms? And one that needs 0.4 ms, with 1 ms?",
-            "⟨a⟩, ⟨b⟩ and ⟨c⟩; the slow one ⟨d⟩. Whether to spend them is another question: *How far "
-            "ahead* found little that a longer horizon gives, and here it halves the rate of the loop.",
+            "A computer needs 0.1 ms for each knot. How many knots can it afford with 1 ms, 2 ms and 5 ms? "
+            "And how many can a computer afford that needs 0.4 ms for each knot, with 1 ms?",
+            "⟨a⟩, ⟨b⟩ and ⟨c⟩; the slow computer affords ⟨d⟩. Whether more knots are useful is another "
+            "question: in *How far ahead* a longer horizon improved little, and here it halves the rate of "
+            "the loop.",
             {
                 "a": (1 / 0.1, ".0f"),
                 "b": (2 / 0.1, ".0f"),

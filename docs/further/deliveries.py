@@ -24,8 +24,8 @@ def _serial(rng: np.random.Generator) -> tuple[float, float]:
 
 
 def _overlapped(rng: np.random.Generator) -> tuple[float, float]:
-    """The round as a sequence of events: base and hand start at the same time, and the next delivery begins
-    when both have finished."""
+    """Returns both sides for a round as a sequence of events: base and hand start at the same time, and the
+    next delivery begins when both have finished."""
     drive, reach, wait = rng.uniform(1, 9, 3)
     ready = 0.0
     for _ in range(4):
@@ -58,8 +58,8 @@ FURTHER = Further(
             _serial,
         ),
         Line(
-            "With a window of two, driving and reaching go on together. What is left is the longer of the "
-            "two, and the wait:",
+            "With a window of two, driving and reaching go on together. The time is then the longer of the "
+            "two plus the wait:",
             r"T_2 = m\,(\max(t_b, t_h) + t_w)",
             _overlapped,
         ),
@@ -72,9 +72,8 @@ FURTHER = Further(
             1e-5,
         ),
         Line(
-            r"If the goal moves, so does this place, along the edge: for a turn by $\varphi$ of the "
-            r"direction to the goal the base "
-            "drives",
+            r"If the goal moves, this place moves along the edge of that circle. If the direction to the "
+            r"goal turns by $\varphi$, the base drives",
             r"s = \rho\, \varphi",
             _along,
             1e-6,
@@ -86,8 +85,8 @@ FURTHER = Further(
             "the first step measures, and how long if both must stop at every place (second step, 41 s)? "
             "What factors are these? The paper has one over four rounds.",
             "The ratios are ⟨ratio⟩ and ⟨strict⟩, so ⟨time⟩ and ⟨strict_time⟩ s: factors of ⟨factor⟩ and "
-            "⟨strict_factor⟩. The paper has 2.3, against a robot whose base and arm take turns; by which "
-            "rule it does not say.",
+            "⟨strict_factor⟩. The paper has 2.3, compared with a robot whose base and arm take turns; the "
+            "paper does not print its rule.",
             {
                 "ratio": (RATIO, ".2f"),
                 "strict": (STRICT, ".2f"),
@@ -98,18 +97,19 @@ FURTHER = Further(
             },
         ),
         Question(
-            "By the two first lines, how large can the factor $T_1/T_2$ be if nobody waits ($t_w = 0$)? "
-            "Somebody reports more. What would you ask?",
-            r"$(t_b + t_h)/\max(t_b, t_h)$ is at most 2, where both take equally long. The lines take $t_b$ "
-            r"and $t_h$ to be the same in both. So ask whether they were: a base that may pass far from its "
-            r"place in one run and has to go all the way to it in the other has two different $t_b$.",
+            "By the two first lines, how large can the factor $T_1/T_2$ be if nobody waits ($t_w = 0$)? A "
+            "report claims a larger factor. What would you ask its authors?",
+            r"$(t_b + t_h)/\max(t_b, t_h)$ is at most 2, where both take equally long. The lines assume "
+            r"that $t_b$ and $t_h$ are the same in both runs. So ask whether they were the same: if the "
+            r"base may pass far from its place in one run and has to go all the way to it in the other, the "
+            r"two runs have different $t_b$.",
         ),
         Question(
             "The base waits at the edge, $\\rho = 1.2$ m from the point below the hand, and the next "
             "person moves so that the direction to them turns by 40°. How far does the base drive while "
             "the hand stays?",
-            r"$\rho\,\varphi = ⟨way⟩$ m. None of it is lost: it is the part of the new way that can be "
-            r"done before the ball is taken.",
+            r"$\rho\,\varphi = ⟨way⟩$ m. This way is not lost: it is the part of the new way that the base "
+            r"can drive before the ball is taken.",
             {"way": (RADIUS * TURN, ".2f")},
         ),
     ),

@@ -14,15 +14,15 @@ LEFT = measured("first-hold-then-reach", "The hand pays")
 
 
 def _integrated(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """(4) and (5) with G = I over one knot, by the matrix exponential and as printed."""
+    """Returns (4) and (5) with G = I over one knot, by the matrix exponential and as printed."""
     dt, q, v, u = 0.1, *rng.normal(size=3)
     A = np.array([[0, 1, 0], [0, 0, 1], [0, 0, 0.0]])  # acts on (q, v, u)
     return (expm(A * dt) @ np.array([q, v, u]))[:2], np.array([q + v * dt + 0.5 * u * dt**2, v + u * dt])
 
 
 def _lexicographic(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """min J₂ over the minimisers of J₁, and the minimiser of a weighted sum in which J₁ counts a million
-    times."""
+    """Returns the minimiser of a weighted sum in which J₁ has the weight 1e8, and the minimiser of J₂ over
+    the minimisers of J₁."""
     a, b = rng.normal(size=(1, 3)), rng.normal(size=(2, 3))
     r, s = rng.normal(size=1), rng.normal(size=2)
     rows = np.vstack([1e4 * a, b])
@@ -39,7 +39,7 @@ def _held(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _nearest(rng: np.random.Generator) -> tuple[float, float]:
-    """The least distance from the goal to a grid of points in the circle around the hand, and the formula."""
+    """Returns the least distance from the goal to a grid of points around the hand, and the formula."""
     goal = np.array([3.5, 0.0])
     reach = rng.uniform(1.0, 2.0)
     r, angle = np.meshgrid(np.linspace(0, reach, 400), np.linspace(0, 2 * np.pi, 721))
@@ -65,14 +65,13 @@ FURTHER = Further(
             1e-5,
         ),
         Line(
-            r"The hand's velocity is $J_b v_b + J_a \dot q_a$. As long as $J_a$ has full rank the arm can "
-            r"take back whatever "
-            "the base does:",
+            r"The hand's velocity is $J_b v_b + J_a \dot q_a$. As long as $J_a$ has full rank, the arm can "
+            r"compensate every motion of the base:",
             r"\dot q_a = -J_a^+ J_b v_b \quad\Rightarrow\quad J_b v_b + J_a \dot q_a = 0",
             _held,
         ),
         Line(
-            r"That ends where the arm is stretched. While the hand rests, the base stays within a "
+            r"This is impossible where the arm is stretched. While the hand rests, the base stays within a "
             r"distance $\rho$ of it; the nearest such place to a goal at a distance $d > \rho$ leaves",
             r"\min_{\lVert p \rVert \le \rho} \lVert p - p_{goal} \rVert = d - \rho",
             _nearest,
@@ -83,20 +82,21 @@ FURTHER = Further(
         Question(
             "The goal of *Out of reach* is 3.5 m from the hand, the arm reaches 1.86 m. How far before "
             "its goal should the base stop? What is measured?",
-            "⟨expected⟩ m on the flat; the run stops ⟨seen⟩ m before it. The difference is geometry: the "
-            "hand is not at the shoulder's height, and the shoulder not in the middle of the base.",
+            "⟨expected⟩ m in the plane; in the run the base stops ⟨seen⟩ m before its goal. The difference "
+            "is geometry: the hand is not at the shoulder's height, and the shoulder not in the middle of "
+            "the base.",
             {"expected": (3.5 - 1.86, ".2f"), "seen": (STOPS, ".2f")},
         ),
         Question(
-            "In the last step the tasks change places. How far is the hand off in the end, and why is it "
-            "the same number?",
+            "In the last step the tasks change places. How far is the hand from its goal in the end, and "
+            "why is it the same number?",
             "⟨left⟩ m. The distance between the two goals and the length of the arm are what they were; "
-            "only who bears the difference has changed.",
+            "only the task that has the error has changed.",
             {"left": (LEFT, ".2f")},
         ),
         Question(
-            "In *Nine joints, two wishes* the base's goal is 0.5 m ahead and 0.4 m to the side. Why is "
-            "this called 64 cm, and how many freedoms are left over?",
+            "In *Nine joints, two wishes* the base's goal is 0.5 m ahead and 0.4 m to the side. Why is this "
+            "called 64 cm, and how many degrees of freedom are left over?",
             r"$\sqrt{0.5^2 + 0.4^2} = ⟨way⟩$ m. Of nine joints, three coordinates of the hand and two of "
             r"the base leave "
             "⟨free⟩: the base may turn, and the arm may move its elbow and turn the hand.",

@@ -21,7 +21,7 @@ def first_left(N: int, Q: float, R: float, g: float) -> float:
 
 
 def _printed(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """(15) with its own matrices, N times, and the sums of c_l."""
+    """Returns the result of (15) with its own matrices, N times, and the sums of c_l."""
     T, N, K_p, K_v = 1e-3, 6, 100.0, 20.0
     A_11 = np.array([[1, T, 0], [0, 2, 0], [0, 0, 1.0]])
     A_12 = np.diag([0.0, -1.0, 0.0])
@@ -74,8 +74,8 @@ FURTHER = Further(
             1e-5,
         ),
         Line(
-            r"$C$ is triangular, and no entry of its diagonal is zero. If $R$ hardly counts, all "
-            r"residuals can be made zero, and the first one is made zero by the first increment alone:",
+            "$C$ is triangular, and no entry of its diagonal is zero. If $R$ is small enough, all residuals "
+            "can be made zero, and the first one is made zero by the first increment alone:",
             r"R \to 0: \quad C\, \bar u = -\bar e_{free} \quad\Rightarrow\quad e_{k+1} = 0",
             _deadbeat,
         ),
@@ -90,9 +90,9 @@ FURTHER = Further(
             r"$K_P = 100$, $K_V = 20$, $T_s = 1$ ms. Compute $c_0$, $c_4$ and $c_{19}$. What would the "
             r"matrix $C$ be if "
             "they were all 1?",
-            r"$⟨c0⟩$, $⟨c4⟩$ and $⟨c19⟩$. All 1: each $e$ would be the sum of the changes up to it, for "
-            r"what acts within "
-            "20 ms is nearly acceleration alone. Velocity and position hardly have the time to change.",
+            "$⟨c0⟩$, $⟨c4⟩$ and $⟨c19⟩$. If they were all 1, each $e$ would be the sum of the changes up to "
+            "it: within 20 ms a change has an effect on almost nothing but acceleration, and velocity and "
+            "position hardly change.",
             {f"c{k}": (effects(20)[k, 0], ".3f") for k in (0, 4, 19)},
         ),
         Question(
@@ -110,14 +110,12 @@ FURTHER = Further(
             },
         ),
         Question(
-            "One coordinate, $g = 1$, a constant $e$, and $R$ as dear as $Q$. Which share of $e$ is left "
-            "at the first knot with $N = 1$, and which with $N = 20$? Why? And with $g = 18$, as for "
-            "torques?",
-            "⟨one⟩ % and ⟨twenty⟩ %. A change of acceleration stays in force at all later knots: with $N "
-            "= 20$ it is paid for once and helps twenty times, so more of it is worth its price. A "
-            "smaller $R$ has the same effect with $N = 1$. With $g "
-            "= 18$ there is ⟨tiny⟩ % left for either: where the price does not count, a longer horizon "
-            "does not lower it.",
+            "One coordinate, $g = 1$, a constant $e$, and $R$ equal to $Q$. Which share of $e$ is left at "
+            "the first knot with $N = 1$, and which with $N = 20$? Why? And with $g = 18$, as for torques?",
+            "⟨one⟩ % and ⟨twenty⟩ %. A change of acceleration stays in force at all later knots: with $N = "
+            "20$ its cost counts once and its benefit twenty times, so a larger change is optimal. A "
+            "smaller $R$ has the same effect with $N = 1$. With $g = 18$ there is ⟨tiny⟩ % left for both: "
+            "where the cost of a change hardly counts, a longer horizon has no advantage.",
             {
                 "one": (100 * first_left(1, 1, 1, 1), ".0f"),
                 "twenty": (100 * first_left(20, 1, 1, 1), ".0f"),

@@ -10,7 +10,7 @@ from docs.further.kit import Further, Line, Question, planar
 
 
 def _inner(rng: np.random.Generator) -> tuple[float, float]:
-    """The amount by which plans that satisfy (12) violate (11), which is zero."""
+    """Returns the amount by which plans that satisfy (12) violate (11), which is zero."""
     Q, best = rng.uniform(0.1, 3, size=(11, 3)), rng.normal(size=(11, 3))
     worst = 0.0
     for _ in range(200):
@@ -51,9 +51,8 @@ FURTHER = Further(
             _inner,
         ),
         Line(
-            r"The QP knows $e$ by its tangent. A step of length $\alpha$ along it leaves the curve by a "
-            r"term of second order: "
-            "half the step, a quarter of the error,",
+            r"The QP contains the linearization of $e$, a tangent. A step of length $\alpha$ along the "
+            r"tangent leaves the curve by a term of second order: half the step has a quarter of the error,",
             r"\lVert f(q + \alpha d) - f(q) - \alpha J d \rVert = \tfrac12 \kappa\, \alpha^2 + O(\alpha^3)",
             _bent,
             5e-3,
@@ -65,10 +64,10 @@ FURTHER = Further(
             _allowed,
         ),
         Line(
-            r"and nothing at all for $\delta = 0$. For (11) one might suspect a missing slope as well. "
-            r"It does not explain the short steps (third step of the lesson: where level 1 pays for its "
-            r"effort, the cost has a slope, and the steps are as short). Where level 1 is at its best with "
-            r"$e^* = 0$, its cost has none:",
+            r"and no step at all for $\delta = 0$. For (11) one might also suspect that the cost has no "
+            r"slope. This does not explain the short steps (third step of the lesson: where level 1 pays "
+            r"for its effort, the cost has a slope, and the steps are as short). Where level 1 is at its "
+            r"optimum with $e^* = 0$, its cost has no slope:",
             r"\nabla \mathcal J_1 = J^\top Q\, e^* = 0",
             _flat,
         ),
@@ -78,8 +77,7 @@ FURTHER = Further(
             "A hand is to stay on a circle of radius 1 m and steps along the tangent. How long may the "
             "step be with $\\delta = 1$ mm, and with $\\delta = 1$ cm?",
             r"It leaves the circle by $\alpha^2/2$ (with $\kappa = 1$ 1/m), so $\alpha = \sqrt{2\delta}$: "
-            r"⟨fine⟩ cm and ⟨rough⟩ "
-            "cm. Ten times the tolerance buys three times the step.",
+            r"⟨fine⟩ cm and ⟨rough⟩ cm. Ten times the tolerance allows three times the step.",
             {
                 "fine": (100 * math.sqrt(2 * 0.001), ".1f"),
                 "rough": (100 * math.sqrt(2 * 0.01), ".1f"),
@@ -88,7 +86,8 @@ FURTHER = Further(
         Question(
             "(11) allows the cost of 1 cm at each of the eleven knots of a plan with $N = 10$. How large "
             "an error does it allow at a single knot, if all weights are equal?",
-            "The root of eleven, ⟨all⟩ cm, all of it spent at once. (12) allows 1 cm there and nowhere more.",
+            "The square root of eleven, ⟨all⟩ cm, if the whole cost is that of one knot. (12) allows 1 cm "
+            "there, and not more at any other knot.",
             {"all": (math.sqrt(11), ".1f")},
         ),
         Question(
@@ -96,8 +95,8 @@ FURTHER = Further(
             "how much is (12) better there? Is that what the derivation says?",
             "By ⟨less⟩ %. The derivation says that (12) is the stricter one, so that the hand must be no "
             "worse; it does not say by how much, nor that the base profits. Under the paper's formulation "
-            "level 1's best is a compromise between error and effort, and the order hangs on $Q$: with 1 we "
-            "find the hand worse off under (12), with 100 better.",
+            "level 1's best is a compromise between error and effort, and the order depends on $Q$: with 1 "
+            "we find the hand worse under (12), with 100 better.",
             {"less": (100 * (1 - 3.42 / 6.25), ".0f")},
         ),
     ),

@@ -39,8 +39,8 @@ def _touching(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _cut(rng: np.random.Generator) -> tuple[float, float]:
-    """The decrease of level 2's cost per unit by which a bound is relaxed, and the bound's multiplier; the
-    bound cuts the line before its optimum."""
+    """Returns the decrease of level 2's cost per unit by which a bound is relaxed, and the multiplier of that
+    bound, which cuts the line before its optimum."""
     _, H, slope, Z, first, second = _level_2(rng)
     z = Z[:, 0]
     joint = int(np.argmax(np.abs(z)))
@@ -69,7 +69,7 @@ FURTHER = Further(
             _optimum,
         ),
         Line(
-            r"(33) leaves all $\Delta\tau_2 = \Delta\tau_1^* + z s$ with $z$ perpendicular to $g$, the "
+            r"(33) allows all $\Delta\tau_2 = \Delta\tau_1^* + z s$ with $z$ perpendicular to $g$, the "
             r"orange line:",
             r"g^\top \Delta\tau_2 = g^\top \Delta\tau_1^*",
             _line,
@@ -83,8 +83,8 @@ FURTHER = Further(
         ),
         Line(
             r"If a side of the box, $a^\top \Delta\tau \le b$, cuts the line before that point, level 2 "
-            r"stops at the cut. The "
-            "gradient then has a part along the line, and this part is the price of the bound:",
+            r"stops at the cut. The gradient then has a component along the line, and this component gives "
+            r"the multiplier of the bound:",
             r"\lambda = -\frac{z^\top (H \Delta\tau + h)}{z^\top a} > 0, \qquad "
             r"\frac{\partial \mathcal J_2^*}{\partial b} = -\lambda",
             _cut,
@@ -96,9 +96,8 @@ FURTHER = Further(
             r"Two joints with $\bar M = 0.033$ kg·m², $J_1 = (-0.3, -0.2)$ m, $e = 12$ m/s², $Q = 200$, "
             r"$R = 10$, $c_0 = 1$. "
             "Where is the disc 1?",
-            r"$g = (⟨g1⟩, ⟨g2⟩)$, so $\Delta\tau_1^* = (⟨t1⟩, ⟨t2⟩)$ N·m: the larger lever does more, in "
-            r"proportion, and $R$ is "
-            "not to be seen in three digits.",
+            r"$g = (⟨g1⟩, ⟨g2⟩)$, so $\Delta\tau_1^* = (⟨t1⟩, ⟨t2⟩)$ N·m: each joint acts in proportion to "
+            r"its lever, and the effect of $R$ is not visible in three digits.",
             {
                 "g1": (ROW[0, 0], ".2f"),
                 "g2": (ROW[0, 1], ".2f"),
@@ -110,9 +109,9 @@ FURTHER = Further(
             r"Level 2 has circles for contours, around $(0.05, 0.05)$ N·m. In which direction is the "
             r"line, and where is the "
             "disc 2?",
-            r"Perpendicular to $g$, along $(⟨d1⟩, ⟨d2⟩)$ up to its length. For circles the nearest point "
-            r"of the line to their middle: $\Delta\tau_2^* = (⟨t1⟩, ⟨t2⟩)$ N·m. Check: $J_1 \bar "
-            r"M^{-1}\Delta\tau_2^* = ⟨same⟩$ m/s², as for the disc 1.",
+            r"The line is perpendicular to $g$, along $(⟨d1⟩, ⟨d2⟩)$ up to its length. For circles the disc "
+            r"2 is the point of the line that is nearest to their centre: $\Delta\tau_2^* = (⟨t1⟩, ⟨t2⟩)$ "
+            r"N·m. Check: $J_1 \bar M^{-1}\Delta\tau_2^* = ⟨same⟩$ m/s², as for the disc 1.",
             {
                 "t1": (SECOND[0], ".3f"),
                 "t2": (SECOND[1], ".3f"),
@@ -122,8 +121,8 @@ FURTHER = Further(
             },
         ),
         Question(
-            "Now joint 1 has only 1.2 N·m left upwards. Which of the two discs feels that? What happens "
-            "to each?",
+            "Now joint 1 has only 1.2 N·m left upwards. Which of the two discs does this bound affect? What "
+            "happens to each?",
             r"Neither of them if both lie below 1.2 N·m, and here they do: $⟨t1⟩$ and $⟨t2⟩$ N·m. A bound "
             r"that is not met has the "
             "multiplier zero and changes nothing, however close it is.",

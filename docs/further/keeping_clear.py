@@ -1,4 +1,4 @@
-"""Keeping clear: the row of a distance, and what a filter behind the levels does to them."""
+"""Keeping clear: the row of a distance, and the effect of a filter behind the levels on the levels."""
 
 from __future__ import annotations
 
@@ -62,20 +62,20 @@ FURTHER = Further(
             _slope,
         ),
         Line(
-            "and the bound is the one of *Stopping takes distance*, along the distance. What runs is, with "
+            "The bound is the one of *Stopping takes distance*, applied to the distance. The lab uses, with "
             "$d_s$ including the margin,",
             r"\nabla d^\top \dot q \ge -a \left( -t + \sqrt{t^2 + 2 (d - d_s)/a} \right)",
             _bound,
         ),
         Line(
-            "A filter that needs $b$ more of $\\nabla d^\\top \\ddot q$ takes the shortest change of "
+            "A filter that must increase $\\nabla d^\\top \\ddot q$ by $b$ uses the smallest change of "
             "acceleration:",
             r"\bar M^{-1} \delta\tau = \frac{b}{\nabla d^\top \nabla d}\, \nabla d",
             _filter,
         ),
         Line(
-            "whose effect on level 1, $J_1 \\nabla d$ times a number, is not zero. Inside the hierarchy "
-            "the change lies in the null space $N$ of level 1:",
+            "The effect of this change on level 1, $J_1 \\nabla d$ times a number, is not zero. Inside the "
+            "hierarchy the change lies in the null space $N$ of level 1:",
             r"J_1 \frac{b\, N \nabla d}{\nabla d^\top N \nabla d} = 0, \qquad "
             r"\nabla d^\top \frac{b\, N \nabla d}{\nabla d^\top N \nabla d} = b",
             _leak,
@@ -83,23 +83,23 @@ FURTHER = Further(
     ),
     questions=(
         Question(
-            "A link comes at 0.5 m/s; $t = 0.2$ s, $a = 2$ m/s², and 20 mm are kept. From which distance on "
-            "does the row act?",
-            r"From $v t + v^2/2a$ = ⟨room⟩ mm before those 20 mm: at ⟨far⟩ mm.",
+            "A link approaches at 0.5 m/s; $t = 0.2$ s, $a = 2$ m/s², and 20 mm are kept. At which distance "
+            "does the row begin to act?",
+            "From $v t + v^2/2a$ = ⟨room⟩ mm before those 20 mm, that is, at ⟨far⟩ mm.",
             {
                 "room": (1e3 * (0.5 * T + 0.25 / (2.0 * A)), ".1f"),
                 "far": (1e3 * (0.5 * T + 0.25 / (2.0 * A) + KEPT), ".1f"),
             },
         ),
         Question(
-            "How fast may a link come closer at a distance of 100 mm? And at 30 mm?",
+            "How fast may a link approach at a distance of 100 mm? And at 30 mm?",
             r"⟨far⟩ m/s, and ⟨near⟩ m/s.",
             {"far": (speed(0.1 - KEPT), ".2f"), "near": (speed(0.03 - KEPT), ".3f")},
         ),
         Question(
             "Which error of the hand would ask for the acceleration that the filter leaks into its level, "
             "with $K_p = 56.2$ 1/s²?",
-            r"The largest leak is ⟨leak⟩ m/s², what an error of ⟨error⟩ cm asks for.",
+            "The largest leak is ⟨leak⟩ m/s²; an error of ⟨error⟩ cm asks for the same acceleration.",
             {"leak": (LEAK, ".0f"), "error": (100.0 * LEAK / 56.2, ".0f")},
         ),
     ),

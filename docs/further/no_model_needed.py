@@ -59,13 +59,13 @@ FURTHER = Further(
             _lumped,
         ),
         Line(
-            r"Nothing has been assumed so far. What $H_q$ was a millisecond ago can be computed from two "
-            r"things that are known, the torque that acted and the acceleration that came of it (9):",
+            "Nothing has been assumed so far. The value of $H_q$ one millisecond ago can be computed from "
+            "two known quantities, the torque that acted and the acceleration that it produced (9):",
             r"(H_q)_0 = \tau_0 - \bar M \ddot q_0",
             _delayed,
         ),
         Line(
-            r"Take it for the present one, and ask for the acceleration $a$: $\Delta\tau = \bar M (a - "
+            r"Use it as the present value, and ask for the acceleration $a$: $\Delta\tau = \bar M (a - "
             r"\ddot q_0)$. If $M$ and $n$ have hardly changed meanwhile, $M(\ddot q - \ddot q_0) = "
             r"\Delta\tau$, thus",
             r"\ddot q - a = (I - M^{-1} \bar M)(\ddot q_0 - a)",
@@ -79,8 +79,8 @@ FURTHER = Further(
             _real,
         ),
         Line(
-            r"If what is asked for changes by $\delta$ in every step, as it does along any curve, the "
-            r"error does not vanish. It settles where one more step leaves it as it is:",
+            r"If the desired acceleration changes by $\delta$ in every step, as along any curve, the error "
+            r"does not vanish. It converges to the value that one more step does not change:",
             r"\ddot q - a \;\to\; -(\bar M^{-1} M - I)\,\delta",
             _ramp,
             1e-6,
@@ -88,26 +88,23 @@ FURTHER = Further(
     ),
     questions=(
         Question(
-            r"One joint, $M = 0.1$ kg·m², $\bar M = 0.033$ kg·m². A load is hung on. After how many "
-            r"milliseconds is "
-            "less than a hundredth (0.01) of the error in its acceleration left?",
+            r"One joint, $M = 0.1$ kg·m², $\bar M = 0.033$ kg·m². A load is added. After how many "
+            r"milliseconds is less than a hundredth (0.01) of the error in its acceleration left?",
             r"Each step leaves $1 - \bar M/M = ⟨left⟩$ of it. $⟨left⟩^k < 0.01$ from $k = ⟨k⟩$ on.",
             {"left": (LEFT, ".2f"), "k": (float(math.ceil(math.log(0.01) / math.log(LEFT))), ".0f")},
         ),
         Question(
             r"The same joint, $M = 0.1$ kg·m². Which $\bar M$ removes the whole error in one step? From "
-            r"which on does it grow?",
-            r"$\bar M = M = 0.1$ kg·m² leaves nothing. Beyond it the error changes its sign in every "
-            r"step, and from $\bar M = 2 M = ⟨edge⟩$ kg·m² on it grows. That is why $\bar M$ is raised in "
-            r"small steps: the best "
-            "value is only half of the fatal one.",
+            r"which $\bar M$ on does the error grow?",
+            r"$\bar M = M = 0.1$ kg·m² leaves nothing. Beyond it the error changes its sign in every step, "
+            r"and from $\bar M = 2 M = ⟨edge⟩$ kg·m² on it grows. That is why $\bar M$ is raised in small "
+            r"steps: the best value is only half of the value at which the loop becomes unstable.",
             {"edge": (2 * 0.1, ".1f")},
         ),
         Question(
-            r"On the iiwa the gauge reads 0.985 with $\bar M$ and 0.94 with four times as much. How long "
-            r"until a "
-            "tenth of the slowest component of an error is left? What does the last line of the "
-            "derivation say about an error along a curve?",
+            r"On the iiwa the gauge shows 0.985 with $\bar M$ and 0.94 with four times as much. After how "
+            r"many milliseconds is a tenth of the slowest component of an error left? What does the last "
+            r"line of the derivation say about an error along a curve?",
             r"$⟨slow⟩$ ms and $⟨fast⟩$ ms. Along a curve the error is about $M/\bar M$ times the change of "
             r"acceleration per step, so four times the $\bar M$ leaves a quarter or less: *Further than the "
             r"proof* measures ⟨left⟩.",

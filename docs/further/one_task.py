@@ -58,17 +58,18 @@ def _left(rng: np.random.Generator) -> tuple[float, float]:
 FURTHER = Further(
     derivation=(
         Line(
-            r"The wish (4) with $K_P = \omega^2$ and $K_V = 2\omega$ is critically damped. Its solution",
+            r"The desired error dynamics (4) with $K_P = \omega^2$ and $K_V = 2\omega$ are critically "
+            r"damped. Their solution",
             r"\tilde x(t) = \left( \tilde x_0 + (\dot{\tilde x}_0 + \omega \tilde x_0)\,t \right) "
             r"e^{-\omega t} \quad\Rightarrow\quad \ddot{\tilde x} + 2 \omega \dot{\tilde x} + \omega^2 "
             r"\tilde x = 0",
             _critically,
         ),
         Line(
-            r"comes home without a swing. What can torque do about $e$ (28)? By (13) and the Euler steps "
-            r"(14) a change $\Delta\tau$ at knot $k$ adds $J \bar M^{-1} \Delta\tau$ to the acceleration "
-            r"at once, $T_s$ times as much to the velocity at every later knot, and to the position one "
-            r"knot later. Summed up, at knot $k + l + 1$",
+            r"returns to zero without oscillation. How does torque change $e$ (28)? By (13) and the Euler "
+            r"steps (14) a change $\Delta\tau$ at knot $k$ adds $J \bar M^{-1} \Delta\tau$ to the "
+            r"acceleration at once, $T_s$ times as much to the velocity at every later knot, and to the "
+            r"position one knot later. The sum of these effects at knot $k + l + 1$ is",
             r"\frac{\partial e_{k+l+1}}{\partial (J \bar M^{-1} \Delta\tau_k)} = c_l "
             r"= 1 + K_V T_s (l+1) + K_P T_s^2 \, \tfrac{l(l+1)}{2}",
             _effect,
@@ -89,9 +90,11 @@ FURTHER = Further(
             {"phase": (10 * HOME, ".2f"), "t": (HOME, ".2f")},
         ),
         Question(
-            "Now $K_V = 2$. How long does a swing take, and how much is left of it after one period?",
-            r"The frequency is $\sqrt{K_P - K_V^2/4} = ⟨w⟩$ rad/s, hardly less than $\sqrt{K_P}$: ⟨T⟩ s a "
-            r"period. The swing shrinks with $e^{-K_V t/2}$, to ⟨left⟩ of itself in a period.",
+            "Now $K_V = 2$. How long is a period of the oscillation, and how much of its amplitude is left "
+            "after one period?",
+            r"The frequency is $\sqrt{K_P - K_V^2/4} = ⟨w⟩$ rad/s, hardly less than $\sqrt{K_P}$: a period "
+            r"takes ⟨T⟩ s. The amplitude decreases with $e^{-K_V t/2}$, to ⟨left⟩ of its value in one "
+            r"period.",
             {
                 "w": (math.sqrt(99), ".2f"),
                 "T": (PERIOD, ".2f"),

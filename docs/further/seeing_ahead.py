@@ -19,8 +19,8 @@ def shortest(d: float) -> float:
 
 
 def _preview(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """The number of knots k = 1 … 10 whose reference is already the new one at a time before the jump,
-    counted and by the formula."""
+    """Returns the number of knots k = 1 … 10 whose reference is already the new one at a time before the
+    jump, counted and by the formula."""
     before = np.round(rng.uniform(0.05, 1.0, 20), 3)
     knots = np.arange(1, 11)
     counted = [(8.0 - t + 0.1 * knots >= 8.0 - 1e-9).sum() for t in before]
@@ -61,20 +61,21 @@ FURTHER = Further(
             _preview,
         ),
         Line(
-            r"HTIDKC asks for $\dot x = \dot r + K (r - x)$. If that is granted, the error obeys $\dot e "
-            r"= -K e$ and is",
+            r"HTIDKC asks for $\dot x = \dot r + K (r - x)$. If the robot reaches this velocity, the error "
+            r"obeys $\dot e = -K e$ and is",
             r"e(t) = e(0)\, e^{-K t}",
             _gain,
             1e-4,
         ),
         Line(
-            r"A plan may use the acceleration there is. From $v$ it takes, to stop,",
+            "A plan may use all available acceleration. To stop from the speed $v$ it needs the time and "
+            "the distance",
             r"t = \frac{v}{a}, \qquad d = \frac{v^2}{2a}",
             _stop,
             1e-6,
         ),
         Line(
-            r"and from rest to rest over a distance $d \ge v^2/a$ no less than",
+            r"From rest to rest over a distance $d \ge v^2/a$ it needs at least",
             r"t = \frac{d}{v} + \frac{v}{a}",
             _fastest,
             1e-6,
@@ -82,16 +83,17 @@ FURTHER = Further(
     ),
     questions=(
         Question(
-            "HTIDKC drives the base home with $K = 0.3$ 1/s, from 1.5 m away. How far is it from home "
-            "after 8 s, if its wish is always granted?",
-            r"$1.5\,e^{-0.3 \cdot 8} = ⟨left⟩$ m: the lesson sees 16 cm. What is missing is not "
-            r"granted: each level also pays $\rho \lVert \dot q \rVert^2$ for its speed. With a thousandth "
-            r"of this $\rho$ the difference goes.",
+            "HTIDKC drives the base home with $K = 0.3$ 1/s, from 1.5 m away. How far is it from home after "
+            "8 s, if it always reaches the desired velocity?",
+            r"$1.5\,e^{-0.3 \cdot 8} = ⟨left⟩$ m: the lesson measures 16 cm. The base does not reach the "
+            r"desired velocity: each level also pays $\rho \lVert \dot q \rVert^2$ for its speed. With a "
+            r"thousandth of this $\rho$ the difference goes.",
             {"left": (1.5 * math.exp(-0.3 * 8), ".2f")},
         ),
         Question(
             "Along one axis the base has a top speed of 1.1 m/s and brakes with 2.5 m/s². How long does it "
-            "need to stop, how far does it go, and how many knots of 0.1 s must a plan have to see that?",
+            "need to stop, how far does it go, and how many knots of 0.1 s must a plan have to contain the "
+            "whole braking?",
             "⟨t⟩ s and ⟨d⟩ m: ⟨N⟩ knots. A plan with $N = 2$ ends in the middle of the braking.",
             {
                 "t": (V / A, ".2f"),
@@ -100,12 +102,11 @@ FURTHER = Further(
             },
         ),
         Question(
-            "What is the shortest time for 1.5 m from rest to rest, with 1.1 m/s and 2.5 m/s²? After "
-            "which time has HTIDKC with $K = 2$ 1/s one per cent (0.01) of it left?",
-            r"$1.5/1.1 + 1.1/2.5 = ⟨fast⟩$ s. $e^{-2t} = 0.01$ at $t = ⟨gain⟩$ s, but at the start such a "
-            r"gain wants ⟨wish⟩ m/s, "
-            "which the base does not have: a gain that is quick at the end asks for too much at the "
-            "beginning.",
+            "What is the shortest time for 1.5 m from rest to rest, with 1.1 m/s and 2.5 m/s²? After which "
+            "time is one per cent (0.01) of the distance left with HTIDKC and $K = 2$ 1/s?",
+            "$1.5/1.1 + 1.1/2.5 = ⟨fast⟩$ s. $e^{-2t} = 0.01$ at $t = ⟨gain⟩$ s, but at the start such a "
+            "gain asks for ⟨wish⟩ m/s, which the base cannot reach: a gain that is fast at the end asks for "
+            "too much speed at the beginning.",
             {
                 "fast": (shortest(1.5), ".2f"),
                 "gain": (math.log(100) / 2, ".1f"),

@@ -25,7 +25,7 @@ def _differences(rng: np.random.Generator) -> tuple[float, float]:
 
 
 def _spread(rng: np.random.Generator) -> tuple[float, float]:
-    """The RMS over independent rounding errors, and δ/(√2 T_s²)."""
+    """Returns the RMS over independent rounding errors, and δ/(√2 T_s²)."""
     delta = rng.uniform(1e-5, 1e-3)
     errors = rng.uniform(-0.5 * delta, 0.5 * delta, size=(400_000, 3))
     a = errors @ np.array([1.0, -2.0, 1.0]) / T_S**2
@@ -54,8 +54,8 @@ FURTHER = Further(
         ),
         Line(
             r"While the joint moves on through many digits, rounding errors are spread evenly over "
-            r"$\pm\delta/2$, each of variance $\delta^2/12$. Of three independent ones the sum $1, -2, 1$ "
-            r"has six times that:",
+            r"$\pm\delta/2$, each of variance $\delta^2/12$. The sum of three independent errors with the "
+            r"weights $1, -2, 1$ has six times this variance:",
             r"\operatorname{rms} \ddot q = \frac{1}{T_s^2} \sqrt{(1 + 4 + 1)\, \frac{\delta^2}{12}} "
             r"= \frac{\delta}{\sqrt 2\, T_s^2}",
             _spread,
@@ -76,25 +76,23 @@ FURTHER = Further(
     ),
     questions=(
         Question(
-            r"$\bar M = 0.033$ kg·m², $T_s = 1$ ms. How much torque is one digit of 0.005°, and of "
-            r"0.00125°, the encoder of "
-            "the paper's arm?",
-            r"$\bar M \delta/T_s^2 = ⟨coarse⟩$ and $⟨paper⟩$ N·m, of the 4 N·m there are.",
+            r"$\bar M = 0.033$ kg·m², $T_s = 1$ ms. To which torque does one digit of 0.005° correspond, "
+            r"and one of 0.00125°, the encoder of the paper's arm?",
+            r"$\bar M \delta/T_s^2 = ⟨coarse⟩$ and $⟨paper⟩$ N·m; the motor has 4 N·m.",
             {"coarse": (digit(0.005), ".1f"), "paper": (digit(0.00125), ".2f")},
         ),
         Question(
-            "At which period is one digit of 0.005° worth 0.1 N·m? What is the period's price?",
+            "With which period does one digit of 0.005° correspond to 0.1 N·m? What is the disadvantage of "
+            "this period?",
             r"$T_s = \sqrt{\bar M \delta/0.1} = ⟨T⟩$ ms. Errors along a curve grow with $T_s$ (*No model "
-            r"needed*, last line): "
-            "what is asked for changes more from step to step.",
+            r"needed*, last line): the desired acceleration changes more from step to step.",
             {"T": (1e3 * math.sqrt(M_BAR * math.radians(0.005) / 0.1), ".1f")},
         ),
         Question(
-            "The encoder of 0.005° is put on the motor's side of a gear of 100 : 1. What is a digit worth "
-            "at the joint now? What would one have to do with $T_s$ for the same?",
-            r"A hundredth: ⟨digit⟩ N·m. With $T_s$ alone it would take ten times the period, since it "
-            r"enters squared. (A real "
-            "gear has play and bends, which is another error.)",
+            "The encoder of 0.005° is put on the motor's side of a gear of 100 : 1. To which torque does a "
+            "digit correspond at the joint now? Which $T_s$ would have the same effect?",
+            "To a hundredth of the torque: ⟨digit⟩ N·m. With $T_s$ alone it would take ten times the "
+            "period, since it enters squared. (A real gear has play and bends, which is another error.)",
             {"digit": (digit(0.005 / 100), ".3f")},
         ),
     ),

@@ -50,28 +50,27 @@ def _what_runs(rng: np.random.Generator) -> tuple[float, float]:
 FURTHER = Further(
     derivation=(
         Line(
-            "With the deceleration $a$ a joint of speed $v$ needs the time $v/a$ to stop, and on the way "
-            "goes",
+            "With the deceleration $a$ a joint of speed $v$ needs the time $v/a$ to stop, and meanwhile "
+            "moves by",
             r"d = \int_0^{v/a} (v - a t)\, dt = \frac{v^2}{2a}",
             _distance,
             1e-6,
         ),
         Line(
-            r"Rows on the next $N$ positions (32d) say nothing until the limit is $N T_s v$ away. To stop "
-            r"within that "
-            "takes",
+            "Rows on the next $N$ positions (32d) have no effect until the limit is $N T_s v$ away. To stop "
+            "within this distance takes the deceleration",
             r"a = \frac{v^2}{2 N T_s v} = \frac{v}{2 N T_s}",
             _seen_too_late,
         ),
         Line(
-            r"Turn the question round: which speed can still be stopped before $q_s$, if for a time $t$ "
-            r"nothing happens? It is the root of a quadratic equation:",
+            "The reverse question is: from which speed can the joint still stop before $q_s$, if it begins "
+            "to brake after a time $t$? This speed is the root of a quadratic equation:",
             r"\dot q\, t + \frac{\dot q^2}{2a} = q_s - q \quad\Leftrightarrow\quad "
             r"\dot q = a \left( -t + \sqrt{t^2 + 2 (q_s - q)/a} \right)",
             _root,
         ),
         Line(
-            "and this bound on the speed is a row that the very next knot knows. What runs is",
+            "This bound on the speed is a row of the next knot. The lab uses",
             r"\dot q_{k+1} \le a \left( -t + \sqrt{t^2 + 2 (q_s - q)/a} \right), \qquad "
             r"t = T_s + \tfrac{5}{15}\,\mathrm s, \quad q_s = q_{\max} - 7\,\mathrm{mrad}",
             _what_runs,
@@ -82,8 +81,8 @@ FURTHER = Further(
             "How many knots must the printed rows see for 20 rad/s² to suffice from 57°/s? What is that "
             "in a QP of a seven-joint arm?",
             r"$v/(2 N T_s) \le 20$ gives $N \ge ⟨N⟩$; braking all the way takes $v/(a T_s)$, ⟨all⟩ knots. "
-            r"With seven joints "
-            "the smaller one has ⟨size⟩ unknowns per level, five times as many as with $N = 5$.",
+            r"With seven joints the smaller number gives ⟨size⟩ unknowns per level, five times as many as "
+            r"with $N = 5$.",
             {
                 "N": (float(math.ceil(V / (2 * A * T_S))), ".0f"),
                 "all": (float(math.ceil(V / (A * T_S))), ".0f"),
@@ -91,8 +90,8 @@ FURTHER = Further(
             },
         ),
         Question(
-            r"A joint comes at 100°/s; $t = 0.33$ s, $a = 20$ rad/s². How far before $q_s$ does the bound "
-            r"on its speed begin to act? And with $t = T_s$?",
+            "A joint approaches at 100°/s; $t = 0.33$ s, $a = 20$ rad/s². How far before $q_s$ does the "
+            "bound on its speed begin to act? And with $t = T_s$?",
             r"The bound begins to act $v t + v^2/2a = ⟨far⟩$° before $q_s$. Only ⟨brake⟩° of these are for "
             r"braking; the rest, $v t$, is the way during the reaction time. With $t = T_s$ the bound begins "
             r"to act ⟨near⟩° before $q_s$.",

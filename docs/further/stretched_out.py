@@ -13,7 +13,7 @@ G = 0.6 / 0.033
 
 
 def _hessian(rng: np.random.Generator) -> tuple[float, float]:
-    """The least eigenvalue of the Hessian, and its bound, for a Jacobian of rank 1."""
+    """Returns the least eigenvalue of the Hessian, and its bound, for a Jacobian of rank 1."""
     B = np.outer(rng.normal(size=4), rng.normal(size=5))
     Q, R = np.diag(rng.uniform(1, 9, 4)), 3.0
     return float(np.linalg.eigvalsh(B.T @ Q @ B + R * np.eye(5))[0]), R
@@ -42,9 +42,9 @@ def _unbiased(rng: np.random.Generator) -> tuple[float, float]:
 FURTHER = Further(
     derivation=(
         Line(
-            r"With the predictions put in, level $i$ is the QP (35). For any vector $X$ it is $X^\top "
-            r"\bar B^\top \bar Q \bar B X \ge 0$, so the Hessian has no eigenvalue below $R$, whatever "
-            r"the rank of $J$ (Lemma 1):",
+            r"With the predictions inserted, level $i$ is the QP (35). For any vector $X$ it is $X^\top "
+            r"\bar B^\top \bar Q \bar B X \ge 0$, so the Hessian has no eigenvalue below $R$, whatever the "
+            r"rank of $J$ (Lemma 1):",
             r"\lambda_{\min}(\bar B^\top \bar Q \bar B + R I) \ge R > 0, "
             r"\qquad \text{and } = R \text{ where } \bar B \text{ loses rank}",
             _hessian,
@@ -56,16 +56,15 @@ FURTHER = Further(
             2e-4,
         ),
         Line(
-            r"An inverse would be $-e/g$. Both agree as long as $Q g^2$ outweighs $R$. Where the "
-            r"direction is lost, one "
-            "goes to infinity and the other to nothing:",
+            "An inverse would be $-e/g$. Both agree as long as $Q g^2$ outweighs $R$. Where the direction "
+            "is lost, the inverse goes to infinity and the optimum to zero:",
             r"\lim_{g \to 0} \frac{Q g}{Q g^2 + R}\, e = 0",
             _gone,
             1e-7,
         ),
         Line(
-            r"Damped inverses have the same form and leave an error where they damp. Here $R$ weighs a "
-            r"*change* of torque, so the step is repeated until nothing of a constant $e$ is left:",
+            "Damped inverses have the same form and leave an error where they damp. Here $R$ weighs a "
+            "*change* of torque, so the step is repeated until a constant $e$ has vanished:",
             r"e_{k+1} = \frac{R}{Q g^2 + R}\, e_k \;\to\; 0",
             _unbiased,
             1e-6,
@@ -85,21 +84,20 @@ FURTHER = Further(
             },
         ),
         Question(
-            r"A trace of $e = 10^{-9}$ m/s² is left along the arm, where $g = 10^{-12}$. What do an inverse "
-            r"and HIMPC ask "
-            "for? ($Q = 200$, $R = 10$.)",
-            r"The inverse asks for $e/g = ⟨inverse⟩$ N·m, out of nothing. HIMPC asks for $Q g e/R = "
-            r"⟨himpc⟩\cdot 10^{-20}$ N·m.",
+            "A small error $e = 10^{-9}$ m/s² is left along the arm, where $g = 10^{-12}$. What do an "
+            "inverse and HIMPC ask for? ($Q = 200$, $R = 10$.)",
+            r"The inverse asks for $e/g = ⟨inverse⟩$ N·m for an error that is nearly zero. HIMPC asks for "
+            r"$Q g e/R = ⟨himpc⟩\cdot 10^{-20}$ N·m.",
             {"inverse": (1e-9 / 1e-12, ".0f"), "himpc": (1e20 * 200 * 1e-12 * 1e-9 / 10, ".0f")},
         ),
         Question(
             r"In a good direction a lever of 0.6 m and $\bar M = 0.033$ kg·m² give $g = 18.2$. How much "
             r"of $e$ is left "
             "after one step with $R = 10$, and with $R = 1000$? What does that say about the lesson's ghost?",
-            r"$R/(Q g^2 + R)$ is ⟨small⟩ % and ⟨large⟩ %. Both are gone within a few milliseconds, which "
-            r"is why the ghost does as well: between the two lies no tuning. At $R = 10^5$ it would be "
-            r"⟨more⟩ %, and at $10^7$ it takes ⟨slow⟩ ms until a third is left. In so long a time $e$ does "
-            r"not stay as it is, and the run with $R = 10^7$ swings by decimetres.",
+            "$R/(Q g^2 + R)$ is ⟨small⟩ % and ⟨large⟩ %. Both vanish within a few milliseconds, which is "
+            "why the ghost does as well: no tuning is needed between the two values. At $R = 10^5$ it would "
+            "be ⟨more⟩ %, and at $10^7$ it takes ⟨slow⟩ ms until a third is left. In such a long time $e$ "
+            "does not stay constant, and the run with $R = 10^7$ swings by decimetres.",
             {
                 "small": (100 * 10 / (200 * G**2 + 10), ".3f"),
                 "large": (100 * 1000 / (200 * G**2 + 1000), ".1f"),

@@ -53,21 +53,21 @@ def _at_rest(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 FURTHER = Further(
     derivation=(
         Line(
-            r"Level $i$ may choose among the $\Delta\tau_i$ that satisfy (33) for all levels $p$ above "
-            r"it. They are $\Delta\tau_{i-1}^*$ plus what all those $J_p \bar M^{-1}$ map to zero, and "
-            r"that has the dimension",
+            r"Level $i$ may choose among the $\Delta\tau_i$ that satisfy (33) for all levels $p$ above it. "
+            r"They are $\Delta\tau_{i-1}^*$ plus any vector that all those $J_p \bar M^{-1}$ map to zero. "
+            r"The space of these vectors has the dimension",
             r"\dim = n - \operatorname{rank} \operatorname{col}(J_1, \ldots, J_{i-1})",
             _dimension,
         ),
         Line(
-            r"A posture has $J = I$. Once it has had its turn, (33) reads $\bar M^{-1} \Delta\tau_p^* = "
-            r"\bar M^{-1} \Delta\tau_i$, and nothing is left to choose for whoever comes below:",
+            r"A posture has $J = I$. For the levels below it, (33) reads $\bar M^{-1} \Delta\tau_p^* = \bar "
+            r"M^{-1} \Delta\tau_i$, and they have no choice:",
             r"\Delta\tau_i = \Delta\tau_p^*",
             _all_taken,
         ),
         Line(
-            r"The order enters nowhere else. In particular, where no task has an error ($e_i = 0$ for all "
-            r"$i$), every order has the same answer, to leave the torque as it is:",
+            "The order enters nowhere else. In particular, where no task has an error ($e_i = 0$ for all "
+            "$i$), every order has the same result, an unchanged torque:",
             r"e_1 = e_2 = e_3 = 0 \quad\Rightarrow\quad \Delta\tau^* = 0 \text{ in every order}",
             _at_rest,
         ),
@@ -75,8 +75,8 @@ FURTHER = Further(
     questions=(
         Question(
             "Seven joints, three levels: position (3 coordinates), orientation (3), posture (7). How many "
-            "motions does each level find free, in the order of the lesson, with the posture in the "
-            "middle, and with the posture first?",
+            "free motions does each level have, in the order of the lesson, with the posture in the middle, "
+            "and with the posture first?",
             "As in the lesson: 7, 4, 1. Posture in the middle: 7, 4, and then none, for the posture takes "
             "all four. Posture first: 7, none, none.",
         ),
@@ -87,11 +87,11 @@ FURTHER = Further(
             {"norm": (math.hypot(25, 20), ".1f")},
         ),
         Question(
-            "With the posture first the hand ends off its target. Compute from the two postures alone how "
-            "far, and compare with what the lesson measures.",
-            "The forward kinematics of both postures put the hand ⟨apart⟩ mm apart; the run ends at "
-            "⟨seen⟩ mm. No controller is needed to know it: whoever comes below a posture that is reached "
-            "has no say.",
+            "With the posture first, the hand does not reach its target. Compute from the two postures "
+            "alone how far it is off, and compare the result with the measurement of the lesson.",
+            "The forward kinematics of both postures put the hand ⟨apart⟩ mm apart; the run ends at ⟨seen⟩ "
+            "mm. The distance does not depend on the controller: the tasks below a posture that is reached "
+            "have no effect.",
             {"apart": (_between_hands(), ".0f"), "seen": (GONE, ".0f")},
         ),
     ),

@@ -61,16 +61,16 @@ FURTHER = Further(
             _task,
         ),
         Line(
-            r"A controller that trusts the model gets $\ddot{\tilde x} + K_V \dot{\tilde x} + K_P \tilde "
-            r"x = -\beta$, up to the sign of $\tilde x$. Under a constant $\beta$ it comes to rest off "
+            r"A controller that relies on the model gets $\ddot{\tilde x} + K_V \dot{\tilde x} + K_P \tilde "
+            r"x = -\beta$, up to the sign of $\tilde x$. With a constant $\beta$ the task comes to rest off "
             r"its target:",
             r"|\tilde x| \to |\beta| / K_P",
             _at_rest,
             1e-6,
         ),
         Line(
-            r"Time-delay estimation errs by (25), with the index 0 for a millisecond ago. Here everything "
-            r"that was the same then cancels, friction and loads included:",
+            "The error of time-delay estimation is (25), where the index 0 means one millisecond ago. Here "
+            "all terms that have not changed in this millisecond cancel, friction and loads included:",
             r"\delta = \bar M^{-1} \left[ (M - \bar M)\ddot q - (M_0 - \bar M)\ddot q_0 + n - n_0 \right]",
             _delayed,
         ),
@@ -79,9 +79,8 @@ FURTHER = Further(
         Question(
             "A joint with $M_n = 0.05$ kg·m² and 0.1 N·m of dry friction that the model does not know; "
             "$K_P = 200$ 1/s². How far from its target may it stop? And with $K_P = 50$?",
-            r"$\beta = 0.1/0.05 = ⟨beta⟩$ rad/s², so up to $\beta/K_P$: ⟨stiff⟩° and ⟨soft⟩°. Once it "
-            r"stands, friction takes any "
-            "value up to 0.1 N·m: it stops somewhere within.",
+            r"$\beta = 0.1/0.05 = ⟨beta⟩$ rad/s², so up to $\beta/K_P$: ⟨stiff⟩° and ⟨soft⟩°. At rest, "
+            r"friction takes any value up to 0.1 N·m: the joint stops somewhere within this range.",
             {
                 "beta": (0.1 / 0.05, ".0f"),
                 "stiff": (math.degrees(0.1 / 0.05 / 200), ".2f"),
@@ -89,7 +88,7 @@ FURTHER = Further(
             },
         ),
         Question(
-            "A model that is 20 % light (0.2) and right in everything else, on an arm in the horizontal "
+            "A model that is 20 % too light (0.2) and right in everything else, on an arm in the horizontal "
             "plane. How wrong is the acceleration it predicts? How large is the error at rest?",
             r"With $M_n = M - 0.2\,M$ it is $\gamma = M_n^{-1} (0.2\,M)\,\ddot q = ⟨share⟩\,\ddot q$: a "
             r"quarter of the acceleration. At rest "
@@ -98,9 +97,9 @@ FURTHER = Further(
             {"share": (0.2 / 0.8, ".2f")},
         ),
         Question(
-            r"Dry friction of 0.05 N·m changes its sign as a joint with $M = 0.1$ kg·m² turns round. How "
-            r"large is the error of acceleration under time-delay estimation with $\bar M = 0.033$ kg·m² "
-            r"at once, and 10 ms later?",
+            r"Dry friction of 0.05 N·m changes its sign when a joint with $M = 0.1$ kg·m² reverses its "
+            r"motion. How large is the error of acceleration under time-delay estimation with $\bar M = "
+            r"0.033$ kg·m² at once, and 10 ms later?",
             r"The force jumps by twice 0.05 N·m: ⟨jump⟩ rad/s². Each step leaves $1 - \bar M/M$, ⟨left⟩; "
             r"after ten ⟨later⟩ rad/s². "
             "A force that does not change leaves no error.",

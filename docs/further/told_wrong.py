@@ -1,4 +1,4 @@
-"""Told wrong: what a wrong report changes of a distance, and what a late one leaves to brake in."""
+"""Told wrong: the effect of a wrong report on a distance, and of a late correction on braking."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ FURTHER = Further(
         ),
         Line(
             "The distance changes by no more than the shift. In the worst case the report moves the box "
-            "straight away from the robot, and the true distance is less by all of it:",
+            "straight away from the robot, and the true distance is smaller by the whole shift:",
             r"\mathrm{sd}(p; c) = \mathrm{sd}(p; c + \Delta) - \lVert \Delta \rVert",
             _worst,
         ),
@@ -82,16 +82,18 @@ FURTHER = Further(
     ),
     questions=(
         Question(
-            "Reports are wrong by at most 20 cm, in any direction. Which $d_{\\mathrm{safe}}$ keeps 5 cm?",
+            "Reports are wrong by at most 20 cm, in any direction. Which $d_{\\mathrm{safe}}$ keeps a "
+            "distance of 5 cm?",
             "By the third line $5 + 20$ = ⟨margin⟩ cm: an error of the report that is bounded can be covered "
             "by the margin.",
             {"margin": (5.0 + 20.0, ".0f")},
         ),
         Question(
-            "And which one would have covered the report of the lesson? What would the robot have done?",
-            "$5 + ⟨offset⟩$ = ⟨margin⟩ cm. With that margin the base would have to leave its line also for a "
-            "crate beside it that is reported right. As it was, the robot overlapped the crate by ⟨depth⟩ "
-            "cm; with the truth at 5 s it kept ⟨kept⟩ cm.",
+            "And which $d_{\\mathrm{safe}}$ would have covered the report of the lesson? What would the "
+            "robot have done?",
+            "$5 + ⟨offset⟩$ = ⟨margin⟩ cm. With that margin the base would have to leave its line also for "
+            "a crate beside the line that is reported at its true place. In the lesson the robot overlapped "
+            "the crate by ⟨depth⟩ cm; with a correct report from 5 s on it kept ⟨kept⟩ cm.",
             {
                 "offset": (OFFSET, ".0f"),
                 "margin": (5.0 + OFFSET, ".0f"),
@@ -101,7 +103,8 @@ FURTHER = Further(
         ),
         Question(
             "A base drives at 0.4 m/s towards the crate, plans ten times a second and brakes with 1 m/s². "
-            "How far from the crate must the truth arrive if 5 cm are to be kept?",
+            "How far from the crate must the base still be when the report is corrected, if 5 cm are to be "
+            "kept?",
             "It needs ⟨room⟩ cm to stop, and 5 cm are kept: ⟨far⟩ cm before the crate at the latest.",
             {
                 "room": (100.0 * (SPEED * PERIOD + SPEED**2 / (2.0 * DECELERATION)), ".0f"),

@@ -35,7 +35,7 @@ def _rows(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _inherited(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """The effects on levels 1 and 2 of level 3's candidate Δτ₂*, and the effects that (33) requires."""
+    """Returns the effects on levels 1 and 2 of level 3's candidate Δτ₂*, and those that (33) requires."""
     G_1, G_2, first = rng.normal(size=(2, 7)), rng.normal(size=(2, 7)), rng.normal(size=7)
     second = first + null_space(G_1) @ rng.normal(size=5)
     return np.concatenate([G_1 @ second, G_2 @ second]), np.concatenate([G_1 @ first, G_2 @ second])
@@ -58,23 +58,23 @@ def _price(rng: np.random.Generator) -> tuple[float, float]:
 FURTHER = Further(
     derivation=(
         Line(
-            r"What is bounded is the torque, what is chosen are its changes. Stacked over the horizon "
-            r"(32f) are linear rows, with blocks $I$ on and below the diagonal:",
+            "The bounds are on the torque, and the QP chooses its changes. Stacked over the horizon, (32f) "
+            "consists of linear rows with blocks $I$ on and below the diagonal:",
             r"\tau_0 + \sum_{s=0}^{j} \Delta\tau_{k+s} = \tau_0 + (L \otimes I)\, U \big|_j, "
             r"\qquad L = \begin{bmatrix} 1 & & \\ 1 & 1 & \\ \vdots & & \ddots \end{bmatrix}",
             _rows,
         ),
         Line(
-            r"As long as $\tau_0$ is within its limits $U = 0$ satisfies them, so level 1 always has a "
-            r"choice. And what level $i-1$ chose satisfies all that level $i$ must keep (Theorem 2), for "
-            r"$p < i$:",
+            r"As long as $\tau_0$ is within its limits $U = 0$ satisfies them, so level 1 is always "
+            r"feasible. And the choice of level $i-1$ satisfies everything that level $i$ must keep "
+            r"(Theorem 2), for $p < i$:",
             r"J_p \bar M^{-1} \Delta\tau_{i-1}^* = J_p \bar M^{-1} \Delta\tau_p^*",
             _inherited,
         ),
         Line(
-            r"So no level can make the one below it infeasible; it can only leave it nothing. A bound "
-            r"$\Delta\tau \le b$ that is active has a multiplier $\lambda \ge 0$, and this is what a "
-            r"little more torque would be worth:",
+            r"So no level can make the one below it infeasible; it can only leave no freedom to it. A bound "
+            r"$\Delta\tau \le b$ that is active has a multiplier $\lambda \ge 0$, which says how much the "
+            r"cost would decrease with a little more torque:",
             r"\frac{\partial \mathcal J^*}{\partial b} = -\lambda, \qquad "
             r"\lambda = -\left( 2 Q g (e + g b) + 2 R b \right)",
             _price,
@@ -83,7 +83,7 @@ FURTHER = Further(
     ),
     questions=(
         Question(
-            "The motors can do 4 N·m. How many N·m are allowed with a factor of 0.06, and how much of "
+            "The motors can produce 4 N·m. How many N·m are allowed with a factor of 0.06, and how much of "
             "that does *Enough for all* need?",
             "⟨limit⟩ N·m; the run needs ⟨share⟩ % of it, ⟨used⟩ N·m.",
             {"limit": (4 * 0.06, ".2f"), "share": (NEED, ".0f"), "used": (4 * 0.06 * NEED / 100, ".2f")},
@@ -97,9 +97,9 @@ FURTHER = Further(
             {"room": (0.16 - 0.10, ".2f")},
         ),
         Question(
-            "Joint 1 swings by 30°, one round in 8 s, a cosine. What is its largest acceleration, and "
-            "which torque does it take for the inertia alone that the arm has about joint 1 where the "
-            "circle begins?",
+            "Joint 1 swings by 30° as a cosine with a period of 8 s. What is its largest acceleration, and "
+            "which torque does this acceleration need for the inertia alone that the arm has about joint 1 "
+            "at the start of the circle?",
             r"A swing of 30° is a cosine of ⟨half⟩°: $⟨half⟩° \cdot (2\pi/8)^2 = ⟨a⟩$ rad/s². With "
             r"$M_{11} = ⟨M⟩$ kg·m² that is ⟨tau⟩ N·m. The dry friction of joint 1 takes ⟨dry⟩ N·m. That is "
             "most of the ⟨three⟩ N·m, three per cent of 4 N·m.",

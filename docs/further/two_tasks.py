@@ -56,9 +56,8 @@ def _limit(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 FURTHER = Further(
     derivation=(
         Line(
-            r"Write $G_i = c_0 J_i \bar M^{-1}$ for what a change of torque does to $e_i$. The sum is "
-            r"smallest where "
-            "its gradient vanishes:",
+            r"Write $G_i = c_0 J_i \bar M^{-1}$ for the effect of a change of torque on $e_i$. The sum is "
+            r"smallest where its gradient vanishes:",
             r"\sum_i Q_i G_i^\top (e_i + G_i \Delta\tau) + R\, \Delta\tau = 0",
             _stationary,
         ),
@@ -87,18 +86,18 @@ FURTHER = Further(
     ),
     questions=(
         Question(
-            "Two wishes about one coordinate: at 0 with $K_P = 200$, at 1 with $K_P = 50$, and equal $Q$. "
-            "Where does a weighted controller come to rest?",
-            r"At $z = 50/(200 + 50) = ⟨z⟩$: what counts is the gain, 4 to 1, though both were said to be "
-            r"equally important. With $Q_2$ four times as large it is ⟨half⟩.",
+            "Two tasks have targets for the same coordinate: 0 with $K_P = 200$, 1 with $K_P = 50$, and "
+            "equal $Q$. Where does a weighted controller come to rest?",
+            "At $z = 50/(200 + 50) = ⟨z⟩$: the gains act as weights, 4 to 1, although both tasks have the "
+            "same $Q$. With $Q_2$ four times as large it is ⟨half⟩.",
             {"z": (SHARE, ".1f"), "half": (4 * 50 / (200 + 4 * 50), ".1f")},
         ),
         Question(
             "How many times larger than $Q_2$ must $Q_1$ be there for $z$ to stay below 0.001, and below "
-            r"$10^{-6}$? What speaks against just taking it so?",
+            "$10^{-6}$? What is the disadvantage of so large a weight?",
             r"From $z = 50\, Q_2/(200\, Q_1 + 50\, Q_2)$ it is $Q_1/Q_2 > ⟨much⟩$, and ⟨more⟩ for a "
             r"millionth. Level 2 then weighs little beside $R$, so it is followed less well even where it "
-            r"could be: the last step of the lesson shows it.",
+            r"could be followed: the last step of the lesson shows this.",
             {"much": ((1 / 0.001 - 1) / 4, ".0f"), "more": ((1 / 1e-6 - 1) / 4, ",.0f")},
         ),
         Question(

@@ -45,7 +45,7 @@ def _capped(rng: np.random.Generator) -> tuple[float, float]:
 FURTHER = Further(
     derivation=(
         Line(
-            "To keep task 2 out of task 1's way, project it into the null space of $J_1$:",
+            "Task 2 does not disturb task 1 if it is projected into the null space of $J_1$:",
             r"P_1 = I - J_1^+ J_1, \qquad J_1 P_1 = 0, \qquad J_{2|1} = J_2 P_1",
             _projected,
         ),
@@ -64,9 +64,9 @@ FURTHER = Further(
             _force,
         ),
         Line(
-            r"HIMPC divides by nothing. Its level 2 minimises $Q (e + g \Delta\tau)^2 + R \Delta\tau^2$ "
-            r"along $n$, with $g$ in proportion to $\sigma$, and whatever $g$ becomes, its answer is "
-            r"bounded:",
+            r"HIMPC does not divide by $\sigma$. Its level 2 minimises $Q (e + g \Delta\tau)^2 + R "
+            r"\Delta\tau^2$ along $n$, with $g$ in proportion to $\sigma$, and its optimum is bounded for "
+            r"every $g$:",
             r"\max_g |\Delta\tau^*| = \max_g \frac{Q g |e|}{Q g^2 + R} = \tfrac12 \sqrt{Q/R}\; |e|",
             _capped,
             1e-6,
@@ -78,28 +78,27 @@ FURTHER = Further(
             r"projection "
             "ask for to accelerate joint 1 by 1 rad/s² if $q_3$ is −90°, −10°, −1°?",
             r"$\sigma$ is ⟨s90⟩, ⟨s10⟩ and ⟨s1⟩; the torque $m/\sigma$ is ⟨t90⟩, ⟨t10⟩ and ⟨t1⟩ N·m. From "
-            r"−10° on every "
-            "degree counts: close to the line it goes with one over the angle.",
+            r"−10° on every degree matters: where links 2 and 3 are nearly in line, the torque is in "
+            r"proportion to one over the angle.",
             {
                 **{f"s{k}": (_sigma(-float(k)), ".3f") for k in (90, 10, 1)},
                 **{f"t{k}": (M_BAR / _sigma(-float(k)), ".2f") for k in (90, 10, 1)},
             },
         ),
         Question(
-            "Joint 1 is one radian behind and its $K_P$ is 50 1/s². At which $\\sigma$ does the "
-            "projection ask for more than the 4 N·m there are?",
-            r"It wants $a = 50$ rad/s², so $\sigma = m a / 4 = ⟨sigma⟩$. With links 2 and 3 at a right "
-            r"angle it is ⟨s90⟩: even far from the "
-            "singularity there is not much room, and the projection has no way of knowing.",
+            "Joint 1 is one radian behind and its $K_P$ is 50 1/s². At which $\\sigma$ does the projection "
+            "ask for more than the 4 N·m of the motor?",
+            r"The task asks for $a = 50$ rad/s², so $\sigma = m a / 4 = ⟨sigma⟩$. With links 2 and 3 at a "
+            r"right angle it is ⟨s90⟩: even far from the singularity the margin is small, and the "
+            r"projection does not take the limit into account.",
             {"sigma": (M_BAR * 50 / 4, ".3f"), "s90": (_sigma(-90.0), ".3f")},
         ),
         Question(
-            "The last line bounds a change of torque with $Q = 200$, $R = 10$ and $e = 50$ rad/s². Is "
-            "that small? What else keeps the torque possible?",
-            r"$\tfrac12\sqrt{Q/R}\,e = ⟨cap⟩$ N·m, far beyond any motor: finite is not yet possible. $R$ "
-            r"makes the "
-            "problem well posed at the singularity (Lemma 1); the bounds (34f) keep the torque "
-            "within its limits, and a projection does not have them.",
+            "The last line bounds a change of torque with $Q = 200$, $R = 10$ and $e = 50$ rad/s². Is that "
+            "small? What else keeps the torque within its limits?",
+            r"$\tfrac12\sqrt{Q/R}\,e = ⟨cap⟩$ N·m, far beyond any motor: a finite torque is not always a "
+            r"possible one. $R$ makes the problem well posed at the singularity (Lemma 1); the bounds (34f) "
+            r"keep the torque within its limits, and a projection does not have them.",
             {"cap": (0.5 * math.sqrt(200 / 10) * 50, ".0f")},
         ),
     ),

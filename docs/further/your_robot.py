@@ -54,7 +54,7 @@ def _worst() -> float:
 
 
 def _least_inertia(rng: np.random.Generator) -> tuple[float, float]:
-    """The torque over the acceleration of joint 1 while the other joints are free, and 1/(M⁻¹)₁₁."""
+    """Returns the torque over the acceleration of joint 1 while the other joints are free, and 1/(M⁻¹)₁₁."""
     M = inertia(rng, 4)
     tau = np.array([1.0, 0, 0, 0])
     return 1.0 / float(np.linalg.solve(M, tau)[0]), 1.0 / float(np.linalg.inv(M)[0, 0])
@@ -83,33 +83,32 @@ def _lighter(rng: np.random.Generator) -> tuple[float, float]:
 FURTHER = Further(
     derivation=(
         Line(
-            r"How heavy is joint $i$? Never lighter than with all other joints free to give way. Then a "
-            r"torque $\tau_i$ alone gives $\ddot q_i = (M^{-1})_{ii} \tau_i$, an inertia of",
+            r"The inertia that acts at joint $i$ is smallest if all other joints are free to move. Then a "
+            r"torque $\tau_i$ alone gives $\ddot q_i = (M^{-1})_{ii} \tau_i$, that is, an inertia of",
             r"D_i = \frac{\tau_i}{\ddot q_i} = \frac{1}{(M^{-1})_{ii}}",
             _least_inertia,
         ),
         Line(
-            r"The least $D_i$ over 200 poses gives $\bar M$ its shape. Its size is a matter of stability. "
-            r"The eigenvalues of $M^{-1} \bar M$ are those of a symmetric matrix, so they are real and "
-            r"positive:",
+            r"The least $D_i$ over 200 poses gives $\bar M$ its shape. Its size follows from stability. The "
+            r"eigenvalues of $M^{-1} \bar M$ are those of a symmetric matrix, so they are real and positive:",
             r"\operatorname{eig}(M^{-1} \bar M) = \operatorname{eig}(\bar M^{1/2} M^{-1} \bar M^{1/2}) > 0",
             _similar,
         ),
         Line(
-            r"and errors die out if the largest is below 2 (*No model needed*). The suggestion has, in "
-            r"the worst of the poses that it looks at,",
+            "Errors vanish if the largest eigenvalue is below 2 (*No model needed*). In the worst of the "
+            "200 poses the suggestion has",
             r"\max_{200\, q} \lambda_{\max}(M^{-1} \bar M) = 1.5",
             _suggested,
         ),
         Line(
-            "Between them there are worse ones. A search over all poses of the lesson's lamp finds",
+            "Between these poses there are worse ones. A search over all poses of the lesson's lamp finds",
             r"\max_q \lambda_{\max}(M^{-1} \bar M) \approx 1.74",
             _between,
             5e-3,
         ),
         Line(
-            "so that a real lamp may be 13 % lighter than its file says before the edge is reached in that "
-            "pose:",
+            "so that a real lamp may be 13 % lighter than its file says before the stability limit is "
+            "reached in that pose:",
             r"\max_q \lambda_{\max}\left( (0.87\, M)^{-1} \bar M \right) \approx 2",
             _lighter,
             5e-3,
@@ -121,8 +120,8 @@ FURTHER = Further(
             r"pose (1.74 in place of 2)? "
             "Why could the lesson double it?",
             r"By $2/1.74 = ⟨factor⟩$. The lamp of the lesson moves little, and where it starts "
-            r"$\lambda_{\max}$ is ⟨here⟩: "
-            r"doubled it stays below 2. In the worst pose it would be ⟨there⟩.",
+            r"$\lambda_{\max}$ is ⟨here⟩: if it is doubled, it stays below 2. In the worst pose the doubled "
+            r"value would be ⟨there⟩.",
             {
                 "factor": (2 / 1.74, ".2f"),
                 "here": (_largest(_lamp()[1]), ".2f"),
@@ -132,16 +131,17 @@ FURTHER = Further(
         Question(
             "The real lamp is half as heavy again as its file (1.5 times). What happens to the largest "
             "eigenvalue of 1.5, and to the smallest? Is the heavier robot safer?",
-            r"All are divided by 1.5: the largest becomes ⟨largest⟩, as far from the edge as can be. The "
-            r"small ones become smaller, "
-            "so slow components are corrected more slowly still. Safer, and less accurate.",
+            "All eigenvalues are divided by 1.5: the largest becomes ⟨largest⟩, in the middle between the "
+            "stability limits 0 and 2. The small ones become smaller, so slow components are corrected more "
+            "slowly still. Safer, and less accurate.",
             {"largest": (LARGEST_EIGENVALUE / 1.5, ".0f")},
         ),
         Question(
-            "Five joints, six coordinates of the head. How many freedoms has the orientation after the "
-            "position, and how does the measured tilt fit that?",
+            "Five joints, six coordinates of the head. How many degrees of freedom has the orientation "
+            "after the position, and how does the measured tilt fit that?",
             "Two: $5 - 3$. Three coordinates of orientation cannot all be had with two freedoms, so the "
-            "head stays tilted by ⟨tilt⟩° while its position is reached. Posture finds none left.",
+            "head stays tilted by ⟨tilt⟩° while its position is reached. The posture task has no freedom "
+            "left.",
             {"tilt": (TILT, ".1f")},
         ),
     ),

@@ -37,15 +37,15 @@ def pages(root: Path) -> dict[str, str]:
             found[f"api/{package}"] = f"# {title}\n\n" + "\n".join(map(one, modules))
     listed = "\n".join(names)
     found["api/index"] = (
-        "# Reference\n\nMade from the docstrings. Numbers of equations are those of the papers; vectors are "
-        "in Pinocchio's joint order, SI units, angles in rad.\n\n"
+        "# Reference\n\nThe reference is made from the docstrings. Numbers of equations are those of the "
+        "papers. Vectors are in Pinocchio's joint order, quantities in SI units, and angles in rad.\n\n"
         f"```{{toctree}}\n:maxdepth: 1\n\n{listed}\n```\n"
     )
     return found
 
 
 def documented(path: Path) -> bool:
-    """Whether a module defines a public class or function."""
+    """Returns whether a module defines a public class or function."""
     body = ast.parse(path.read_text(encoding="utf-8")).body
     kinds = (ast.ClassDef, ast.FunctionDef)
     return any(isinstance(node, kinds) and not node.name.startswith("_") for node in body)

@@ -33,7 +33,7 @@ def _plot(plot: Mapping[str, Any]) -> str:
     values = _values(plot)
     name = escape(plot["words"] + (f", {plot['unit']}" if plot["unit"] else ""))
     if not values:
-        return f"<p>{name}: nothing to see in this run.</p>"
+        return f"<p>{name}: no values in this run.</p>"
     low, high, log = _range(values, plot["unit"])
     place = math.log10 if log else float
 

@@ -14,8 +14,8 @@ def pages(_: Path) -> dict[str, str]:
     """Returns the name and Markdown of the page."""
     parts = [
         "# Exercises",
-        "Write the missing lines of a controller in a file of your own. What you save runs on the page, and "
-        "`himpc-lab grade` judges what the robot does, not what the file says.",
+        "Write the missing lines of a controller in a file of your own. The page runs each version that you "
+        "save, and `himpc-lab grade` grades the motion of the robot, not the text of the file.",
     ]
     return {"exercises": "\n\n".join([*parts, *(part(load_exercise(name)) for name in EXERCISES)]) + "\n"}
 

@@ -42,8 +42,9 @@ def pages(root: Path, live: bool = False) -> dict[str, str]:
         rows.append(f"| {number} | [{card.title}]({name}.md) | {cell(card.question)} | {card.minutes} |")
     listed = "\n".join(COURSE)
     found["lessons/index"] = (
-        "# Lessons\n\nEach asks for a prediction, runs the real controller and judges its claims. On the "
-        "page: `himpc-lab --lesson NAME`. Without it: `himpc-lab lessons --check NAME`.\n\n"
+        "# Lessons\n\nEach lesson asks for a prediction, runs the real controller and checks its claims. "
+        "`himpc-lab --lesson NAME` opens a lesson on the page, and `himpc-lab lessons --check NAME` "
+        "checks its claims without the page.\n\n"
         "| | lesson | asks | minutes |\n|---|---|---|---|\n"
         + "\n".join(rows)
         + f"\n\n```{{toctree}}\n:hidden:\n\n{listed}\n```\n"
@@ -71,7 +72,8 @@ def page(
         f"# {card.title}",
         f"*{card.question}*",
         f"About {card.minutes} minutes. You need: {card.needs}",
-        f"`himpc-lab --lesson {lesson.name}` opens it, `himpc-lab lessons --check {lesson.name}` judges it.",
+        f"`himpc-lab --lesson {lesson.name}` opens the lesson, "
+        f"`himpc-lab lessons --check {lesson.name}` checks its claims.",
     ]
     for number, step in enumerate(lesson.steps, start=1):
         here = runs_here(lesson, number - 1) if live else ""
@@ -89,7 +91,7 @@ def page(
     if picture:
         parts += [
             "## On the page",
-            "Every step before and after its run. The predictions drawn are the tempting ones, often wrong.",
+            "Every step before and after its run. The drawn predictions are the tempting ones, often wrong.",
             f"![{card.title}, step by step]({lesson.name}.webp)",
         ]
     return "\n\n".join(parts) + "\n"

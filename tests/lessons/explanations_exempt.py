@@ -74,7 +74,7 @@ TEXTS = (
     Exempt("mathematics", FURTHER + "an_answer_computes_its_numbers", (
         ("further/a-redundant-arm", "The rank is 1, so two motions are free"),
         ("further/no-model-needed", "Along a curve the error is about $M/\\bar M$ times"),
-        ("further/when-tasks-fight", "It wants $a = 50$ rad/s², so"),
+        ("further/when-tasks-fight", "The task asks for $a = 50$ rad/s², so"),
         ("further/how-far-ahead", "A change of acceleration stays in force at all later knots"),
         ("further/deadlines", "$(1 - 0.1 - 0.1)^k = 0.01$ at $k = 21$"),
         ("further/sensors-are-coarse", "With $T_s$ alone it would take ten times the period"),

@@ -24,7 +24,7 @@ export interface TaskData {
 export interface LevelData { name: string; Q: Numbers; R: Numbers; enabled: boolean }
 /** An object that is drawn: its body in MuJoCo, its geometry there, and where it is at the start. */
 export interface Thing { body: string; kind: string; size: number[]; pose: number[] }
-/** The array is empty for what the session writes itself. */
+/** The array is empty for fields that the session itself writes. */
 export type Field = [name: string, array: string, start: number, width: number];
 export type SceneEvent = { t: number; event: string; [key: string]: unknown };
 export interface SceneData {
@@ -61,7 +61,7 @@ export interface Scenes { scene?: SceneData; steps?: Record<string, StepData> }
 export const through = (bytes: ReadableStream, way: CompressionStream | DecompressionStream, type = ""): Response =>
   new Response(bytes.pipeThrough(way), { headers: { "Content-Type": type } });
 
-/** What a script of the site holds, decoded and decompressed by the browser itself while it is read. */
+/** The content of a script of the site; the browser decodes and decompresses it while it is read. */
 export async function unwrapped(text: string): Promise<Response> {
   const { body } = await fetch(`data:;base64,${text}`);
   return through(body!, new DecompressionStream("gzip"), "application/wasm");

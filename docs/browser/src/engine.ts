@@ -1,9 +1,9 @@
-/** The page's end of the simulation: a thread with MuJoCo and the kernel in it. */
+/** The page's connection to the simulation, a thread that contains MuJoCo and the kernel. */
 import type { Simulation, Told } from "./worker";
 
 type Answer<K extends keyof Simulation> = Awaited<ReturnType<Simulation[K]>>;
 
-/** The script that gave something to the page under a name, as text. */
+/** The text of the script that gave data to the page under a name. */
 export function packed(name: string): string {
   const text = window.HIMPC_PACKS?.[name];
   if (text === undefined) throw new Error(`the file with ${name} was not loaded`);

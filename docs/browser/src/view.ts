@@ -27,7 +27,7 @@ export class View {
   private links: Group[];
   private ghosts: Group[];
   private objects: Object3D[];
-  /** Of each task: where its target is, and in what cannot be seen but grasped, where it was dragged to. */
+  /** For each task: the ball at its target, and the invisible object that is grasped, at the place to which it was dragged. */
   private balls = new Map<string, { raw: Mesh; filtered: Mesh }>();
   private planned = 0;
   private fitted = false;
@@ -140,7 +140,7 @@ export class View {
     return [box.left + (0.5 + 0.5 * at.x) * box.width, box.top + (0.5 - 0.5 * at.y) * box.height];
   }
 
-  /** A ball was moved in a plane before the camera; that of a planar arm goes on along the camera's ray to its own plane. */
+  /** Called when a ball was moved in a plane in front of the camera; the ball of a planar arm is projected along the ray to its plane. */
   private drag({ name, position }: Mesh): void {
     const eye = this.camera.position, ray = position.clone().sub(eye), own = this.balls.get(name)!.filtered.position.z;
     if (this.robot.told.planar) position.copy(eye).addScaledVector(ray, (own - eye.z) / ray.z);

@@ -1,4 +1,4 @@
-/** The simulation, in a thread of its own: it keeps pace with the clock, or says how much slower it is. */
+/** The simulation, in a separate thread. It runs in real time, or reports how much slower it is. */
 import loadMujoco from "@mujoco/mujoco";
 import { FALLBACKS, kernel } from "../../../himpc/export/files/himpc.mjs";
 import { split } from "./code";
@@ -75,7 +75,7 @@ const simulation = {
     for (const each of both()) each.happen({ t: 0, event: "Push", joint, force, torque: [0, 0, 0], seconds });
   },
 
-  /** The torques of so many periods from the start, row by row, and what they are judged to be. */
+  /** The torques of a number of periods from the start, row by row, and the measured claims and prediction. */
   replay(ticks: number): { tau: Float64Array } & Verdict {
     simulation.reset();
     const n = session.plant.n, tau = new Float64Array(ticks * n);
@@ -94,7 +94,7 @@ function pace(): void {
   [due, last, speed] = [0, performance.now(), 1];
 }
 
-/** One period, and what the plots show of it. */
+/** Performs one period and stores its values for the plots. */
 function advance(): void {
   const { rows, scene, robot } = session, at = (name: string): number[] => [...rows.at(-1, name)];
   session.tick();
@@ -111,7 +111,7 @@ function verdict(): Verdict {
     prediction: step?.prediction ? of(step.prediction.measure) : NaN };
 }
 
-/** Simulates up to the present, for a bounded time; what is not reached is left out, and time runs slower. */
+/** Simulates up to the present, for a bounded time. If the time is not enough, simulated time runs slower. */
 function loop(): void {
   if (!running) return;
   const begun = performance.now(), { period } = session.scene;
