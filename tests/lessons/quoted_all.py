@@ -229,7 +229,7 @@ QUOTED = (
     Quoted("seeing-ahead/1", "is off by 3 cm all the same", _of(EE), 25, 35),
     Quoted("seeing-ahead/2", "16 cm from home at the end", _of(BASE, "mean", after=15.9), 0.155, 0.165),
     Quoted("seeing-ahead/2", "the plan keeps the hand within a millimetre", _of(EE), 0.1, 1.0, None),
-    Quoted("seeing-ahead/3", "the hand pays with 2 cm", _of(EE), 15, 25),
+    Quoted("seeing-ahead/3", "the hand is off by 2 cm", _of(EE), 15, 25),
     Quoted(
         "deliveries/0",
         "less than two thirds of the ghost's time",
