@@ -1,5 +1,4 @@
-"""Obstacles: HTMPC drives a mobile manipulator up to a post and under a ball. Torque control has no
-obstacles.
+"""Obstacles: HTMPC drives a mobile manipulator up to a post and under a ball.
 
 The task of level 1 keeps the hand at its place. The task of level 2 moves the base towards a post, which it
 must not touch. Prints the smallest distance to an obstacle along the path, the largest distance of the hand

@@ -66,8 +66,8 @@ FURTHER = Further(
             _bought,
         ),
         Line(
-            r"But the stability limit is $\mu = 2$ in both cases, and doubling $\bar M$ goes half of the "
-            r"way to it:",
+            r"But the stability limit is $\mu = 2$ in both cases, and doubling $\bar M$ doubles $\mu$, which "
+            r"comes closer to it:",
             r"\varepsilon_k \to 0 \quad\Leftrightarrow\quad 0 < \mu < 2",
             _cliff,
         ),
