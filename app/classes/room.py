@@ -84,6 +84,8 @@ class Room(ABC):
         identities that their browser had; account: with which they signed in."""
         with self._lock:
             self._state = self._state.succeeded(who, before, account)
+            if self._sessions is None:
+                return  # the robot is the teacher's
             with suppress(InputError):  # the class is full
                 self._state = self._state.entered(who, "robot", time.monotonic(), account)
 
