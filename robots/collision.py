@@ -48,7 +48,7 @@ class Box:
 
 @dataclass(frozen=True)
 class Floor:
-    """Everything below a height, m; spheres of a mobile base, which stands on the floor, are exempt."""
+    """Everything below a height, m. A mobile base stands on the floor: its spheres are not checked."""
 
     name: str = "floor"
     height: float = 0.0

@@ -152,8 +152,9 @@ class Gathering:
         return self if known is None or not known.here else self._with(who, replace(known, here=False))
 
     def succeeded(self, who: str, before: Sequence[str], account: str = "") -> Gathering:
-        """The class after a learner who had left came back under another identity: a browser that they had
-        before, or any browser with their account."""
+        """The class after a learner who had left came back under another identity, `who`: with a
+        browser that they used before (`before`: its identities), or with any browser and their
+        account."""
         members, account = self.members, account if self.named else ""
         theirs = [one for one, each in members.items() if account and each.account == account]
         known = [*theirs, *(one for one in before if one in members and members[one].account == account)]

@@ -188,7 +188,7 @@ class Hall(Room):
             if known is not None and taken:
                 return
             if told.who in self._replaced and not told.here:
-                return  # the server that this learner left still tells of them
+                return  # a late report of the server that this learner has left
             state = self._state.succeeded(told.who, told.before, told.account)
             self._replace(self._state.members, state.members)
             self._replaced.pop(told.who, None)

@@ -27,7 +27,8 @@ LONGEST = 200_000
 BEFORE = 8
 """Largest number of earlier identities of a browser that are told."""
 PORTION = 50_000
-"""Size, B, from which further learners are told in the next message; one learner has less than the rest."""
+"""Size, B, above which a message is sent, and further learners follow in the next one. One learner takes
+less than LONGEST − PORTION."""
 
 _SECRET = r"^[A-Za-z0-9_-]{16,64}\Z"
 Secret = Annotated[str, Meta(pattern=_SECRET)]
@@ -142,7 +143,7 @@ def known_place(told: Place | None, course: Sequence[View]) -> LessonPlace | Non
 
 
 def read_done(told: Sequence[Ran], course: Sequence[View]) -> dict[LessonPlace, tuple[int, int]]:
-    """Claims met and claims of each step that the class has."""
+    """For each step that the class has: the number of claims that held, and the number of claims."""
     found = ((known_place((lesson, k), course), met, claims) for lesson, k, met, claims in told)
     return {place: (min(met, claims), claims) for place, met, claims in found if place is not None}
 

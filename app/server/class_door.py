@@ -46,7 +46,8 @@ class Served:
 
 @dataclass(frozen=True)
 class ClassDoor:
-    """The pages of a class and who may open them. key: of the class; None: no other server takes part."""
+    """The pages of a class and who may open them. key: the key of the class; None if no other server
+    takes part."""
 
     hall: Hall
     sockets: Sockets

@@ -134,7 +134,7 @@ class StackForm:
         return np.array([float(np.linalg.norm(errors[task.name])) for task in self.tasks])
 
     def fastest(self, previews: Mapping[str, Preview]) -> float:
-        """The largest velocity of a row of a reference, m/s or rad/s."""
+        """The largest velocity of a coordinate of the references, m/s or rad/s."""
         led = (task for task in self.tasks if not isinstance(task, Damping))
         return max((float(np.abs(previews[task.name].velocity[0]).max()) for task in led), default=0.0)
 

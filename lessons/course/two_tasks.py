@@ -32,9 +32,9 @@ BOTH = Step(
     """,
     do="Let joint 1 swing further, degree by degree, until one of the errors grows. Which one is it?",
     why=r"""
-    As long as all wishes can be granted together, priorities hardly matter: the ghost has none, only
-    equal weights. They still do wherever a bound is in the way of one of them: lesson *Torque has a
-    limit*.
+    As long as all tasks can be done together, priorities hardly matter: the ghost has none, only equal
+    weights. Priorities matter again wherever a bound is in the way of one of the tasks: lesson *Torque
+    has a limit*.
     """,
     claims=(
         Claim(

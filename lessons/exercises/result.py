@@ -15,7 +15,7 @@ class CheckResult:
         check: the sentence of the check.
         measured: value in `unit`; NaN if there was nothing to measure.
         unit, wanted: e.g. "mm", "≤ 0.5 mm".
-        points, of: points given, and points possible.
+        points, of: the points that were given, and the largest possible number.
         why: one sentence with the cause if the check fails, "" if it holds.
     """
 

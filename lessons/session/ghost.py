@@ -117,7 +117,8 @@ def swapped(settings: SceneSettings, own: Sequence[str]) -> tuple[tuple[str, ...
     places = settings.places()
     if any(path not in places or places[path].shorthand for path, _ in given):
         raise InputError(
-            f"{', '.join(own)} cannot change sides: name a level or a task, e.g. levels.position.Q=50"
+            f"{', '.join(own)} cannot be swapped between robot and ghost: name a level or a task, "
+            "e.g. levels.position.Q=50"
         )
     kept = tuple(assignment(path, settings.value_at(path)) for path, _ in given)
     return kept, tuple(Set(path, value) for path, value in given)

@@ -1,5 +1,5 @@
-"""The missions of the scenes with obstacles: past some on both sides of the way, and past one that is
-reported where it is not."""
+"""The missions of the scenes with obstacles: one passes obstacles on both sides of the way, and one
+passes an obstacle that is reported at a wrong place."""
 
 from __future__ import annotations
 

@@ -91,7 +91,7 @@ TASK_ROWS = (
         HAND, (0.7, 1.4), NO_FRICTION, (0, 0.3), of=("controller=osf",), seconds=0.6,
     ),
     Intervention(
-        "two-tasks/0", "They still do wherever a bound is in the way of one of them",
+        "two-tasks/0", "Priorities matter again wherever a bound is in the way of one of the tasks",
         HAND, (1, 3), ("controller=himpc",), (0, 0.2), of=("controller=weighted",), on="torque-has-a-limit/1",
     ),
     Intervention(

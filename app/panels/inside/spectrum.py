@@ -77,5 +77,5 @@ def _verdict(worst: float) -> str:
     if worst < -1.0:
         return f"{figure}: the error grows and changes sign at every step"
     if worst >= 1.0:
-        return f"{figure}: the error does not die out"
+        return f"{figure}: the error does not decay"
     return f"largest {figure}: " + ("slow" if worst > 0 else "the sign changes at every step")

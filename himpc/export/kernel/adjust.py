@@ -119,7 +119,7 @@ def write_rows(t: TickArrays, p: LoopArrays, first: int, last: int) -> None:
 
 @inline_kernel
 def fade(t: TickArrays, p: LoopArrays) -> None:
-    """Lets rows that were switched on fade in by one period."""
+    """Lets the weights of rows that were switched on grow by the share of one period."""
     if p.state[FADING] == 0.0:
         return
     p.state[FADING] = 0.0

@@ -178,8 +178,8 @@ def forget(t: TickArrays, p: LoopArrays) -> int:
 
 @inline_kernel
 def begin(t: TickArrays) -> None:
-    """The memory of a robot that has moved with constant velocity so far;
-    `himpc.tick.tick.CompiledTick.recall`."""
+    """Sets the memory to that of a robot that has moved with constant velocity so far, as
+    `himpc.tick.tick.CompiledTick.recall` does."""
     T_s = t.scalars[T_S]
     copy(t.q, t.q_was, t.q.size)
     copy(t.v, t.v_was, t.q.size)

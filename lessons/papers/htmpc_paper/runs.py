@@ -39,7 +39,7 @@ def example(controller: str, *assignments: str) -> Job:
 
 
 def part(runs: Sequence[JobResult], place: int, key: str = "normalised_base_error") -> Array:
-    """A figure of one part of each run; NaN where there is none."""
+    """The number `key` of one part of each run; NaN for a run without this part."""
     return np.array([run.figure("parts", place, key) for run in runs])
 
 
