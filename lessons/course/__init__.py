@@ -1,4 +1,4 @@
-"""The course: one file per lesson, its docstring is its card.
+"""The lessons of the course, one per file; the docstring of each file is the card of its lesson.
 
 A file defines `LESSON`. A file is imported when its lesson is first needed.
 """
@@ -41,7 +41,7 @@ COURSE: tuple[str, ...] = (
 
 
 def load_lesson(name: str) -> Lesson:
-    """A lesson by its name. Raises InputError, which names the nearest lesson, for an unknown name."""
+    """Returns the lesson of this name; an InputError for an unknown name contains the nearest one."""
     if name not in COURSE:
         raise unknown_name("lesson", name, COURSE)
     lesson: Lesson = import_module(f"lessons.course.{name.replace('-', '_')}").LESSON

@@ -1,6 +1,6 @@
 """A blind arm
 
-An arm that feels only its joints is sent into a table: how hard does it press?
+An arm that measures only its joints is sent into a table: how hard does it press?
 
 Minutes: 8
 You need: lesson "no-model-needed"; lesson "torque-has-a-limit"
@@ -28,25 +28,25 @@ STIFFNESS = Control("levels.position.K_p", "K_P of the hand, 1/s²", 10.0, 100.0
 UNSEEN = Step(
     title="A table one centimetre too high",
     text=r"""
-    The hand is sent straight down, to a place 1 cm below the surface of a table. The controller knows
-    nothing of the table. It estimates whatever acts on the arm from the last torque,
+    The hand is sent straight down, to a place 1 cm below the surface of a table. The controller has no
+    information about the table. It estimates everything that acts on the arm from the last torque,
 
     $$\tau_0 - \bar M \ddot q_0,$$
 
-    and adds what is missing to the motion it wants. The ghost is OSF, which computes its torque
-    from a model of the arm.
+    and compensates for the estimate. The ghost is OSF, which computes its torque from a model of the arm.
     """,
     do="Switch to OSF with time-delay estimation (tdeosf). Halve M̄. What makes the force grow?",
     why=r"""
-    The force grows by more than 200 N per second. The estimate contains the push of the table, so the
-    controller compensates it like the unknown weight of lesson *No model needed*. On top of that, every
-    millisecond the torque grows by what the last centimetre still asks for. OSF without a horizon, but
-    with time-delay estimation, presses as hard, so MPC is not the cause. With half of $\bar M$ the arm
-    presses half as hard. The ghost acts like a spring: for an error of one centimetre it presses with 4
-    N.
+    The force grows by more than 200 N per second. The force of the table is part of the estimate, so the
+    controller compensates for this force, as it compensated for the unknown weight in lesson *No model
+    needed*. In addition, every millisecond the torque grows by the change that the remaining centimetre of
+    error demands. OSF without a horizon, but with time-delay estimation, presses as hard, so MPC is not to
+    blame. With half of $\bar M$ the arm presses half as hard. The ghost acts like a spring: for one
+    centimetre of error it presses with 4 N, and no more.
     """,
     prediction=Choice(
-        "The target lies 1 cm inside the table. Two seconds after the drag the arm presses with …",
+        "The target lies 1 cm inside the table. Two seconds after the target has moved, the arm presses "
+        "with …",
         (
             Option("a few newtons, as a soft spring would", high=20.0),
             Option("less than a hundred newtons", 20.0, 100.0),
@@ -62,7 +62,7 @@ UNSEEN = Step(
             "at least",
             300.0,
             fails_with=("controller=osf",),
-            because="without time-delay estimation the arm is a spring",
+            because="without time-delay estimation the arm acts like a spring",
         ),
         Claim(
             "In the last half second the force grows by more than 80 N.",
@@ -70,12 +70,12 @@ UNSEEN = Step(
             "at least",
             80.0,
             fails_with=("M_bar_scale=0.5",),
-            because="with half of M̄ it grows half as fast",
+            because="with half of M̄ the force grows half as fast",
         ),
     ),
     events=INTO,
     duration=2.2,
-    ghost=Ghost("osf, on the model", ("controller=osf",)),
+    ghost=Ghost("osf, with the model", ("controller=osf",)),
     controls=(CONTROLLER, Control("M_bar_scale", "M̄, factor", 0.25, 1.0), STIFFNESS),
     plots=(FORCE, HAND, TORQUE),
 )
@@ -83,17 +83,17 @@ UNSEEN = Step(
 BOUND = Step(
     title="Who limits the force?",
     text=r"""
-    The same again, but the bound of the torque (32f) is a quarter of what the motors can give:
+    The same motion, but the bound of the torque (32f) is a quarter of the torque of the motors:
 
     $$\tau_{\min} \le \tau_0 + \sum_{s=0}^{j} \Delta\tau_{k+s} \le \tau_{\max}$$
     """,
-    do="Halve K_P, and let it run on. Does the arm press less, or only later?",
+    do="Halve K_P, and let the simulation run on. Does the arm press less, or only later?",
     why=r"""
     The torque grows until joints 2 and 4 are at their bounds, and so does the force. Stiffness does not
     limit it: with half of $K_p$ both bounds are reached, too, up to 0.9 s later and at the same force. With
-    all its torque the arm presses with 650 N after 4 s, and joint 2 is at its bound again. A bound of
-    the torque cannot replace a bound of the force: it also limits what the arm may carry, and how fast
-    it may stop.
+    all its torque the arm presses with 650 N after 4 s, and joint 2 is at its bound again. A bound of the
+    torque does not replace a bound of the force: it also limits the load that the arm can carry, and its
+    deceleration.
     """,
     prediction=Value(
         "With a quarter of the torque: how hard does the arm press at the end, in N?",
@@ -109,7 +109,7 @@ BOUND = Step(
             "at most",
             230.0,
             fails_with=("limits.torque_scale=1",),
-            because="then the torque grows on",
+            because="then the torque continues to grow",
         ),
         Claim(
             "A joint is at its bound.",
@@ -130,14 +130,14 @@ BOUND = Step(
 SEEN = Step(
     title="Seen, not felt",
     text=r"""
-    Now the controller is told where the table is. It bounds the speed with which any link may come
-    closer to it, and to everything else. The next lesson shows how.
+    Now the controller knows the position of the table. It bounds the speed with which any link may approach
+    the table or any other object. The next lesson shows how.
     """,
     do="Lower d_safe to 0 mm. Can the arm be made to touch the table lightly?",
     why=r"""
-    The arm stops above the table and its motors have nothing to push against. The bound keeps a
-    distance and controls no force: this arm cannot press at all, not even where it should. An arm that
-    must wipe a table needs to feel it.
+    The arm stops above the table, and its motors have nothing to push against. The controller keeps a
+    distance, and does not control a force: this arm cannot press at all, even where it should. An arm that
+    must wipe a table needs a measurement of the contact force.
     """,
     claims=(
         Claim(
@@ -146,7 +146,7 @@ SEEN = Step(
             "at most",
             0.0,
             fails_with=("avoidance.on=false",),
-            because="the arm does not know of the table",
+            because="the controller has no information about the table",
         ),
         Claim(
             "The nearest pair stays more than 10 mm apart.",
@@ -177,8 +177,8 @@ SEEN = Step(
 
 CHALLENGE = Challenge(
     text=r"""
-    Without being told of the table: press on it with 100 N at least at the end, and at no time with more
-    than 300 N.
+    The controller has no information about the table. At the end the arm must press on the table with at
+    least 100 N, and at no time with more than 300 N.
     """,
     goals=(
         Claim("At the end it presses with 100 N.", Measure(FORCE, "last"), "at least", 100.0),

@@ -25,16 +25,16 @@ TURN_ELBOW = ((0.1, MoveTarget("posture", (0.0, 0.5236, 1.0472, -1.5708, 0.0, 1.
 FOLLOW = Step(
     title="The hand follows",
     text=r"""
-    Seven joints $q$, one hand. Its position $x = f(q)$ is where the arm's geometry puts it (2), and
-    the Jacobian says how fast it moves: $\dot x = J(q)\, \dot q$ with $J = \partial f / \partial q$
-    (3). The target moves aside by 15 cm. The controller looks for joint torques that bring the hand
-    there while the hand keeps its orientation.
+    The arm has seven joints $q$ and one hand. The position of the hand $x = f(q)$ follows from the geometry
+    of the arm (2), and the Jacobian gives its velocity: $\dot x = J(q)\, \dot q$ with $J = \partial f /
+    \partial q$ (3). The target moves aside by 15 cm. The controller looks for joint torques that bring the
+    hand there while the hand keeps its orientation.
     """,
-    do="Drag the target. Turn it, too.",
+    do="Drag the target, and turn the target as well.",
     why=r"""
-    All seven joints take part, although three joints are enough to place a point, and six are enough to
-    keep the hand upright as well. No joint has a role of its own: the controller only compares the
-    position and the orientation of the hand with their targets.
+    All seven joints take part, although three joints are enough to place a point, and six to keep the hand
+    upright as well. No joint has a purpose of its own: the controller only compares the position and the
+    orientation of the hand with their targets.
     """,
     prediction=Choice(
         "The hand moves aside and stays upright. How many of the seven joints turn by more than 1°?",
@@ -80,18 +80,19 @@ FOLLOW = Step(
 ELBOW = Step(
     title="Drag the elbow",
     text=r"""
-    A hand has six coordinates, three for where and three for which way. Seven joints for six
-    coordinates: one motion is left over. It is the null space of $J$, the joint velocities with $J
+    A hand has six coordinates, three for its position and three for its orientation. Seven joints for six
+    coordinates leave one free motion. This motion is the null space of $J$, the joint velocities with $J
     \dot q = 0$. Joint 3 is asked to turn by 60°, as the last of three levels.
     """,
-    do="Grab the posture's target and turn the elbow around. Then grab the hand's: which one wins?",
+    do="Drag the target of the posture and turn the elbow. Then drag that of the hand: which task is met?",
     why=r"""
-    The elbow swings around the line from shoulder to wrist; the hand stays. This is called
-    *self-motion*. Joint 3 stops at 29°, because the same level asks the other six joints to stay, and
-    the elbow cannot swing without them. Asked for joint 3 alone, the arm turns it by nearly the whole 60°.
+    The elbow swings around the line from shoulder to wrist, and the hand stays in place. This motion is
+    called *self-motion*. Joint 3 stops at 29°, because the same level asks the other six joints to stay,
+    and the elbow cannot swing without them. If the level has a target for joint 3 alone, the arm turns
+    joint 3 by nearly the whole 60°.
     """,
     prediction=Choice(
-        "The elbow turns by almost 30°. How far does the hand move on the way?",
+        "The elbow turns by almost 30°. How far does the hand move during this motion?",
         (
             Option("less than 5 mm", high=5.0),
             Option("a few centimetres", 5.0, 60.0),
@@ -107,7 +108,7 @@ ELBOW = Step(
             "at most",
             5.0,
             fails_with=("levels.position.enabled=false",),
-            because="the posture then takes the hand along",
+            because="the posture then moves the hand as well",
         ),
         Claim(
             "Joint 3 turns by more than 20°.",
@@ -127,16 +128,16 @@ ELBOW = Step(
 COUNT = Step(
     title="Count the freedom",
     text=r"""
-    The hand may now turn as it likes: the orientation level is off. Three coordinates are left for
-    seven joints, $7 - 3 = 4$ free motions instead of one. Joint 3 is asked for the same turn. The ghost
-    keeps its orientation.
+    The hand may now turn freely: the orientation level is off. Three coordinates are left for seven joints,
+    which makes $7 - 3 = 4$ free motions instead of one. The target of joint 3 is the same. The ghost keeps
+    its orientation.
     """,
-    do="Switch levels on and off and feel how stiff the elbow becomes.",
+    do="Switch levels on and off, push the elbow and see how stiff it is.",
     why=r"""
-    Joint 3 gets further, and the hand tilts, which no level forbids. The hand is still where it
-    was. Every level takes away at most as many free motions as it has coordinates. It takes away fewer
-    if levels above have taken some already, or in a singular pose. The next level has to do with the
-    rest.
+    Joint 3 turns further, and the hand tilts, because no level holds its orientation. The position of the
+    hand is unchanged. Every level takes away at most as many free motions as it has coordinates. It takes
+    away fewer if levels above have taken some already, or in a singular pose. The next level can use only
+    the free motions that remain.
     """,
     prediction=Value(
         "Without the orientation level: by how many degrees does the hand tilt?",

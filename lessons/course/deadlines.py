@@ -1,6 +1,6 @@
 """Deadlines
 
-The torque is due every millisecond: what if the computer is not ready?
+The torque is due every millisecond: what happens if the computer is not ready?
 
 Minutes: 10
 You need: lesson "no-model-needed"; lesson "how-far-ahead"
@@ -28,26 +28,25 @@ PLOTS = (HAND, LATE, Signal("torque share", "%"))
 ONE_MORE = Step(
     title="One knot more",
     text=r"""
-    So far the simulation waited while the controller computed. Now it does not wait: the controller
-    must measure, solve and apply within $T_s = 1$ ms. If the torque is not ready when it is due, the
-    motors hold the previous one, and the late torque acts at the next tick. The computer of this lesson
-    needs 0.1 ms for each of the $N$ knots, on every machine the same. (That is an assumption, and a
-    slow computer: this lab's own step takes about 0.01 ms a knot.) $N = 10$ is just in time; now $N =
-    11$. The target moves by 13 cm in half a second.
+    So far the simulated time stood still while the controller computed. Now time goes on: measuring,
+    solving and applying the torque must all fit in $T_s = 1$ ms. If the torque is not ready when it is due,
+    the motors hold the previous torque, and the late torque acts at the next tick. The computer of this
+    lesson needs 0.1 ms for each of the $N$ knots, on every machine the same. (That is an assumption, and a
+    slow computer: this lab's own step takes about 0.01 ms a knot.) With $N = 10$ the torque is just in
+    time; now $N = 11$. The target moves by 13 cm in half a second.
     """,
-    do="Where is the edge if the deadline is 2 ms? And what happens beyond it, at N = 20, N = 30?",
+    do="What is the largest N in time if the deadline is 2 ms? What happens beyond it, at N = 20 and N = 30?",
     why=r"""
-    The error more than doubles, between one knot and the next. Nothing is gained by the longer horizon,
-    and every single torque is one tick late. Each $\Delta\tau$ is meant as a change of the torque that
-    acts now; when it arrives, the torque that it was meant to change has been replaced. The even and
-    the odd ticks are two sequences of torques, each corrected only once in 2 ms, and neither knows of
-    the other's corrections. No correction is lost, but each sequence is a control loop of half the
-    rate.
+    The error more than doubles with one knot more. The longer horizon brings no gain, and every torque is
+    one tick late. Each $\Delta\tau$ is computed as a change of the torque that acts now. When $\Delta\tau$
+    is applied, another torque acts already. The even and the odd ticks form two sequences of torques. Each
+    sequence is corrected only once in 2 ms, and neither contains the corrections of the other. No
+    correction is lost, but each sequence is a control loop of half the rate.
     """,
     prediction=Choice(
         "Eleven knots instead of ten, 0.1 ms too slow: the largest error of this motion …",
         (
-            Option("shrinks a little: a longer horizon sees more", high=0.95),
+            Option("shrinks a little: a longer horizon covers more time", high=0.95),
             Option("stays the same within 30 %", 0.95, 1.3),
             Option("about doubles", 1.6, 3.0),
         ),
@@ -81,26 +80,27 @@ ONE_MORE = Step(
 )
 
 SLOWER = Step(
-    title="Promise less, keep it",
+    title="Half the rate, in time",
     text=r"""
-    Eleven knots again, but asked for every 2 ms only, and due after 2 ms: now they are in time. The
-    controller is told: its prediction uses $T_s = 2$ ms. The ghost keeps asking every millisecond and
-    is always one tick late.
+    Eleven knots again, but the controller computes a torque only every 2 ms, and the torque is due after 2
+    ms: now it is in time. The prediction of the controller uses $T_s = 2$ ms as well. The ghost still
+    computes a torque every millisecond and is always one tick late.
     """,
-    do="What do 5 ms and 10 ms do? Where does the arm stop to be usable?",
+    do="Try 5 ms and 10 ms. From which period on is the arm no longer usable?",
     why=r"""
-    The same error, with half the computing. A loop that misses every deadline by one tick follows no
-    better than a loop of half the rate. With coarse sensors it follows worse. With encoders of 0.005°
-    the late hand is off by 47 mm, that of half the rate by 3.2 mm. In time and at the full
-    rate, the hand is off by 1.5 mm with the same encoders, although the torque reaches its limit there,
-    too. Besides the lateness, two things are needed for so large an error. One is the division by 1 ms:
-    if the late controller divides by 2 ms instead, 6.6 mm are left of the 47. The other is the torque
-    limit: without it, in the bounds and in the motors, the late hand is off by 3.4 mm. The error grows
-    with the period (Remark 6): that is why the paper wants 1 ms, and why it calls its own 8 ms per step
-    on seven joints, at $N = 5$, too long.
+    The error is the same, with half the computing. A loop that misses every deadline by one tick follows no
+    better than a loop of half the rate. With coarse sensors the late loop follows worse. With encoders of
+    0.005° the hand of the late loop is off by 47 mm, that of half the rate by 3.2 mm. In time and at the
+    full rate, the hand is off by 1.5 mm with the same encoders, although the torque reaches its limit in
+    that case, too. Besides the lateness, two conditions are necessary for so large an error. One is the
+    division by 1 ms: if the late controller divides by 2 ms instead, 6.6 mm are left of the 47. The other
+    is the torque limit: without it, in the bounds and in the motors, the late hand is off by 3.4 mm. The
+    error grows with the period (Remark 6): that is why the paper requires 1 ms, and why it calls its own 8
+    ms per step on seven joints, at $N = 5$, too long.
     """,
     prediction=Value(
-        "Every 2 ms and in time, against every 1 ms and one late: the ratio of the largest errors is …",
+        "A torque every 2 ms in time, against a torque every 1 ms that is one tick late: the ratio of the "
+        "largest errors is …",
         Measure(HAND, over_ghost=True),
         low=0.1,
         high=10.0,
@@ -135,17 +135,17 @@ SLOWER = Step(
 REPAIR = Step(
     title="Buy it back",
     text=r"""
-    One tick late again. A small $\bar M$ and a late torque have the same effect, corrections come
-    too slowly. So let $\bar M$ be twice as large. The ghost is in time, with the old $\bar M$.
+    The torque is one tick late again. A small $\bar M$ and a late torque have the same effect: corrections
+    are too slow. So let $\bar M$ be twice as large. The ghost is in time, with the old $\bar M$.
     """,
-    do="How far does this go: 2.5, 3? And what if the computer becomes fast again, N = 10?",
+    do="Try factors of 2.5 and 3. What happens if the torque is in time again, with N = 10?",
     why=r"""
-    The late controller now errs as little as the one in time, to the third digit. The price is the
-    margin: the stability limit is where it was, between 2 and 2.5 times the old $\bar M$, and noise has
-    twice the effect.
+    The error of the late controller is now as small as that of the controller in time, to the third digit.
+    But its stability margin is smaller: the limit of stability is where it was, between 2 and 2.5 times the
+    old $\bar M$, and the effect of noise doubles.
     """,
     prediction=Choice(
-        "Always one tick late, but M̄ doubled. Compared with an arm in time the error is …",
+        "The torque is always one tick late, but M̄ is doubled. Compared with an arm in time the error is …",
         (
             Option("still clearly larger", low=1.2),
             Option("the same within 10 %", 0.9, 1.1),
@@ -167,15 +167,15 @@ REPAIR = Step(
     set=("deadline_ms=1", "horizon=11", "M_bar_scale=2"),
     events=MOVE,
     duration=1.2,
-    ghost=Ghost("in time, M̄ as it was", ("horizon=10", "M_bar_scale=1")),
+    ghost=Ghost("in time, with the old M̄", ("horizon=10", "M_bar_scale=1")),
     controls=(M_BAR, HORIZON, DEADLINE),
     plots=PLOTS,
 )
 
 CHALLENGE = Challenge(
     text=r"""
-    A slower computer: 0.4 ms per knot, and $N = 5$. The deadline stays 1 ms, and so does the
-    period. Keep the hand within 2 mm without chatter. There is more than one way.
+    The computer is slower: it needs 0.4 ms per knot, and $N = 5$. The deadline and the period stay 1 ms.
+    Keep the hand within 2 mm without chatter. There is more than one solution.
     """,
     goals=(
         Claim("The hand stays within 2 mm.", Measure(HAND), "at most", 2.0),

@@ -1,6 +1,6 @@
 """Deliveries
 
-Three people wait for a ball each: must the robot finish one thing before it begins the next?
+Three people wait for a ball each: must the robot finish one task before it begins the next?
 
 Minutes: 15
 You need: lesson "first-hold-then-reach"
@@ -30,29 +30,30 @@ TAKEN = ((14.0, Release("ee 1")), (15.0, Release("ee 2")))
 PLOTS = (PLACE, HAND, WAY)
 
 OVERLAP = Step(
-    title="Begin the next, finish this",
+    title="Two tasks at the same time",
     text=r"""
-    A round to three people is a list of tasks that alternate: base to a place near the person, hand
-    to the person's hand for one second, base to the next place, … The controller gets a window of
-    $L$ tasks of this list, $[\mathcal T_{l_0}, \ldots, \mathcal T_{l_0+L-1}]$. When
-    $\mathcal T_{l_0}$ is done the window moves on by one. The ghost has $L = 1$: it drives, reaches,
-    waits, drives. Here $L = 2$: the present task ranks first, the next one second. For both a task
-    of the hand is done when it was within 2 cm of its goal for a second, and one of the base as
-    soon as it comes within 80 cm of its place.
+    A round to three people is a list of tasks that alternate: base to a place near the person, hand to the
+    person's hand for one second, base to the next place, … The controller gets a window of $L$ tasks of
+    this list, $[\mathcal T_{l_0}, \ldots, \mathcal T_{l_0+L-1}]$. When $\mathcal T_{l_0}$ is done the
+    window moves on by one. The ghost has $L = 1$: it drives, reaches, waits, drives. Here $L = 2$: the
+    current task ranks first, the next one second. For both robots a task of the hand is done when the hand
+    was within 2 cm of its goal for a second, and a task of the base as soon as the base comes within 80 cm
+    of its place.
     """,
-    do="Could the ghost keep up with a higher speed of the paths? What does its base do at each stop?",
+    do="Is the ghost as fast if its paths have a higher speed? What does its base do at each stop?",
     why=r"""
-    The robot needs less than two thirds of the ghost's time, and of the way. While the hand holds the ball
-    out, the base already leaves for the next person, as far as the arm allows. While the base drives, the
-    hand already reaches. Leaving early saves 9 of the ghost's 31 seconds by itself, reaching early 7
-    (measured with a second task that was taken away at times). Both together save 11, less than the sum:
-    once the base is there, no driving is left during which the hand could reach. The way is shorter because
-    the base stays behind its hand: the ghost's only task is the hand, so the base goes along with it.
+    The robot needs less than two thirds of the ghost's time, and of its distance. While the hand holds the
+    ball out, the base already leaves for the next person, as far as the arm allows. While the base drives,
+    the hand already reaches. Leaving early by itself saves 9 of the ghost's 31 seconds, reaching early 7
+    (measured with a second task that was active only at times). Both together save 11, less than the sum:
+    once the base is there, no driving is left during which the hand could reach. The distance is shorter
+    because the base stays behind its hand: the ghost's only task is the hand, so its base moves with the
+    hand.
     """,
     prediction=Choice(
         "The same places, the same speed of the paths. Two tasks at a time take …",
         (
-            Option("nearly as long: the way is the same", low=0.85),
+            Option("nearly as long: the distance is the same", low=0.85),
             Option("about two thirds of the time", 0.55, 0.85),
             Option("less than half the time", high=0.5),
         ),
@@ -82,7 +83,7 @@ OVERLAP = Step(
             "at most",
             0.7,
             fails_with=SINGLE,
-            because="the base goes along with the hand",
+            because="the base moves with the hand",
         ),
     ),
     set=ROUND,
@@ -95,27 +96,28 @@ OVERLAP = Step(
 THERE = Step(
     title="When is the base there?",
     text=r"""
-    Somebody has to say when *base to a place near the person* is done. So far it was within 80 cm
-    of the place, at any speed. Now the base must come within 5 cm and to rest, and again the rule
-    is the same for both robots. Which of the two loses more by it?
+    A rule must define when *base to a place near the person* is done. So far the task was done within 80 cm
+    of the place, at any speed. Now the base must come within 5 cm and to rest, and again the rule is the
+    same for both robots. Which of the two robots loses more time by this rule?
     """,
-    do="Set the distance to 5, 25 and 50 cm, without the rest. What becomes of the factor?",
+    do="Set the distance to 5, 25 and 50 cm, without the condition of rest. How does the factor change?",
     why=r"""
-    The strict rule costs the ghost 11 seconds and the other one 14. The robot with two tasks could pass 80
-    cm beside the place, and it loses more because it now has to go all the way to it: its base drives half
-    as far again. The ghost's base drives only a tenth farther, because it went up to the people anyhow.
-    Each of the rule's two conditions makes the base go all the way. Within 5 cm alone, at any speed, costs
-    the ghost 8 s and the other one 12. Coming to rest alone, within 80 cm, costs as much as the whole rule:
-    the base comes to rest only at its place. So the factor between the two ways of working depends on the
-    rule: it was 1.6 before and is 1.2 now. Two tasks at a time under the first rule save 22 s of the 41 s
-    that one task at a time takes under the strict rule. About half of that is due to the rule: 11 s if the
-    rule is changed first, 14 s if it is changed last. The paper measured a factor of 2.3 over four rounds,
-    against a robot whose base and arm take turns. It does not say when a base counts as there.
+    The strict rule costs the ghost 11 seconds and the other robot 14. The robot with two tasks could pass
+    the place at a distance of 80 cm, and it loses more because it now has to go all the way to it: its base
+    drives half as far again. The ghost's base drives only a tenth farther, because it went up to the people
+    under the first rule as well. Each of the rule's two conditions makes the base go all the way. The
+    condition of 5 cm alone, at any speed, costs the ghost 8 s and the other robot 12. The condition of rest
+    alone, within 80 cm, costs as much as the whole rule: the base comes to rest only at its place. So the
+    factor between the two ways of working depends on the rule: it was 1.6 before and is 1.2 now. Two tasks
+    at a time under the first rule save 22 s of the 41 s that one task at a time takes under the strict
+    rule. About half of that is due to the rule: 11 s if the rule is changed first, 14 s if it is changed
+    last. The paper measured a factor of 2.3 over four rounds, against a robot whose base and arm move in
+    turn. The paper does not say when a task of the base is done.
     """,
     prediction=Choice(
         "Both have to stop at every place. Two tasks at a time now take …",
         (
-            Option("less than half the ghost's time: it stops as before, the other one reaches", high=0.5),
+            Option("less than half of it: the ghost stops as before, the other robot reaches", high=0.5),
             Option("two thirds of it, as in the step before", 0.55, 0.7),
             Option("more than three quarters of it", low=0.75),
         ),
@@ -132,7 +134,7 @@ THERE = Step(
             because="then both robots have the same settings",
         ),
         Claim(
-            "They gain less than in the step before: more than 0.75 times the ghost's time.",
+            "The gain is smaller than in the step before: more than 0.75 times the ghost's time.",
             Measure(WORK, over_ghost=True),
             "at least",
             0.75,
@@ -145,32 +147,32 @@ THERE = Step(
     ghost=ONE_BY_ONE,
     controls=(
         ARCHITECTURE,
-        Control("base_tolerance", "Base is there within, m", 0.05, 0.8),
+        Control("base_tolerance", "Base is at its place within, m", 0.05, 0.8),
         Control("base_at_rest", "and at rest", choices=(False, True)),
     ),
     plots=PLOTS,
 )
 
 WAIT = Step(
-    title="She takes her time",
+    title="A person who takes the ball late",
     text=r"""
-    How long somebody needs to take a ball, nobody knows. The hand is with the first person by 3 s;
-    here the ball is taken at 14 s, and only then the controller learns of it. Until then
-    $\mathcal T_{l_0}$ is *hand at her hand*, of unknown length, and the base's next place, 2 m
-    further on, is out of reach. What will the base do with the time?
+    The time that a person needs to take a ball is unknown. The hand is with the first person by 3 s; here
+    the ball is taken at 14 s, and the controller has this information only from then on. Until then
+    $\mathcal T_{l_0}$ is *hand at her hand*, of unknown length, and the base's next place, 2 m further on,
+    is out of reach. What will the base do during this time?
     """,
-    do="Release the ball yourself, early or late. Can you see in advance how long the rest will take?",
+    do="Release the ball yourself, early or late. Can you predict how long the rest will take?",
     why=r"""
-    It goes to the edge of what the arm allows and waits there with the arm stretched. When the ball is
-    gone the window moves on, and the rest of the way is short: three seconds to the second person. The
-    ghost, whose only task was the hand, needs nearly seven. The duration of the wait is not a part of
-    the problem, and nobody had to know it.
+    The base goes as far as the arm allows and waits there, with the arm stretched. When the ball is taken
+    the window moves on, and the rest of the way is short: the robot needs three seconds to the second
+    person, where the ghost, whose only task was the hand, needs nearly seven. The plan needs no duration of
+    the wait: the problem contains none.
     """,
     prediction=Choice(
         "From 5 s until the ball is taken, how far does the base drive?",
         (
             Option("not at all: the hand must stay", high=0.05),
-            Option("some decimetres, to the edge of the arm's reach", 0.2, 1.4),
+            Option("some decimetres, to the limit of the arm's reach", 0.2, 1.4),
             Option("all of the 2 m to its next place", low=1.4),
         ),
         Measure(WAY, "range", after=5.0, until=14.0),
@@ -178,7 +180,7 @@ WAIT = Step(
     ),
     claims=(
         Claim(
-            "While she takes her time, 5 s to 14 s, the base drives on by at least 45 cm.",
+            "While the hand waits, 5 s to 14 s, the base drives on by at least 45 cm.",
             Measure(WAY, "range", after=5.0, until=14.0),
             "at least",
             0.45,
@@ -212,21 +214,21 @@ WAIT = Step(
 MOVES = Step(
     title="People move",
     text=r"""
-    The same wait, and at 8 s the second person walks over to another seat: the goals of tasks three
-    and four change, while the hand is still with the first one. At 16.5 s, the hand all but there,
-    the second person lifts the ball's place by 20 cm and shifts it by 30 cm. Nothing is planned
-    again from the beginning: the references $r$ in (8) change, and the next plan, a tenth of a
-    second later, has them. The ghost is HTIDKC, which has no plan.
+    The same wait, and at 8 s the second person walks over to another seat: the goals of tasks three and
+    four change, while the hand is still with the first one. At 16.5 s, when the hand is almost there, the
+    second person lifts the ball's place by 20 cm and shifts it by 30 cm. No plan starts again from the
+    beginning: the references $r$ in (8) change, and the next plan, a tenth of a second later, uses them.
+    The ghost is HTIDKC, which has no plan.
     """,
     do="Move the people yourself, while the ball waits and while the robot is on its way.",
     why=r"""
-    At 8 s the base, waiting at the edge for the old place, goes along the edge to where it is nearest
-    to the new one. At 16.5 s the hand turns to the new spot, and a second later it is there within two
-    centimetres. Twice a goal changed, and nothing but the references was told to the controller. Only
-    the goals are given, in the space in which the people move.
+    At 8 s the base, which waits at the limit of the arm's reach for the old place, moves along this limit
+    to the point nearest to the new one. At 16.5 s the hand turns to the new spot, and a second later it is
+    there within two centimetres. The goals changed twice, and the controller received only new references.
+    The goals are given in the space in which the people move.
     """,
     prediction=Choice(
-        "At 16.5 s the goal jumps by 36 cm, when the hand is all but there. One second later it is …",
+        "At 16.5 s the goal jumps by 36 cm, when the hand is almost there. One second later the hand is …",
         (
             Option("still more than 10 cm off", low=100.0),
             Option("some centimetres off", 20.0, 100.0),
@@ -242,7 +244,7 @@ MOVES = Step(
             "at most",
             5.0,
             fails_with=("controller=htidkc",),
-            because="with the authors' gain the hand needs seconds for the last stretch",
+            because="with the authors' gain the hand needs seconds for the last part of the way",
         ),
         Claim(
             "Between 8 s and 14 s the base turns to the new place by at least 10 cm.",
@@ -276,8 +278,8 @@ MOVES = Step(
 
 CHALLENGE = Challenge(
     text=r"""
-    One round to three people, one task at a time, takes 31 s and 9.8 m of driving. Be done within
-    25 s, with less than 8 m. The fastest round counts.
+    One round to three people, one task at a time, takes 31 s and 9.8 m of driving. Finish the round within
+    25 s, with less than 8 m of driving. The score is the time of the round.
     """,
     goals=(
         Claim("All six tasks are done within 25 s.", Measure(PLACE, until=25.0), "at least", 6.0),

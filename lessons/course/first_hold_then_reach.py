@@ -27,30 +27,31 @@ PLOTS = (HAND, BASE, STRETCHED)
 BASE_FIRST = ("order=base,ee",)
 
 BOTH = Step(
-    title="Nine joints, two wishes",
+    title="Nine joints, two tasks",
     text=r"""
-    A base that rolls in every direction and turns, and on it an arm of six joints. Task
-    $\mathcal T_1$: the hand stays where it is, three coordinates. Task $\mathcal T_2$: the base
-    drives to a place 64 cm away, two coordinates. Five of nine: there should be enough freedom for
-    both. Ten times a second the controller plans the accelerations of the next second, $N = 10$
-    knots $\Delta t = 0.1$ s apart, and each task has a cost of its own, the errors $e = f(q) - r$
-    summed over them:
+    A base that rolls in every direction and turns, and on it an arm of six joints. Task $\mathcal T_1$: the
+    hand stays where it is, three coordinates. Task $\mathcal T_2$: the base drives to a place 64 cm away,
+    two coordinates. The tasks use five of nine coordinates, which should leave enough freedom for both. Ten
+    times a second the controller plans the accelerations of the next second, $N = 10$ knots $\Delta t =
+    0.1$ s apart, and each task has a cost of its own, the errors $e = f(q) - r$ summed over
+    them:
 
     $$\mathcal J_l = \tfrac12 \Big( \sum_{k=0}^{N-1} \lVert e_k \rVert_{Q_k}^2 + \lVert e_N
     \rVert_P^2 \Big) \quad (8) \qquad \mathrm{lex\,min} \; [\mathcal J_1, \mathcal J_2] \quad (7a)$$
 
-    *Lex min* reads like a dictionary: first the smallest $\mathcal J_1$, and only among the plans
-    that have it the smallest $\mathcal J_2$.
+    *Lex min* is the lexicographic minimum, as in the order of words in a dictionary: first the smallest
+    $\mathcal J_1$, and then the smallest $\mathcal J_2$ among the plans that have the smallest $\mathcal
+    J_1$.
     """,
-    do="Drag the base's target around the hand. From which side is it hardest to follow?",
+    do="Drag the base's target around the hand. On which side is the base furthest from it?",
     why=r"""
-    Hundredths of a millimetre. The base drives off, and the arm takes back at every instant what
-    the base does to the hand. With the base first (the ghost) both tasks end at their goals too, but
-    on the way the hand swings out by 12 cm. Even where both tasks reach their goals, the priorities
-    decide which one may be disturbed on the way.
+    The hand is off by hundredths of a millimetre. The base drives off, and the arm compensates at every
+    instant for the motion of the base. With the base first (the ghost) both tasks end at their goals too,
+    but on the way the hand swings out by 12 cm. Even where all tasks reach their goals, priorities decide
+    which task may have an error on the way.
     """,
     prediction=Choice(
-        "While the base drives 64 cm away under it: how far is the hand ever off?",
+        "The base drives 64 cm away under the hand. The largest error of the hand is …",
         (
             Option("less than a millimetre", high=1.0),
             Option("about a centimetre", 1.0, 50.0),
@@ -61,7 +62,7 @@ BOTH = Step(
     ),
     claims=(
         Claim(
-            "The hand stays within 1 mm all along.",
+            "The hand stays within 1 mm all the time.",
             Measure(HAND),
             "at most",
             1.0,
@@ -74,7 +75,7 @@ BOTH = Step(
             "at most",
             0.01,
             fails_with=("controller=stmpc",),
-            because="single-task MPC looks at the first task only",
+            because="single-task MPC uses the first task only",
         ),
     ),
     events=NEAR,
@@ -95,7 +96,7 @@ REACH = Step(
 
     at every knot $k$ and in each coordinate $p$.
     """,
-    do="Push the base's target around in a circle. What does the base draw on the floor?",
+    do="Drag the base's target around in a circle. Which path does the base follow on the floor?",
     why=r"""
     The base stops exactly where the arm is stretched, 1.63 m before its target, and the hand stays
     in its place. The program contains no rule for this place. It is where every plan that makes
@@ -105,8 +106,8 @@ REACH = Step(
     prediction=Choice(
         "The base's target cannot be reached while the hand stays. What happens to the hand?",
         (
-            Option("it is drawn along by some centimetres, a compromise", low=10.0),
-            Option("it trembles within a centimetre at the edge", 1.0, 10.0),
+            Option("it moves by some centimetres, a compromise", low=10.0),
+            Option("it vibrates within a centimetre at the limit of the arm's reach", 1.0, 10.0),
             Option("nothing", high=1.0),
         ),
         Measure(HAND),
@@ -119,7 +120,7 @@ REACH = Step(
             "at most",
             1.0,
             fails_with=BASE_FIRST,
-            because="the base drives on and takes the hand along",
+            because="the base drives on and moves the hand as well",
         ),
         Claim(
             "The base stops more than 1.5 m before its target.",
@@ -146,18 +147,19 @@ REACH = Step(
 )
 
 SWAP = Step(
-    title="Turn the list round",
+    title="Reverse the order",
     text=r"""
-    The same, and at 4 s, with the arm at full stretch, the two tasks change places. Now
-    $\mathcal T_1$ is the base and $\mathcal T_2$ the hand: (12) protects the base.
+    The start is the same, and at 4 s, when the arm is stretched, the two tasks change places. Now $\mathcal
+    T_1$ is the base and $\mathcal T_2$ the hand: (12) protects the base.
     """,
-    do="Is there a way back? Swap them once more while the base is on its way.",
+    do="Swap the tasks once more while the base is on its way. Does the hand return?",
     why=r"""
-    The base goes the missing 1.63 m, and the hand is left behind by exactly these 1.63 m. The conflict
-    is as large as before, only the other task loses: in a hierarchy it is the last one in the list.
+    The base goes the missing 1.63 m, and the hand is left behind by exactly these 1.63 m. The conflict is
+    as large as before, but now the other task has the error: in a hierarchy it is the last task in the
+    list.
     """,
     prediction=Value(
-        "The base now gets to its target. How far is the hand off in the end, in m?",
+        "The base now gets to its target. How large is the error of the hand in the end, in m?",
         Measure(HAND_M, "mean", after=8.5),
         low=0.05,
         high=5.0,
@@ -170,18 +172,18 @@ SWAP = Step(
             "at most",
             1.0,
             fails_with=BASE_FIRST,
-            because="then the base was first from the beginning",
+            because="then the base ranks first from the beginning",
         ),
         Claim(
-            "4.5 s after it the base is at its target.",
+            "4.5 s after the swap the base is at its target.",
             Measure(BASE, "mean", after=8.5),
             "at most",
             0.01,
             fails_with=("limits.velocity_scale=0.2",),
-            because="at a fifth of the speed it is still on its way",
+            because="at a fifth of the speed the base is still on its way",
         ),
         Claim(
-            "The hand pays: it is left behind by more than 1.5 m.",
+            "The error of the hand is then more than 1.5 m.",
             Measure(HAND_M, "mean", after=8.5),
             "at least",
             1.5,

@@ -1,6 +1,6 @@
 """How far ahead
 
-Model predictive control looks ahead: is further always better?
+Model predictive control looks ahead: is a longer horizon always better?
 
 Minutes: 10
 You need: lesson "one-task"
@@ -21,23 +21,22 @@ N = Control("horizon", "N", 1, 30)
 R_ON = Control("R_on", "What R weighs", choices=("torque", "acceleration"))
 
 FURTHER = Step(
-    title="Twenty instead of one",
+    title="Twenty steps instead of one",
     text=r"""
-    The arm follows the paper's circle. $N = 20$ means that the cost (32a) is summed over 20 steps
-    of a millisecond, and that the first of 20 torque changes is applied. The ghost looks one step
-    ahead (HIQP). Remark 9 says: choose $N$ as large as the computer allows. Ours would allow it: a
-    step takes about 0.04 ms with $N = 5$, 0.12 with 20 and 0.21 with 30, of the millisecond there
-    is.
+    The arm follows the paper's circle. $N = 20$ means that the cost (32a) is summed over 20 steps of a
+    millisecond, and that the first of 20 torque changes is applied. The ghost looks one step ahead (HIQP).
+    Remark 9 says: choose $N$ as large as the computer allows. Our computer allows it: of the available
+    millisecond, a step takes about 0.04 ms with $N = 5$, 0.12 with 20 and 0.21 with 30.
     """,
-    do="Go through N = 1, 2, 5, 10, 20 and read the time per step. Then leave N alone and double M̄.",
+    do="Try N = 1, 2, 5, 10, 20 and read the time per step. Then keep N and double M̄.",
     why=r"""
-    Nothing happens. With $Q = 200$, $R = 10$ and this small an $\bar M$, the very first $\Delta\tau$
-    already removes nearly all of $e$: the controller is deadbeat, and there is nothing left to plan.
-    The paper's Table VI prints a gain of 17 % in x from $N = 5$ to $N = 30$. Over the whole 4 s we find
-    a third of that gain, because a longer horizon sees the ends of the joints' ranges sooner. Without
-    position limits there is no gain. In the 1.2 s of this step no joint comes near an end. Over the 4 s
-    the error in x is smaller with $N = 1$ than with $N = 30$, but with $N = 1$ 1600 QPs have no
-    solution. Twice the $\bar M$ halves the error; no horizon does that.
+    The error does not change. With $Q = 200$, $R = 10$ and such a small $\bar M$, the first $\Delta\tau$
+    already removes nearly all of $e$: the controller is deadbeat, and the later steps of the plan have no
+    error left to remove. The paper's Table VI prints a gain of 17 % in x from $N = 5$ to $N = 30$. Over the
+    whole 4 s we find a third of that gain, because a longer horizon includes the ends of the joints' ranges
+    sooner. Without position limits there is no gain. In the 1.2 s of this step no joint comes near an end.
+    Over the 4 s the error in x is smaller with $N = 1$ than with $N = 30$, but with $N = 1$ 1600 QPs have
+    no solution. Twice the $\bar M$ halves the error; no horizon has this effect.
     """,
     prediction=Choice(
         "N = 20 instead of N = 1: the RMS error of the hand becomes …",
@@ -51,7 +50,7 @@ FURTHER = Step(
     ),
     claims=(
         Claim(
-            "The RMS error is not 5 % smaller than one step ahead.",
+            "The RMS error is not 5 % smaller than with a horizon of one step.",
             Measure(HAND, "rms", over_ghost=True),
             "at least",
             0.95,
@@ -59,7 +58,7 @@ FURTHER = Step(
             because="twice the M̄ halves it, whatever the horizon",
         ),
         Claim(
-            "Nor is it 5 % larger.",
+            "The RMS error is not 5 % larger either.",
             Measure(HAND, "rms", over_ghost=True),
             "at most",
             1.05,
@@ -75,7 +74,7 @@ FURTHER = Step(
 )
 
 REASON = Step(
-    title="A reason to plan?",
+    title="Another meaning of R",
     text=r"""
     Let $R$ weigh the change of acceleration that a torque change makes, $\lVert \bar M^{-1}
     \Delta\tau \rVert_R^2$. In these units $R = 10$ is no longer small beside $Q = 200$, so no step
@@ -83,14 +82,14 @@ REASON = Step(
     """,
     do="Compare N = 1 with N = 20 for both meanings of R. Then set N = 1 and make R smaller, down to 0.1.",
     why=r"""
-    Twenty steps make about half the error of one step, with smoother torques, which is the paper's
-    trend. But what the longer horizon changes is the price of torque. A change of torque stays in force
-    at all later knots. With $N = 20$ it is paid for once and counts at twenty knots, so $R$ weighs
-    less: $R = 10$ acts like 1.7 with $N = 1$. It does not act like $10/20$: the plan's later changes
-    remove a part of $e$ as well, so the first one counts for fewer than twenty knots. A smaller $R$
-    does the same: with a hundredth of it, $R = 0.1$, one step ahead errs less than twenty steps with $R
-    = 10$, and its torque is as smooth. At $R = 0.1$ the two horizons err alike. Even here the longer
-    horizon gives nothing that another weight does not give.
+    Twenty steps give about half the error of one step, with smoother torques, which is the trend in the
+    paper. But the longer horizon only changes the relative weight of the torque. A change of torque acts at
+    all later knots. With $N = 20$ its cost counts once and its effect counts at twenty knots, so $R$ weighs
+    less: $R = 10$ acts like 1.7 with $N = 1$. It does not act like $10/20$: the plan's later changes remove
+    a part of $e$ as well, so the first change counts for fewer than twenty knots. A smaller $R$ has the
+    same effect: with a hundredth of it, $R = 0.1$, the error of one step ahead is smaller than that of
+    twenty steps with $R = 10$, and its torque is as smooth. At $R = 0.1$ the errors of the two horizons are
+    equal. Even here another weight gives the same improvement as the longer horizon.
     """,
     prediction=Value(
         "R on accelerations: the RMS error with N = 20 is how many times that with N = 1?",
@@ -114,7 +113,7 @@ REASON = Step(
             "at most",
             0.8,
             fails_with=("R_on=torque",),
-            because="deadbeat control is rough, however far it looks",
+            because="deadbeat control is rough with any horizon",
         ),
     ),
     set=("R_on=acceleration", "horizon=20"),

@@ -124,7 +124,7 @@ TEXTS = (
     Exempt("measured", (
         LESSONS + "architectures.py::test_a_base_that_stays_behind_the_hand_drives_no_farther"
     ), (
-        ("deliveries/0", "The way is shorter because the base stays behind its hand"),
+        ("deliveries/0", "The distance is shorter because the base stays behind its hand"),
         ("deliveries/1", "The ghost's base drives only a tenth farther"),
     )),
     Exempt("measured", LESSONS + "architectures.py::test_the_factor_hangs_on_the_rule", (

@@ -83,7 +83,7 @@ FOURTH_ROWS = (
     ),
     # ---------------------------------------- deadlines
     Intervention(
-        "deadlines/1", "the late hand is off by 47 mm, that of half the rate by 3.2 mm",
+        "deadlines/1", "the hand of the late loop is off by 47 mm, that of half the rate by 3.2 mm",
         HAND, (45, 49), ("T_s=0.002", "deadline_ms=2"), (3.1, 3.3), of=LATE,
     ),
     Intervention(

@@ -72,7 +72,7 @@ LIMIT_ROWS = (
     ),
     # ---------------------------------------- a-blind-arm
     Intervention(
-        "a-blind-arm/0", "so the controller compensates it",
+        "a-blind-arm/0", "so the controller compensates for this force",
         FORCE, (360, 390), ("controller=osf",), (3, 5),
     ),
     Intervention(
@@ -121,17 +121,17 @@ LIMIT_ROWS = (
     ),
     # ---------------------------------------- how-far-ahead
     Intervention(
-        "how-far-ahead/0", "a longer horizon sees the ends of the joints' ranges sooner",
+        "how-far-ahead/0", "a longer horizon includes the ends of the joints' ranges sooner",
         X, (0.56, 0.57), ("horizon=15",), (0.538, 0.547), of=("horizon=5",), on="iiwa14-circle-paper",
         seconds=4.0,
     ),
     Intervention(
-        "how-far-ahead/0", "a longer horizon sees the ends of the joints' ranges sooner",
+        "how-far-ahead/0", "a longer horizon includes the ends of the joints' ranges sooner",
         X, (0.47, 0.475), ("horizon=15",), (0.47, 0.475), of=("horizon=5", "limits.position=off"),
         on="iiwa14-circle-paper", seconds=4.0, stays=True,
     ),
     Intervention(
-        "how-far-ahead/0", "Twice the $\\bar M$ halves the error; no horizon does that.",
+        "how-far-ahead/0", "Twice the $\\bar M$ halves the error; no horizon has this effect.",
         of("error/position", "mm", "rms"), (0.75, 1.0), ("M_bar_scale=2",), (0.3, 0.55),
     ),
     Intervention(
@@ -141,7 +141,7 @@ LIMIT_ROWS = (
     ),
     # ---------------------------------------- deadlines
     Intervention(
-        "deadlines/0", "every single torque is one tick late", HAND, (3, 4), ("deadline_ms=0",), (1.2, 1.7),
+        "deadlines/0", "every torque is one tick late", HAND, (3, 4), ("deadline_ms=0",), (1.2, 1.7),
     ),
     Intervention(
         "deadlines/0", "each sequence is a control loop of half the rate",
@@ -152,7 +152,7 @@ LIMIT_ROWS = (
         (7, 15),
     ),
     Intervention(
-        "deadlines/2", "noise has twice the effect",
+        "deadlines/2", "the effect of noise doubles",
         of("delta_tau", "N·m", "rms"), (1.1, 1.6), ("M_bar_scale=1",), (0.5, 0.8),
         of=("plant.encoder_resolution_deg=0.001",), seconds=0.3,
     ),

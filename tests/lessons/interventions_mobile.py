@@ -17,7 +17,7 @@ KEPT = (0.045, 0.055)
 MOBILE_ROWS = (
     # ---------------------------------------- first-hold-then-reach
     Intervention(
-        "first-hold-then-reach/0", "the priorities decide which one may be disturbed on the way",
+        "first-hold-then-reach/0", "priorities decide which task may have an error on the way",
         EE, (0, 0.1), ("order=base,ee",), (100, 140),
     ),
     Intervention(

@@ -134,15 +134,15 @@ READER_ROWS = (
         seconds=4.0,
     ),
     Intervention(
-        "how-far-ahead/1", "it is paid for once and counts at twenty knots, so $R$ weighs less",
+        "how-far-ahead/1", "its cost counts once and its effect counts at twenty knots, so $R$ weighs less",
         HAND_RMS, (1.35, 1.6), ("horizon=1",), (2.4, 3.0),
     ),
     Intervention(
-        "how-far-ahead/1", "At $R = 0.1$ the two horizons err alike",
+        "how-far-ahead/1", "At $R = 0.1$ the errors of the two horizons are equal",
         HAND_RMS, (0.93, 1.07), ("horizon=1",), (0.93, 1.07), of=("R=0.1",), stays=True,
     ),
     Intervention(
-        "how-far-ahead/1", "one step ahead errs less than twenty steps with $R = 10$",
+        "how-far-ahead/1", "the error of one step ahead is smaller than that of twenty steps with $R = 10$",
         HAND_RMS, (1.35, 1.6), ("horizon=1", "R=0.1"), (0.93, 1.07),
     ),
     Intervention(

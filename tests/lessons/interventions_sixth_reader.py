@@ -17,8 +17,8 @@ LATE_SWING = of("v", "deg/s", "largest", 3.5, column=2)
 ENCODER = ("T_s=0.001", "deadline_ms=1", "plant.encoder_resolution_deg=0.005")
 PASSES = ("base_tolerance=0.8", "base_at_rest=false")
 SINGLE = ("architecture=single_task",)
-AT_REST = "Coming to rest alone, within 80 cm, costs as much as the whole rule"
-WITHIN = "Within 5 cm alone, at any speed, costs the ghost 8 s and the other one 12"
+AT_REST = "The condition of rest alone, within 80 cm, costs as much as the whole rule"
+WITHIN = "The condition of 5 cm alone, at any speed, costs the ghost 8 s and the other robot 12"
 NO_DELAY = ("limits.velocity_approach=0",)
 NO_ACCELERATION = ("limits.acceleration=false", "limits.jerk=false")
 THERE = partial(Intervention, "deliveries/1", measure=WORK)
@@ -105,7 +105,7 @@ SIXTH_ROWS = (
         HAND, (45, 49), ("horizon=10",), (1.45, 1.54), of=ENCODER,
     ),
     Intervention(
-        "deadlines/1", "although the torque reaches its limit there, too",
+        "deadlines/1", "although the torque reaches its limit in that case, too",
         TORQUE, (99.9, 100.1), ("horizon=10",), (99.9, 100.1), of=ENCODER, stays=True,
     ),
     # ---------------------------------------- how-strict-is-strict

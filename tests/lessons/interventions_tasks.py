@@ -37,7 +37,7 @@ TASK_ROWS = (
         of("q", "deg", "range", column=2), (28.5, 29.5), ("tasks.posture.K_p=[0,0,56.2,0,0,0,0]",), (53, 61),
     ),
     Intervention(
-        "a-redundant-arm/2", "the hand tilts, which no level forbids",
+        "a-redundant-arm/2", "the hand tilts, because no level holds its orientation",
         TILT, (15, 17), ("levels.orientation.enabled=true",), (0, 0.1),
     ),
     # ---------------------------------------- one-task

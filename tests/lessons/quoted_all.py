@@ -138,7 +138,7 @@ QUOTED = (
         16.5,
         ("limits.velocity_approach=0",),
     ),
-    Quoted("how-far-ahead/0", "Nothing happens", _ratio(HAND, "rms"), 0.98, 1.02),
+    Quoted("how-far-ahead/0", "The error does not change", _ratio(HAND, "rms"), 0.98, 1.02),
     Quoted(
         "how-far-ahead/0",
         "Twice the $\\bar M$ halves the error",
@@ -149,9 +149,13 @@ QUOTED = (
     ),
     Quoted("how-far-ahead/1", "about half the error", _ratio(HAND, "rms"), 0.4, 0.6),
     Quoted("deadlines/0", "The error more than doubles", _ratio(HAND), 2.0, 2.5),
-    Quoted("deadlines/1", "The same error", _ratio(HAND), 0.95, 1.05),
+    Quoted("deadlines/1", "The error is the same", _ratio(HAND), 0.95, 1.05),
     Quoted(
-        "deadlines/2", "errs as little as the one in time, to the third digit", _ratio(HAND), 0.995, 1.005
+        "deadlines/2",
+        "as small as that of the controller in time, to the third digit",
+        _ratio(HAND),
+        0.995,
+        1.005,
     ),
     Quoted("sensors-are-coarse/0", "the motion needs 3 % of the torque limit", _of(TORQUE), 2.5, 3.5, None),
     Quoted("sensors-are-coarse/1", "a quarter of the noise", _ratio(ROUGH, "rms"), 0.22, 0.28),
@@ -197,7 +201,7 @@ QUOTED = (
         7.5,
         None,
     ),
-    Quoted("first-hold-then-reach/0", "Hundredths of a millimetre", _of(EE), 0.005, 0.1),
+    Quoted("first-hold-then-reach/0", "off by hundredths of a millimetre", _of(EE), 0.005, 0.1),
     Quoted("first-hold-then-reach/0", "the hand swings out by 12 cm", _of(EE), 115, 125, None),
     Quoted("first-hold-then-reach/1", "1.63 m before its target", _of(BASE, "mean", after=7.0), 1.625, 1.635),
     Quoted(
@@ -237,7 +241,7 @@ QUOTED = (
         0.55,
         0.667,
     ),
-    Quoted("deliveries/0", "and of the way", _ratio(WAY), 0.55, 0.667),
+    Quoted("deliveries/0", "and of its distance", _ratio(WAY), 0.55, 0.667),
     Quoted(
         "deliveries/2", "The hand is with the first person by 3 s", _of(EE, after=3.0, until=4.0), 0.0, 10.0
     ),
@@ -248,10 +252,10 @@ QUOTED = (
         10,
         20,
     ),
-    Quoted("deadlines/2", "the stability limit is where it was, between 2 and 2.5", _of(RADIUS), 0.5, 1.0),
+    Quoted("deadlines/2", "the limit of stability is where it was, between 2 and 2.5", _of(RADIUS), 0.5, 1.0),
     Quoted(
         "deadlines/2",
-        "the stability limit is where it was, between 2 and 2.5",
+        "the limit of stability is where it was, between 2 and 2.5",
         _of(RADIUS),
         1.0,
         9.0,
@@ -307,12 +311,7 @@ QUOTED = (
     ),
     Quoted("a-blind-arm/0", "grows by more than 200 N per second", _of(FORCE, "range", 1.7), 100, 130),
     Quoted(
-        "a-blind-arm/0",
-        "for an error of one centimetre it presses with 4 N",
-        _of(FORCE, "last"),
-        3.5,
-        4.5,
-        None,
+        "a-blind-arm/0", "for one centimetre of error it presses with 4 N", _of(FORCE, "last"), 3.5, 4.5, None
     ),
     Quoted("a-blind-arm/2", "its motors have nothing to push against", _of(TORQUE), 10, 20),
     Quoted("keeping-clear/1", "15 cm above a target", _of(HAND, "last"), 145, 155),
