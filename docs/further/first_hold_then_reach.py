@@ -95,7 +95,7 @@ FURTHER = Further(
             {"left": (LEFT, ".2f")},
         ),
         Question(
-            "In *Nine joints, two wishes* the base's goal is 0.5 m ahead and 0.4 m to the side. Why is this "
+            "In *Nine joints, two tasks* the base's goal is 0.5 m ahead and 0.4 m to the side. Why is this "
             "called 64 cm, and how many degrees of freedom are left over?",
             r"$\sqrt{0.5^2 + 0.4^2} = ⟨way⟩$ m. Of nine joints, three coordinates of the hand and two of "
             r"the base leave "

@@ -76,7 +76,7 @@ LIMIT_ROWS = (
         FORCE, (360, 390), ("controller=osf",), (3, 5),
     ),
     Intervention(
-        "a-blind-arm/0", "so MPC is not the cause",
+        "a-blind-arm/0", "so MPC is not to blame",
         FORCE, (360, 390), ("controller=tdeosf",), (360, 400), stays=True,
     ),
     Intervention(
