@@ -220,8 +220,8 @@ def test_the_authors_gain_is_what_makes_the_last_stretch_long() -> None:
 
 
 def test_it_is_effort_that_lets_the_hand_slip() -> None:
-    """*A person who takes the ball late*: with the paper's formulation the hand slips, and with a hundredth of the relative
-    effort it does not."""
+    """*A person who takes the ball late*: with the paper's formulation the hand slips, and with a hundredth
+    of the relative effort it does not."""
     waiting = Measure(HAND, after=5.0, until=14.0)
     assert waiting.value(of_step("deliveries", 2, "formulation=paper", duration=14.0)) > 10.0
     light = of_step("deliveries", 2, "formulation=paper", "levels.ee.Q=1000", duration=14.0)
