@@ -36,11 +36,11 @@ MOBILE_ROWS = (
     ),
 
     Intervention(
-        "how-strict-is-strict/3", "its own best plan lets the hand slip a little",
+        "how-strict-is-strict/3", "in its own best plan the hand slips a little",
         EE, (12, 20), ("velocity_effort=0.001",), (2, 9),
     ),
     Intervention(
-        "how-strict-is-strict/3", "$\\delta$ comes on top", EE, (12, 20), ("delta_m=0.001",), (2, 9),
+        "how-strict-is-strict/3", "$\\delta$ is added to it", EE, (12, 20), ("delta_m=0.001",), (2, 9),
     ),
     # ---------------------------------------- seeing-ahead
     Intervention(

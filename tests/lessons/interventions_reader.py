@@ -43,7 +43,7 @@ READER_ROWS = (
 
     # ---------------------------------------- inside-the-qp
     Intervention(
-        "inside-the-qp/0", "With equal weights it pays 12 degrees",
+        "inside-the-qp/0", "With equal weights the error is 12 degrees",
         of("error/pose", "deg", "last"), (14, 14.5), ("levels.pose.Q=200",), (11.7, 12.1),
     ),
     # ---------------------------------------- two-tasks

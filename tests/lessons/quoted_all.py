@@ -161,7 +161,13 @@ QUOTED = (
     Quoted("sensors-are-coarse/1", "a quarter of the noise", _ratio(ROUGH, "rms"), 0.22, 0.28),
     Quoted("sensors-are-coarse/1", "grows by little more than half", _ratio(HAND), 1.5, 1.65),
     Quoted("the-model-is-wrong/2", "The error grows a little", _ratio(HAND), 1.02, 1.25),
-    Quoted("inside-the-qp/0", "pays with 14 degrees", _of(Signal("error/pose", "deg"), "last"), 13.5, 14.5),
+    Quoted(
+        "inside-the-qp/0",
+        "level 2 keeps an error of 14 degrees",
+        _of(Signal("error/pose", "deg"), "last"),
+        13.5,
+        14.5,
+    ),
     Quoted("inside-the-qp/1", "10 cm off its target", _of(Signal("error/reach", "mm"), after=2.5), 95, 105),
     Quoted(
         "inside-the-qp/2",
@@ -173,7 +179,7 @@ QUOTED = (
     ),
     Quoted(
         "inside-the-qp/2",
-        "its error is no larger than with all the torque",
+        "it is no larger than with all the torque",
         _of(Signal("error/reach", "mm")),
         1.0,
         1.1,
@@ -189,7 +195,7 @@ QUOTED = (
     ),
     Quoted(
         "inside-the-qp/3",
-        "the joints give 7 degrees",
+        "the joints are off by 7 degrees",
         _of(Signal("error/pose", "deg"), "last"),
         6.5,
         7.5,
@@ -205,10 +211,12 @@ QUOTED = (
         1.625,
         1.635,
     ),
-    Quoted("how-strict-is-strict/1", "The hand uses less than a tenth of $\\delta$", _of(EE), 0.1, 1.0),
+    Quoted(
+        "how-strict-is-strict/1", "The error of the hand is less than a tenth of $\\delta$", _of(EE), 0.1, 1.0
+    ),
     Quoted(
         "how-strict-is-strict/1",
-        "with (11) in its place it is off by 3 mm",
+        "with (11) instead, the hand is off by 3 mm",
         _of(EE),
         2.5,
         3.5,
@@ -266,7 +274,7 @@ QUOTED = (
     Quoted("the-model-is-wrong/1", "here that is mostly the friction", _of(HAND), 1.0, 5.0),
     Quoted(
         "inside-the-qp/2",
-        "then level 1 pays as well",
+        "then the error of level 1 grows as well",
         _of(Signal("active/reach")),
         1,
         9,
@@ -309,6 +317,6 @@ QUOTED = (
     ),
     Quoted("a-blind-arm/2", "its motors have nothing to push against", _of(TORQUE), 10, 20),
     Quoted("keeping-clear/1", "15 cm above a target", _of(HAND, "last"), 145, 155),
-    Quoted("keeping-clear/2", "orientation gives way by 28°", _of(TILT, "last"), 27.5, 28.5),
+    Quoted("keeping-clear/2", "orientation is off by 28°", _of(TILT, "last"), 27.5, 28.5),
     Quoted("keeping-clear/3", "it stops 27 cm before its target", _of(HAND, "last"), 265, 275),
 )
