@@ -38,10 +38,7 @@ LINE = Step(
     allows are the orange line. **Level 2** (blue) has the task to keep both joints where they are. At 0.1 s
     the wrist's target moves aside by 10 cm.
     """,
-    do=(
-        "Drag the target to and fro: line, valley and both discs move as well. Pause, and step tick by "
-        "tick (T)."
-    ),
+    do=("Drag the target to and fro, and watch line, valley and discs. Pause, and step tick by tick (T)."),
     why=r"""
     The optimum of level 2 by itself is the ring "2 alone", the centre of its ellipses. Level 2 may choose
     only points on the line, and takes the point where one of its ellipses touches the line. The wrist
@@ -141,10 +138,10 @@ BOUND = Step(
     """,
     do="Reduce the torque further, to 0.1. At what time does disc 1 reach the frame, too?",
     why=r"""
-    Level 1 moves along its valley, where all points have the same cost, and its error does not grow: it is
-    no larger than with all the torque. Level 2 moves along the line only to the frame, before the point
-    where its ellipse touches the line. Such a bound is *active*. With a little more room this level's cost
-    (31) would fall by twice the bound's multiplier, per N·m. With a tenth of the torque the whole valley is
+    Level 1 moves along its valley, where other points are as good, and its error does not grow: it is no
+    larger than with all the torque. Level 2 moves along the line only to the frame, before the point where
+    its ellipse touches the line. Such a bound is *active*. With a little more room this level's cost (31)
+    would fall by twice the bound's multiplier, per N·m. With a tenth of the torque the whole valley is
     outside for a while: then the error of level 1 grows as well.
 
     A projection separates torques by priority, but it contains no bounds: the triangle leaves the frame,

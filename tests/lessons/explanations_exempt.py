@@ -84,7 +84,7 @@ TEXTS = (
         ("further/deliveries", "The ratios are 0.63 and 0.82, so"),
     )),
     Exempt("mathematics", HIMPC + "prediction.py::test_joint_predictions_equal_the_printed_system", (
-        ("no-model-needed/0", "So (13) only asks for the *change*"),
+        ("no-model-needed/0", "So (13) only contains the *change*"),
     )),
     Exempt("mathematics", LESSONS + (
         "derivations.py::test_with_links_2_and_3_in_line_any_motion_of_joint_1_moves_the_hand"

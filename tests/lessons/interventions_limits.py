@@ -158,7 +158,7 @@ LIMIT_ROWS = (
     ),
     # ---------------------------------------- sensors-are-coarse
     Intervention(
-        "sensors-are-coarse/0", "With finer encoders the noise goes in proportion.",
+        "sensors-are-coarse/0", "With finer encoders the noise decreases in proportion.",
         of("delta_tau", "N·m", "rms"), (3.2, 4.4), ("plant.encoder_resolution_deg=0.0025",), (1.6, 2.2),
     ),
     Intervention(
