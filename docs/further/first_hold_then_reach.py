@@ -10,7 +10,7 @@ from scipy.linalg import expm
 from docs.further.kit import Further, Line, Question, measured
 
 STOPS = measured("first-hold-then-reach", "The base stops more than 1.5 m before its target.")
-LEFT = measured("first-hold-then-reach", "The error of the hand is then more than 1.5 m")
+LEFT = measured("first-hold-then-reach", "The error of the hand is then")
 
 
 def _integrated(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:

@@ -45,10 +45,9 @@ OVERLAP = Step(
     The robot needs less than two thirds of the ghost's time, and of its distance. While the hand holds the
     ball out, the base already leaves for the next person, as far as the arm allows. While the base drives,
     the hand already reaches. Leaving early by itself saves 9 of the ghost's 31 seconds, reaching early 7
-    (measured with a second task that was active only at times). Both together save 11, less than the sum:
-    once the base is there, no driving is left during which the hand could reach. The distance is shorter
-    because the base stays behind its hand: the ghost's only task is the hand, so its base moves with the
-    hand.
+    (measured with a second task active only at times). Both together save 11, less than the sum: once the
+    base is there, no driving is left during which the hand could reach. The distance is shorter because the
+    base stays behind its hand: the ghost's only task is the hand, so its base moves with the hand.
     """,
     prediction=Choice(
         "The same places, the same speed of the paths. Two tasks at a time take …",

@@ -1,6 +1,6 @@
 """How strict is strict
 
-A priority that gives way by nothing at all: could any task below it ever move?
+If a task allows no deviation at all, can the tasks below it cause any motion?
 
 Minutes: 12
 You need: lesson "first-hold-then-reach"
@@ -25,26 +25,26 @@ FORMULATION = Control("formulation", "Effort", choices=("proximal", "paper"))
 PLOTS = (HAND, BASE, STEP)
 
 NOTHING = Step(
-    title="Not a hair's breadth",
+    title="No tolerance at all",
     text=r"""
-    The hand holds its place, the base is sent out of reach, 2.2 m from the hand. Level 2 must keep
-    (12), $|e_{kp}| \le |e_{kp}|^*$. The errors are curved functions of the joints; the quadratic
-    program of level 2 knows their tangents only. Its answer is a direction. A line search tries the
-    steps $\alpha = 1, \frac12, \frac14, \ldots$ in this direction until the true errors keep
+    The hand holds its place, and the base is sent out of reach, 2.2 m from the hand. Level 2 must keep
+    (12), $|e_{kp}| \le |e_{kp}|^*$. The errors are nonlinear functions of the joints; the quadratic program
+    of level 2 uses only their linearisation. Its solution is a direction. A line search tries the steps
+    $\alpha = 1, \frac12, \frac14, \ldots$ in this direction until the true errors keep
 
     $$h_i \le \delta_i \quad (13)$$
 
-    Here $\delta = 0$: the error of the hand must not exceed the smallest possible one at all.
+    Here $\delta = 0$: the error of the hand must not exceed its best at all.
     """,
     do="What is the smallest δ with which the base moves at all?",
     why=r"""
-    It does not move: with $\delta = 0$ the second task gets nothing, and the line search accepts no
-    step. Rounding errors are not what matters: with $\delta = 10^{-12}$ m it does not move either, and
-    with $10^{-6}$ m it drives 14 cm. A straight step along a tangent leaves the curve at once (given),
-    so that only tiny steps are accepted.
+    The base does not move: with $\delta = 0$ the second task has no effect, and the line search accepts no
+    step. Rounding errors are not what matters: with $\delta = 10^{-12}$ m it does not move either, and with
+    $10^{-6}$ m it drives 14 cm. A step along a tangent departs from the curve immediately (given), so that
+    only very small steps are accepted.
     """,
     prediction=Choice(
-        "δ = 0, the strictest of all hierarchies. How far does the base drive in 8 s?",
+        "The hierarchy is as strict as possible, δ = 0. How far does the base drive in 8 s?",
         (
             Option("as far as the arm allows, about 1.5 m", 0.8, 3.0),
             Option("more slowly, some decimetres", 0.05, 0.8),
@@ -79,17 +79,17 @@ NOTHING = Step(
 )
 
 LITTLE = Step(
-    title="A centimetre, if you must",
+    title="A tolerance of one centimetre",
     text=r"""
-    Now $\delta = 1$ cm: a plan of the base is accepted if it takes the hand off by no more than a
-    centimetre more than its best, at any knot of the coming second. (13) was made to put a number on
-    it: how much may the first task be compromised to improve the second?
+    Now $\delta = 1$ cm: a plan of the base is accepted if the error of the hand exceeds its best by at most
+    a centimetre, at every knot of the coming second. (13) expresses as a number how much the first task may
+    be compromised to improve the second.
     """,
-    do="Watch the hand while δ goes from 1 mm to 5 cm. Does the base get closer to its target?",
+    do="Watch the hand while you raise δ from 1 mm to 5 cm. Does the base get faster?",
     why=r"""
-    The hand uses less than a tenth of $\delta$. It is the *plan* that $\delta$ bounds at every knot,
-    not what the robot does. How much of it is used depends on how often a new plan is made. One plan for
-    every knot is best. The hand is off by
+    The error of the hand is less than a tenth of $\delta$. $\delta$ bounds the *plan* at every knot, and
+    the motion of the robot may differ from the plan. How much of $\delta$ the hand uses depends on how
+    often a new plan is made. One plan for every knot is best. The hand is off by
 
     - 0.8 mm with ten plans a second and a knot every 0.1 s, as here; 6.7 mm with one plan a second,
     2.2 mm with five, 3.5 mm with twenty, 4.3 mm with fifty;
@@ -103,7 +103,7 @@ LITTLE = Step(
     prediction=Choice(
         "The hand may be off by 1 cm. How far is it off at most?",
         (
-            Option("about 1 cm: what is allowed is used", low=8.0),
+            Option("about 1 cm: the whole tolerance is used", low=8.0),
             Option("some millimetres", 1.5, 8.0),
             Option("less than 1.5 mm", high=1.5),
         ),
@@ -117,7 +117,7 @@ LITTLE = Step(
             "at most",
             1.5,
             fails_with=("lexicographic=cost",),
-            because="with (11) in its place it is off by 3 mm",
+            because="with (11) instead, the hand is off by 3 mm",
         ),
         Claim(
             "By 6 s the base is as near as the arm allows, 35 cm from its target.",
@@ -136,29 +136,30 @@ LITTLE = Step(
 )
 
 SUM = Step(
-    title="One sum or every knot",
+    title="A bound on the sum or on every knot",
     text=r"""
-    *No worse than the best* can be said in two ways. Of the whole cost,
+    *No worse than the best* can have two meanings. One bounds the whole cost,
 
     $$\mathcal J_i(\bar x, \bar u) \le \mathcal J_i(\bar x^{i*}, \bar u^{i*}) \quad (11)$$
 
-    or of each error, (12). Every plan that keeps (12) keeps (11) as well: (12) is the stricter one.
-    Here is (11), with a $\delta$ that allows the cost of 1 cm at every knot. The ghost has (12).
+    the other bounds each error, (12). Every plan that keeps (12) keeps (11) as well: (12) is the stricter
+    one. This step uses (11), with a $\delta$ that allows the cost of 1 cm at every knot. The ghost has
+    (12).
     """,
-    do="Give (11) more δ until the base is as fast as the ghost. How far is the hand off then?",
+    do="Raise the δ of (11) until the base is as fast as the ghost. How large is the error of the hand?",
     why=r"""
-    The looser rule makes the slower robot: the line search cuts the step to a fortieth. One would
-    expect that the flat cost matters: at its best the hand's error is nearly zero, and there $\mathcal
-    J_1$, a sum of squares, has hardly a slope. We tested that. If level 1 also pays for its effort,
-    with the same $Q = 10$ (`formulation=paper` and `Q=10`), its best leaves an error and the cost has a
-    slope, but the steps are as short as before. So the missing slope is not the reason. A smaller $Q$
-    makes them longer: with $Q = 1$ they are 2.3 times as long, still far shorter than with (12). What
-    makes them so short we do not know. The paper finds the same, (12) "permitting larger step sizes",
-    and for the hand 3.07 and 3.42 mm at low and high $\delta$ against 3.24 and 6.25 mm.
+    The robot is slower with the looser rule: the line search cuts the step to a fortieth. A possible
+    explanation is the flat cost: at its best the hand's error is nearly zero, and there the slope of
+    $\mathcal J_1$, a sum of squares, is nearly zero. We tested this explanation. If level 1 also pays for
+    its effort, with the same $Q = 10$ (`formulation=paper` and `Q=10`), its best leaves an error and the
+    cost has a slope, but the steps are as short as before. So the missing slope is not the reason. A
+    smaller $Q$ makes the steps longer: with $Q = 1$ they are 2.3 times as long, still far shorter than with
+    (12). We do not know why they are so short. The paper finds the same, (12) "permitting larger step
+    sizes", and for the hand 3.07 and 3.42 mm at low and high $\delta$ against 3.24 and 6.25 mm.
 
-    In the formulation as printed (`formulation=paper`, which brings our $Q = 1$) it depends on $Q$ which
-    of the two is better for the hand, and the paper does not print $Q$. With our $Q = 1$ the hand is
-    worse off under (12). With $Q = 100$ its mean error is smaller under (12), and its largest error is
+    In the formulation as printed (`formulation=paper`, which brings our $Q = 1$) it depends on $Q$ which of
+    the two is better for the hand, and the paper does not print $Q$. With our $Q = 1$ the error of the hand
+    is larger under (12). With $Q = 100$ its mean error is smaller under (12), and its largest error is
     still larger.
     """,
     prediction=Choice(
@@ -197,29 +198,31 @@ SUM = Step(
 )
 
 EFFORT = Step(
-    title="What the best is",
+    title="What a level protects",
     text=r"""
     Each level also pays for effort,
 
     $$\mathcal J_{eff} = \tfrac12 \left\{ \lVert \bar x \rVert_{\bar S}^2 + \lVert \bar u
     \rVert_{\bar R}^2 + \lVert \Delta \bar u \rVert_{\bar W}^2 \right\} \quad (10)$$
 
-    with which $|e|^*$ is the best *compromise between error and effort*. So far the first level only
-    paid for leaving the plan it had; now it pays for all effort, as the paper prints it, and its bounds
-    are softened, as the paper does on the real robot. $Q = 10$, (12) and $\delta = 1$ cm are as before.
+    with which $|e|^*$ is the best *compromise between error and effort*. So far the cost of the first level
+    only contained the changes of its plan; now it contains all effort, as the paper prints it, and its
+    bounds are softened, as in the paper's experiments on the real robot. $Q = 10$, (12) and $\delta = 1$ cm
+    are as before.
     """,
-    do="What does our default, Q = 1, do? And a Q of 100: is the hand safe then?",
+    do="Try our default, Q = 1, and Q = 100. Is the error of the hand small with one of them?",
     why=r"""
-    The hand is off by more than $\delta$. The arm must move to hold the hand while the base drives, and
-    that now costs level 1 something: its own best plan lets the hand slip a little. (12) allows level 2
-    the same slip, $\delta$ comes on top, and the next plan starts from there. Most of this comes from
-    the cost of speed: with a thousandth of it 6 mm remain. A very large $Q$ does not protect the hand
-    either: with $Q = 1000$ it is off by 40 mm. There it is the bounds on speed: without them 5.4 mm
-    remain. A hierarchy protects what a level *asks for*. If it asks for a compromise, the hierarchy
-    protects the compromise.
+    The hand is off by more than $\delta$. The arm must move to hold the hand while the base drives, and the
+    cost of level 1 now contains this motion: in its own best plan the hand slips a little. (12) allows
+    level 2 the same slip, $\delta$ is added to it, and the next plan starts from there. Most of the error
+    is due to the cost of speed: with a thousandth of this cost 6 mm remain. A very large $Q$ does not
+    protect the hand either: with $Q = 1000$ it is off by 40 mm. With this $Q$ and without the bounds on
+    speed, 5.4 mm remain. A hierarchy protects the *cost* of a level. If this cost is a compromise, the
+    hierarchy protects the compromise.
     """,
     prediction=Choice(
-        "Same δ, same constraint (12), effort paid on both levels: the hand is off by at most …",
+        "With the same δ and constraint (12), and effort in the cost of both levels, the hand is off by at "
+        "most …",
         (
             Option("about 1 mm, as before", high=3.0),
             Option("3 to 10 mm: within δ", 3.0, 11.0),
@@ -235,20 +238,23 @@ EFFORT = Step(
             "at least",
             12.0,
             fails_with=("formulation=proximal",),
-            because="then level 1 pays for changes of its plan only, and holding the hand costs nothing",
+            because=(
+                "then the cost of level 1 contains only changes of its plan, and holding the hand costs "
+                "nothing"
+            ),
         ),
     ),
     set=("formulation=paper", "Q=10"),
     duration=8.0,
-    ghost=Ghost("paying for leaving the plan", ("formulation=proximal",)),
+    ghost=Ghost("cost on changes of the plan", ("formulation=proximal",)),
     controls=(FORMULATION, Control("Q", "Q of both levels", 0.1, 1000.0, log=True), DELTA),
     plots=PLOTS,
 )
 
 CHALLENGE = Challenge(
     text=r"""
-    (11) with $\delta = 5$ cm: the base is fast, and the hand is off by 18 mm. Keep the hand within 4
-    mm, and the base's mean error over the 8 s below 1.15 m.
+    With (11) and $\delta = 5$ cm the base is fast, and the hand is off by 18 mm. Keep the hand within 4 mm,
+    and the base's mean error over the 8 s below 1.15 m.
     """,
     goals=(
         Claim("The hand stays within 4 mm.", Measure(HAND), "at most", 4.0),

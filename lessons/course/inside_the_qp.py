@@ -1,6 +1,6 @@
 """Inside the QP
 
-One millisecond on a sheet of paper: what is asked for, what is left, and who feels which bound?
+The picture of one millisecond: what does each level ask for, what is left, and which bounds are active?
 
 Minutes: 15
 You need: lesson "torque-has-a-limit"; ellipses as the contours of a quadratic function
@@ -26,28 +26,28 @@ WEIGHT = Control("levels.reach.Q", "Q of level 1", 1.0, 1000.0, log=True)
 CONTROLLER = Control("controller", "Controller", choices=("himpc", "weighted", "osf"))
 
 LINE = Step(
-    title="A valley and a line",
+    title="Two levels in one plane",
     text=r"""
-    The picture *Inside* is one tick. With $N = 1$ the unknowns are three torque changes; joint 3
-    only holds its own angle, so all the rest happens in the plane of $\Delta\tau_1$ and
-    $\Delta\tau_2$. The red frame holds the bounds: nothing outside can be asked for.
+    The picture *Inside* shows one tick. With $N = 1$ the unknowns are three torque changes; joint 3 only
+    holds its own angle, so all the rest happens in the plane of $\Delta\tau_1$ and $\Delta\tau_2$. The red
+    frame shows the bounds: no torque change outside it is allowed.
 
-    **Level 1** (orange) wants *one* number, the wrist's $x$. One equation for two unknowns: its
-    cost (31) is a long valley, and its optimum the disc 1 ($R$ picks the one nearest to no change
-    at all). **(33)** says: whatever comes below must not touch this. What it leaves is the orange
-    line. **Level 2** (blue) wants both joints to stay where they are. At 0.1 s the wrist's target
-    moves aside by 10 cm.
+    **Level 1** (orange) has a target for *one* number, the wrist's $x$. This gives one equation for two
+    unknowns: its cost (31) is a long valley, and its optimum is the disc 1 ($R$ selects the optimum nearest
+    to no change at all). **(33)** requires that the levels below keep this result. The points that (33)
+    allows are the orange line. **Level 2** (blue) has the task to keep both joints where they are. At 0.1 s
+    the wrist's target moves aside by 10 cm.
     """,
-    do="Drag the target to and fro: line, valley and both discs move along. Pause, and go tick by tick (T).",
+    do=("Drag the target to and fro, and watch line, valley and discs. Pause, and step tick by tick (T)."),
     why=r"""
-    Blue would like to be at the ring "2 alone", the middle of its ellipses. It may only choose on
-    the line, and takes the point where one of its ellipses just touches it. The wrist arrives, and the
-    joints stay 14 degrees off: on the line there is no better point by the weights of level 2, which
-    count joint 1 four times as much as joint 2. With equal weights they stay 12 degrees off. At rest
-    both discs lie at zero, "leave the torque as it is", and the ring stays outside.
+    The optimum of level 2 by itself is the ring "2 alone", the centre of its ellipses. Level 2 may choose
+    only points on the line, and takes the point where one of its ellipses touches the line. The wrist
+    arrives, and level 2 keeps an error of 14 degrees: the line contains no better point by the weights of
+    level 2, which count joint 1 four times as much as joint 2. With equal weights the error is 12 degrees.
+    At rest both discs lie at zero, which means no change of torque, and the ring stays outside.
     """,
     prediction=Choice(
-        "The wrist goes 10 cm aside, and both joints want to stay. In the end the joints are off by …",
+        "The wrist goes 10 cm aside, and both joints should stay. In the end the joints are off by …",
         (
             Option("nothing: three joints are enough for all", high=1.0),
             Option("10° to 20°, and the wrist is on its target", 10.0, 20.0),
@@ -63,15 +63,15 @@ LINE = Step(
             "at most",
             0.01,
             fails_with=("controller=weighted",),
-            because="one cost for all has no line, only a compromise",
+            because="one cost for all tasks gives only a compromise",
         ),
         Claim(
-            "Level 2 is more than 10° away from what it wants.",
+            "The joints of level 2 are more than 10° away from their targets.",
             Measure(JOINTS, "last"),
             "at least",
             10.0,
             fails_with=("order=pose,reach,wrist",),
-            because="then it has the higher priority",
+            because="then this level has the higher priority",
         ),
     ),
     events=(ASIDE,),
@@ -82,18 +82,18 @@ LINE = Step(
 SWAP = Step(
     title="Swap the levels",
     text=r"""
-    The same again, but at 1.2 s the two levels change places: blue becomes level 1. It wants *two*
-    numbers, so look at what (33) can leave of a plane then.
+    The start is the same, but at 1.2 s the two levels change places: the blue level becomes level 1. It has
+    targets for *two* numbers, so look at the part of the plane that (33) then allows.
     """,
-    do="Swap them back and forth while you watch the line come and go.",
+    do="Swap the levels back and forth, and watch the line appear and disappear.",
     why=r"""
-    Two equations for two unknowns leave a point. The line is gone, disc 1 sits in the middle of the
-    blue ellipses, and the orange valley has to take what is there: the wrist goes all the way back,
-    10 cm off its target, though it is *wanted* as much as before. Same costs, same numbers, another
-    order: only the roles have changed.
+    Two equations for two unknowns leave one point. The line is gone, disc 1 lies in the middle of the blue
+    ellipses, and the orange level must use this point: the wrist goes all the way back, 10 cm off its
+    target, though its task has the same weight as before. The costs and the numbers are the same, and only
+    the order has changed.
     """,
     prediction=Choice(
-        "The wrist is on its target when its level becomes the second. A second later it is …",
+        "The wrist is on its target when its level becomes the second. One second later the wrist is …",
         (
             Option("still there: nobody has moved the target", high=10.0),
             Option("half way back", 10.0, 80.0),
@@ -127,26 +127,26 @@ SWAP = Step(
 )
 
 BOUND = Step(
-    title="A torque bound cuts",
+    title="A torque bound",
     text=r"""
-    Now the motors give a quarter of their torque. At every tick $\Delta\tau$ may only be what is
-    left up to the limit, so a side of the red frame says *torque* and comes close to zero while the
-    arm speeds up. The box cuts the line: what is left of it is the thick part.
+    Now the motors give a quarter of their torque. At every tick $\Delta\tau$ is limited by the distance
+    from the torque to its limit, so a side of the red frame says *torque* and comes close to zero while the
+    arm speeds up. The frame cuts the line: the thick part is inside the frame.
 
-    The red triangle is what OSF would ask for in the same tick: projection instead of (33), the
-    same order of tasks, no bounds at all. The ghost is OSF, and *its* motors give whatever is asked.
+    The red triangle is the torque change that OSF demands in the same tick, with projection instead of
+    (33), the same order of tasks, and no bounds at all. The ghost is OSF, and *its* motors give any torque.
     """,
-    do="Make the torque scarcer, to 0.1: from when on does the disc 1 hit the frame, too?",
+    do="Reduce the torque further, to 0.1. At what time does disc 1 reach the frame, too?",
     why=r"""
-    Level 1 moves along its valley, where other points are as good, and loses nothing: its error is
-    no larger than with all the torque. Level 2 slides along the line until the frame stops it, short
-    of the point where its ellipse would touch. Such a bound is *active*. With a little more room this
-    level's cost (31) would fall by twice the bound's multiplier, per N·m. With a tenth of the torque
-    the whole valley is outside for a while: then level 1 pays as well.
+    Level 1 moves along its valley, where other points are as good, and its error does not grow: it is no
+    larger than with all the torque. Level 2 moves along the line only to the frame, before the point where
+    its ellipse touches the line. Such a bound is *active*. With a little more room this level's cost (31)
+    would fall by twice the bound's multiplier, per N·m. With a tenth of the torque the whole valley is
+    outside for a while: then the error of level 1 grows as well.
 
-    A projection splits torques by priority; that a torque must also be *possible* is no part of it:
-    the triangle leaves the box, here by a third of the limit. A real motor would clip its torque joint
-    by joint, and the clipped torques no longer lie on the orange line: they change what level 1 decided.
+    A projection separates torques by priority, but it contains no bounds: the triangle leaves the frame,
+    here by a third of the limit. Real motors would clip their torques joint by joint, and the clipped
+    torques no longer lie on the orange line: they change the result of level 1.
     """,
     prediction=Choice(
         "With all of the torque the wrist is never more than 1.1 mm off. With a quarter of it …",
@@ -168,7 +168,7 @@ BOUND = Step(
             because="then the torque is not enough even for level 1",
         ),
         Claim(
-            "At some tick a bound is active at level 2.",
+            "A bound is active at level 2 in at least one tick.",
             Measure(ACTIVE_2),
             "at least",
             1.0,
@@ -176,7 +176,7 @@ BOUND = Step(
             because="then the torque is never at its bound",
         ),
         Claim(
-            "No more than the limit is ever asked for.",
+            "The demanded torque never exceeds the limit.",
             Measure(TORQUE),
             "at most",
             100.001,
@@ -195,19 +195,19 @@ BOUND = Step(
 SUM = Step(
     title="One cost for all",
     text=r"""
-    The violet diamond is the optimum of *one* cost, the sum of all levels': no line, no order. The
-    ghost moves that way. How strict the line is can be measured: the leak is what lower levels
-    change about a higher one, $\lVert J_p \bar M^{-1} (\Delta\tau_i - \Delta\tau_p) \rVert$, in
-    m/s². By (33) it should be zero.
+    The violet diamond is the optimum of *one* cost, the sum of the costs of all levels, without a line and
+    without an order. The ghost uses this sum. The strictness of the order can be measured: the leak is the
+    effect of lower levels on a higher one, $\lVert J_p \bar M^{-1} (\Delta\tau_i - \Delta\tau_p) \rVert$,
+    in m/s². By (33) it should be zero.
     """,
-    do="Give level 1 a larger Q, and watch the diamond come nearer to the line; it never gets there.",
+    do="Give level 1 a larger Q, and watch the diamond come nearer to the line; it never reaches the line.",
     why=r"""
-    The diamond lies between the valley and the ring, where the slopes of the two costs cancel. In the
-    end the wrist is left 5 cm short of its 10 cm, and the joints give 7 degrees of the 14 that a strict
-    order costs them: half of each. The disc 2 never leaves the line: nothing leaks, up to rounding.
-    It is the line of $\bar M$, though. With the true $M$ a leak remains, which the second meter shows:
-    $\bar M$ is not the arm's true inertia. Time-delay estimation notices it at the next tick and
-    corrects it over tens of ticks.
+    The diamond lies between the valley and the ring, where the slopes of the two costs cancel. In the end
+    the wrist is left 5 cm short of its 10 cm, and the joints are off by 7 degrees instead of the 14 of a
+    strict order: half of each. The disc 2 never leaves the line: the leak is zero, up to rounding. But this
+    line is computed with $\bar M$. With the true $M$ a leak remains, which the second meter shows: $\bar M$
+    is not the arm's true inertia. Time-delay estimation measures the leak at the next tick and corrects it
+    over tens of ticks.
     """,
     prediction=Choice(
         "With the arm's true inertia instead of M̄, the leak of the same torques is …",
@@ -228,7 +228,7 @@ SUM = Step(
             because="then both robots have the same settings",
         ),
         Claim(
-            "In the controller's own terms nothing leaks: less than 10⁻⁹ m/s².",
+            "In the model of the controller the leak is less than 10⁻⁹ m/s².",
             Measure(LEAK),
             "at most",
             1e-9,
@@ -236,7 +236,7 @@ SUM = Step(
             because="in a weighted sum every task changes the results of all others",
         ),
         Claim(
-            "In the arm's terms there is a leak, more than 10⁻³ m/s².",
+            "With the inertia of the arm the leak is more than 10⁻³ m/s².",
             Measure(TRUE_LEAK),
             "at least",
             1e-3,
@@ -244,7 +244,7 @@ SUM = Step(
             because="OSF with the arm's exact inertia projects with the true M",
         ),
         Claim(
-            "Of what leaks, more than 85 % are left a millisecond later.",
+            "More than 85 % of the leak are left a millisecond later.",
             Measure(Signal("gauge_radius"), "mean"),
             "at least",
             0.85,

@@ -43,14 +43,14 @@ BELOW = Step(
     The hand is sent 1 cm into the table again. Level 2 is a task that keeps the hand's distance from
     the table's surface, $x = n^\top p - d$. Level 1 is the hand's position.
     """,
-    do="Before you read on: put the distance first. Which level is not satisfied now?",
+    do="Before you read on: put the distance first. Which task is not met now?",
     why=r"""
-    Level 2 is not satisfied. The position fixes the hand's height, so nothing is left for the distance,
-    and the arm presses on the table as if there were no task of a distance. A task that ranks below
-    another one protects nothing.
+    Level 2 has no effect. The position fixes the hand's height, so nothing is left for the distance, and
+    the arm presses on the table as if there were no task of a distance. A task does not protect against a
+    task of higher priority.
     """,
     prediction=Choice(
-        "The distance is the task right below the hand's position. At the end the table is pressed with …",
+        "The task of the distance ranks right below the hand's position. At the end the arm presses with …",
         (
             Option("nothing: the hand stops above it", high=1.0),
             Option("less than without that task", 1.0, 200.0),
@@ -61,7 +61,7 @@ BELOW = Step(
     ),
     claims=(
         Claim(
-            "At the end the table is pressed with more than 200 N.",
+            "At the end the arm presses on the table with more than 200 N.",
             Measure(FORCE, "last"),
             "at least",
             200.0,
@@ -77,17 +77,16 @@ BELOW = Step(
 )
 
 FIRST_TASK = Step(
-    title="A task on top",
+    title="The task ranks first",
     text=r"""
-    Now the distance is level 1, and the hand's target is moved to 5 cm above the table: a place where
-    nothing is touched. A task asks for equality, $x = x_d$, and this one holds the 20 cm of the start.
+    Now the distance is level 1, and the hand's target is moved to 5 cm above the table: a place where the
+    arm touches nothing. A task requires an equality, $x = x_d$, and this task holds the 20 cm of the start.
     """,
-    do="Drag the target sideways, then up. What may the hand still do?",
+    do="Drag the target sideways, then up. In which directions can the hand still move?",
     why=r"""
-    The hand stays where it is, 15 cm above a target that is perfectly safe. What was meant is an
-    inequality, a distance of at least so much. A task takes away the whole direction, also where there
-    is room. It also holds the distance of one frame from one plane only: it does not contain the elbow
-    and the post.
+    The hand stays where it is, 15 cm above a target that is safe. The requirement is an inequality, a
+    minimum distance. A task fixes the whole direction, even where there is enough distance. A task also
+    holds only the distance of one frame from one plane: it does not include the elbow and the post.
     """,
     claims=(
         Claim(
@@ -96,7 +95,7 @@ FIRST_TASK = Step(
             "at least",
             140.0,
             fails_with=("order=position,distance,orientation,posture",),
-            because="then the hand goes there, and touches nothing",
+            because="then the hand goes to the target, and touches nothing",
         ),
         Claim(
             "The distance is kept to 1 mm.",
@@ -117,22 +116,23 @@ FIRST_TASK = Step(
 INSIDE = Step(
     title="Above all levels",
     text=r"""
-    A distance $d$ between any two links, or a link and an object, becomes a row beside those of torque
-    and speed. It bounds how fast $d$ may shrink,
+    For a distance $d$ between any two links, or a link and an object, the controller adds a row to those of
+    torque and speed. The row bounds how fast $d$ may shrink,
 
     $$\nabla d^\top \dot q_{k+j} \ge -a\left(-t + \sqrt{t^2 + 2\,(d - d_s)/a}\right),$$
 
-    the speed from which one can still stop. The seven pairs that could reach $d_s$ first have rows, and each
-    level is solved under them. The hand is sent to the other side of the post, and the elbow has to pass it.
+    to the speed from which the arm can still stop. The seven pairs that could reach $d_s$ first have rows,
+    and each level is solved under these rows. The hand is sent to the other side of the post, and the elbow
+    has to pass it.
     """,
-    do="Open the list of active bounds: which links meet what? Then put the orientation first.",
+    do="Open the list of active bounds: which pairs are at their bound? Then put the orientation first.",
     why=r"""
-    The bound is shared by all levels, and the order decides who pays for it. The hand comes first: its
-    target is reached, and the hand's orientation gives way by 28°. With the orientation first it is the
-    other way round: then the hand stays 6 cm away. Where there is room, no level loses anything.
+    The bound applies to all levels, and the order decides which task has an error. The hand comes first:
+    its target is reached, and the hand's orientation is off by 28°. With the orientation first the position
+    has the error: then the hand stays 6 cm away. Where the bound is not active, no task has an error.
     """,
     prediction=Choice(
-        "The straight way is blocked by the post. At the end the hand …",
+        "The post blocks the straight way. At the end the hand …",
         (
             Option("waits far before its target", low=50.0),
             Option("has come near its target", 5.0, 50.0),
@@ -156,15 +156,15 @@ INSIDE = Step(
             "at most",
             5.0,
             fails_with=("controller=himpc_filtered",),
-            because="a filter behind the levels does not know that the hand comes first",
+            because="a filter behind the levels does not use the order of the tasks",
         ),
         Claim(
-            "The orientation gives way by more than 20°.",
+            "The orientation is off by more than 20°.",
             Measure(TILT, "last"),
             "at least",
             20.0,
             fails_with=("order=orientation,position,posture",),
-            because="then the position gives way",
+            because="then the position has the error",
         ),
     ),
     set=("avoidance.on=true",),
@@ -180,8 +180,8 @@ INSIDE = Step(
 BEHIND = Step(
     title="Behind all levels",
     text=r"""
-    Many robots get a safety filter instead: the controller knows no distance. Behind it a QP changes its
-    torque as little as possible,
+    Many robots have a safety filter instead: the controller itself uses no distances. Behind the controller
+    a QP changes its torque as little as possible,
 
     $$\min_\tau \lVert \bar M^{-1} (\tau - \tau_{\mathrm{nom}}) \rVert^2,$$
 
@@ -190,15 +190,15 @@ BEHIND = Step(
     """,
     do="Switch off the orientation and the posture. How near does the hand come now?",
     why=r"""
-    The filter is as safe: nothing is touched. But it does not know who comes first. Orientation and
-    posture pull the elbow towards the post, the filter takes the sum of all pulls and changes it as
-    little as it can, and the hand loses: it stops 27 cm before its target. That is the lower levels'
-    doing: with both of them switched off the hand is 5 cm away by then, and comes closer. One of them
-    is enough to hold it back: without the posture alone 23 cm are left, without the orientation alone
-    19 cm. An order that is decided before the bounds are known does not hold.
+    The filter is as safe: the arm touches nothing. But the filter does not use the order of the tasks. The
+    tasks of orientation and posture move the elbow towards the post, the filter changes the sum of all
+    torques as little as possible, and the hand has the error: it stops 27 cm before its target. The lower
+    levels are to blame: with both of them switched off the hand is 5 cm away by then, and comes closer. One
+    of them is enough to hold it back: without the posture alone 23 cm are left, without the orientation
+    alone 19 cm. An order of tasks does not hold if the bounds are applied after it.
     """,
     prediction=Choice(
-        "The same rows, but behind the levels. At the end the hand …",
+        "The rows are the same, but behind the levels. At the end the hand …",
         (
             Option("is at its target, as the ghost's", high=5.0),
             Option("is a few centimetres away", 5.0, 100.0),
@@ -225,12 +225,12 @@ BEHIND = Step(
             because="inside the hierarchy the hand comes first",
         ),
         Claim(
-            "What changes the torque leaks into higher levels, with more than 1 m/s².",
+            "The filter's change of the torque changes higher levels by more than 1 m/s².",
             Measure(LEAK),
             "at least",
             1.0,
             fails_with=("controller=himpc",),
-            because="there each level leaves those above as they are (33)",
+            because="there no level changes the levels above it (33)",
         ),
     ),
     set=("avoidance.on=true", "controller=himpc_filtered"),

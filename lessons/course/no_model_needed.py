@@ -1,6 +1,6 @@
 """No model needed
 
-The robot lifts a weight nobody told it of: does the hand sag?
+The robot lifts a weight that its controller does not know: does the hand sag?
 
 Minutes: 12
 You need: lesson "one-task"; mass times acceleration is force
@@ -25,23 +25,24 @@ M_BAR = Control("M_bar_scale", "M̄, factor", 0.1, 40.0, log=True)
 LOAD = Step(
     title="Pick up a kilogram",
     text=r"""
-    At 0.2 s one kilogram hangs at the hand. The controller is not told. It has no identified model,
-    only one number in kg·m² per joint, $\bar M$; all it does not know is collected in one term (6),
+    At 0.2 s one kilogram is attached to the hand. The controller has no information about it. The
+    controller has no identified model, only one number in kg·m² per joint, $\bar M$. All unknown terms are
+    collected in one term (6),
 
     $$\bar M \ddot q + H_q = \tau,$$
 
-    and $H_q$ is taken to be what it was a millisecond ago (8): $H_q \approx \tau_0 - \bar M \ddot
-    q_0$, from the torque that acted and the acceleration that came of it. So (13) only asks for the
-    *change*: $\ddot x = \ddot x_0 + J \bar M^{-1} \Delta\tau$. The ghost knows the exact model of
-    the arm, but not the load.
+    and $H_q$ is estimated by its value of a millisecond ago (8): $H_q \approx \tau_0 - \bar M \ddot q_0$,
+    from the torque that acted and the acceleration that resulted. So (13) only contains the *change*:
+    $\ddot x = \ddot x_0 + J \bar M^{-1} \Delta\tau$. The ghost knows the exact model of the arm, but not
+    the load.
     """,
-    do="Hang on more weight, and take it off again.",
+    do="Attach more weight, and remove it again.",
     why=r"""
-    The hand dips by a few millimetres and comes back, to a hundredth of a millimetre. Whatever the load
-    does to the acceleration is measured, and in the next millisecond it is part of $H_q$. That ends the
-    sag. The spring of (4) then brings the hand back. Without a spring, $K_P = 0$, the hand stays 3.3 mm
-    too low. The ghost's model is exact but for the kilogram; its springs hold that, so it sags by
-    centimetres and stays there.
+    The hand dips by a few millimetres and comes back, to a hundredth of a millimetre. The effect of the
+    load on the acceleration is measured, and in the next millisecond it is part of $H_q$. That ends the
+    sag. The spring of (4) then brings the hand back. Without a spring, $K_P = 0$, the hand stays 3.3 mm too
+    low. The ghost's model is exact except for the kilogram; only its springs carry the kilogram, so it sags
+    by centimetres and stays there.
     """,
     prediction=Choice(
         "One kilogram that the controller does not know of: where is the hand 1.5 s later?",
@@ -84,9 +85,9 @@ LOAD = Step(
 SMALL = Step(
     title="M̄ too small",
     text=r"""
-    One thing must be chosen, the diagonal $\bar M$. It says how much torque a wanted acceleration
-    costs. Let it be 0.3 times what it was: the controller believes the arm to be that light, and
-    gives three tenths of the torque changes. The target moves aside by 13 cm.
+    One quantity must be chosen, the diagonal $\bar M$. It gives the torque for a wanted acceleration. Now
+    it is 0.3 times its old value: the model of the controller is that light, and its torque changes are
+    three tenths of the old ones. The target moves aside by 13 cm.
     """,
     do="Go down to 0.1, then up to 2, and watch the gauge.",
     why=r"""
@@ -113,7 +114,8 @@ SMALL = Step(
             because="then both robots have the same settings",
         ),
         Claim(
-            "The gauge stays above 0.99: less than a hundredth of the slowest error goes in a millisecond.",
+            "The gauge stays above 0.99: less than a hundredth of the slowest error is removed in a "
+            "millisecond.",
             Measure(GAUGE, "mean"),
             "at least",
             0.99,
@@ -124,22 +126,22 @@ SMALL = Step(
     set=("M_bar_scale=0.3",),
     events=MOVE,
     duration=1.2,
-    ghost=Ghost("M̄ as it was", ("M_bar_scale=1",)),
+    ghost=Ghost("the old M̄", ("M_bar_scale=1",)),
     controls=(M_BAR,),
     plots=(HAND, GAUGE),
 )
 
 FURTHER = Step(
-    title="Further than the proof",
+    title="Beyond the proof",
     text=r"""
-    Now upwards. Twice the $\bar M$ leaves 0.41 of the error; here it is four times as large. Remark 4
-    guarantees that the errors stay bounded if $\lVert I - M^{-1} \bar M \rVert < 1$. For four times
-    $\bar M$ this norm is 1.21 where the arm begins.
+    Now $\bar M$ is larger. Twice the $\bar M$ leaves 0.41 of the error; here $\bar M$ is four times as
+    large. Remark 4 guarantees that the errors stay bounded if $\lVert I - M^{-1} \bar M \rVert < 1$. For
+    four times $\bar M$ this norm is 1.21 where the arm begins.
     """,
-    do="Which of the two numbers turns upwards first on the way up from 1, norm or radius?",
+    do="Raise M̄ from 1. Which of the two numbers turns upwards first, norm or radius?",
     why=r"""
-    The error is less than a fifth, and nothing trembles. A norm below 1 is sufficient, but it is not
-    necessary: it requires that *no* error grows, not even for a single step. In the long run the
+    The error is less than a fifth, and the arm does not vibrate. A norm below 1 is sufficient, but it is
+    not necessary: it requires that *no* error grows, not even for a single step. In the long run the
     eigenvalues decide, and the largest of them is 0.94.
     """,
     claims=(
@@ -171,7 +173,7 @@ FURTHER = Step(
     set=("M_bar_scale=4",),
     events=MOVE,
     duration=0.6,
-    ghost=Ghost("M̄ as it was", ("M_bar_scale=1",)),
+    ghost=Ghost("the old M̄", ("M_bar_scale=1",)),
     controls=(M_BAR,),
     plots=(HAND, GAUGE, Signal("gauge_norm")),
 )
@@ -179,22 +181,22 @@ FURTHER = Step(
 LARGE = Step(
     title="M̄ too large",
     text=r"""
-    Four times the $\bar M$ left less than a fifth of the error, six times is better still. Now it is
-    eight times as large. For each eigenvalue $\lambda$ of $M^{-1}\bar M$ the error is multiplied by
-    $1 - \lambda$ in every step. (Remark 4 prints $1 - \bar M_i/\lambda_i(M)$; the two agree for a
-    diagonal $M$ only.)
+    Four times the $\bar M$ left less than a fifth of the error, and six times leaves even less. Now $\bar
+    M$ is eight times as large. For each eigenvalue $\lambda$ of $M^{-1}\bar M$ the error is multiplied by
+    $1 - \lambda$ in every step. (Remark 4 prints $1 - \bar M_i/\lambda_i(M)$; the two agree for a diagonal
+    $M$ only.)
     """,
-    do="Reset, go up from 4 in small steps, and read the gauge each time before you let it run.",
+    do="Reset, raise M̄ from 4 in small steps, and read the gauge each time before you run the simulation.",
     why=r"""
     The smallest $1 - \lambda$ has passed −1: each correction is more than twice too large, and every
-    millisecond the error comes back half as large again, with the opposite sign. The arm chatters,
-    takes its full torque, and is lost. At × 6 the gauge read 0.91, less than ever: the slowest
-    component had 0.91, the fastest −0.89. From there on the fastest one leads, to −1.21 at × 7. So
-    start small, go up in small steps, and stop where the gauge turns upwards: the stability limit is
-    near.
+    millisecond the error comes back half as large again, with the opposite sign. The arm chatters, reaches
+    full torque and becomes unstable. At × 6 the gauge read 0.91, its smallest value: the slowest component
+    had 0.91, the fastest −0.89. From there on the fastest component is the largest in size, up to −1.21 at
+    × 7. So start small, go up in small steps, and stop when the gauge turns upwards: there the limit of
+    stability is near.
     """,
     prediction=Choice(
-        "M̄ × 2, × 4, × 6: always better. What does × 8 do?",
+        "M̄ × 2, × 4 and × 6 were better each time. What happens at × 8?",
         (
             Option("better again, or as good", high=1.5),
             Option("a little worse", 1.5, 5.0),
@@ -218,7 +220,7 @@ LARGE = Step(
             "at least",
             1.5,
             fails_with=("M_bar_scale=6.5",),
-            because="there it has only just turned",
+            because="there the gauge has only just turned upwards",
         ),
         Claim(
             "A joint exceeds its speed limit at least threefold.",
@@ -226,7 +228,7 @@ LARGE = Step(
             "at least",
             300.0,
             fails_with=("M_bar_scale=4",),
-            because="with half of it the motion is calm, and more accurate than ever",
+            because="with half of it the motion is smooth, and more accurate than before",
         ),
     ),
     set=("M_bar_scale=8",),
@@ -239,8 +241,8 @@ LARGE = Step(
 
 CHALLENGE = Challenge(
     text=r"""
-    Three kilograms this time, and at 0.8 s the target moves aside by 13 cm. Keep the hand within 10
-    mm of it all along.
+    The load is three kilograms, and at 0.8 s the target moves aside by 13 cm. Keep the hand within 10 mm of
+    its target all the time.
     """,
     goals=(
         Claim("The hand stays within 10 mm.", Measure(HAND), "at most", 10.0),

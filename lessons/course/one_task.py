@@ -1,6 +1,6 @@
 """One task under MPC
 
-A hand is hit and let go: which curve does it come back on, and who decided that?
+A hand is pushed and released: on which curve does it return, and what determines this curve?
 
 Minutes: 10
 You need: a mass on a spring with a damper
@@ -24,23 +24,22 @@ K_P = Control("tasks.position.K_p", "K_P, 1/s²", 1.0, 400.0, log=True)
 K_V = Control("tasks.position.K_v", "K_V, 1/s", 1.0, 60.0)
 
 SPRING = Step(
-    title="A spring that is not there",
+    title="The motion of a spring",
     text=r"""
-    The arm has one task: its hand stays on the target. What *staying* means is written down as a
-    wish for the error $\tilde x = x - x_d$, equation (4) of the paper:
+    The arm has one task: its hand stays on the target. Equation (4) of the paper defines the desired motion
+    of the error $\tilde x = x - x_d$:
 
     $$\ddot{\tilde x} + K_V \dot{\tilde x} + K_P \tilde x = 0$$
 
-    A mass on a spring $K_P$ with a damper $K_V$. Here $K_P = 100$ and $K_V = 20 = 2\sqrt{K_P}$. At
-    0.1 s the forearm is pushed with 10 N for 0.2 s.
+    This is the motion of a mass on a spring $K_P$ with a damper $K_V$. Here $K_P = 100$ and $K_V = 20 =
+    2\sqrt{K_P}$. At 0.1 s the forearm is pushed with 10 N for 0.2 s.
     """,
     do="Push the arm yourself, wherever you like.",
     why=r"""
-    The push moves the hand off its target when it begins. When the push ends, the hand moves off to the
-    other side, because by then the torques had changed so as to push back. Half a second later the
-    hand is back on its target, and it has not swung: with $K_V = 2\sqrt{K_P}$ the wish is critically
-    damped. There is no spring in
-    the arm. The controller looks for torques that make (4) true.
+    When the push begins, the hand moves off its target. When the push ends, the hand moves off to the other
+    side, because by then the torques had changed so as to push back. Half a second later the hand is back
+    on its target, and it has not swung: with $K_V = 2\sqrt{K_P}$ the desired motion is critically damped.
+    There is no spring in the arm. The controller looks for torques that make (4) true.
     """,
     prediction=Sketch(
         "Draw how far the hand is from its target, in mm. The push lasts from 0.1 s to 0.3 s.",
@@ -68,14 +67,14 @@ SPRING = Step(
 DAMPER = Step(
     title="Take the damper away",
     text=r"""
-    Now $K_V = 2$, a tenth of before. Equation (4) has become a weakly damped oscillator with
-    $\omega = \sqrt{K_P} = 10$ rad/s, thus a period of 0.63 s. The arm, its motors and its links are
-    the same as before.
+    Now $K_V = 2$, a tenth of the value before. Equation (4) has become a weakly damped oscillator with
+    $\omega = \sqrt{K_P} = 10$ rad/s, thus a period of 0.63 s. The arm, its motors and its links are the
+    same as before.
     """,
     do="Look for the smallest K_V without a swing to the other side. Then double K_P and look again.",
     why=r"""
-    The hand swings like the oscillator of (4), although nothing in the arm is springy. Gains do not
-    describe torques here, they describe a motion.
+    The hand swings like the oscillator of (4), although the arm contains no spring. Here the gains describe
+    a motion, not a torque.
     """,
     claims=(
         Claim(
@@ -103,22 +102,22 @@ DAMPER = Step(
 )
 
 PRICE = Step(
-    title="The price of torque",
+    title="The weight on changes of torque",
     text=r"""
     Every millisecond the controller looks $N = 5$ steps ahead and minimises (31), summed over them:
 
     $$\lVert e \rVert_Q^2 + \lVert \Delta\tau \rVert_R^2, \qquad e = \ddot{\tilde x} + K_V
     \dot{\tilde x} + K_P \tilde x \quad (28)$$
 
-    $Q = 200$ is the price of not being on the wished curve, $R = 10$ that of *changing* the torque.
-    Now $R$ is 1000, a hundred times as much.
+    $Q = 200$ is the weight on deviations from the desired motion, $R = 10$ the weight on *changes* of the
+    torque. Now $R$ is 1000, a hundred times as much.
     """,
     do="Raise R further. From which value on can you see a difference?",
     why=r"""
-    Almost nothing happens. The torque that holds the arm costs nothing, only its change from one
-    millisecond to the next does. And a small change has a large effect: $e$ moves by $J \bar M^{-1}
-    \Delta\tau$ with $\bar M^{-1} = 30$ here, so that $Q \lVert J \bar M^{-1} \Delta\tau \rVert^2$
-    outweighs $R$ by far. Only around $R = 10^5$ both terms count alike.
+    Almost nothing happens. The torque that holds the arm costs nothing; only its change from one
+    millisecond to the next has a cost. A small change has a large effect: $e$ changes by $J \bar M^{-1}
+    \Delta\tau$ with $\bar M^{-1} = 30$ here, so that $Q \lVert J \bar M^{-1} \Delta\tau \rVert^2$ outweighs
+    $R$ by far. Only around $R = 10^5$ do both terms count equally.
     """,
     prediction=Choice(
         "R is a hundred times larger. How does the largest error of the same push change?",
@@ -152,22 +151,23 @@ PRICE = Step(
 )
 
 FREE = Step(
-    title="What nobody asks for",
+    title="A motion without a task",
     text=r"""
-    Two coordinates of the hand, three joints: one direction of motion is nobody's task. $R$ weighs
-    changes of torque, so in that direction the torque stays what it is, as long as no bound changes it.
-    A short push, 10 N for 0.2 s on the middle link, and the last level, `damping`, is switched off.
+    The hand has two coordinates and the arm three joints: no task controls the remaining direction of
+    motion. $R$ weighs changes of torque, so in that direction the torque stays what it is, as long as no
+    bound changes it. The middle link gets a short push, 10 N for 0.2 s, and the last level, `damping`, is
+    switched off.
     """,
-    do="Take the speed limits away and push again: which way does the elbow go? Then switch damping on.",
+    do="Switch the speed limits off and push again: which way does the elbow go? Then switch damping on.",
     why=r"""
-    Nothing asks that direction to stop, so the elbow still moves long after the hand is back on its
-    target. Which way it moves is decided by a bound. The push drives joint 2 to its speed limit, and
-    the torques change to hold it there. When the push ends, the part of the torques along the free
-    motion stays as it is, and it turns joint 2 round. 0.2 s later joint 2 does 80°/s the other way.
-    Without speed limits joint 2 goes on the way it was pushed, with more than 300°/s. It turns round
-    only 0.75 s after the push, where the held hand lets it go no further: the last link then lies on
-    the line from joint 1 to the hand. A last level that wants $\ddot q + K_V \dot q = 0$ brings it to
-    rest; the hand hardly notices.
+    No task stops the motion in that direction, so the elbow still moves when the hand has long been on its
+    target. A bound determines which way the elbow moves. The push drives joint 2 to its speed limit, and
+    the torques change to hold it there. When the push ends, the part of the torques along the free motion
+    stays as it is, and this part reverses joint 2. 0.2 s later joint 2 does 80°/s the other way. Without
+    speed limits joint 2 goes on in the direction of the push, with more than 300°/s. It turns round only
+    0.75 s after the push, where the held hand allows no further motion: the last link then lies on the line
+    from joint 1 to the hand. A last level with the task $\ddot q + K_V \dot q = 0$ brings the elbow to
+    rest, with hardly any effect on the hand.
     """,
     prediction=Choice(
         "The hand is held. What does the elbow do after the push?",
@@ -181,7 +181,7 @@ FREE = Step(
     ),
     claims=(
         Claim(
-            "The elbow reaches three quarters of its speed limit and more.",
+            "The elbow reaches at least three quarters of its speed limit.",
             Measure(Signal("speed share", "%")),
             "at least",
             75.0,
@@ -201,8 +201,8 @@ FREE = Step(
 
 CHALLENGE = Challenge(
     text=r"""
-    The same hit. Never let the hand get further than 3 mm from its target, and have it back within
-    0.5 mm at 0.6 s, 0.3 s after the push has ended.
+    The push is the same. Keep the hand within 3 mm of its target all the time, and bring it back within 0.5
+    mm at 0.6 s, 0.3 s after the push has ended.
     """,
     goals=(
         Claim("The hand stays within 3 mm.", Measure(HAND), "at most", 3.0),

@@ -1,6 +1,6 @@
 """Seeing ahead
 
-Eight seconds there, eight seconds back: what is it worth to know that beforehand?
+Eight seconds away, eight seconds back: what is the advantage of knowing this in advance?
 
 Minutes: 12
 You need: lesson "first-hold-then-reach"
@@ -24,20 +24,20 @@ PLOTS = (BASE, HAND, WAY)
 PAIRS = ([0.5, 0.3], [1, 1], [2, 2], [5, 2], [20, 2])
 
 EARLY = Step(
-    title="It leaves before it is told",
+    title="The base leaves before the jump",
     text=r"""
-    The hand holds its place. The base follows a square wave: from 0 to 8 s a peak that it cannot
-    reach (Part 1), from 8 to 16 s its home (Part 2). Every plan looks $N \Delta t = 1$ s ahead, and
-    the cost (8) takes each knot's own reference, $e_k = f(q_k) - r(t + k \Delta t)$: half a second
-    before the jump six of ten knots already ask for home. The ghost is the same controller, but it
-    gets two separate waypoints, one after the other, and knows nothing of the second until it comes.
+    The hand holds its place. The base follows a square wave: from 0 to 8 s a peak that it cannot reach
+    (Part 1), from 8 to 16 s its home (Part 2). Every plan looks $N \Delta t = 1$ s ahead, and the cost (8)
+    takes each knot's own reference, $e_k = f(q_k) - r(t + k \Delta t)$: half a second before the jump the
+    references of six of ten knots are already at home. The ghost is the same controller, but it receives
+    two separate waypoints, one after the other, and has no information about the second before it is due.
     """,
-    do="Let N grow from 1 to 20. When does the base set out?",
+    do="Raise N from 1 to 20. When does the base leave?",
     why=r"""
-    More than half a metre of the way back is done at 8 s. A base that leaves
-    early errs more at the end of Part 1 and less at the beginning of Part 2. Summed over all knots of
-    the plan, leaving early is cheaper. The mean error of Part 2 is about a quarter of the ghost's. The
-    hand does not notice either way: whatever level 2 foresees, (12) holds.
+    The base has done more than half a metre of the way back at 8 s. A base that leaves early has a larger
+    error at the end of Part 1 and a smaller one at the beginning of Part 2. Summed over all knots of the
+    plan, leaving early is cheaper. The mean error of Part 2 is about a quarter of the ghost's. The hand
+    stays in place in both cases: with and without preview in level 2, (12) holds.
     """,
     prediction=Choice(
         "The jump comes at 8 s. How much of the way back is done before that?",
@@ -56,7 +56,7 @@ EARLY = Step(
             "at least",
             0.4,
             fails_with=("controller=htmpc_wpt",),
-            because="without preview it does not know the next place before 8 s",
+            because="without preview the controller receives the next place only at 8 s",
         ),
         Claim(
             "In Part 2 its mean error is at most half of the ghost's.",
@@ -76,19 +76,18 @@ EARLY = Step(
 SHORT = Step(
     title="A fifth of a second",
     text=r"""
-    How far must one see? Now $N = 2$: the plan ends 0.2 s from now. Along each of its two axes the
-    base still brakes with at most 2.5 m/s², and its acceleration changes by at most 10 m/s³: from none
-    to all of it takes 0.25 s. Along each axis its top speed is 1.1 m/s, from which it needs 0.44 s and
-    more to stop.
+    How long must the horizon be? Now $N = 2$: the plan ends 0.2 s from now. Along each of its two axes the
+    base still brakes with at most 2.5 m/s², and its acceleration changes by at most 10 m/s³: from zero to
+    the largest braking it takes 0.25 s. Along each axis its top speed is 1.1 m/s, from which it needs 0.44
+    s and more to stop.
     """,
-    do="From which N on is the hand within 1 mm? Count the seconds: what takes that long to stop?",
+    do="From which N on is the hand within 1 mm? Compare this horizon with the time the base needs to stop.",
     why=r"""
-    The hand is first in the list and is off by 3 cm all the same. On its way home the base drives at
-    its top speed along both axes. The hand needs a slower base, but the plan shows that too late: by
-    then the acceleration of the base cannot change in time. Without the bound on that change the same
-    0.2 s are enough for 6 mm, with half the top speed for 4 mm; three times the acceleration hardly
-    helps. A priority decides between plans; it cannot choose a plan that nobody looked far enough to
-    make.
+    The hand ranks first, but is off by 3 cm. On its way home the base drives at its top speed along both
+    axes. The hand needs a slower base, but the plan contains this need too late: by then the acceleration
+    of the base cannot change in time. Without the bound on that change the same 0.2 s are enough for 6 mm,
+    with half the top speed for 4 mm; three times the acceleration hardly helps. A priority selects the best
+    plan within the horizon; it cannot select a plan for events beyond the horizon.
     """,
     prediction=Choice(
         "N = 2 instead of 10. The hand still ranks first. It is off by at most …",
@@ -120,26 +119,26 @@ SHORT = Step(
 NO_PLAN = Step(
     title="Without any plan",
     text=r"""
-    HTIDKC, the rival of the paper, is inverse kinematics with priorities: a wish for the velocity of
-    every point,
+    HTIDKC, the method that the paper compares with, is inverse kinematics with priorities: a desired
+    velocity for every point,
 
     $$\dot x = \dot r + K (r - x)$$
 
-    one quadratic program per level, bounds included, fifty times a second. $K = 0.5$ 1/s for the
-    hand and $0.3$ 1/s for the base, the authors' values. It sees the present instant only. The ghost
-    plans a second ahead, but from waypoints: neither of the two knows of the jump.
+    one quadratic program per level, bounds included, fifty times a second. $K = 0.5$ 1/s for the hand and
+    $0.3$ 1/s for the base, the authors' values. HTIDKC uses the present instant only. The ghost plans a
+    second ahead, but from waypoints: neither of the two has information about the jump.
     """,
-    do="Compare the two speeds: who is the faster right after a jump, who shortly before the goal?",
+    do="Compare the two speeds: which robot is faster right after a jump, and which shortly before the goal?",
     why=r"""
-    Both are surprised at 8 s, yet HTIDKC is far behind, 16 cm from home at the end where the ghost has
-    long arrived. A velocity in proportion to the error is slow at the end, and with 0.3 1/s it is slow
-    for long: without any limit on speed and acceleration it is hardly nearer home, with a gain of 2 1/s
-    it arrives. A planner has weights instead of a gain. With our $Q = 10$ it is nearly as quick as the
-    limits let it be: with half the speed limit, or a third of the acceleration, it comes home later.
-    HTIDKC does not: it never drives faster than half the limit, and comes home as late as before. With
-    $Q = 1$ and the scene's own limits it is still 22 cm away
-    at the time when $Q = 10$ has brought it home. The paper, which tuned both to do equally well in
-    Part 1, counts 42 % less error in Part 2 for HTMPC.
+    Neither of the two knows the new reference before 8 s, yet HTIDKC is far behind, 16 cm from home at the
+    end, when the ghost has long arrived. A velocity in proportion to the error is slow at the end, and with
+    0.3 1/s it is slow for long: without any limit on speed and acceleration HTIDKC is hardly nearer home,
+    with a gain of 2 1/s it arrives. A planner has weights instead of a gain. With our $Q = 10$ it is nearly
+    as quick as the limits allow: with half the speed limit, or a third of the acceleration, it comes home
+    later. HTIDKC is not limited in this way: it never drives faster than half the limit, and comes home as
+    late as before. With $Q = 1$ and the scene's own limits the planner is still 22 cm away at the time when
+    it is home with $Q = 10$. The paper, which tuned both to do equally well in Part 1, counts 42 % less
+    error in Part 2 for HTMPC.
     """,
     prediction=Value(
         "Part 2, mean error of the base: that of HTIDKC is how many times the ghost's?",
@@ -163,7 +162,7 @@ NO_PLAN = Step(
             "at least",
             3.0,
             fails_with=("controller=htmpc_wpt",),
-            because="the plan keeps the hand within a millimetre, and knows no more of the jump",
+            because="the plan keeps the hand within a millimetre, with the same information about the jump",
         ),
     ),
     set=("controller=htidkc",),
@@ -174,27 +173,25 @@ NO_PLAN = Step(
 )
 
 GAINS = Step(
-    title="Just turn the gain up",
+    title="Higher gains",
     text=r"""
-    If it is too slow, why not raise the gains? $K = 2$ 1/s for both. The ghost keeps the authors'
-    0.5 and 0.3.
+    Do higher gains make HTIDKC faster? Now $K = 2$ 1/s for both. The ghost keeps the authors' 0.5 and 0.3.
     """,
-    do="Is there a pair of gains that is good to both, hand and base? Try [5, 2] and [20, 2].",
+    do="Is there a pair of gains that is good for both hand and base? Try [5, 2] and [20, 2].",
     why=r"""
-    The base is quick now, and the hand is off by 2 cm although it ranks first. A velocity is held for
-    the 20 ms until the next one is asked for. Meanwhile base and arm move on, and velocities that kept
-    the hand in place at the beginning no longer do: the faster base and arm move, the further the hand
-    drifts. It drifts most at the edge of the arm's reach, 20 mm, where the arm's joints turn fastest.
-    It drifts nearly as far on the way home, 16 mm, where the base is at full speed. With a peak that
-    the arm can just reach the hand is off by 14 mm, with a near one by 4 mm. Asked for a hundred times
-    a second it drifts half as far. At two hundred times the hand is off by 8 mm, not 5: on the way home
-    a part of the error is due to the limits on acceleration and its change, and does not shrink with
-    the period. Without these limits 4.5 mm are left. The hand's error is brought back in proportion to
-    $K$: with 5 1/s for the hand it is off by half, with 20 1/s by 3 mm, and the base is as quick as
-    before. The limits act both ways: without those on acceleration and its change the hand is off by
-    18.5 mm, without those on speed by 28 mm, without any by 37 mm. A good pair exists, and has to be
-    found. The paper says (given, not tried here) that HTIDKC would need its parameters scheduled, where
-    one set of weights serves HTMPC in both parts.
+    The base is quick now, and the hand is off by 2 cm although it ranks first. A velocity is held for the
+    20 ms until the next one is asked for. Meanwhile base and arm move on, and velocities that kept the hand
+    in place at the beginning no longer do: the faster base and arm move, the further the hand drifts. It
+    drifts most at the edge of the arm's reach, 20 mm, where the arm's joints turn fastest. It drifts nearly
+    as far on the way home, 16 mm, where the base is at full speed. With a peak that the arm can just reach
+    the hand is off by 14 mm, with a near one by 4 mm. Asked for a hundred times a second it drifts half as
+    far. At two hundred times the hand is off by 8 mm, not 5: on the way home a part of the error is due to
+    the limits on acceleration and its change, and does not shrink with the period. Without these limits 4.5
+    mm are left. The hand's error is brought back in proportion to $K$: with 5 1/s for the hand it is off by
+    half, with 20 1/s by 3 mm, and the base is as quick as before. The limits act both ways: without those
+    on acceleration and its change the hand is off by 18.5 mm, without those on speed by 28 mm, without any
+    by 37 mm. A good pair exists, but it must be found. The paper says (given, not tried here) that HTIDKC
+    needs different parameters in the two parts, whereas one set of weights is enough for HTMPC.
     """,
     prediction=Choice(
         "Gains four and seven times as high. The largest error of the hand, in the first task, …",
@@ -221,7 +218,7 @@ GAINS = Step(
             "at least",
             10.0,
             fails_with=("gains=[0.5,0.3]",),
-            because="in 20 ms a slow base and arm take the hand less far",
+            because="in 20 ms a slow base and arm move the hand less far",
         ),
     ),
     set=("controller=htidkc", "gains=[2,2]"),

@@ -1,6 +1,6 @@
 """Sensors are coarse
 
-A sensor rounds to five thousandths of a degree: who could notice that?
+A sensor rounds to five thousandths of a degree: does this have a visible effect?
 
 Minutes: 10
 You need: lesson "no-model-needed"
@@ -27,16 +27,15 @@ COARSE = "plant.encoder_resolution_deg=0.005"
 ROUNDING = Step(
     title="Two differences",
     text=r"""
-    The encoders round to $\delta = 0.005°$: at the hand that is 0.08 mm. Velocity is the difference
-    of two positions over $T_s$, acceleration the difference of two velocities over $T_s$. One digit
-    more or less is an acceleration of $\delta / T_s^2$, and (13) answers with $\bar M\,\delta /
-    T_s^2$.
+    The encoders round to $\delta = 0.005°$: at the hand that is 0.08 mm. Velocity is the difference of two
+    positions over $T_s$, acceleration the difference of two velocities over $T_s$. A change by one digit is
+    an acceleration of $\delta / T_s^2$, and the torque change in (13) is $\bar M\,\delta / T_s^2$.
     """,
     do="Make the encoders finer until you cannot see the noise in the torque any more.",
     why=r"""
-    $\bar M \delta / T_s^2 = 0.033 \cdot 8.7 \cdot 10^{-5} / 10^{-6} = 2.9$ N·m for a single digit,
-    of the 4 N·m there are. With finer encoders the noise goes in proportion. The hand hardly moves all
-    the same. The paper finds the same limit (Table VIII) and calls it chattering.
+    $\bar M \delta / T_s^2 = 0.033 \cdot 8.7 \cdot 10^{-5} / 10^{-6} = 2.9$ N·m for a single digit, of the
+    available 4 N·m. With finer encoders the noise decreases in proportion. The hand hardly moves in spite
+    of the noise. The paper finds the same limit (Table VIII) and calls it chattering.
     """,
     prediction=Choice(
         "Without rounding the motion needs 3 % of the torque limit. With it, the largest demand is …",
@@ -58,7 +57,7 @@ ROUNDING = Step(
             because="ideal sensors give a smooth torque",
         ),
         Claim(
-            "All the same the hand stays within half a millimetre.",
+            "The hand still stays within half a millimetre.",
             Measure(HAND),
             "at most",
             0.5,
@@ -74,16 +73,17 @@ ROUNDING = Step(
 )
 
 SQUARE = Step(
-    title="A square in the way",
+    title="The square of the period",
     text=r"""
-    The digit stays as coarse as it is. The period becomes $T_s = 2$ ms instead of 1 ms; the ghost
-    keeps 1 ms. We know that a slower loop follows less well. What does it do to the noise?
+    The resolution stays the same. The period becomes $T_s = 2$ ms instead of 1 ms; the ghost keeps 1 ms. A
+    slower loop follows less well. What is its effect on the noise?
     """,
-    do="Go to 4 ms. Then try M̄ instead: which M̄ has the same effect?",
+    do="Set 4 ms. Then change M̄ instead: which factor has the same effect on the noise?",
     why=r"""
-    $\bar M \delta / T_s^2$ has the period squared: twice the time, a quarter of the noise, while
-    the error grows by little more than half. Faster is not better when sensors are coarse. $\bar M$
-    enters once: half of it leaves half of the noise, and again the error grows by little more than half.
+    $\bar M \delta / T_s^2$ contains the square of the period: twice the period gives a quarter of the
+    noise, while the error grows by little more than half. With coarse sensors a faster loop is not better.
+    $\bar M$ enters to the first power: half of it leaves half of the noise, and again the error grows by
+    little more than half.
     """,
     prediction=Value(
         "T_s twice as long: the torque changes become how many times as large?",

@@ -43,7 +43,7 @@ TEXTS = (
         ("further/no-model-needed", "That is why $\\bar M$ is raised in small steps"),
         ("stretched-out/2", "Where an experiment has two possible causes"),
         ("deadlines/2", "So let $\\bar M$ be twice as large."),
-        ("inside-the-qp/1", "It wants *two* numbers, so look"),
+        ("inside-the-qp/1", "It has targets for *two* numbers, so look"),
         ("further/deliveries", "So ask whether they were"),
         ("contributing", "Each sentence that gives a reason needs a run"),
     )),
@@ -84,7 +84,7 @@ TEXTS = (
         ("further/deliveries", "The ratios are 0.63 and 0.82, so"),
     )),
     Exempt("mathematics", HIMPC + "prediction.py::test_joint_predictions_equal_the_printed_system", (
-        ("no-model-needed/0", "So (13) only asks for the *change*"),
+        ("no-model-needed/0", "So (13) only contains the *change*"),
     )),
     Exempt("mathematics", LESSONS + (
         "derivations.py::test_with_links_2_and_3_in_line_any_motion_of_joint_1_moves_the_hand"
@@ -119,7 +119,7 @@ TEXTS = (
         ("app/panels/torque/tasks.py", "R weighs changes of torque only"),
     )),
     Exempt("measured", LESSONS + "geometry.py::test_a_torque_bound_cuts", (
-        ("inside-the-qp/2", "At every tick $\\Delta\\tau$ may only be what is left up to the limit"),
+        ("inside-the-qp/2", "At every tick $\\Delta\\tau$ is limited by the distance from the torque"),
     )),
     Exempt("measured", (
         LESSONS + "architectures.py::test_a_base_that_stays_behind_the_hand_drives_no_farther"

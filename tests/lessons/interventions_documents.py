@@ -212,7 +212,7 @@ DOCUMENT_ROWS = (
         of=("formulation=paper", "lexicographic=per_coordinate", "Q=100"),
     ),
     STRICT(
-        "how-strict-is-strict/2", "With our $Q = 1$ the hand is worse off under (12)",
+        "how-strict-is-strict/2", "With our $Q = 1$ the error of the hand is larger under (12)",
         of("error/ee", "mm", "mean"), (8, 30), ("lexicographic=cost",), (3.0, 6.0),
         of=("formulation=paper", "lexicographic=per_coordinate"),
     ),

@@ -98,11 +98,11 @@ LIMIT_ROWS = (
         FORCE, (280, 300), ("levels.distance.enabled=false",), (280, 300), stays=True,
     ),
     Intervention(
-        "keeping-clear/1", "A task takes away the whole direction",
+        "keeping-clear/1", "A task fixes the whole direction",
         AT_THE_END, (145, 150), ("levels.distance.enabled=false",), (0, 1),
     ),
     Intervention(
-        "keeping-clear/2", "the order decides who pays for it",
+        "keeping-clear/2", "the order decides which task has an error",
         TILT_AT_THE_END, (27.5, 28.5), ("order=orientation,position,posture",), (0, 0.5),
     ),
     Intervention(
@@ -111,7 +111,7 @@ LIMIT_ROWS = (
     ),
     Intervention(
         "keeping-clear/3",
-        "That is the lower levels' doing: with both of them switched off the hand is 5 cm away by then",
+        "The lower levels are to blame: with both of them switched off the hand is 5 cm away by then",
         AT_THE_END, (265, 275), ("levels.orientation.enabled=false", "levels.posture.enabled=false"),
         (45, 58),
     ),
@@ -158,7 +158,7 @@ LIMIT_ROWS = (
     ),
     # ---------------------------------------- sensors-are-coarse
     Intervention(
-        "sensors-are-coarse/0", "With finer encoders the noise goes in proportion.",
+        "sensors-are-coarse/0", "With finer encoders the noise decreases in proportion.",
         of("delta_tau", "N·m", "rms"), (3.2, 4.4), ("plant.encoder_resolution_deg=0.0025",), (1.6, 2.2),
     ),
     Intervention(
@@ -231,7 +231,7 @@ LIMIT_ROWS = (
     ),
     # ---------------------------------------- inside-the-qp
     Intervention(
-        "inside-the-qp/3", "Time-delay estimation notices it at the next tick and corrects it",
+        "inside-the-qp/3", "Time-delay estimation measures the leak at the next tick and corrects it",
         of("error/reach", "mm", "rms", 0.5), (0, 0.6), ("controller=hqp",), (1.2, 3), seconds=0.9,
     ),
     Intervention(

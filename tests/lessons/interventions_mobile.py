@@ -36,15 +36,15 @@ MOBILE_ROWS = (
     ),
 
     Intervention(
-        "how-strict-is-strict/3", "its own best plan lets the hand slip a little",
+        "how-strict-is-strict/3", "in its own best plan the hand slips a little",
         EE, (12, 20), ("velocity_effort=0.001",), (2, 9),
     ),
     Intervention(
-        "how-strict-is-strict/3", "$\\delta$ comes on top", EE, (12, 20), ("delta_m=0.001",), (2, 9),
+        "how-strict-is-strict/3", "$\\delta$ is added to it", EE, (12, 20), ("delta_m=0.001",), (2, 9),
     ),
     # ---------------------------------------- seeing-ahead
     Intervention(
-        "seeing-ahead/0", "without preview it does not know the next place before 8 s",
+        "seeing-ahead/0", "without preview the controller receives the next place only at 8 s",
         of("way of the base", "m", "range", 6.5, 8.0), (0, 0.05), ("controller=htmpc",), (0.4, 0.8),
         of=("controller=htmpc_wpt",), seconds=8.0,
     ),
@@ -61,7 +61,7 @@ MOBILE_ROWS = (
         EE, (20, 40), ("limits.acceleration_scale=3",), (20, 40), stays=True,
     ),
     Intervention(
-        "seeing-ahead/2", "without any limit on speed and acceleration it is hardly nearer home",
+        "seeing-ahead/2", "without any limit on speed and acceleration HTIDKC is hardly nearer home",
         of("error/base", "m", "mean", 15.9), (0.14, 0.17), NO_LIMITS, (0.14, 0.17), stays=True,
     ),
     Intervention(
@@ -69,7 +69,7 @@ MOBILE_ROWS = (
         of("error/base", "m", "mean", 15.9), (0.14, 0.17), ("gains=[2,2]",), (0, 0.01),
     ),
     Intervention(
-        "seeing-ahead/2", "nearly as quick as the limits let it be: with half the speed limit",
+        "seeing-ahead/2", "nearly as quick as the limits allow: with half the speed limit",
         BASE_10, (0, 0.06), ("limits.velocity_scale=0.5",), (0.4, 0.6), of=("controller=htmpc_wpt",),
     ),
     Intervention(

@@ -25,7 +25,7 @@ READER_ROWS = (
     # ---------------------------------------- one-task
     Intervention(
         "one-task/3",
-        "the part of the torques along the free motion stays as it is, and it turns joint 2 round",
+        "the part of the torques along the free motion stays as it is, and this part reverses joint 2",
         of("v", "deg/s", "mean", 0.495, 0.505, column=1), (78, 82), ("damping=true",), (-10, 10),
         seconds=0.6,
     ),
@@ -43,7 +43,7 @@ READER_ROWS = (
 
     # ---------------------------------------- inside-the-qp
     Intervention(
-        "inside-the-qp/0", "With equal weights they stay 12 degrees off",
+        "inside-the-qp/0", "With equal weights the error is 12 degrees",
         of("error/pose", "deg", "last"), (14, 14.5), ("levels.pose.Q=200",), (11.7, 12.1),
     ),
     # ---------------------------------------- two-tasks
@@ -169,7 +169,7 @@ READER_ROWS = (
         of("v", column=1), (1.095, 1.105), ("limits.velocity_scale=0.5",), (0.54, 0.56),
     ),
     Intervention(
-        "seeing-ahead/2", "With $Q = 1$ and the scene's own limits it is still 22 cm away",
+        "seeing-ahead/2", "With $Q = 1$ and the scene's own limits the planner is still 22 cm away",
         of("error/base", "m", "mean", 10.0, 10.2), (0, 0.05), ("Q=1",), (0.215, 0.23),
         of=("controller=htmpc_wpt",),
     ),

@@ -111,12 +111,12 @@ SIXTH_ROWS = (
     # ---------------------------------------- how-strict-is-strict
     Intervention(
         "how-strict-is-strict/3",
-        "Most of this comes from the cost of speed: with a thousandth of it 6 mm remain",
+        "Most of the error is due to the cost of speed: with a thousandth of this cost 6 mm remain",
         EE, (15.5, 15.9), ("velocity_effort=0.001",), (5.8, 6.1),
     ),
     Intervention(
         "how-strict-is-strict/3",
-        "with $Q = 1000$ it is off by 40 mm. There it is the bounds on speed: without them 5.4 mm remain",
+        "with $Q = 1000$ it is off by 40 mm. With this $Q$ and without the bounds on speed, 5.4 mm remain",
         EE, (39.5, 40.4), ("limits.velocity=false",), (5.35, 5.5), of=("Q=1000",), seconds=1.2,
     ),
     Intervention(

@@ -55,16 +55,18 @@ TASK_ROWS = (
         seconds=0.6,
     ),
     Intervention(
-        "one-task/3", "Without speed limits joint 2 goes on the way it was pushed, with more than 300°/s",
+        "one-task/3",
+        "Without speed limits joint 2 goes on in the direction of the push, with more than 300°/s",
         of("v", "deg/s", "mean", 0.3, 0.5, column=1), (-500, -300), ("limits.velocity=true",), (-50, 50),
         of=("limits.velocity=false",), seconds=0.6,
     ),
     Intervention(
-        "one-task/3", "Nothing asks that direction to stop",
+        "one-task/3", "No task stops the motion in that direction",
         of("speed share", "%", "largest", 1.0), (50, 101), ("damping=true",), (0, 5),
     ),
     Intervention(
-        "one-task/3", "the hand hardly notices", HAND, (1.8, 2.8), ("damping=true",), (1.8, 2.8), stays=True,
+        "one-task/3", "with hardly any effect on the hand",
+        HAND, (1.8, 2.8), ("damping=true",), (1.8, 2.8), stays=True,
     ),
     Intervention(
         "one-task/2", "The torque that holds the arm costs nothing",
@@ -73,7 +75,7 @@ TASK_ROWS = (
     ),
     # ---------------------------------------- no-model-needed
     Intervention(
-        "no-model-needed/0", "its springs hold that, so it sags by centimetres",
+        "no-model-needed/0", "only its springs carry the kilogram, so it sags by centimetres",
         of("error/position", "mm", "last"), (20, 90), ("nominal.payload_kg=1",), (0, 0.1),
         of=("controller=hqp", "plant.payload_kg=1"), seconds=0.4,
     ),

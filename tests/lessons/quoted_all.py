@@ -163,7 +163,7 @@ QUOTED = (
     Quoted("the-model-is-wrong/2", "The error grows a little", _ratio(HAND), 1.02, 1.25),
     Quoted(
         "inside-the-qp/0",
-        "the joints stay 14 degrees off",
+        "level 2 keeps an error of 14 degrees",
         _of(Signal("error/pose", "deg"), "last"),
         13.5,
         14.5,
@@ -179,7 +179,7 @@ QUOTED = (
     ),
     Quoted(
         "inside-the-qp/2",
-        "its error is no larger than with all the torque",
+        "it is no larger than with all the torque",
         _of(Signal("error/reach", "mm")),
         1.0,
         1.1,
@@ -195,7 +195,7 @@ QUOTED = (
     ),
     Quoted(
         "inside-the-qp/3",
-        "the joints give 7 degrees",
+        "the joints are off by 7 degrees",
         _of(Signal("error/pose", "deg"), "last"),
         6.5,
         7.5,
@@ -211,10 +211,12 @@ QUOTED = (
         1.625,
         1.635,
     ),
-    Quoted("how-strict-is-strict/1", "The hand uses less than a tenth of $\\delta$", _of(EE), 0.1, 1.0),
+    Quoted(
+        "how-strict-is-strict/1", "The error of the hand is less than a tenth of $\\delta$", _of(EE), 0.1, 1.0
+    ),
     Quoted(
         "how-strict-is-strict/1",
-        "with (11) in its place it is off by 3 mm",
+        "with (11) instead, the hand is off by 3 mm",
         _of(EE),
         2.5,
         3.5,
@@ -228,9 +230,15 @@ QUOTED = (
         1 / 50,
         1 / 33,
     ),
-    Quoted("seeing-ahead/0", "More than half a metre of the way back", _of(WAY, "range", 6.5, 8.0), 0.5, 0.7),
+    Quoted(
+        "seeing-ahead/0",
+        "more than half a metre of the way back at 8 s",
+        _of(WAY, "range", 6.5, 8.0),
+        0.5,
+        0.7,
+    ),
     Quoted("seeing-ahead/0", "about a quarter of the ghost's", _ratio(BASE, "mean", after=8.0), 0.2, 0.3),
-    Quoted("seeing-ahead/1", "is off by 3 cm all the same", _of(EE), 25, 35),
+    Quoted("seeing-ahead/1", "is off by 3 cm", _of(EE), 25, 35),
     Quoted("seeing-ahead/2", "16 cm from home at the end", _of(BASE, "mean", after=15.9), 0.155, 0.165),
     Quoted("seeing-ahead/2", "the plan keeps the hand within a millimetre", _of(EE), 0.1, 1.0, None),
     Quoted("seeing-ahead/3", "the hand is off by 2 cm", _of(EE), 15, 25),
@@ -272,7 +280,7 @@ QUOTED = (
     Quoted("the-model-is-wrong/1", "here that is mostly the friction", _of(HAND), 1.0, 5.0),
     Quoted(
         "inside-the-qp/2",
-        "then level 1 pays as well",
+        "then the error of level 1 grows as well",
         _of(Signal("active/reach")),
         1,
         9,
@@ -315,6 +323,6 @@ QUOTED = (
     ),
     Quoted("a-blind-arm/2", "its motors have nothing to push against", _of(TORQUE), 10, 20),
     Quoted("keeping-clear/1", "15 cm above a target", _of(HAND, "last"), 145, 155),
-    Quoted("keeping-clear/2", "orientation gives way by 28°", _of(TILT, "last"), 27.5, 28.5),
+    Quoted("keeping-clear/2", "orientation is off by 28°", _of(TILT, "last"), 27.5, 28.5),
     Quoted("keeping-clear/3", "it stops 27 cm before its target", _of(HAND, "last"), 265, 275),
 )
