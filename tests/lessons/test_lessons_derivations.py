@@ -189,7 +189,7 @@ def test_R_weighs_as_much_as_the_error_around_1e5() -> None:
     [("limits.velocity=false", True), ("damping=true", False), ("limits.velocity=true", False)],
 )
 def test_a_direction_that_is_nobodys_keeps_its_torque(change: str, kept: bool) -> None:
-    """Step *What nobody asks for*: during a push, Δτ has no component in a direction that moves no task,
+    """Step *A motion without a task*: during a push, Δτ has no component in a direction that moves no task,
     unless a bound or another level requires it."""
     lesson = load_lesson("one-task")
     assert "in that direction the torque stays what it is, as long as no bound changes it" in " ".join(
