@@ -64,7 +64,6 @@ GIVEN: dict[str, tuple[str, ...]] = {
     # Numbers of the step's own text and script.
     "a-redundant-arm/1": ("60",),
     "when-tasks-fight/2": ("2",),
-    "seeing-ahead/0": ("8",),
     "seeing-ahead/2": ("8", "0.3", "1", "42"),  # and the paper's improvement
     "seeing-ahead/3": ("20",),
     "deliveries/3": ("8", "16.5"),
