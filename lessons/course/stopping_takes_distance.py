@@ -1,6 +1,6 @@
 """Stopping takes distance
 
-A controller that looks 5 ms ahead meets the end of a joint's range: is that soon enough?
+A controller looks 5 ms ahead, and a joint reaches the end of its range: is the horizon long enough?
 
 Minutes: 10
 You need: lesson "torque-has-a-limit"; braking distance
@@ -35,30 +35,31 @@ APPROACH = Control("limits.velocity_approach", "Speed bounds closed in on at, 1/
 PRINTED = Step(
     title="Five milliseconds",
     text=r"""
-    Joint 2 may turn to 150°. Its target is put 22° beyond, and it comes at 57°/s. This arm has no end
-    stops: only the controller keeps a joint in its range. The paper bounds the predicted positions (32d),
+    Joint 2 may turn to 150°. Its target lies 22° beyond this limit, and the joint arrives at 57°/s. This
+    arm has no end stops: only the controller keeps a joint in its range. The paper bounds the predicted
+    positions (32d),
 
     $$q_{\min} \le q_{k+j+1} \le q_{\max}, \qquad j = 0 \dots N-1,$$
 
-    with $N = 5$ steps of a millisecond. In 5 ms the joint turns by 0.3°. Only there does the limit
-    first appear in the controller's problem.
+    with $N = 5$ steps of a millisecond. In 5 ms the joint turns by 0.3°. The limit affects the plan only
+    from this distance on.
     """,
-    do="Watch the torque of joint 2 at the moment it gets there.",
+    do="Watch the torque of joint 2 when the joint reaches the limit.",
     why=r"""
-    To stop from 57°/s within 0.3° takes a deceleration of about 100 rad/s². With all its torque the
-    motor gets 35 to 38 rad/s², and the joint overruns its range by 0.6°. Many of the QPs have no
-    solution, and a fallback takes over. The lack of torque explains most of the overrun: at 15°/s,
-    where 26 rad/s² are enough, the joint overruns by 0.03° only. But QPs have no solution there either,
-    because the rows on the position contradict those on how fast a speed may change: without the latter
-    (`limits.velocity_approach=0`) only seven are left. The rows on speed cost 0.07°: without them
-    it still overruns by 0.57°. With three times the torque, in the bounds and in the motors, 0.2° is
-    left, and the rows on speed cost half of that: without them 0.1° is left. The row on the position is
-    correct, but it comes too late.
+    To stop from 57°/s within 0.3° takes a deceleration of about 100 rad/s². With all its torque the motor
+    reaches 35 to 38 rad/s², and the joint overruns its range by 0.6°. Many of the QPs have no solution, and
+    a fallback takes over. The lack of torque explains most of the overrun: at 15°/s, where 26 rad/s² are
+    enough, the joint overruns by 0.03° only. But QPs have no solution in that case either, because the rows
+    on the position contradict those on the change of speed: without the latter
+    (`limits.velocity_approach=0`) only seven such QPs are left. The rows on speed add 0.07° to the overrun:
+    without them it is still 0.57°. With three times the torque, in the bounds and in the motors, 0.2° is
+    left, and the rows on speed cause half of it: without them 0.1° is left. The row on the position is
+    correct, but it takes effect too late.
     """,
     prediction=Choice(
         "The joint comes at 57°/s and the controller looks 5 ms ahead. How hard does it brake?",
         (
-            Option("gently, it saw the limit coming", high=50.0),
+            Option("gently, because the limit is in its horizon", high=50.0),
             Option("firmly", 50.0, 95.0),
             Option("with all the torque it has", low=95.0),
         ),
@@ -72,7 +73,7 @@ PRINTED = Step(
             "at least",
             100.1,
             fails_with=("limits.position=viability",),
-            because="there it starts to brake in time",
+            because="with this bound it starts to brake in time",
         ),
         Claim(
             "More than twenty QPs have no solution.",
@@ -80,7 +81,7 @@ PRINTED = Step(
             "at least",
             20.0,
             fails_with=("horizon=20",),
-            because="with 20 ms there is always one",
+            because="with 20 ms every QP has a solution",
         ),
     ),
     set=("limits.position=paper",),
@@ -96,10 +97,10 @@ LONGER = Step(
     The same rows with $N = 20$. Braking from $v$ with deceleration $a$ takes the time $v/a$ and the
     distance $v^2/2a$: at 1 rad/s and the 20 rad/s² this arm is rated for, 50 ms and 1.4°.
     """,
-    do="Raise N to 40. How far must one look to brake gently, and what does a step cost then?",
+    do="Raise N to 40. Which horizon is needed to brake gently, and how long does a step then take?",
     why=r"""
-    The joint stays within its range, just so, with full torque: 20 ms are enough for an emergency
-    stop, not for a gentle one. A horizon that sees the whole braking distance would have 50 steps.
+    The joint just stays within its range, with full torque: 20 ms are enough for an emergency stop, not for
+    a gentle one. A horizon that covers the whole braking distance has 50 steps.
     """,
     claims=(
         Claim(
@@ -111,7 +112,7 @@ LONGER = Step(
             because="5 ms are too short to stop in",
         ),
         Claim(
-            "Still it brakes with more than 90 % of its torque.",
+            "The joint still brakes with more than 90 % of its torque.",
             Measure(TORQUE),
             "at least",
             90.0,
@@ -127,38 +128,37 @@ LONGER = Step(
 )
 
 VIABLE = Step(
-    title="A speed from which one can stop",
+    title="A speed from which the joint can stop",
     text=r"""
-    Instead of the position, bound the speed by what can still be stopped, at any distance:
+    Instead of the position, bound the speed to values from which the joint can still stop, at any distance:
 
     $$\dot q \le a\left(-t + \sqrt{t^2 + 2\,(q_s - q)/a}\right)$$
 
-    A joint at that speed that goes on for a time $t$ and then brakes with $a = 20$ rad/s² stops at
-    $q_s$. Such a state is called viable: there is a future that keeps the limit. For an exact model $t
-    = T_s$ and $q_s = q_{\max}$ would do. Two things are not exact. The rows on speed delay the braking:
-    in a second the speed may change by at most 15 times its distance from its bound. So $t = T_s +
-    5/15$ s $= 0.33$ s. And our model is estimated, so that the joint brakes late and then harder than
-    with $a$. For that $q_s$ lies 0.4° before the limit; beyond $q_s$ the joint must come back, at a
-    speed of five times the excess per second. Again $N = 5$.
+    A joint at that speed that goes on for a time $t$ and then brakes with $a = 20$ rad/s² stops at $q_s$.
+    Such a state is called viable: a motion exists that keeps the limit. For an exact model $t = T_s$ and
+    $q_s = q_{\max}$ would be enough. Two things are not exact. The rows on speed delay the braking: in a
+    second the speed may change by at most 15 times its distance from its bound. So $t = T_s + 5/15$ s $=
+    0.33$ s. Our model is estimated, so that the joint brakes late and then harder than with $a$. To allow
+    for this delay, $q_s$ lies 0.4° before the limit; beyond $q_s$ the joint must come back, at a speed of
+    five times the excess per second. Again $N = 5$.
     """,
-    do="Let it close in faster, at 60 and 200 1/s. What is gained, and what happens to the torque?",
+    do="Let the speed bound close in faster, at 60 and 200 1/s. What improves, and how large is the torque?",
     why=r"""
-    Now the bound of the very next step contains the whole braking distance. At 5° before the limit $t =
-    T_s$ would allow 106°/s, $t = 0.33$ s only 13.5°/s. The arm does 18: it follows the falling bound a
-    little late. The rows on speed are the reason, not the estimate: with twice the $\bar M$ the arm
-    does 18 as well. Without the rows on speed ($t = T_s$) the estimate's lateness shows: the joint
-    brakes with 28 instead of 20 rad/s² and passes $q_s$ by 0.002°. With twice the $\bar M$ it brakes
-    with 24 rad/s². With 0.3 of the $\bar M$ it takes all the torque and passes $q_s$ by 0.03°. So 0.4°
-    are more than enough for the estimate. An even stop before the limit would never take more than 1.5
-    of the 20 rad/s², and every QP has a solution. The price is time: the joint creeps through the last
-    degrees. What a short horizon cannot see must be put into its bounds. It is this lab's default and a
-    deliberate departure
-    from (32d).
+    Now the bound on the next step already contains the whole braking distance. At 5° before the limit $t =
+    T_s$ would allow 106°/s, $t = 0.33$ s only 13.5°/s. The joint does 18: it follows the falling bound a
+    little late. The rows on speed are the reason, not the estimate: with twice the $\bar M$ the joint does
+    18 as well. Without the rows on speed ($t = T_s$) the delay of the estimate has a visible effect: the
+    joint brakes with 28 instead of 20 rad/s² and passes $q_s$ by 0.002°. With twice the $\bar M$ it brakes
+    with 24 rad/s². With 0.3 of the $\bar M$ it needs all the torque and passes $q_s$ by 0.03°. So 0.4° are
+    more than enough for the estimate. A stop before the limit with constant deceleration would never take
+    more than 1.5 of the 20 rad/s², and every QP has a solution. The disadvantage is time: the joint moves
+    slowly over the last degrees. Limits beyond a short horizon must be part of its bounds. This bound is
+    the default of this lab and a deliberate departure from (32d).
     """,
     prediction=Choice(
         "A horizon of 5 ms again, but with the bound on speed. The largest torque is …",
         (
-            Option("all there is, as before", low=95.0),
+            Option("all the available torque, as before", low=95.0),
             Option("about half", 30.0, 95.0),
             Option("less than a third", high=30.0),
         ),
@@ -183,7 +183,7 @@ VIABLE = Step(
             because="the late stop takes all of it",
         ),
         Claim(
-            "At no moment would a stop before the limit take more than 2 rad/s².",
+            "At no time would a stop before the limit take more than 2 rad/s².",
             Measure(STOP),
             "at most",
             2.0,
@@ -191,7 +191,7 @@ VIABLE = Step(
             because="with t = Tₛ it takes 16 of the 20 rad/s²",
         ),
         Claim(
-            "Within 5° of the limit no joint does more than 20°/s.",
+            "Within 5° of the limit no joint moves at more than 20°/s.",
             Measure(LATE_SPEED),
             "at most",
             20.0,
@@ -215,8 +215,8 @@ VIABLE = Step(
 
 CHALLENGE = Challenge(
     text=r"""
-    With the printed rows only: bring joint 2 to 149° and beyond without overrunning its range, and
-    brake with less than 90 % of the torque.
+    Use the printed rows only. Bring joint 2 to 149° or more without overrunning its range, and brake with
+    less than 90 % of the torque.
     """,
     goals=(
         Claim("Joint 2 gets to 149°.", Measure(JOINT_2, "last"), "at least", 149.0),

@@ -1,6 +1,6 @@
 """Stretched out
 
-A straight arm cannot push further out: does its controller know?
+A straight arm cannot move its hand further out: can its controller handle this pose?
 
 Minutes: 8
 You need: lesson "when-tasks-fight"; the rank of a matrix
@@ -20,25 +20,25 @@ CONTROLLER = Control("controller", "Controller", choices=("himpc", "osf", "osf_d
 SMOOTH = Control("smooth", "Start gently", choices=(False, True))
 
 INVERSE = Step(
-    title="The wall of reach",
+    title="The limit of reach",
     text=r"""
-    The arm starts straight, and the circle starts sideways at the very edge of its reach. All three
-    columns of $J$ are parallel there: no joint moves the hand along the arm, and $J M^{-1} J^\top$
-    loses its rank. Operational-space control needs $(J M^{-1} J^\top)^{-1}$.
+    The arm starts straight, and the circle starts sideways at the limit of its reach. All three columns of
+    $J$ are parallel there: no joint moves the hand along the arm, and $J M^{-1} J^\top$ loses its rank.
+    Operational-space control needs $(J M^{-1} J^\top)^{-1}$.
     """,
-    do="Start gently. Then try OSF with a damped inverse, TDEOSF, HQP and HIMPC.",
+    do="Start the circle gently. Then try OSF with a damped inverse, TDEOSF, HQP and HIMPC.",
     why=r"""
-    Sideways almost no torque would be enough. But a circle also bends: right after the start this one
-    asks for 0.06 m/s² along the arm, where no joint can move the hand, and the inverse magnifies that
-    many million times. Started gently, the circle asks for nothing along the arm at first, and for a
-    tenth of a second the demand is small. Then, at 0.13 s, it passes a thousand times the limit all the
-    same, for a tick or two. A damped inverse, `osf_damped`, asks for a fifth of the limit. Motors
-    cannot follow such demands: they clip them.
+    Sideways almost no torque would be enough. But the path is curved: right after the start the circle
+    demands 0.06 m/s² along the arm, where no joint can move the hand, and the inverse magnifies that many
+    million times. With a gentle start the circle demands no acceleration along the arm at first, and for a
+    tenth of a second the demanded torque is small. Then, at 0.13 s, the demand still passes a thousand
+    times the limit, for a tick or two. A damped inverse, `osf_damped`, demands a fifth of the limit. Motors
+    cannot supply torques above their limit: they clip them.
     """,
     prediction=Choice(
-        "The hand should only move sideways. How much torque does OSF ask for, at most?",
+        "The hand should only move sideways. What is the largest torque that OSF demands?",
         (
-            Option("what the motion needs, less than half of the limit", high=100.0),
+            Option("as much as the motion needs, less than half of the limit", high=100.0),
             Option("a few times the limit", 100.0, 1e4),
             Option("more than a thousand times the limit", low=1e5),
         ),
@@ -64,19 +64,19 @@ INVERSE = Step(
 REGULAR = Step(
     title="A softer question",
     text=r"""
-    HIMPC asks another question: which $\Delta\tau$ makes $Q \lVert e \rVert^2 + R \lVert
-    \Delta\tau \rVert^2$ small? Where $J$ loses a direction, the first term does not depend on it, and
-    the second makes the torque change zero there. The Hessian $\bar B^\top \bar Q \bar B + \bar R$ is
-    positive definite whatever $J$ is (Lemma 1).
+    HIMPC minimises $Q \lVert e \rVert^2 + R \lVert \Delta\tau \rVert^2$ over $\Delta\tau$. Where $J$ loses
+    a direction, the first term does not depend on the torque in this direction, and the second term makes
+    its change zero. The Hessian $\bar B^\top \bar Q \bar B + \bar R$ is positive definite whatever $J$ is
+    (Lemma 1).
     """,
-    do="Make R smaller by a factor of a million. Is it still calm?",
+    do="Make R smaller by a factor of a million. Is the torque still small?",
     why=r"""
     The torque never leaves its bounds, and after a few tenths of a second the hand is on its circle,
-    with no case distinction for singular poses. With its bounds HIMPC demands 67 % of the limit even
-    with $R = 10^{-12}$. Without bounds $R$ keeps it calm: with $R = 10^{-5}$ it then demands more than
-    a hundred times the limit. $R$ is a damping factor, too. But it damps the *change* of torque: at
-    rest it costs nothing, so it need not be small to be accurate. The ghost, with a hundred times the
-    $R$, does as well; with a million times the hand swings by centimetres and more.
+    without a special case for singular poses. With its bounds HIMPC demands 67 % of the limit even with $R
+    = 10^{-12}$. Without bounds $R$ keeps the torque small: with $R = 10^{-5}$ it then demands more than a
+    hundred times the limit. $R$ is a damping factor, too. But $R$ damps the *change* of torque: at rest its
+    cost is zero, so $R$ need not be small for accuracy. The ghost, with a hundred times the $R$, is as
+    accurate; with a million times the hand swings by centimetres and more.
     """,
     claims=(
         Claim(
@@ -111,21 +111,21 @@ REGULAR = Step(
 )
 
 BLAME = Step(
-    title="Who is to blame?",
+    title="The cause of the error",
     text=r"""
-    There was an error of some millimetres right at the start. Is the singularity the cause, or the
-    reference, which starts with a jump of its velocity to 0.08 m/s? Now the same circle starts gently,
-    at the same singular pose. The ghost starts with the jump.
+    The hand had an error of some millimetres right at the start. Does the singularity cause it, or the
+    reference, which starts with a jump of its velocity to 0.08 m/s? Now the same circle starts gently, at
+    the same singular pose. The ghost starts with the jump.
     """,
-    do="Look at 8 s: straight again, and the circles change there.",
+    do="Look at 8 s: the arm is straight again, and the circles change.",
     why=r"""
-    Nearly all of it was the jump. How far the hand then gets off is mostly decided by (4), which brings
-    it back slowly. With four times the $K_P$ and twice the $K_V$ the jump costs 1.7 mm. In a singular
-    pose HIMPC follows what can be followed. Where an experiment has two possible causes at once, it
-    does not show which one acts; so take one of them away.
+    Nearly all of the error was due to the jump. The size of this error is mostly due to the desired motion:
+    (4) returns slowly. With four times the $K_P$ and twice the $K_V$ the error after the jump is 1.7 mm. In
+    a singular pose HIMPC follows the directions that the arm can move in. Where an experiment has two
+    possible causes at once, it does not show which of them acts; so remove one of them.
     """,
     prediction=Choice(
-        "Same singular pose, gentle start. The largest error becomes …",
+        "With the same singular pose and a gentle start, the largest error becomes …",
         (
             Option("hardly smaller: the pose is the problem", low=0.7),
             Option("about half", 0.3, 0.7),

@@ -1,6 +1,6 @@
 """Swap the priorities
 
-What happens to a moving arm when its last wish becomes its first?
+What happens to a moving arm when its last level becomes its first?
 
 Minutes: 8
 You need: lesson "two-tasks"
@@ -25,22 +25,23 @@ PROMOTE = (1.2, MoveLevel("posture", 0))
 DEMOTE = (2.6, MoveLevel("posture", 2))
 
 LAST = Step(
-    title="A wish without freedom",
+    title="A task without a free motion",
     text=r"""
-    Three levels: position, then orientation, then posture. The posture's target changes: shoulder
-    25° further, elbow 20° straighter. The one motion that level 1 and 2 leave free turns the elbow
-    about the line from shoulder to wrist, and this wish has no part along it.
+    The stack has three levels: position, then orientation, then posture. The target of the posture changes:
+    shoulder 25° further, elbow 20° straighter. The one motion that levels 1 and 2 leave free turns the
+    elbow about the line from shoulder to wrist, and the change of the target has no component along this
+    motion.
     """,
-    do="Ask for a turn of joint 1 or 3 instead: that has a part in the free direction.",
+    do="Change the target of joint 1 or 3 instead: this change has a component in the free direction.",
     why=r"""
-    Nothing moves at all. Level 3 may only use torques that satisfy (33), and among those none
-    brings it nearer. In a strict hierarchy the posture's error of 32° has no weight against the levels
-    above.
+    The arm does not move at all. Level 3 may only use torques that satisfy (33), and none of these brings
+    the posture nearer to its target. In a strict hierarchy the posture's error of 32° has no effect on the
+    levels above.
     """,
     prediction=Choice(
-        "The posture asks for 32° in all, as the last level. How far does the hand move?",
+        "The target of the posture, the last level, changes by 32° in all. How far does the hand move?",
         (
-            Option("not a hair's breadth", high=0.1),
+            Option("not at all", high=0.1),
             Option("some millimetres", 0.1, 20.0),
             Option("centimetres, and it comes back", low=20.0),
         ),
@@ -54,10 +55,10 @@ LAST = Step(
             "at most",
             0.1,
             fails_with=("controller=weighted",),
-            because="in a sum 32° of posture buy centimetres of the hand",
+            because="in a weighted sum an error of 32° of the posture moves the hand by centimetres",
         ),
         Claim(
-            "The posture stays off by more than 30°.",
+            "The error of the posture stays above 30°.",
             Measure(POSTURE, "last"),
             "at least",
             30.0,
@@ -72,15 +73,15 @@ LAST = Step(
 )
 
 FIRST = Step(
-    title="First shall be last",
+    title="The last level becomes the first",
     text=r"""
-    At 1.2 s the posture becomes level 1, while the arm is under way. Only the order of the problems
-    changes; target, gains and weights stay.
+    At 1.2 s the posture becomes level 1, while the arm is moving. Only the order of the problems changes;
+    target, gains and weights stay the same.
     """,
-    do="Put the posture in the middle. Who gets what?",
+    do="Put the posture in the middle. Which tasks are met?",
     why=r"""
-    Level 1 now determines all seven joints: its error falls to a hundredth of a degree. Position and
-    orientation, which had priority an instant ago, get nothing.
+    Level 1 now determines all seven joints: the posture is reached to a hundredth of a degree. No motion is
+    left for position and orientation, which ranked first before.
     """,
     prediction=Value(
         "The posture ranks first from 1.2 s on. How far is the hand from its target at the end?",
@@ -115,15 +116,14 @@ FIRST = Step(
 BACK = Step(
     title="And back",
     text=r"""
-    At 2.6 s the old order is restored. Between the two orders lies a jump in what the controller
-    wants, but not in what it knows: $\tau_0$, $\ddot x_0$ and the last plan stay.
+    At 2.6 s the old order is restored. At this moment the targets of the controller jump, but its
+    measurements do not: $\tau_0$, $\ddot x_0$ and the last plan stay.
     """,
-    do="Swap levels as fast as you can click. Try to make the arm jump.",
+    do="Swap levels as fast as you can. Try to make the arm jump.",
     why=r"""
-    The controller computes a change $\Delta\tau$ of the torque that acts anyway (12), whatever the
-    order. The torque may still jump: by 4.7 N·m in the first millisecond. It is not the bounds that
-    keep the motion orderly: without any of them the run is nearly the same. What keeps it orderly we
-    have not tested.
+    In any order, the controller computes a change $\Delta\tau$ of the torque that acts already (12). The
+    torque may still jump: by 4.7 N·m in the first millisecond. The bounds do not explain the smooth motion:
+    without any of them the run is nearly the same. We have not tested what keeps the motion smooth.
     """,
     claims=(
         Claim(
@@ -135,7 +135,7 @@ BACK = Step(
             because="then no level has the task to bring the hand back",
         ),
         Claim(
-            "The posture has lost again: it is off by more than 30°.",
+            "The posture is off by more than 30° again.",
             Measure(POSTURE, "last"),
             "at least",
             30.0,

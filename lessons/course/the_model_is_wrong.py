@@ -1,6 +1,6 @@
 """The model is wrong
 
-If you had the exact model of an arm, would you still not use it?
+If you had the exact model of an arm, would you use it?
 
 Minutes: 10
 You need: lesson "no-model-needed"
@@ -30,18 +30,17 @@ EXACT = (
 EXACTLY = Step(
     title="If only",
     text=r"""
-    OSF computes its torque from a model, $\tau = M_n \ddot q_{ref} + N_n$. Here it is told the
-    exact masses, inertias and viscous friction, and the dry friction is taken out of the arm. Its
-    model (19) is the arm. The ghost is HIMPC, which has no model and uses what happened a millisecond
-    ago.
+    OSF computes its torque from a model, $\tau = M_n \ddot q_{ref} + N_n$. Here the model has the exact
+    masses, inertias and viscous friction, and the arm has no dry friction. The model (19) is equal to the
+    arm. The ghost is HIMPC, which has no model and uses the measurements of a millisecond ago.
     """,
-    do="Put a little dry friction back in.",
+    do="Add a little dry friction.",
     why=r"""
-    A perfect model wins by far: it knows what is going to happen, time-delay estimation only what
-    has happened. The question is how long such a model stays perfect.
+    With a perfect model the error is far smaller: the model predicts the dynamics, whereas time-delay
+    estimation measures them afterwards. The question is how long such a model stays perfect.
     """,
     prediction=Choice(
-        "Exact model against no model at all. OSF's error is …",
+        "OSF has the exact model and HIMPC has no model. OSF's error is …",
         (
             Option("much smaller than HIMPC's", high=0.2),
             Option("about the same", 0.5, 2.0),
@@ -70,16 +69,15 @@ EXACTLY = Step(
 REALITY = Step(
     title="As identified",
     text=r"""
-    Now as in a laboratory: all masses and inertias of the model are 20 % light, and it knows no
-    friction. What the model gets wrong, (24), acts like a disturbance all the time:
+    Now the model is as inexact as in a laboratory: all its masses and inertias are 20 % too light, and it
+    contains no friction. The error of the model, (24), acts like a disturbance all the time:
 
     $$\beta = J M_n^{-1} ( \tilde M \ddot q + \tilde N + \tau_d )$$
     """,
-    do="Remove the friction, then correct the masses. Which of the two errors mattered?",
+    do="Remove the friction, then correct the masses. Which of the two errors was larger?",
     why=r"""
-    The springs of (4) must hold against whatever the model does not explain; here that is mostly
-    the friction. HIMPC assumes nothing about friction: it has measured the effect of the torque of a
-    millisecond ago.
+    The springs of (4) must compensate for the forces that the model does not explain; here these are mostly
+    friction. HIMPC needs no model of friction: it measures the effect of the torque of a millisecond ago.
     """,
     prediction=Value(
         "Model 20 % light, friction unknown: how many times larger is OSF's error than HIMPC's?",
@@ -106,26 +104,27 @@ REALITY = Step(
 )
 
 HEAVIER = Step(
-    title="Half as heavy again",
+    title="Links that are 50 % heavier",
     text=r"""
-    HIMPC, and every link 50 % heavier than before. The controller is not told, and nothing is retuned;
-    $\bar M$ stays. Table V of the paper disturbs the inertias by ±20 % and finds level 1 changed by
-    about 2 % at most. The ghost has the old links.
+    The controller is HIMPC, and every link is 50 % heavier than before. The controller has no information
+    about this change, and $\bar M$ stays. Table V of the paper disturbs the inertias by ±20 % and finds
+    that level 1 changes by about 2 % at most. The ghost has the old links.
     """,
-    do="Go down to half the mass: which way do error and gauge go? Then back, M̄ up, and friction off.",
+    do=(
+        "Set half the mass: how do error and gauge change? Then reset the mass, raise M̄, and remove friction."
+    ),
     why=r"""
-    The error grows a little. Heavier links make $M^{-1}\bar M$ smaller, so corrections are slower. The
-    part of the error that comes of inertia grows by half, as the mass does. To see this part alone,
-    take the friction away. But three quarters of the error are friction's, which does not grow with the
-    mass. A larger $\bar M$ makes the whole error as small as before. Lighter links make corrections
-    faster and the error smaller. They do not lead to instability, since the inertia of the motors is
-    left: with links of a twentieth the gauge reads 0.47. It passes 1 only if the motors are lighter,
-    too, 0.01 kg·m² each. As long as $\lVert I - M^{-1}\bar M \rVert$ is below 1 errors stay bounded
-    (Remark 4). That is sufficient, not necessary: in the long run the spectral radius decides, the
-    gauge.
+    The error grows a little. Heavier links make $M^{-1}\bar M$ smaller, so corrections are slower. The part
+    of the error that is due to inertia grows by half, as the mass does. To see this part alone, remove the
+    friction. But three quarters of the error are due to friction, which does not grow with the mass. A
+    larger $\bar M$ makes the whole error as small as before. Lighter links make corrections faster and the
+    error smaller. They do not lead to instability, since the inertia of the motors is left: with links of a
+    twentieth of the mass the gauge reads 0.47. It passes 1 only if the motors are lighter, too, 0.01 kg·m²
+    each. As long as $\lVert I - M^{-1}\bar M \rVert$ is below 1 errors stay bounded (Remark 4). That is
+    sufficient, not necessary: in the long run the spectral radius decides, the gauge.
     """,
     prediction=Choice(
-        "Links 50 % heavier, not told. HIMPC's largest error grows …",
+        "The links are 50 % heavier, and HIMPC does not know it. HIMPC's largest error grows …",
         (
             Option("by half, as the mass does", 1.35, 1.65),
             Option("by less than a quarter", high=1.25),
@@ -149,7 +148,7 @@ HEAVIER = Step(
             "at most",
             1.0,
             fails_with=("M_bar_scale=4",),
-            because="for links of this weight so large an M̄ is beyond the stability limit",
+            because="for links of this weight so large an M̄ is beyond the limit of stability",
         ),
         Claim(
             "The hand stays within 0.3 mm.",
@@ -162,7 +161,7 @@ HEAVIER = Step(
     ),
     set=("plant.mass_scale=1.5", "plant.inertia_scale=1.5"),
     duration=1.5,
-    ghost=Ghost("links as they were", ("plant.mass_scale=1", "plant.inertia_scale=1")),
+    ghost=Ghost("the old links", ("plant.mass_scale=1", "plant.inertia_scale=1")),
     controls=(MASS, Control("M_bar_scale", "M̄, factor", 0.5, 4.0, log=True), CONTROLLER, FRICTION),
     plots=(HAND, Signal("gauge_radius")),
 )

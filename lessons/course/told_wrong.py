@@ -1,6 +1,6 @@
 """Told wrong
 
-A robot is told that a crate stands in its way, and it does not: what does the mistake cost?
+A robot receives a wrong report of the position of a crate: what is the effect of this error?
 
 Minutes: 10
 You need: lesson "first-hold-then-reach"
@@ -25,7 +25,7 @@ WRONG = Control("false_report", "The report is wrong for a while", choices=(Fals
 UNTIL = Control("report_end", "Right again from, s", 2.0, 12.0)
 
 NOT_THERE = Step(
-    title="A crate that is not there",
+    title="A reported crate at a wrong position",
     text=r"""
     The hand has to move along a line for 4 m: level 1. The base has a line of its own, level 2. A crate
     stands 1.4 m beside it. Every plan keeps the signed distance of each body $B$ of the robot to each
@@ -33,23 +33,23 @@ NOT_THERE = Step(
 
     $$\mathrm{sd}(B(q_k), O) \ge d_{\mathrm{safe}} \quad (7c),$$
 
-    here 5 cm. But $O$ is what a camera and a map report. From 1 s to 7 s they report the crate 1.1 m
-    away from where it is, next to the line of the base: the outline. It is low enough for the hand to
-    pass above it, and the base has to make way. Then the report is corrected.
+    here 5 cm. But a camera and a map report $O$. From 1 s to 7 s they report the crate 1.1 m away from its
+    true place, next to the line of the base: the outline shows the reported place. The crate is low enough
+    for the hand to pass above it, and the base has to make way. Then the report is corrected.
     """,
     do="Correct the report at 5 s. Then put the base first, in the tab Mission.",
     why=r"""
-    The base makes way: it leaves its line by 57 cm, and the hand stays within half a millimetre of its
-    own. The distance bounds every level, and the order says who pays for it: with the base first the hand
-    swings out by 48 cm. Nothing in the controller remembers a report. The next plan is made with the
-    crate where it is, and from 9 s on the base is within 2 cm of its line. The ghost knows the hand
-    alone. It makes way as well, but comes back only as far as its hand needs: at 12 s its base is still
-    71 cm away.
+    The base makes way: it leaves its line by 57 cm, and the hand stays within half a millimetre of its own
+    line. The distance bounds every level, and the order decides which task has an error: with the base
+    first the hand swings out by 48 cm. The controller does not store old reports. After the correction the
+    next plan uses the true place of the crate, and from 9 s on the base is within 2 cm of its line. The
+    only task of the ghost is the hand. The ghost makes way as well, but its base comes back only as far as
+    its hand needs: at 12 s its base is still 71 cm away.
     """,
     prediction=Choice(
-        "The base cannot pass where the crate is reported. The hand leaves its line by …",
+        "The base cannot pass the reported place of the crate. The hand leaves its line by …",
         (
-            Option("more than 10 cm: it sits on the base", low=100.0),
+            Option("more than 10 cm: the hand is carried by the base", low=100.0),
             Option("some millimetres or centimetres", 1.0, 100.0),
             Option("less than 1 mm", high=1.0),
         ),
@@ -79,7 +79,7 @@ NOT_THERE = Step(
             "at most",
             0.01,
             fails_with=("controller=stmpc",),
-            because="then nobody asks for the base",
+            because="then the base has no task",
         ),
         Claim(
             "The crate is never nearer than 40 cm.",
@@ -87,7 +87,7 @@ NOT_THERE = Step(
             "at least",
             400.0,
             fails_with=("obstacles.crate=[1.9,0.8,0.25]",),
-            because="then the crate itself stands near the way",
+            because="then the crate itself stands near the line",
         ),
     ),
     duration=12.0,
@@ -101,24 +101,26 @@ NOT_THERE = Step(
 )
 
 THERE = Step(
-    title="A crate that is there",
+    title="A crate that is really there",
     text=r"""
-    Now the other way round: the crate stands next to the line of the base, and until 7 s it is reported
-    1.1 m away from there. Nothing else has changed. At velocity level the simulation has no contacts: no
-    crate stops the robot, and the distance becomes negative where the two overlap.
+    Now the true and the reported place are exchanged: the crate stands next to the line of the base, and
+    until 7 s it is reported 1.1 m away from there. Everything else is the same. At velocity level the
+    simulation has no contacts: the crate does not stop the robot, and the distance becomes negative where
+    the two overlap.
     """,
-    do="How late may the report be corrected? Find the last time at which 5 cm are kept.",
+    do="How late may the correction of the report come? Find the last time with which 5 cm are kept.",
     why=r"""
-    It drives 40 cm into the crate; until 7 s its base is never more than 3 mm from its line. The bound
-    keeps clear of what is reported; what is there does not enter it. The time at which the truth
-    arrives decides. At 5 s nothing is lost: 5 cm are kept and the hand stays on its line. At 5.4 s it
-    is nearly too late: 2 cm are left. The hand swings out by 12 cm meanwhile: (7c) bounds level 1, too.
-    At 5.6 s it is too late: the robot overlaps the crate by 7 cm. A larger margin helps against small
-    errors of a report. The authors of HTMPC keep a map instead, and infer with Bayes' rule from what is
-    seen which objects still stand where the map has them (given, not measured here).
+    The robot drives 40 cm into the crate; until 7 s its base is never more than 3 mm from its line. The
+    bound keeps a distance from the reported crate; the true crate is no part of it. The time of the
+    correction is decisive. A correction at 5 s is early enough: 5 cm are kept and the hand stays on its
+    line. A correction at 5.4 s is nearly too late: 2 cm are left. The hand swings out by 12 cm meanwhile:
+    (7c) bounds level 1, too. A correction at 5.6 s is too late: the robot overlaps the crate by 7 cm. A
+    larger margin helps against small errors of a report. The authors of HTMPC keep a map instead, and infer
+    with Bayes' rule from the observations which objects still stand where the map has them (given, not
+    measured here).
     """,
     prediction=Choice(
-        "The crate is reported beside the way until 7 s. The least distance to it is …",
+        "The crate is reported beside the line until 7 s. The least distance to it is …",
         (
             Option("5 cm, as always", low=40.0),
             Option("less, but the robot stops before the crate", 0.0, 40.0),
@@ -142,7 +144,7 @@ THERE = Step(
             "at most",
             0.005,
             fails_with=NEVER_WRONG,
-            because="then it makes way",
+            because="then the base makes way",
         ),
         Claim(
             "From 8.5 s on the robot is at least 4 cm away from the crate.",
@@ -150,7 +152,7 @@ THERE = Step(
             "at least",
             40.0,
             fails_with=("report_end=12",),
-            because="then nobody has corrected the report yet",
+            because="then the report is still wrong",
         ),
     ),
     set=ON_THE_WAY,

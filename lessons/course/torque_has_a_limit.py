@@ -1,6 +1,6 @@
 """Torque has a limit
 
-When the motors cannot do it all, which task loses?
+When the motors do not have enough torque for all tasks, which task has an error?
 
 Minutes: 8
 You need: lesson "two-tasks"
@@ -29,13 +29,13 @@ ENOUGH = Step(
 
     $$\tau_{\min} \le \tau_0 + \sum_{s=0}^{j} \Delta\tau_{k+s} \le \tau_{\max}$$
 
-    The motors could give 4 N·m. Six per cent of that are allowed here.
+    The motors could give 4 N·m. The limit here is six per cent of this torque.
     """,
-    do="Lower the limit until something changes. What is it that changes first?",
+    do="Lower the limit until something changes. Which error changes first?",
     why=r"""
-    The run needs nine tenths of the 0.24 N·m, and most of that is friction: without any friction the
-    same motion needs a third of the 0.24 N·m, and without dry friction alone it needs half of it. A
-    bound that is not met does nothing: with all the torque the errors are the same.
+    The run needs nine tenths of the 0.24 N·m, and most of that is friction: without any friction the same
+    motion needs a third of the 0.24 N·m, and without dry friction alone it needs half of it. A bound that
+    is not active has no effect: with all the torque the errors are the same.
     """,
     prediction=Value(
         "What is the largest torque during the motion, as a share of the reduced limit?",
@@ -71,21 +71,22 @@ ENOUGH = Step(
 SHORT = Step(
     title="A third less",
     text=r"""
-    Four per cent of the torque are left, 0.16 N·m. That is not enough any more for both wishes and the
-    dry friction of the joints, 0.05 to 0.1 N·m each. Every level is solved under the same bounds, level
-    1 first; level 2 chooses among what leaves level 1 as it is (34).
+    The limit is now four per cent of the torque, 0.16 N·m. This is not enough for both tasks and the dry
+    friction of the joints, 0.05 to 0.1 N·m each. Every level is solved under the same bounds, level 1
+    first; level 2 chooses among what leaves level 1 as it is (34).
     """,
-    do="Open the list of active bounds: which level feels the torque limit? Then take the friction away.",
+    do="Open the list of active bounds: at which level is the torque limit active? Then remove the friction.",
     why=r"""
-    Level 2 loses: joint 1 falls behind by half a degree, and the hand is hardly affected. The order
-    decides this. With joint 1 first the hand loses, by 1.6 mm, and joint 1 is hardly affected. An order
-    helps where both need what is scarce. If joint 1 swings to the other side, by 60°, only the motor of
-    joint 1 is short of torque. The hand does not need it, so the order makes no difference. The torque
-    is scarce because of friction, dry and viscous together: without the dry one both wishes together
-    need 77 % of what there is, and without either joint 1 does not fall behind.
+    Level 2 has the error: joint 1 falls behind by half a degree while the error of the hand does not grow.
+    This is due to the order. With joint 1 first the hand has the error, 1.6 mm, and the error of joint 1
+    does not grow. An order helps where both tasks need the same scarce torque. If joint 1 swings to the
+    other side, by 60°, only the motor of joint 1 has too little torque. The hand does not need this motor,
+    so the order makes no difference. The torque is scarce because of friction, dry and viscous together:
+    without dry friction both tasks together need 77 % of the available torque, and without any friction
+    joint 1 does not fall behind.
     """,
     prediction=Choice(
-        "Both tasks together need more torque than there is. The hand's largest error …",
+        "Both tasks together need more torque than is available. The hand's largest error …",
         (
             Option("stays below a millimetre", high=1.0),
             Option("grows to some centimetres", low=10.0),
@@ -132,25 +133,25 @@ SHORT = Step(
 )
 
 LESS = Step(
-    title="Not even enough for one",
+    title="Too little torque for one task",
     text=r"""
-    Three per cent, 0.12 N·m. Now even the circle by itself is too much for the motors, together with
-    the dry friction. Joint 1 swings to the other side, by 60°. The ghost has the task of joint 1
-    switched off.
+    The limit is three per cent, 0.12 N·m. Now even the circle by itself, together with the dry friction,
+    needs more torque. Joint 1 swings to the other side, by 60°. The ghost has the task of joint 1 switched
+    off.
     """,
-    do="Find the least torque with which the hand is still served. How much is enough without friction?",
+    do="Find the least torque with which the hand stays on its circle. How much is enough without friction?",
     why=r"""
-    The hand leaves its circle: bounds rank above level 1. Without dry friction the circle by itself
-    would need 0.07 N·m, and the hand would stay on it. Level 2 does not make it worse, in either order:
-    with joint 1 first the hand is off as far. In both orders joint 1's motor is at the same limit
-    nearly all the time. The order holds at each tick. Over a run a second task may still lead the arm to
-    where the hand is worse off: with a swing of −30° the hand gets further off than the ghost's,
-    16 mm instead of 10. With joint 1 first it is off by 9 mm there.
+    The hand leaves its circle: bounds rank above level 1. Without dry friction the circle by itself would
+    need 0.07 N·m, and the hand would stay on it. Level 2 does not make it worse, in either order: with
+    joint 1 first the hand is off as far. In both orders joint 1's motor is at the same limit nearly all the
+    time. The order holds at each tick. Over a run a second task may still lead the arm to poses in which
+    the error of the hand is larger: with a swing of −30° the hand gets further off than the ghost's, 16 mm
+    instead of 10. With joint 1 first it is off by 9 mm there.
     """,
     prediction=Choice(
-        "Compared with the ghost, which has no second task: how much larger is the hand's error?",
+        "The ghost has no second task. How much larger is the error of the hand than the ghost's?",
         (
-            Option("not larger: the hand gets all there is", high=1.1),
+            Option("not larger: the hand gets all the torque", high=1.1),
             Option("about twice", 1.1, 3.0),
             Option("much larger", low=3.0),
         ),
@@ -172,7 +173,7 @@ LESS = Step(
             "at most",
             1.1,
             fails_with=("limits.torque_scale=0.025",),
-            because="less torque than the ghost has",
+            because="then the robot has less torque than the ghost",
         ),
     ),
     set=("q1_amplitude_deg=60", "limits.torque_scale=0.03"),

@@ -1,6 +1,6 @@
 """Two tasks, one arm
 
-Two wishes cannot both be granted: does weighing them do, or must one of them rank first?
+Two tasks cannot both be fulfilled: is it enough to weigh them, or must one of them rank first?
 
 Minutes: 10
 You need: lesson "one-task"; Jacobians
@@ -27,14 +27,14 @@ SWING = Control("q1_amplitude_deg", "Swing of joint 1, °", -120.0, 60.0)
 BOTH = Step(
     title="Enough for both",
     text=r"""
-    Level 1: the hand follows a circle, two coordinates. Level 2: joint 1 swings by 20°, one
-    coordinate. Three joints for three coordinates: both tasks can be done exactly.
+    Level 1: the hand follows a circle, two coordinates. Level 2: joint 1 swings by 20°, one coordinate. The
+    three joints are exactly enough for the three coordinates.
     """,
     do="Let joint 1 swing further, degree by degree, until one of the errors grows. Which one is it?",
     why=r"""
-    As long as all tasks can be done together, priorities hardly matter: the ghost has none, only equal
-    weights. Priorities matter again wherever a bound is in the way of one of the tasks: lesson *Torque
-    has a limit*.
+    As long as all tasks can be fulfilled together, priorities have hardly any effect: the ghost has none,
+    only equal weights. Priorities matter where a bound limits one of the tasks: see lesson *Torque has a
+    limit*.
     """,
     claims=(
         Claim(
@@ -51,15 +51,15 @@ BOTH = Step(
             "at most",
             1.0,
             fails_with=("q1_amplitude_deg=-120",),
-            because="with joint 1 that far round, the links cannot reach the circle",
+            because="with such a large swing of joint 1, the links cannot reach the circle",
         ),
         Claim(
-            "With priorities the hand errs as much as with equal weights, within 5 %.",
+            "With priorities the error of the hand is that of equal weights, within 5 %.",
             Measure(HAND, "rms", over_ghost=True),
             "at most",
             1.05,
             fails_with=("controller=weighted", "q1_amplitude_deg=-120"),
-            because="weights pay for joint 1 with the hand as soon as the two conflict",
+            because="with weights joint 1 increases the error of the hand as soon as the two tasks conflict",
         ),
     ),
     set=("q1_amplitude_deg=20",),
@@ -72,17 +72,18 @@ BOTH = Step(
 WEIGHTED = Step(
     title="Weigh them",
     text=r"""
-    Now joint 1 is to swing to −120° and back. From there the links cannot reach the circle. The
-    controller puts both wishes into one cost with equal weights, $Q_1 = Q_2 = 200$:
+    Now the target of joint 1 swings to −120° and back. From there the links cannot reach the circle. The
+    controller puts both tasks into one cost with equal weights, $Q_1 = Q_2 = 200$:
 
     $$\min_{\Delta\tau} \; \lVert e_1 \rVert_{Q_1}^2 + \lVert e_2 \rVert_{Q_2}^2 + \lVert \Delta\tau
     \rVert_R^2$$
     """,
-    do="Make Q of level 2 smaller until the hand is where you want it. What does it cost?",
+    do="Make Q of level 2 smaller until the hand is on its circle. How large is the error of joint 1 then?",
     why=r"""
-    A sum is a trade. It weighs $e$, and at rest $e = K_P \tilde x$. A metre of the hand counts 200
-    m/s², and a radian of joint 1 counts 50 rad/s². So the gains are prices, too. Both tasks lose, and
-    the hand leaves its circle by a quarter of a metre. No unit tells you the right weights.
+    A sum is a compromise. It weighs $e$, and at rest $e = K_P \tilde x$. A metre of the hand counts 200
+    m/s², and a radian of joint 1 counts 50 rad/s². So the gains act as weights, too. Both tasks have
+    errors, and the hand leaves its circle by a quarter of a metre. The units do not determine the right
+    weights.
     """,
     prediction=Choice(
         "Equal weights for hand and joint 1: how far from its circle does the hand get?",
@@ -104,7 +105,7 @@ WEIGHTED = Step(
             because="then the hand has the higher priority",
         ),
         Claim(
-            "It is off by more than 20 cm.",
+            "The error of the hand exceeds 20 cm.",
             Measure(HAND),
             "at least",
             200.0,
@@ -122,23 +123,23 @@ WEIGHTED = Step(
 STRICT = Step(
     title="Rank them",
     text=r"""
-    HIMPC solves one problem per level. The second may choose among the torques that leave the first
-    as it is, and that is what (33) says:
+    HIMPC solves one problem per level. The second level may choose among the torques that do not change the
+    result of the first. This is the equality (33):
 
     $$\hat J_p \bar M^{-1} \Delta\tau_p^* = \hat J_p \bar M^{-1} \Delta\tau_i, \qquad p < i$$
 
-    Level 2 is granted what is left. The ghost is the weighted controller.
+    Level 2 uses the motions that are left. The ghost is the weighted controller.
     """,
-    do="Set Q of level 2 to 1000. Does the hand's error change? And with the weighted controller?",
+    do="Set Q of level 2 to 1000. Does the error of the hand change? And with the weighted controller?",
     why=r"""
-    Joint 1 pays: it goes no further than the circle lets it. The hand keeps its circle to a millimetre,
-    and with $Q_2 = 1000$ it does so as well: a heavy level 2 takes nothing from it. Without level 2 the
-    hand errs by 0.2 mm only. With it joint 3 swings with up to 100°/s, and time-delay estimation has to
-    correct what that motion changes. The weight changes that motion, too: with $Q_2 = 0.01$ the hand
-    errs by 1.8 mm.
+    Joint 1 has the error: it goes only as far as the circle allows. The hand keeps its circle to a
+    millimetre, and with $Q_2 = 1000$ it does so as well: a large weight of level 2 does not increase the
+    error of the hand. Without level 2 the hand is off by 0.2 mm only. With level 2 joint 3 swings with up
+    to 100°/s, and time-delay estimation has to correct the effects of that motion. The weight changes that
+    motion, too: with $Q_2 = 0.01$ the hand is off by 1.8 mm.
     """,
     prediction=Choice(
-        "With strict priorities: who pays for the conflict?",
+        "With strict priorities, which task has the error of the conflict?",
         (
             Option("the hand, a little", low=3.0),
             Option("only joint 1", high=3.0),
@@ -153,15 +154,15 @@ STRICT = Step(
             "at most",
             1.5,
             fails_with=("controller=weighted",),
-            because="equal weights trade the hand away",
+            because="equal weights allow a large error of the hand",
         ),
         Claim(
-            "Joint 1 is off by more than 30°: it pays.",
+            "Joint 1 has the error: it is off by more than 30°.",
             Measure(Q1),
             "at least",
             30.0,
             fails_with=("controller=weighted",),
-            because="there the hand pays for most of it",
+            because="there most of the error is that of the hand",
         ),
     ),
     duration=SECONDS,
@@ -177,15 +178,15 @@ LIMIT = Step(
     strict.
     """,
     do=r"""
-    Make Q of level 2 ten and a hundred times smaller still. Then let joint 1 swing by 20° only, where
-    both wishes can be granted, and go down to the least Q.
+    Make Q of level 2 ten and a hundred times smaller still. Then let joint 1 swing by 20° only, where both
+    tasks can be fulfilled, and go down to the least Q.
     """,
     why=r"""
-    Better, and still several times the error of a strict priority. In the limit the weighted
-    solution becomes the strict one. But a $Q$ that small no longer outweighs $R$. On the easy
-    circle joint 1 is off by 0.02° with $Q_2 = 1$, by 0.05° with 0.01, and at the slider's end, with
-    $10^{-5}$, by 13° of its 20°: there it is not followed any more, although it could be. With a
-    smaller $R$ it would.
+    The error is smaller, and still several times that of a strict priority. In the limit the weighted
+    solution becomes the strict one. But such a small $Q$ no longer outweighs $R$. With the smaller swing
+    joint 1 is off by 0.02° with $Q_2 = 1$, by 0.05° with 0.01, and at the slider's end, with $10^{-5}$, by
+    13° of its 20°: there joint 1 no longer follows its reference, although this would be possible. With a
+    smaller $R$ it would follow.
     """,
     prediction=Choice(
         "The hand counts 200 times as much as joint 1. Its largest error is …",
@@ -216,9 +217,9 @@ LIMIT = Step(
 
 CHALLENGE = Challenge(
     text=r"""
-    The start is weighted with equal weights. Keep the hand within 5 mm of its circle while joint 1
-    still gets as close to its reference as it can (within 80°), with no torque change rougher than
-    0.1 N·m RMS.
+    At the start the tasks are weighted with equal weights. Keep the hand within 5 mm of its circle while
+    joint 1 still gets as close to its reference as it can (within 80°), with torque changes below 0.1 N·m
+    RMS.
     """,
     goals=(
         Claim("The hand stays within 5 mm.", Measure(HAND), "at most", 5.0),

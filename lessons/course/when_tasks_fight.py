@@ -1,6 +1,6 @@
 """When tasks fight
 
-Two tasks can each be done alone, but not both together: why does that break some controllers?
+Each of two tasks can be fulfilled alone, but not both together: why do some controllers fail then?
 
 Minutes: 10
 You need: lesson "two-tasks"; the null space of a matrix
@@ -24,19 +24,18 @@ AMPLITUDE = Control("q1_amplitude_deg", "Swing of joint 1, °", -120.0, 20.0)
 PROJECTION = Step(
     title="Project and invert",
     text=r"""
-    The classical way to rank tasks: project task 2 into the null space of task 1, $J_{2|1} = J_2
-    P_1$, and compute the force it takes there. That needs the inverse of $J_{2|1} M^{-1}
-    J_{2|1}^\top$. Here the hand follows its circle and joint 1 swings to −120°, beyond what the
-    circle allows. From 1.3 s on links 2 and 3 come into line. When they are, they can no longer make
-    up for joint 1, so any motion of joint 1 moves the hand: $J_{2|1}$ vanishes. The controller is OSF,
-    with a model that is 20 % too light. The torque limit of the motors is only measured here, not
-    enforced.
+    The classical method for priorities projects task 2 into the null space of task 1, $J_{2|1} = J_2 P_1$,
+    and computes the force that task 2 needs there. That needs the inverse of $J_{2|1} M^{-1} J_{2|1}^\top$.
+    Here the hand follows its circle and joint 1 swings to −120°, beyond what the circle allows. From 1.3 s
+    on links 2 and 3 come into line. When they are in line, they can no longer compensate for joint 1, so
+    any motion of joint 1 moves the hand: $J_{2|1}$ vanishes. The controller is OSF, with a model that is 20
+    % too light. The torque limit of the motors is only measured here, not enforced.
     """,
     do="Switch to HIMPC in good time, and back, while the arm moves.",
     why=r"""
-    Dividing by almost nothing gives almost infinity: the demanded torque passes a thousand times the
-    limit and the arm is thrown out of control. Neither Jacobian alone is singular there. The
-    singularity is made by the algorithm, and is therefore called algorithmic.
+    A division by almost zero gives a very large number: the demanded torque passes a thousand times the
+    limit and the arm goes out of control. Neither Jacobian alone is singular there. The algorithm creates
+    the singularity, which is therefore called algorithmic.
     """,
     prediction=Choice(
         "When the tasks start to conflict, the torque that OSF demands is at most …",
@@ -63,10 +62,10 @@ PROJECTION = Step(
             "at least",
             2000.0,
             fails_with=("q1_amplitude_deg=20",),
-            because="a swing of 20° does not conflict",
+            because="a swing of 20° does not conflict with the circle",
         ),
         Claim(
-            "Up to 1.3 s, links 2 and 3 still at an angle, it needs no more than the limit.",
+            "Up to 1.3 s, while links 2 and 3 are still at an angle, the demand stays within the limit.",
             Measure(TORQUE, until=1.3),
             "at most",
             100.0,
@@ -88,17 +87,17 @@ BETTER_MODEL = Step(
     """,
     do="Let joint 1 swing by 20° only and compare OSF with TDEOSF.",
     why=r"""
-    It knows the arm better and fails at the same place, and so does OSF with an exact model: the model
-    is not the cause. The inverse asks for more than the arm can do and knows no bound. With a damped
-    inverse TDEOSF comes through, with less than four times the speed limit. With a damped inverse OSF
-    does not: a joint passes six times its limit. A controller without any inverse is lost as well if
-    nothing bounds it: HIMPC is, with all its bounds off.
+    TDEOSF describes the arm better and fails at the same place, and so does OSF with an exact model. The
+    model does not explain the failure. The inverse demands more than the arm can do and contains no bound.
+    With a damped inverse TDEOSF keeps control, with less than four times the speed limit. With a damped
+    inverse OSF does not: a joint passes six times its limit. A controller without any inverse loses control
+    as well if nothing bounds it: HIMPC does, with all its bounds off.
     """,
     prediction=Choice(
-        "Estimated dynamics instead of a wrong model. At the conflict the arm …",
+        "The dynamics are estimated instead of taken from a wrong model. At the conflict the arm …",
         (
-            Option("comes through, since the model is right", high=500.0),
-            Option("is lost as before", low=500.0),
+            Option("stays under control, since the model is right", high=500.0),
+            Option("goes out of control as before", low=500.0),
         ),
         Measure(SPEED),
         tempting=0,
@@ -130,25 +129,26 @@ BETTER_MODEL = Step(
 EQUALITY = Step(
     title="A constraint instead of a projection",
     text=r"""
-    HIMPC never forms $J_{2|1}$. Level 2 is a problem of its own with the equality (34g), which
-    keeps what level 1 decided. If nothing is left for level 2, that problem is still solvable:
-    $\Delta\tau_2 = \Delta\tau_1$ satisfies everything (Theorem 2), and its Hessian is positive
-    definite because of $R$ (Lemma 1).
+    HIMPC never forms $J_{2|1}$. Level 2 is a problem of its own with the equality (34g), which keeps the
+    result of level 1. If nothing is left for level 2, that problem is still solvable: $\Delta\tau_2 =
+    \Delta\tau_1$ satisfies everything (Theorem 2), and its Hessian is positive definite because of $R$
+    (Lemma 1).
     """,
-    do="Watch joint 1 at 1.4 s and again where it comes back.",
+    do="Watch joint 1 at 1.4 s and again when it comes back.",
     why=r"""
-    Level 2 wants something it cannot have. It goes to the edge of what level 1 leaves, where links 2
-    and 3 are in line, and does not come to rest there: from 2 s on joint 3 swings about the edge, to
-    and fro with 94°/s, a little more than once a second, until joint 1 is called back. A strict order
-    does not make the arm calm. What keeps it swinging? It is not the strict order: in a weighted sum
-    with $Q_2 = 0.01$ joint 3 swings as well, with up to 73°/s. It is not the estimation: with twice the
-    $\bar M$ it swings as before. With our weights it is the horizon of level 2: with $N = 1$ at level 2
-    alone the swing dies away to a tremble of 12°/s, with $N = 1$ at level 1 alone it swings as before.
-    Another weight changes this. With $R_2 = 10^5$ the swing slows down to 58°/s and does not need the
-    horizon: with $N = 1$ and $R_2 = 10^5$ joint 3 goes on swinging with 62°/s. But torque and speed
-    stay within their bounds, and the hand stays on its circle. The equality (34g) alone is not enough
-    for that. The bounds are needed, too: without those on speed and position every motor comes to its
-    limit and the hand is off by 11 mm, and without any bound the arm is lost as with a projection.
+    Level 2 has a target that it cannot reach. It goes to the limit of the motions that level 1 leaves,
+    where links 2 and 3 are in line, and does not come to rest there: from 2 s on joint 3 swings about this
+    limit, to and fro with 94°/s, a little more than once a second, until the reference of joint 1 comes
+    back. A strict order does not prevent such oscillations. What keeps the joint swinging? It is not the
+    strict order: in a weighted sum with $Q_2 = 0.01$ joint 3 swings as well, with up to 73°/s. It is not
+    the estimation: with twice the $\bar M$ it swings as before. With our weights it is the horizon of level
+    2: with $N = 1$ at level 2 alone the swing decays to an oscillation of 12°/s, with $N = 1$ at level 1
+    alone it swings as before. Another weight changes this result. With $R_2 = 10^5$ the swing slows down to
+    58°/s and does not need the horizon: with $N = 1$ and $R_2 = 10^5$ joint 3 goes on swinging with 62°/s.
+    But torque and speed stay within their bounds, and the hand stays on its circle. The equality (34g)
+    alone is not enough for this. The bounds are needed, too: without those on speed and position every
+    motor comes to its limit and the hand is off by 11 mm, and without any bound the arm goes out of control
+    as with a projection.
     """,
     claims=(
         Claim(
@@ -176,15 +176,15 @@ EQUALITY = Step(
             because="HQP has rows on torque only, none on speed",
         ),
         Claim(
-            "From 2.5 s on joint 3 swings, through more than 150°/s from one way to the other.",
+            "From 2.5 s on joint 3 swings: its speed varies by more than 150°/s.",
             Measure(Signal("v", "deg/s", column=2), "range", after=2.5),
             "at least",
             150.0,
             fails_with=("q1_amplitude_deg=20",),
-            because="without a conflict there is no edge to swing about",
+            because="without a conflict there is no limit to swing about",
         ),
         Claim(
-            "It swings about the line: from 1.75 s on joint 3 is within 20° of straight.",
+            "Joint 3 swings about the straight pose: from 1.75 s on it is within 20° of straight.",
             Measure(Signal("q", "deg", column=2), after=1.75),
             "at most",
             20.0,

@@ -1,6 +1,6 @@
 """Your robot
 
-A file from the internet, no manual, half the numbers missing: how long until it moves well?
+A robot file from the internet lacks half of its numbers: how long does it take until the robot moves well?
 
 Minutes: 15
 You need: lesson "no-model-needed"; a URDF of your own, if you have one
@@ -31,24 +31,25 @@ HEAVY = ("plant.mass_scale=1.5", "plant.inertia_scale=1.5")
 LOAD = Step(
     title="Load it",
     text=r"""
-    This is a desk lamp, `lamp.urdf`, a file with the usual gaps. `himpc-lab robots
-    --check lamp.urdf` says what is missing: a joint without end stops, a head without inertia, a
-    joint without a speed limit. What is filled in is reported, what cannot be is refused. The stack
-    is made for any robot: position, then orientation, then posture. $\bar M$ is suggested from the
-    masses in the file, on the safe side, and the gains from how fast that $\bar M$ lets the loop
-    follow.
+    The file `lamp.urdf` describes a desk lamp, and is as incomplete as many robot files. `himpc-lab robots
+    --check lamp.urdf` lists what is missing: a joint without end stops, a head without inertia, a joint
+    without a speed limit. The program reports the values that it fills in, and refuses a file whose values
+    it cannot fill in. The stack is made for any robot: position, then orientation, then posture. The
+    program suggests $\bar M$ from the masses in the file, on the safe side, and the gains from the speed of
+    the loop with this $\bar M$.
     """,
     do="Load a URDF of your own: Robot, Load URDF, or himpc-lab --urdf FILE.",
     why=r"""
-    Five joints for six coordinates of the head: no freedom is left, one coordinate is even missing.
-    The hierarchy decides by itself: the position is reached, the orientation as far as five joints can,
-    and the posture is given up. A weighted sum gives up the position instead.
+    The lamp has five joints for six coordinates of the head: no free motion is left, and even one joint is
+    missing. The hierarchy resolves this conflict by itself: the position is reached, the orientation as far
+    as five joints allow, and no motion is left for the posture. In a weighted sum the position has an error
+    instead.
     """,
     prediction=Choice(
         "The head is moved by 11 cm. It has five joints. In the end …",
         (
-            Option("it is there, as upright as before", high=1.0),
-            Option("it is there, but tilted", low=5.0),
+            Option("the head is there, as upright as before", high=1.0),
+            Option("the head is there, but tilted", low=5.0),
         ),
         Measure(TILT, "last"),
         tempting=0,
@@ -80,17 +81,17 @@ LOAD = Step(
 WRONG = Step(
     title="The file is wrong",
     text=r"""
-    Masses in such files are guesses. Suppose the real lamp is 50 % heavier than its file says, in
-    every link. The ghost is the model-based HQP with the masses of the file.
+    Masses in such files are often inaccurate. Suppose that every link of the real lamp is 50 % heavier than
+    in its file. The ghost is the model-based HQP with the masses of the file.
     """,
     do="Try 0.7 times and twice the mass, with both controllers.",
     why=r"""
-    Nothing in HIMPC depended on those masses but the suggestion for $\bar M$, and that had room.
-    The ghost believes the file: its springs must carry the weight that the file does not contain, and
-    the head stays too low.
+    In HIMPC only the suggestion for $\bar M$ depends on those masses, and this suggestion has a margin. The
+    ghost uses the masses of the file: its springs must carry the additional weight, and the head stays too
+    low.
     """,
     prediction=Choice(
-        "The lamp is half as heavy again as its file says. Where is the head in the end?",
+        "The lamp is 50 % heavier than in its file. Where is the head in the end?",
         (
             Option("on the target, within 1 mm", high=1.0),
             Option("some millimetres low", 1.0, 10.0),
@@ -123,15 +124,16 @@ WRONG = Step(
 TUNE = Step(
     title="Make it yours",
     text=r"""
-    The suggested $\bar M$ must be safe wherever the lamp may go. Yours need only be safe where it
-    works. Twice as much here; the ghost keeps the suggestion. Then take it home: *export* writes a
-    Python script of twenty lines that runs this very stack, `load_robot("lamp.urdf")`,
-    `Level((FramePosition(…),))`, `HIMPC(robot, Settings(stack, M_bar))`, `step` once a millisecond.
+    The suggested $\bar M$ must be safe in all poses of the lamp. Your own $\bar M$ need only be safe in the
+    poses that you use. Here it is twice the suggestion; the ghost keeps the suggestion. Then use the
+    controller in your own program: *export* writes a Python script of twenty lines that runs this stack,
+    `load_robot("lamp.urdf")`, `Level((FramePosition(…),))`, `HIMPC(robot, Settings(stack, M_bar))`, `step`
+    once a millisecond.
     """,
-    do="Go on to 3 and read the gauge. Then export, and run the script.",
+    do="Set 3 times the suggestion and read the gauge. Then export, and run the script.",
     why=r"""
-    Less than half the error. At three times the suggestion the gauge passes 1 and the lamp is lost:
-    you have found your margin. `himpc-lab tune` does the same search step by step.
+    The error is less than half of the ghost's. At three times the suggestion the gauge passes 1 and the
+    lamp becomes unstable: this factor is your margin. `himpc-lab tune` does the same search step by step.
     """,
     claims=(
         Claim(
@@ -160,7 +162,10 @@ TUNE = Step(
 )
 
 CHALLENGE = Challenge(
-    text="The heavy lamp again, and the same move. Keep the head within 7 mm of its target all along.",
+    text=(
+        "The lamp is the heavy one again, and the motion is the same. Keep the head within 7 mm of its "
+        "target all the time."
+    ),
     goals=(
         Claim("The head stays within 7 mm.", Measure(HAND), "at most", 7.0),
         Claim("The gauge stays below 1.", Measure(Signal("gauge_radius")), "at most", 1.0),

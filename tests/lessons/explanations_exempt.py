@@ -89,7 +89,7 @@ TEXTS = (
     Exempt("mathematics", LESSONS + (
         "derivations.py::test_with_links_2_and_3_in_line_any_motion_of_joint_1_moves_the_hand"
     ), (
-        ("when-tasks-fight/0", "When they are, they can no longer make up for joint 1"),
+        ("when-tasks-fight/0", "When they are in line, they can no longer compensate for joint 1"),
     )),
     Exempt("mathematics", HIMPC + "cascade.py::test_no_freedom_left_keeps_the_upper_levels", (
         ("when-tasks-fight/2", "If nothing is left for level 2, that problem is still solvable"),

@@ -18,7 +18,7 @@ INF = float("inf")
 # fmt: off
 FIFTH_ROWS = (
     Intervention(
-        "two-tasks/2", "with $Q_2 = 0.01$ the hand errs by 1.8 mm",
+        "two-tasks/2", "with $Q_2 = 0.01$ the hand is off by 1.8 mm",
         HAND, (0.5, 1.2), ("levels.q1.Q=0.01",), (1.7, 1.85),
     ),
     Intervention(
@@ -27,7 +27,7 @@ FIFTH_ROWS = (
     ),
     *(
         Intervention("stretched-out/2", says, HAND, (4.3, 4.8), QUICKER, (1.6, 1.8), of=("smooth=false",))
-        for says in ("mostly decided by (4)", "twice the $K_V$ the jump costs 1.7 mm")
+        for says in ("mostly due to the desired motion", "twice the $K_V$ the error after the jump is 1.7 mm")
     ),
     Intervention(
         "when-tasks-fight/0", "without them it also demands a hundred times more",
@@ -36,12 +36,12 @@ FIFTH_ROWS = (
         of=("controller=himpc",),
     ),
     Intervention(
-        "torque-has-a-limit/1", "without either joint 1 does not fall behind",
+        "torque-has-a-limit/1", "without any friction joint 1 does not fall behind",
         of("error/q1", "deg"), (0.45, 0.65), ("plant.damping=0",), (0, 0.05),
     ),
     Intervention(
         "stopping-takes-distance/0",
-        "because the rows on the position contradict those on how fast a speed may change",
+        "because the rows on the position contradict those on the change of speed",
         of("unsolved", "", "sum"), (100, 150), ("limits.velocity_approach=0",), (6.5, 7.5),
         of=("limits.velocity_scale=0.15",), seconds=5.0,
     ),

@@ -35,7 +35,7 @@ FOURTH_ROWS = (
     ),
     # ---------------------------------------- when-tasks-fight
     Intervention(
-        "when-tasks-fight/1", "With a damped inverse TDEOSF comes through, with less than four times the",
+        "when-tasks-fight/1", "With a damped inverse TDEOSF keeps control, with less than four times the",
         SPEED, (360, 400), ("controller=tdeosf",), (2000, INF), of=("controller=tdeosf_damped",),
     ),
     Intervention(
@@ -44,7 +44,8 @@ FOURTH_ROWS = (
     ),
     # ---------------------------------------- stretched-out
     Intervention(
-        "stretched-out/1", "Without bounds $R$ keeps it calm: with $R = 10^{-5}$ it then demands more than",
+        "stretched-out/1",
+        "Without bounds $R$ keeps the torque small: with $R = 10^{-5}$ it then demands more than",
         of("tau_demand", "N·m"), (1.6, 2.6), ("R=1e-5",), (400, INF), of=OFF,
     ),
     Intervention(
@@ -67,7 +68,7 @@ FOURTH_ROWS = (
     # ---------------------------------------- stopping-takes-distance
     Intervention(
         "stopping-takes-distance/0",
-        "QPs have no solution there either",
+        "QPs have no solution in that case either",
         of("unsolved", "", "sum"), (100, 150), ("limits.velocity_scale=0.15",), (100, 150),
         seconds=5.0, stays=True,
     ),

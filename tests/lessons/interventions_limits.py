@@ -19,16 +19,16 @@ TILT_AT_THE_END = of("error/orientation", "deg", "last")
 LIMIT_ROWS = (
     # ---------------------------------------- torque-has-a-limit
     Intervention(
-        "torque-has-a-limit/0", "A bound that is not met does nothing",
+        "torque-has-a-limit/0", "A bound that is not active has no effect",
         HAND, (0.03, 0.07), ("limits.torque_scale=1",), (0.03, 0.07), stays=True,
     ),
     Intervention(
         "torque-has-a-limit/1",
-        "The order decides this. With joint 1 first the hand loses, by 1.6 mm",
+        "This is due to the order. With joint 1 first the hand has the error, 1.6 mm",
         HAND, (0, 0.1), ("order=q1,position",), (1.55, 1.7),
     ),
     Intervention(
-        "torque-has-a-limit/1", "joint 1 is hardly affected",
+        "torque-has-a-limit/1", "the error of joint 1 does not grow",
         Q1, (0.45, 0.65), ("order=q1,position",), (0, 0.05),
     ),
     Intervention(
@@ -52,7 +52,7 @@ LIMIT_ROWS = (
         ("limits.torque_scale=3", "plant.saturate=false", "limits.velocity=false"), (149, 150.2),
     ),
     Intervention(
-        "stopping-takes-distance/0", "the rows on speed cost half of that: without them 0.1° is left",
+        "stopping-takes-distance/0", "the rows on speed cause half of it: without them 0.1° is left",
         JOINT_2, (150.05, 150.15), ("limits.torque_scale=1", "plant.saturate=true"), (150.4, 151),
         of=("limits.torque_scale=3", "plant.saturate=false", "limits.velocity=false"),
     ),
@@ -66,7 +66,7 @@ LIMIT_ROWS = (
         JOINT_2, (149.8, 150.0), ("horizon=5",), (150.5, 150.8),
     ),
     Intervention(
-        "stopping-takes-distance/2", "The price is time: the joint creeps through the last degrees",
+        "stopping-takes-distance/2", "The disadvantage is time: the joint moves slowly over the last degrees",
         of("q", "deg", "mean", 1.6, 1.7, column=1), (147.5, 148.7), ("limits.velocity_approach=0",),
         (149.5, 149.7),
     ),
@@ -184,15 +184,15 @@ LIMIT_ROWS = (
     ),
     # ---------------------------------------- the-model-is-wrong
     Intervention(
-        "the-model-is-wrong/0", "time-delay estimation only what has happened",
+        "the-model-is-wrong/0", "whereas time-delay estimation measures them afterwards",
         HAND, (0.009, 0.014), ("T_s=0.0005",), (0.004, 0.007), of=("controller=himpc",),
     ),
     Intervention(
-        "the-model-is-wrong/1", "here that is mostly the friction",
+        "the-model-is-wrong/1", "here these are mostly friction",
         HAND, (0.7, 1.6), ("plant.friction=0",), (0, 0.3), seconds=0.75,
     ),
     Intervention(
-        "the-model-is-wrong/1", "here that is mostly the friction",
+        "the-model-is-wrong/1", "here these are mostly friction",
         HAND, (0.7, 1.6),
         ("nominal.mass_scale=1", "nominal.inertia_scale=1", "nominal.armature=[0.05,0.05,0.03]"), (0.7, 1.6),
         seconds=0.75, stays=True,
@@ -212,12 +212,12 @@ LIMIT_ROWS = (
     ),
     Intervention(
         "the-model-is-wrong/2",
-        "the inertia of the motors is left: with links of a twentieth the gauge reads 0.47",
+        "the inertia of the motors is left: with links of a twentieth of the mass the gauge reads 0.47",
         RADIUS, (0.465, 0.475), ("plant.armature=0.01",), (1.2, 4),
         of=("plant.mass_scale=0.05", "plant.inertia_scale=0.05"), seconds=0.05,
     ),
     Intervention(
-        "the-model-is-wrong/2", "for links of this weight so large an M̄ is beyond the stability limit",
+        "the-model-is-wrong/2", "for links of this weight so large an M̄ is beyond the limit of stability",
         RADIUS, (1.5, 4), ("plant.mass_scale=10", "plant.inertia_scale=10"), (0.5, 0.98),
         of=("M_bar_scale=4",), seconds=0.05,
     ),

@@ -131,18 +131,19 @@ MOBILE_ROWS = (
         of=("controller=stmpc",),
     ),
     Intervention(
-        "told-wrong/1", "It drives 40 cm into the crate", DEEP, (-0.405, -0.395), ("report_end=5",), KEPT,
+        "told-wrong/1",
+        "The robot drives 40 cm into the crate", DEEP, (-0.405, -0.395), ("report_end=5",), KEPT,
     ),
     Intervention(
         "told-wrong/1", "until 7 s its base is never more than 3 mm from its line",
         of("error/base", "m", "largest", until=7.0), (0.001, 0.003), ("false_report=false",), (0.5, 0.6),
     ),
     Intervention(
-        "told-wrong/1", "At 5 s nothing is lost: 5 cm are kept", DEEP, KEPT, ("report_end=5.6",),
+        "told-wrong/1", "A correction at 5 s is early enough: 5 cm are kept", DEEP, KEPT, ("report_end=5.6",),
         (-0.075, -0.065), of=("report_end=5",),
     ),
     Intervention(
-        "told-wrong/1", "At 5.4 s it is nearly too late: 2 cm are left",
+        "told-wrong/1", "A correction at 5.4 s is nearly too late: 2 cm are left",
         DEEP, (0.015, 0.025), ("report_end=5",), KEPT, of=("report_end=5.4",),
     ),
     Intervention(
@@ -150,13 +151,13 @@ MOBILE_ROWS = (
         EE, (115, 125), ("report_end=5",), (0, 1), of=("report_end=5.4",),
     ),
     Intervention(
-        "told-wrong/1", "At 5.6 s it is too late: the robot overlaps the crate by 7 cm",
+        "told-wrong/1", "A correction at 5.6 s is too late: the robot overlaps the crate by 7 cm",
         DEEP, (-0.075, -0.065), ("report_end=5",), KEPT, of=("report_end=5.6",),
     ),
 
     # ---------------------------------------- your-robot
     Intervention(
-        "your-robot/0", "the orientation as far as five joints can",
+        "your-robot/0", "the orientation as far as five joints allow",
         TILT, (11, 12), ("levels.orientation.enabled=false",), (17, 20),
     ),
     Intervention(
@@ -164,17 +165,17 @@ MOBILE_ROWS = (
         TILT, (11, 12), ("levels.position.enabled=false",), (0, 1), on="your-robot/0",
     ),
     Intervention(
-        "your-robot/0", "the posture is given up",
+        "your-robot/0", "no motion is left for the posture",
         of("error/posture", "deg", "last"), (20, 30),
         ("levels.position.enabled=false", "levels.orientation.enabled=false"), (0, 1),
     ),
     Intervention(
-        "your-robot/0", "A weighted sum gives up the position instead",
+        "your-robot/0", "In a weighted sum the position has an error instead",
         of("error/position", "mm", "last"), (90, 120), ("controller=himpc",), (0, 0.2),
         of=("controller=weighted",),
     ),
     Intervention(
-        "your-robot/1", "its springs must carry the weight that the file does not contain",
+        "your-robot/1", "its springs must carry the additional weight",
         of("error/position", "mm", "last"), (10, 100),
         ("nominal.mass_scale=1.5", "nominal.inertia_scale=1.5"),
         (0, 0.2), of=("controller=hqp",), seconds=0.3,

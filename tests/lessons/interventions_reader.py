@@ -48,11 +48,11 @@ READER_ROWS = (
     ),
     # ---------------------------------------- two-tasks
     Intervention(
-        "two-tasks/2", "With it joint 3 swings with up to 100°/s",
+        "two-tasks/2", "With level 2 joint 3 swings with up to 100°/s",
         of("v", "deg/s", "largest", column=2), (99, 101), ("levels.q1.enabled=false",), (20, 30),
     ),
     Intervention(
-        "two-tasks/2", "time-delay estimation has to correct what that motion changes",
+        "two-tasks/2", "time-delay estimation has to correct the effects of that motion",
         HAND, (0.7, 1.0), ("limits.velocity_scale=0.5",), (0.4, 0.5),
     ),
     # ---------------------------------------- when-tasks-fight
@@ -61,11 +61,11 @@ READER_ROWS = (
         LATE_SWING, (61.5, 62.5), ("levels.q1.R=10",), (11, 12.5), of=("horizon=1", "levels.q1.R=1e5"),
     ),
     Intervention(
-        "when-tasks-fight/1", "The inverse asks for more than the arm can do and knows no bound",
+        "when-tasks-fight/1", "The inverse demands more than the arm can do and contains no bound",
         of("speed share", "%"), (2000, INF), ("controller=tdeosf_damped",), (0, 500),
     ),
     Intervention(
-        "when-tasks-fight/1", "A controller without any inverse is lost as well if nothing bounds it",
+        "when-tasks-fight/1", "A controller without any inverse loses control as well if nothing bounds it",
         of("v", "deg/s"), (2000, INF),
         ("limits.torque_scale=1", "plant.saturate=true", "limits.velocity=true", "limits.position=viability"),
         (50, 150),
@@ -83,7 +83,7 @@ READER_ROWS = (
     ),
     # ---------------------------------------- stretched-out
     Intervention(
-        "stretched-out/0", "Then, at 0.13 s, it passes a thousand times the limit all the",
+        "stretched-out/0", "Then, at 0.13 s, the demand still passes a thousand times the",
         of("torque share", "%", "largest", 0.12, 0.14), (1e5, INF), ("controller=osf_damped",), (0, 5),
         of=("smooth=true",),
     ),
@@ -105,7 +105,7 @@ READER_ROWS = (
         of("error/q1", "deg"), (0.45, 0.65), ("plant.friction=0",), (0, 0.05),
     ),
     Intervention(
-        "torque-has-a-limit/1", "without the dry one both wishes together need 77 % of what there is",
+        "torque-has-a-limit/1", "without dry friction both tasks together need 77 % of the available torque",
         TORQUE, (99, 101), ("plant.friction=0",), (76, 77.4),
     ),
     Intervention(
@@ -120,7 +120,7 @@ READER_ROWS = (
     # ---------------------------------------- stopping-takes-distance
     Intervention(
         "stopping-takes-distance/0",
-        "The rows on speed cost 0.07°: without them it still overruns by 0.57°",
+        "The rows on speed add 0.07° to the overrun: without them it is still 0.57°",
         JOINT_2, (150.635, 150.65), ("limits.velocity=false",), (150.565, 150.58),
     ),
     # ---------------------------------------- how-far-ahead
@@ -151,12 +151,13 @@ READER_ROWS = (
     ),
     # ---------------------------------------- the-model-is-wrong
     Intervention(
-        "the-model-is-wrong/2", "The part of the error that comes of inertia grows by half, as the mass does",
+        "the-model-is-wrong/2",
+        "The part of the error that is due to inertia grows by half, as the mass does",
         HAND, (0.0158, 0.0172), OLD_LINKS, (0.0105, 0.0114), of=NO_FRICTION,
     ),
     Intervention(
         "the-model-is-wrong/2",
-        "three quarters of the error are friction's, which does not grow with the mass",
+        "three quarters of the error are due to friction, which does not grow with the mass",
         HAND, (0.041, 0.047), NO_FRICTION, (0.0105, 0.0114), of=OLD_LINKS,
     ),
     # ---------------------------------------- seeing-ahead

@@ -30,7 +30,7 @@ SIXTH_ROWS = (
     # ---------------------------------------- when-tasks-fight
     Intervention(
         "when-tasks-fight/2",
-        "with $N = 1$ at level 2 alone the swing dies away to a tremble of 12°/s",
+        "with $N = 1$ at level 2 alone the swing decays to an oscillation of 12°/s",
         LATE_SWING, (93, 95), ("levels.q1.horizon=1",), (11.5, 12.5),
     ),
     Intervention(
@@ -43,15 +43,15 @@ SIXTH_ROWS = (
         measure=LATE_SPEED, there=(17.5, 18.5), without=NO_DELAY, gone=(57, 58),
     ),
     VIABLE(
-        says="with twice the $\\bar M$ the arm does 18 as well",
+        says="with twice the $\\bar M$ the joint does 18 as well",
         measure=LATE_SPEED, there=(17.5, 18.5), without=("M_bar_scale=2",), gone=(17.5, 18.5), stays=True,
     ),
     VIABLE(
-        says="our model is estimated, so that the joint brakes late and then harder than with $a$",
+        says="Our model is estimated, so that the joint brakes late and then harder than with $a$",
         measure=TORQUE, there=(76.5, 77.5), without=("M_bar_scale=2",), gone=(66.5, 67.5), of=NO_DELAY,
     ),
     VIABLE(
-        says="With 0.3 of the $\\bar M$ it takes all the torque",
+        says="With 0.3 of the $\\bar M$ it needs all the torque",
         measure=TORQUE, there=(76.5, 77.5), without=("M_bar_scale=0.3",), gone=(99.9, 100.1), of=NO_DELAY,
     ),
     *(

@@ -93,11 +93,11 @@ TASK_ROWS = (
         HAND, (0.7, 1.4), NO_FRICTION, (0, 0.3), of=("controller=osf",), seconds=0.6,
     ),
     Intervention(
-        "two-tasks/0", "Priorities matter again wherever a bound is in the way of one of the tasks",
+        "two-tasks/0", "Priorities matter where a bound limits one of the tasks",
         HAND, (1, 3), ("controller=himpc",), (0, 0.2), of=("controller=weighted",), on="torque-has-a-limit/1",
     ),
     Intervention(
-        "two-tasks/1", "So the gains are prices, too.",
+        "two-tasks/1", "So the gains act as weights, too.",
         HAND, (200, 300), ("tasks.q1.K_p=5", "tasks.q1.K_v=1.6"), (5, 150),
     ),
     Intervention(
@@ -105,15 +105,15 @@ TASK_ROWS = (
         HAND, (0.5, 1.2), ("levels.q1.Q=1000",), (0.5, 1.2), stays=True,
     ),
     Intervention(
-        "two-tasks/2", "Without level 2 the hand errs by 0.2 mm", HAND, (0.5, 1.2),
+        "two-tasks/2", "Without level 2 the hand is off by 0.2 mm", HAND, (0.5, 1.2),
         ("levels.q1.enabled=false",), (0.15, 0.25),
     ),
     Intervention(
-        "two-tasks/2", "time-delay estimation has to correct what that motion changes",
+        "two-tasks/2", "time-delay estimation has to correct the effects of that motion",
         HAND, (0.7, 1.0), ("M_bar_scale=2",), (0.3, 0.6),
     ),
     Intervention(
-        "two-tasks/3", "But a $Q$ that small no longer outweighs $R$.",
+        "two-tasks/3", "But such a small $Q$ no longer outweighs $R$.",
         Q1, (8, 20), ("levels.q1.R=0.001", "levels.position.R=0.001"), (0, 0.1),
         of=("q1_amplitude_deg=20", "levels.q1.Q=1e-5"),
     ),
@@ -129,18 +129,18 @@ TASK_ROWS = (
         ("levels.position.enabled=false", "levels.orientation.enabled=false"), (0, 0.1),
     ),
     Intervention(
-        "swap-the-priorities/2", "It is not the bounds that keep the motion orderly",
+        "swap-the-priorities/2", "The bounds do not explain the smooth motion",
         of("v", "deg/s"), (85, 105), ("limits.velocity=false", "limits.torque=false", "limits.position=off"),
         (85, 105), stays=True,
     ),
     # ---------------------------------------- when-tasks-fight
     Intervention(
-        "when-tasks-fight/0", "The singularity is made by the algorithm",
+        "when-tasks-fight/0", "The algorithm creates the singularity",
         of("torque share", "%"), (1e5, INF), ("controller=osf_damped",), (0, 2000),
     ),
 
     Intervention(
-        "when-tasks-fight/1", "It knows the arm better and fails at the same place",
+        "when-tasks-fight/1", "TDEOSF describes the arm better and fails at the same place",
         of("torque share", "%"), (1e5, INF), ("plant.friction=0", *EXACT), (1e5, INF), of=("controller=osf",),
         stays=True,
     ),
@@ -149,7 +149,7 @@ TASK_ROWS = (
         HAND, (2, 2.7), NO_FRICTION, (0, 0.3), of=("controller=osf",), seconds=0.5,
     ),
     Intervention(
-        "when-tasks-fight/2", "Level 2 wants something it cannot have",
+        "when-tasks-fight/2", "Level 2 has a target that it cannot reach",
         of("v", "deg/s", "range", 2.5, column=2), (170, 200), ("q1_amplitude_deg=20",), (40, 80),
     ),
     Intervention(
@@ -177,7 +177,7 @@ TASK_ROWS = (
         HAND, (0.7, 1), NO_BOUNDS[2:], (10.5, 11.5), seconds=2.5,
     ),
     Intervention(
-        "when-tasks-fight/2", "without any bound the arm is lost as with a projection",
+        "when-tasks-fight/2", "without any bound the arm goes out of control as with a projection",
         HAND, (0.7, 1), NO_BOUNDS, (1000, INF), seconds=2.5,
     ),
     # ---------------------------------------- stretched-out
@@ -194,15 +194,15 @@ TASK_ROWS = (
         HAND, (0.7, 1.3), NO_FRICTION, (0, 0.3), of=("controller=hqp",), seconds=0.5,
     ),
     Intervention(
-        "stretched-out/0", "for a tenth of a second the demand is small",
+        "stretched-out/0", "for a tenth of a second the demanded torque is small",
         of("torque share", "%"), (1e6, INF), ("smooth=true",), (0, 1), seconds=0.1,
     ),
     Intervention(
-        "stretched-out/0", "A damped inverse, `osf_damped`, asks for a fifth of the limit.",
+        "stretched-out/0", "A damped inverse, `osf_damped`, demands a fifth of the limit.",
         of("torque share", "%"), (1e6, INF), ("controller=osf_damped",), (18, 22),
     ),
     Intervention(
-        "stretched-out/2", "Nearly all of it was the jump",
+        "stretched-out/2", "Nearly all of the error was due to the jump",
         HAND, (2, 10), ("smooth=true",), (0, 0.5), of=("smooth=false",),
     ),
     Intervention(
@@ -210,7 +210,7 @@ TASK_ROWS = (
         of("error/position", "mm", "largest", 1.0), (50, INF), ("R=1000",), (0, 0.5), of=("R=1e7",),
     ),
     Intervention(
-        "stretched-out/1", "at rest it costs nothing, so it need not be small to be accurate",
+        "stretched-out/1", "at rest its cost is zero, so $R$ need not be small for accuracy",
         of("error/position", "mm", "largest", 1.0), (0.15, 0.3), ("R=1000",), (0.15, 0.3), stays=True,
     ),
     Intervention(

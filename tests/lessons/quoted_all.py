@@ -73,7 +73,7 @@ QUOTED = (
     Quoted(
         "two-tasks/3", "by 13° of its 20°", _of(Q1), 12.5, 14.5, ("q1_amplitude_deg=20", "levels.q1.Q=1e-5")
     ),
-    Quoted("two-tasks/3", "still several times the error", _ratio(HAND), 3, 20),
+    Quoted("two-tasks/3", "still several times that of a strict priority", _ratio(HAND), 3, 20),
     Quoted(
         "swap-the-priorities/0",
         "the posture's error of 32°",
@@ -99,7 +99,7 @@ QUOTED = (
     Quoted("when-tasks-fight/2", "to and fro with 94°/s", _of(SPEED_3, after=2.0), 93.5, 94.5),
     Quoted(
         "stretched-out/0",
-        "what the motion needs, less than half of the limit",
+        "as much as the motion needs, less than half of the limit",
         _of(TORQUE),
         30,
         50,
@@ -115,10 +115,16 @@ QUOTED = (
     Quoted("stretched-out/2", "an error of some millimetres right at the start", _of(HAND), 2, 10, None),
     Quoted("torque-has-a-limit/0", "nine tenths of the 0.24 N·m", _of(TORQUE), 85, 92),
     Quoted("torque-has-a-limit/1", "falls behind by half a degree", _of(Q1), 0.45, 0.6),
-    Quoted("stopping-takes-distance/0", "it comes at 57°/s", _of(Signal("v", "deg/s", column=1)), 56.5, 57.5),
+    Quoted(
+        "stopping-takes-distance/0",
+        "the joint arrives at 57°/s",
+        _of(Signal("v", "deg/s", column=1)),
+        56.5,
+        57.5,
+    ),
     Quoted(
         "stopping-takes-distance/2",
-        "The arm does 18",
+        "The joint does 18",
         _of(Signal("speed within 5° of an end", "deg/s")),
         17.5,
         18.5,
@@ -271,13 +277,13 @@ QUOTED = (
     ),
     Quoted(
         "the-model-is-wrong/1",
-        "here that is mostly the friction",
+        "here these are mostly friction",
         _of(HAND),
         0.0,
         0.5,
         ("plant.friction=0", "plant.damping=0"),
     ),
-    Quoted("the-model-is-wrong/1", "here that is mostly the friction", _of(HAND), 1.0, 5.0),
+    Quoted("the-model-is-wrong/1", "here these are mostly friction", _of(HAND), 1.0, 5.0),
     Quoted(
         "inside-the-qp/2",
         "then the error of level 1 grows as well",
@@ -308,7 +314,7 @@ QUOTED = (
         4.75,
     ),
     Quoted("your-robot/1", "the head stays too low", _of(HAND, "last"), 10, 100, None),
-    Quoted("your-robot/2", "Less than half the error", _ratio(HAND), 0.35, 0.5),
+    Quoted("your-robot/2", "The error is less than half of the ghost's", _ratio(HAND), 0.35, 0.5),
     Quoted(
         "your-robot/2",
         "At three times the suggestion the gauge passes 1",
