@@ -116,7 +116,7 @@ FIRST = Step(
 BACK = Step(
     title="And back",
     text=r"""
-    At 2.6 s the old order is restored. At this moment the targets of the controller jump, but its
+    At 2.6 s the old order is restored. At this moment the order of the problems jumps, but the
     measurements do not: $\tau_0$, $\ddot x_0$ and the last plan stay.
     """,
     do="Swap levels as fast as you can. Try to make the arm jump.",
