@@ -105,7 +105,8 @@ FURTHER = Further(
             },
         ),
         Question(
-            "Compute the two speeds that *A speed from which the joint can stop* quotes for 5° before the limit.",
+            "Compute the two speeds that *A speed from which the joint can stop* quotes for 5° before the "
+            "limit.",
             r"Exact model, $t = T_s$, $q_s$ at the limit: ⟨exact⟩°/s. Ours, $t = 0.33$ s and $q_s$ lying "
             r"0.4° before it: ⟨ours⟩°/s.",
             {
