@@ -1,4 +1,4 @@
-"""QP solvers and a kernel that find no solution, for tests of the fallbacks."""
+"""QP solvers and a kernel that find no solution; the tests of the fallbacks use them."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ NONSENSE = {
 
 
 def break_solver(monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
-    """Makes every QP solver return an invalid point with the status of a solution, and disables the method
-    that starts from the point above."""
+    """Makes every QP solver return an invalid point with the status of a solution, and disables `descended`,
+    the method that starts from the feasible point x = 0."""
 
     def nonsense(H: Array, f: Array, A: Array, *_: Any, **__: Any) -> tuple[Array, Array, str]:
         return NONSENSE[kind](f, A)
@@ -36,7 +36,7 @@ def break_solver(monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
 
 
 def break_kernel(monkeypatch: pytest.MonkeyPatch, place: int | None = None) -> None:
-    """Makes the kernel find no optimum, at one level or at all, and disables the printed QP."""
+    """Makes the kernel find no optimum, at one level or at all levels, and disables the printed QP."""
     healthy = fallbacks.control_period
 
     def broken(*given: Any) -> int:

@@ -1,4 +1,5 @@
-"""Settings for all tests: one thread per matrix product, and the same random examples in every run."""
+"""Settings for all tests: each matrix product uses one thread, and every run uses the same random
+examples."""
 
 from __future__ import annotations
 
@@ -12,11 +13,12 @@ from shutil import rmtree
 from tempfile import mkdtemp
 from typing import TYPE_CHECKING, Any
 
-# Set before NumPy is imported: the matrices are tiny, and threads would only compete for the cores.
+# These variables are set before NumPy is imported. The matrices are tiny; more threads would only compete for
+# the cores.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-# A process in the background ignores Ctrl-C, and so would every program that a test starts.
+# A process in the background ignores Ctrl-C, and every program that a test starts would inherit this.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -46,7 +48,8 @@ of an arm, all runs of the course, or the built site."""
 
 
 class OneWorkerForWhatIsShared(LoadScopeScheduling):
-    """Sends all tests of an entry of `_TOGETHER`, and all tests of any other file, to one worker each."""
+    """Sends all tests of one entry of `_TOGETHER` to one worker, and all tests of any other file to one
+    worker."""
 
     def _split_scope(self, nodeid: str) -> str:
         shared = (files[0] for files in _TOGETHER if nodeid.startswith(files))
@@ -99,7 +102,7 @@ _QUICK = (
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
-    """With `-m quick` pytest collects these files only."""
+    """With `-m quick` pytest collects only the files in `_QUICK`."""
     if config.getoption("markexpr") != "quick" or collection_path.suffix != ".py":
         return None
     return True if collection_path.relative_to(_ROOT).as_posix() not in _QUICK else None
@@ -122,7 +125,8 @@ _COLD = pytest.StashKey[tuple[str, str]]()
 
 def pytest_configure(config: pytest.Config) -> None:
     """Compiles all functions before the tests, because compilation takes a minute. In a fresh clone the first
-    run compiles them, and is stored for the test that compares it with the second run."""
+    run of the command compiles them; its recording is stored for the test that compares it with the second
+    run."""
     if hasattr(config, "workerinput") or _few_files(config):
         return
     if not any(_ROOT.glob("himpc/**/__pycache__/compiled/*.code")) and "NUMBA_CACHE_DIR" not in os.environ:
@@ -133,8 +137,8 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def _few_files(config: pytest.Config) -> bool:
-    """Whether only files were named on the command line, no folder: each file then compiles the functions
-    that it needs."""
+    """Whether the command line names only files, at most three, and no folder. Each of these files then
+    compiles only the functions that it needs."""
     named = [Path(str(config.rootpath), each.split("::")[0]) for each in config.args]
     return len(named) <= 3 and all(each.is_file() for each in named)
 
@@ -145,7 +149,7 @@ def pytest_configure_node(node: Any) -> None:
 
 
 def _run(file: Path, **environment: str) -> str:
-    """Returns the standard error of a run."""
+    """Runs the command, which writes a recording to the file, and returns its standard error."""
     command = ["run", "iiwa14-circle", "--duration", "0.3", "--npz", str(file), "--json", "-"]
     done = subprocess.run(
         [sys.executable, "-m", "app", *command],
@@ -163,7 +167,8 @@ Run = tuple[Path, str]
 
 @pytest.fixture
 def first_and_second_run(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[Run, Run]:
-    """The recording and the standard error of a run with an empty cache, and of the same run after it."""
+    """The recordings and standard errors of two equal runs: the first starts with an empty cache, and the
+    second uses the cache that the first has filled."""
     config, second = request.config, tmp_path / "second.npz"
     on_compiled = getattr(config, "workerinput", {"cold": config.stash.get(_COLD, None)})
     if (cold := on_compiled["cold"]) is not None:
@@ -197,7 +202,7 @@ def browser() -> Iterator[Browser]:
 
 @pytest.fixture(scope="session")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The site, built by the function of the command; every warning would be an error."""
+    """The site, built by the function that the command calls; every warning counts as an error."""
     from docs.build import build
 
     out = tmp_path_factory.mktemp("docs") / "site"

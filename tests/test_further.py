@@ -1,4 +1,5 @@
-"""Derivations and questions of the site: their equations hold, and their answers contain computed numbers."""
+"""The equations of the site's derivations hold, and the numbers in the answers to its questions are
+computed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The notebook in examples/ runs in a kernel, and a robot in Python does what the page does."""
+"""The notebook in examples/ runs in a kernel, and Python and the page control the same robot."""
 
 from __future__ import annotations
 
@@ -25,7 +25,8 @@ LONG = 120
 def test_the_notebook_shows_the_page_and_moves_the_robot(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Outside of a Jupyter server the cell shows a link; the hand rises by what was asked."""
+    """Outside of a Jupyter server the cell shows a link, and the hand rises by the distance that the notebook
+    requests."""
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
     monkeypatch.setenv("IPYTHONDIR", str(tmp_path))
     monkeypatch.delenv("JUPYTERHUB_SERVICE_PREFIX", raising=False)
@@ -49,7 +50,7 @@ def lab() -> Iterator[Lab]:
 
 
 def test_the_page_and_python_have_one_robot(lab: Lab) -> None:
-    """Two cells that show the page control the robot that Python controls; only the notebook's page may show
+    """Python and two cells that show the page control the same robot. Only the page of the notebook may show
     it in a frame."""
     with Wire(lab.url) as page, Wire(lab.url) as other:
         lab.set("horizon", 7)
@@ -82,8 +83,9 @@ def test_a_lab_that_was_stopped_says_so(lab: Lab) -> None:
 def test_the_frame_has_the_address_at_which_jupyter_serves(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """With Jupyter's proxy the address has no host, so that any name of it works; without it, it has the name
-    under which Jupyter was opened, and only that page may show it."""
+    """With Jupyter's proxy the address has no host, so that it works with every name of the server. Without
+    the proxy, it has the host name under which Jupyter was opened, and only a page from there may show the
+    frame."""
     proxied = Surroundings("http://localhost:8888/user/zoe/", True)
     assert proxied.source(1, "a=b") == "/user/zoe/proxy/1/?a=b" and proxied.embedders == ("'self'",)
     direct = Surroundings("http://localhost:8888/", False)

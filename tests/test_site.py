@@ -1,5 +1,5 @@
-"""The documentation site is built without a warning, complete, with valid links, and loads nothing from other
-hosts."""
+"""The documentation site is built without a warning. It is complete, its links are valid, and it loads
+nothing from other hosts."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_every_link_leads_somewhere(site: Path) -> None:
         for link in (*parts.links, *parts.loads):
             goal = urlsplit(link)
             if goal.scheme == "data":
-                continue  # part of the page itself
+                continue  # a data URL is part of the page itself
             if goal.scheme:
                 assert link in parts.links, f"{path.name} loads {link}"
                 continue
@@ -107,7 +107,8 @@ def test_every_claim_on_a_page_has_been_measured(site: Path) -> None:
 
 
 def test_what_is_recorded_is_of_the_lessons_as_they_are() -> None:
-    """Recorded steps, plots and ghosts agree with the lessons, and the curve of one lesson is recomputed."""
+    """Recorded steps, plots and ghosts agree with the lessons, and a new computation gives the curve of one
+    lesson again."""
     for name in COURSE:
         kept = json.loads((FOLDER / f"{name}.json").read_text(encoding="utf-8"))["steps"]
         for step, drawn in zip(load_lesson(name).steps, kept, strict=True):
@@ -127,8 +128,8 @@ def test_what_is_recorded_is_of_the_lessons_as_they_are() -> None:
 def test_the_site_in_a_browser(
     site: Path, browser: Browser, width: int, height: int, scheme: Literal["light", "dark"]
 ) -> None:
-    """From a file, no page is wider than the screen or loads anything from elsewhere; film, answers and
-    search work."""
+    """When pages are opened from a file, no page is wider than the screen or loads anything from another
+    host, and film, answers and search work."""
     asked: list[str] = []
     page = browser.new_page(viewport={"width": width, "height": height}, color_scheme=scheme)
     page.set_default_timeout(SLOW)
@@ -160,7 +161,7 @@ def test_what_one_would_search_for_is_in_the_index(site: Path) -> None:
 
 
 def test_a_quoted_number_is_still_so(tmp_path: Path) -> None:
-    """The numbers that pages quote of a lesson agree with a new measurement, to the three digits that are
+    """The numbers of a lesson that pages quote agree with a new measurement, to the three digits that are
     printed."""
     told = measured(ROOT / MEASURED)[QUICK]
     path = tmp_path / "now.json"

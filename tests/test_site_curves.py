@@ -13,7 +13,8 @@ from docs.pages.curves import FLOORS, figure, label
 
 
 def test_a_peak_is_neither_lost_nor_moved() -> None:
-    """One tick far above, one far below, and both ends are kept, each at its own time."""
+    """A value of one tick far above the curve, one far below it, and both ends are kept, each at its own
+    time."""
     t = np.linspace(0.0, 8.0, 8000)
     y = np.sin(t)
     y[[1234, 6543]] = 5.0, -5.0
@@ -35,7 +36,7 @@ def test_what_is_not_known_stays_a_gap() -> None:
 
 
 def drawn(values: list[float], unit: str) -> str:
-    """Returns the plot of one curve."""
+    """Returns the plot of one curve as SVG text."""
     plot: dict[str, Any] = {"words": "error", "unit": unit, "t": [[0.1 * k for k in range(len(values))]]}
     return figure({"plots": [{**plot, "curves": [values]}]}, None)
 

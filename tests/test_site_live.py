@@ -1,4 +1,4 @@
-"""Live figures of the site: a browser simulates what the lab computes, and all of it opens from a disk."""
+"""In the live figures of the site a browser simulates what the lab computes. The site opens from a disk."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ _REPLAY = """async ([pack, robot, step, ticks]) => {
 
 @pytest.fixture(scope="module")
 def everything(site: Path) -> Iterator[str]:
-    """The address of a page on the disk with all scripts of the live figures."""
+    """The address of a page on the disk that contains all scripts of the live figures."""
     scripts = "".join(
         f'<script src="live/{path.name}"></script>' for path in sorted((site / "live").glob("*.js"))
     )
@@ -85,7 +85,7 @@ def everything(site: Path) -> Iterator[str]:
 
 @pytest.fixture(scope="module")
 def simulated(everything: str, browser: Browser) -> Iterator[Page]:
-    """That page in Chromium, and a thread that simulates."""
+    """The page `everything` in Chromium, with the simulating thread loaded."""
     opened = browser.new_page()
     opened.set_default_timeout(SLOW)
     opened.goto(everything)
@@ -113,7 +113,7 @@ def simulated_in_firefox(everything: str, in_firefox: Tab) -> Tab:
 
 def torques(scene: TorqueScene, seconds: float) -> np.ndarray:
     """Returns the torques that Python computes in closed loop, (ticks, n) N·m, until the robot touches
-    something: the page's MuJoCo is an older one, and from then on its forces of contact differ."""
+    something: the page has an older MuJoCo with other contact forces, and later torques would differ."""
     session = TorqueSession(scene, 0)
     demand, touch = (session.layout.fields[name] for name in ("tau_demand", "contact_force"))
     found: list[np.ndarray] = []
@@ -148,7 +148,7 @@ def replayed(page: Page | Tab, pack: str, robot: str, step: str | None, ticks: i
 
 
 def figure(page: Page | Tab, name: str, ticks: int) -> dict[str, Any]:
-    """Returns what a browser computes of a live figure, `SCENE` or `LESSON/STEP`."""
+    """Returns what a browser computes for a live figure, `SCENE` or `LESSON/STEP`."""
     if "/" not in name:
         scene = as_torque_scene(load_scene(name), "a test's")
         return replayed(page, f"scene/{name}", scene.robot.name, None, ticks)
@@ -165,7 +165,7 @@ def test_the_page_computes_what_the_lab_computes(simulated: Page, name: str) -> 
 
 @pytest.mark.parametrize("name", STEPS)
 def test_a_live_step_is_the_step_of_the_lesson(simulated: Page, name: str) -> None:
-    """The torques of two seconds equal Python's, and the claims that a browser judges hold in it."""
+    """The torques of two seconds equal Python's, and the claims that a browser judges hold in the step."""
     lesson, step = parts_of(name)
     scene = scene_of_step(lesson, step)
     found = figure(simulated, name, round(step.duration / scene.settings.T_s))
@@ -189,7 +189,7 @@ def test_firefox_computes_what_the_lab_computes(simulated_in_firefox: Tab, name:
 
 
 def test_firefox_draws_the_robot(site: Path, in_firefox: Tab) -> None:
-    """The page simulates in Firefox, and the ball of the first level is orange at the place that it has."""
+    """The page simulates in Firefox and draws the ball of the first level, in orange, at its position."""
     in_firefox.goto((site / "try.html").as_uri() + "#planar3-hold")
     in_firefox.evaluate(_MOVED)
     picture = np.asarray(Image.open(BytesIO(in_firefox.screenshot())).convert("RGB"), float)
@@ -200,8 +200,8 @@ def test_firefox_draws_the_robot(site: Path, in_firefox: Tab) -> None:
 
 @pytest.mark.parametrize("name", ["iiwa14-table", "panda-hold", "planar3-hold"])
 def test_the_model_in_the_browser_is_that_of_the_lab(name: str) -> None:
-    """With the nominal numbers in its places, the text that the page completes gives the lab's model bit by
-    bit: bodies, geometries, contacts, stops and objects."""
+    """When its placeholders have the nominal numbers, the text that the page completes gives the model of the
+    lab bit by bit: bodies, geometries, contacts, stops and objects."""
     scene = as_torque_scene(load_scene(name), "a test's")
     told = mechanics(scene.robot)
     text = model_text(scene.robot, scene.world)
@@ -225,7 +225,7 @@ def test_the_model_in_the_browser_is_that_of_the_lab(name: str) -> None:
 
 
 def test_few_claims_are_left_to_the_lab() -> None:
-    """Of the live steps one claim needs the plant's M at every level, which the page does not compute."""
+    """One claim of the live steps needs the plant's M at every level, which the page does not compute."""
     names = [
         claim.measure.signal.name
         for name in STEPS
@@ -237,8 +237,8 @@ def test_few_claims_are_left_to_the_lab() -> None:
 
 @pytest.mark.parametrize(("width", "height"), [(1440, 900), (390, 844)])
 def test_try_it(site: Path, browser: Browser, width: int, height: int) -> None:
-    """From a file, the robot is pushed, its target is dragged with mouse and keys, levels change places, and
-    nobody is asked."""
+    """The page is opened from a file. The robot is pushed, its target is dragged with mouse and keys, levels
+    change places, and the page sends no request to a server."""
     asked: list[str] = []
     page = browser.new_page(viewport={"width": width, "height": height}, has_touch=width < 500)
     page.set_default_timeout(SLOW)
@@ -275,7 +275,7 @@ def test_try_it(site: Path, browser: Browser, width: int, height: int) -> None:
 
 
 def test_a_code_goes_both_ways(site: Path, browser: Browser) -> None:
-    """A code of the lab opens on the page with its settings, and one of the page is read by the lab."""
+    """The page opens a code of the lab with its settings, and the lab reads a code of the page."""
     told = (
         "M_bar_scale=2",
         "horizon=10",
@@ -301,7 +301,7 @@ def test_a_code_goes_both_ways(site: Path, browser: Browser) -> None:
 
 
 def test_a_step_in_a_page(site: Path, browser: Browser) -> None:
-    """A step is predicted, run and judged in its page; its code opens in the lab, a link opens the step."""
+    """A step is predicted, run and judged in its page. The lab opens its code, and a link opens the step."""
     page = browser.new_page(reduced_motion="reduce")
     page.set_default_timeout(SLOW)
     page.goto((site / "lessons" / "inside-the-qp.html").as_uri())
@@ -326,7 +326,7 @@ def test_a_step_in_a_page(site: Path, browser: Browser) -> None:
 
 
 def test_what_is_loaded_first_is_small(site: Path) -> None:
-    """The page, its program, MuJoCo, the kernel, a robot and its scene; scripts hold compressed data."""
+    """Page, program, MuJoCo, kernel, robot and scene have few bytes; the scripts hold compressed data."""
     names = ("live", "mujoco", "kernel", "iiwa14-hold", "robot-iiwa14")
     files = [site / "try.html", *(site / "live" / f"{name}.js" for name in names)]
     assert sum(path.stat().st_size for path in files) < 5e6
@@ -336,7 +336,7 @@ def test_what_is_loaded_first_is_small(site: Path) -> None:
 
 
 def test_the_program_is_small_and_typed_and_its_packages_are_pinned() -> None:
-    """It has at most 1,500 lines."""
+    """The program has at most 1,500 lines."""
     told = json.loads((front.PROGRAM / "package.json").read_text())
     files = [front.PROGRAM / "build.mjs", *(front.PROGRAM / "src").iterdir()]
     assert sum(len(path.read_text(encoding="utf-8").splitlines()) for path in files) <= 1500
@@ -352,7 +352,7 @@ def test_the_program_is_small_and_typed_and_its_packages_are_pinned() -> None:
 
 
 def test_without_node_the_site_has_recordings(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Then a build says what is missing, and pages have no live figures."""
+    """Without Node, the build names what is missing, and the pages have curves but no live figures."""
     monkeypatch.setattr("docs.figures.front.shutil.which", lambda name: None)
     assert "need node" in str(front.missing())
     pages = lessons.pages(front.ROOT, live=False)
@@ -382,7 +382,7 @@ CHANGES = (
 
 
 def test_what_is_changed_while_the_robot_moves_acts_as_in_the_lab(simulated: Page) -> None:
-    """Targets, order, levels, N, M̄, gains, weights, limits, payload, friction and pushes, one by one."""
+    """Targets, order, levels, N, M̄, gains, weights, limits, payload, friction and pushes are changed."""
     scene = load_scene("iiwa14-hold")
     assert isinstance(scene, TorqueScene)
     changed, pack = replace(scene, events=CHANGES), Pack()

@@ -1,5 +1,5 @@
-"""The architecture as rules: imports have one direction, heavy dependencies have one door, files stay
-small."""
+"""The rules of the architecture: imports have one direction, each heavy dependency is imported in one place,
+and files stay small."""
 
 from __future__ import annotations
 
@@ -52,8 +52,8 @@ def tree(path: Path) -> ast.Module:
 
 @cache
 def imports(path: Path) -> frozenset[str]:
-    """Returns every module or name that a file imports, in dotted form, anywhere in the file and also for
-    types."""
+    """Returns every module or name that a file imports, in dotted form, including imports inside functions
+    and for types."""
     found: set[str] = set()
     for node in ast.walk(tree(path)):
         if isinstance(node, ast.Import):
@@ -92,7 +92,7 @@ def test_imports_go_one_way(package: str) -> None:
 
 
 def test_himpc_is_tested_without_lessons_and_app() -> None:
-    """The tests of himpc use it without the other packages, and thus show its use as a library."""
+    """The tests of himpc do not import lessons or app, and thus show that himpc can be used as a library."""
     files = sources("tests/himpc")
     assert files
     assert not {
@@ -124,7 +124,7 @@ beside the simulation, whose reports it uses."""
 
 
 def test_app_is_the_folders_it_says() -> None:
-    """Every folder has its rule, and app/ contains no other file."""
+    """Every folder of app/ has an entry in `APP`, and app/ contains only two other files."""
     folders = {path.name for path in (ROOT / "app").iterdir() if path.is_dir() and path.name[0] not in "._"}
     assert folders == set(APP)
     assert {path.name for path in (ROOT / "app").glob("*.py")} == {"__init__.py", "__main__.py"}
@@ -153,8 +153,8 @@ def test_contributing_names_what_is_there() -> None:
 
 @pytest.mark.parametrize("folder", APP)
 def test_page_and_simulation_meet_in_link_only(folder: str) -> None:
-    """Imports go in the direction commands → server → page → panels → view → client → link ← worker, never
-    back and never across."""
+    """Imports go in the direction commands → server → page → panels → view → client → link ← worker. A folder
+    imports only the folders that `APP` lists for it."""
     files = sources(f"app/{folder}")
     assert files
     wrong = {
@@ -285,7 +285,7 @@ def test_robots_are_built_in_one_direction(part: str) -> None:
 
 
 def test_robots_have_no_other_parts() -> None:
-    """Every file belongs to one part, and every rule is used."""
+    """Every file belongs to one part, and each import that `ROBOTS` allows occurs."""
     files = sources("robots")
     assert outside_all_parts("robots") == {ROOT / "robots" / "__init__.py"}
     used = {
@@ -299,7 +299,7 @@ def test_robots_have_no_other_parts() -> None:
 
 @pytest.mark.parametrize("package", ["robots", "lessons"])
 def test_files_do_not_import_each_other(package: str) -> None:
-    """No file imports itself through others, also not for types or inside functions."""
+    """There are no import cycles; imports for types and inside functions count as well."""
     below = {
         path: {home_of(name) for name in imports(path) if within(name, package)} - {path}
         for path in sources(package)
@@ -431,8 +431,8 @@ PRIVATE_OF_NUMBA = {"private", "private_views", "pieces", "keeping", "loading"}
 
 
 def test_few_files_touch_private_names_of_numba() -> None:
-    """The other files of the tool chain use only public names of `numba`; they work also if private names
-    change."""
+    """Only five files of the tool chain use private names of `numba`. The other files still work if these
+    names change."""
     touching, using = set(), set()
     for path in sources("himpc/compilation"):
         of_numba = {name for name in imports(path) if within(name, "numba")}
@@ -457,11 +457,11 @@ PRIVATE = "app/adapter/private.py"
 
 
 def test_one_file_touches_private_names_of_viser() -> None:
-    """A name with one leading underscore belongs to the class that uses it, or is in the one file that checks
-    it before the server starts."""
+    """A private name, with one leading underscore, is used only by its own class or in the one file that
+    checks it before the server starts."""
     files = sources(*(f"app/{folder}" for folder in APP if folder not in NO_PICTURE))
     touching: dict[str, set[str]] = {}
-    ours = {"_exit"}  # of os, and not private
+    ours = {"_exit"}  # `_exit` is a public name of os
     for path in files:
         name = str(path.relative_to(ROOT))
         for node in ast.walk(tree(path)):
@@ -482,7 +482,7 @@ def test_one_file_touches_private_names_of_viser() -> None:
 
 
 def test_one_file_has_the_names_of_visers_page() -> None:
-    """Scripts and styles use the constants of one module, whose table is checked before the server starts."""
+    """Scripts and styles use the constants of one module, which are checked before the server starts."""
     name = re.compile(r"__viser\w|mantine-[A-Z]|\.uplot|\.u-\w|20em")
     files = {str(path.relative_to(ROOT)) for path in sources("app") if name.search(path.read_text())}
     assert files == {"app/adapter/names.py"}
@@ -494,7 +494,7 @@ def is_private(name: str) -> bool:
 
 @pytest.mark.parametrize("library", DOORS)
 def test_heavy_dependencies_have_one_door(library: str) -> None:
-    """A library is imported only behind its door, and the door exists."""
+    """A library is imported only in the files or folders of its entry in `DOORS`, and at least once."""
     users = {
         str(path.relative_to(ROOT))
         for path in sources(*ORDER[:-1])
@@ -505,7 +505,7 @@ def test_heavy_dependencies_have_one_door(library: str) -> None:
 
 
 def test_what_is_imported_is_declared() -> None:
-    """Every imported package is a declared dependency, not one that another package happens to install."""
+    """Every imported package is declared as a dependency, also if another package would install it anyway."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     wanted = [
         *project["dependencies"],
@@ -520,7 +520,7 @@ def test_what_is_imported_is_declared() -> None:
 
 
 def test_the_oracle_of_the_clearances_stays_in_the_tests() -> None:
-    """Distances are computed in closed form; the collision library is used only to check them."""
+    """The packages compute distances in closed form; only tests use the collision library, as a check."""
     packages, tests = (
         any(within(name, "coal") for path in sources(*where) for name in imports(path))
         for where in (ORDER[:-1], ORDER[-1:])
@@ -530,7 +530,7 @@ def test_the_oracle_of_the_clearances_stays_in_the_tests() -> None:
 
 
 def test_the_controller_cannot_peek() -> None:
-    """himpc never imports the plant; thus a controller cannot use the true mechanics."""
+    """himpc never imports the plant, so that a controller cannot use the true mechanics."""
     names = {name for path in sources("himpc") for name in imports(path)}
     assert names
     plant = ("robots.plant", "robots.mechanics")
@@ -549,14 +549,14 @@ MAY_ASK = ("lessons/scenes/catalog.py", "lessons/session/torque.py", "lessons/se
 
 
 def test_who_tells_torque_from_velocity() -> None:
-    """Only the catalog and the two sessions distinguish the two kinds; everything else uses one table."""
+    """Only the catalog and the two sessions distinguish the two kinds; all other code uses one table."""
     asking = {str(path.relative_to(ROOT)) for path in sources("lessons", "app") if asks_for_kind(path)}
     assert "lessons/scenes/catalog.py" in asking, "the test sees nothing any more"
     assert asking <= set(MAY_ASK)
 
 
 def asks_for_kind(path: Path) -> bool:
-    """Whether a file tests for, compares with, or matches a class of one kind."""
+    """Whether a file tests for, compares with, or matches a class of one kind (torque or velocity)."""
     for node in ast.walk(tree(path)):
         about: list[ast.AST] = []
         if isinstance(node, ast.Call) and getattr(node.func, "id", "") in ("isinstance", "issubclass"):
@@ -577,8 +577,8 @@ classes."""
 
 
 def test_classes_are_abstract_or_final() -> None:
-    """Every class that is subclassed has an abstract method or is a declared base class, except those in
-    EXTENDED."""
+    """Every class that is subclassed has an abstract method or is an abstract base or protocol, except those
+    in EXTENDED."""
     classes = {(path, each.name): each for path in sources(*ORDER[:-1]) for each in classes_of(path)}
     lines: dict[tuple[Path, str], list[tuple[Path, str]]] = {}
     for path, name in classes:
@@ -611,20 +611,20 @@ def classes_of(path: Path) -> list[ast.ClassDef]:
 
 
 def words_of(nodes: list[ast.expr]) -> list[str]:
-    """Returns the last word of each name, without subscripts."""
+    """Returns the last word of each dotted name, without subscripts."""
     plain = [node.value if isinstance(node, ast.Subscript) else node for node in nodes]
     return [str(getattr(node, "id", getattr(node, "attr", ""))) for node in plain]
 
 
 @cache
 def origins(path: Path) -> dict[str, str]:
-    """Returns the modules that the names of a file come from."""
+    """Returns the module from which a file imports each name."""
     nodes = [node for node in ast.walk(tree(path)) if isinstance(node, ast.ImportFrom)]
     return {alias.asname or alias.name: str(node.module) for node in nodes for alias in node.names}
 
 
 def stands_in(path: Path, module: str) -> bool:
-    """Whether a file is that module, or one whose names the package of that name exports."""
+    """Whether a file is the given module, or part of the package of that name."""
     return bool(module) and within(".".join(path.relative_to(ROOT).with_suffix("").parts), module)
 
 
@@ -639,9 +639,9 @@ def test_files_stay_readable() -> None:
 
 
 def test_no_file_names_a_package_index() -> None:
-    """Packages are installed from the index that the machine is configured with."""
+    """No file under version control names a package index; pip uses the index configured on the machine."""
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True)
-    # One by one: a search for a fixed beginning is far faster than one for several beginnings.
+    # The patterns are searched one by one: a fixed beginning is found far faster than one of several.
     patterns = [
         *map(re.compile, ("--(extra-)?index[-]url", "--find-links", r"py[p]i\.org", "python[h]osted")),
         re.compile(r"https?://[^\s\"'<>)]*/simple\b"),

@@ -1,4 +1,4 @@
-"""A built wheel works in an environment of its own, outside the checkout."""
+"""A built wheel works in a separate environment, outside the checkout."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _ELSEWHERE = "NUMBA_CACHE_DIR" in os.environ
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A wheel built from the files under version control, as from a fresh clone."""
+    """The wheel, built from the files under version control, as from a fresh clone."""
     folder = tmp_path_factory.mktemp("wheel")
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True)
     for name in filter(None, listed.stdout.split("\0")):
@@ -52,8 +52,8 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def command(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """`himpc-lab` of an environment that contains the wheel; its dependencies are those of this
-    environment."""
+    """The program `himpc-lab` of an environment that contains the wheel and uses the dependencies of the
+    environment of the tests."""
     home = tmp_path_factory.mktemp("venv")
     venv.create(home, with_pip=False, symlinks=True)
     with zipfile.ZipFile(wheel) as archive:
@@ -69,7 +69,7 @@ def command(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         "-q",
         "--no-deps",
     ]
-    # With the checkout in PYTHONPATH, pip would consider the package as installed.
+    # If PYTHONPATH contained the checkout, pip would consider the package as installed.
     alone = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     done = subprocess.run(
         [*pip, "--no-index", str(wheel)], env=alone, capture_output=True, text=True, check=False
@@ -77,15 +77,16 @@ def command(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert done.returncode == 0, done.stderr
     here = Path(sysconfig.get_path("purelib"))
     (there,) = home.glob("lib/python*/site-packages")
-    # The checkout is installed here in place, by its own import finder, which the environment must not use.
+    # Here the checkout is installed in place by an import finder. The new environment must not use this
+    # finder, so its .pth file lists only the folders of the dependencies.
     (there / "dependencies.pth").write_text(f"{here}\n{here / 'cmeel.prefix' / there.relative_to(home)}\n")
     _take_compiled_code_along(there)
     return home / "bin" / "himpc-lab"
 
 
 def _take_compiled_code_along(there: Path) -> None:
-    """Copy the compiled code into the new environment, as its compilation takes a minute and is not tested
-    here."""
+    """Copies the compiled code into the new environment, because its compilation takes a minute and is not
+    tested here."""
     compile_all(lambda *_: None)
     found = [*ROOT.glob("himpc/**/__pycache__/compiled/*.code")]
     assert found or _ELSEWHERE
@@ -96,7 +97,7 @@ def _take_compiled_code_along(there: Path) -> None:
 
 
 def run(command: Path, folder: Path, what: Sequence[str]) -> str:
-    """Returns the output of the command, started in `folder` without the paths of this process."""
+    """Runs the command in `folder` without the import paths of this process, and returns its output."""
     processor = {name: value for name, value in os.environ.items() if name == "NUMBA_CPU_NAME"}
     environment = {"HOME": str(folder), "PATH": "/usr/bin:/bin", "LANG": "C.UTF-8", **processor}
     done = subprocess.run(
