@@ -326,7 +326,7 @@ def test_a_step_in_a_page(site: Path, browser: Browser) -> None:
 
 
 def test_what_is_loaded_first_is_small(site: Path) -> None:
-    """Page, program, MuJoCo, kernel, robot and scene have few bytes; the scripts hold compressed data."""
+    """Page, program, MuJoCo, kernel, robot and scene have less than 5 MB; scripts hold compressed data."""
     names = ("live", "mujoco", "kernel", "iiwa14-hold", "robot-iiwa14")
     files = [site / "try.html", *(site / "live" / f"{name}.js" for name in names)]
     assert sum(path.stat().st_size for path in files) < 5e6

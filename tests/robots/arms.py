@@ -1,4 +1,4 @@
-"""Small URDFs and independent references for the tests of `robots`."""
+"""Small URDFs and independently computed references for the tests of `robots`."""
 
 from __future__ import annotations
 
@@ -45,5 +45,5 @@ def full_mass_matrix(model: pin.Model, q: np.ndarray) -> np.ndarray:
 
 
 def load(text: str) -> Robot:
-    """Load a URDF like `load_urdf_text`, but in this process."""
+    """Loads a URDF like `load_urdf_text`, but in this process."""
     return import_robot(text.encode(), "the URDF text").used()

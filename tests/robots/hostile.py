@@ -1,4 +1,4 @@
-"""Malformed and malicious robot descriptions, by kind."""
+"""Malformed and malicious robot descriptions, each with the name of its kind."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ ARM = two_joint_arm()
 
 
 def chain(count: int, kind: str = "revolute") -> str:
-    """Returns links in series, with joints of one kind and estimated effort limits."""
+    """Returns the URDF of links in series, with joints of one type whose effort limits the import must
+    estimate."""
     limit = '<limit lower="-1" upper="1" velocity="1" effort="0"/>'
     parts = [link("l0"), *(link(f"l{k + 1}") for k in range(count))]
     parts += [joint(f"j{k}", f"l{k}", f"l{k + 1}", kind, limit, "0 1 0") for k in range(count)]
@@ -79,7 +80,7 @@ NUMBERS = (
 
 
 def texts() -> Iterator[tuple[str, str]]:
-    """Yields all kinds that are texts."""
+    """Yields the name and the text of every kind that is a text."""
     # Documents
     yield "empty", ""
     yield "blank", " \n\t "
@@ -279,7 +280,7 @@ def texts() -> Iterator[tuple[str, str]]:
 
 
 def documents() -> dict[str, bytes]:
-    """Returns all kinds, as bytes."""
+    """Returns the files of all kinds as bytes, by name."""
     found = {name: text.encode() for name, text in texts()}
     found["UTF-16"] = f'<?xml version="1.0" encoding="UTF-16"?>{ARM}'.encode("utf-16")
     found["UTF-16 without a word"] = ARM.encode("utf-16-le")

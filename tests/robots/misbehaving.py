@@ -1,4 +1,4 @@
-"""Functions that crash, hang or print, for tests of work in a separate process."""
+"""Functions that crash, hang or print; tests run them in a separate process."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _seen: list[str] = []
 
 
 def seen_by(*what: str) -> list[str]:
-    """Returns all words that this process has received until now, including the given ones."""
+    """Adds the given words to those that this process has received, and returns all of them."""
     _seen.extend(what)
     return _seen
 
@@ -28,7 +28,7 @@ def open_files() -> set[str]:
 
 
 def apart(work: Any, *args: Any, seconds: float = 10.0) -> Any:
-    """Run `isolated(work, *args)` in a copy of this process if possible; the copy has the word "the
+    """Runs `isolated(work, *args)`, in a copy of this process if possible. The copy contains the word "the
     original"."""
     from robots.processes.isolation import Allowance, Fault, isolated
 
@@ -52,7 +52,7 @@ def descend() -> None:
 
 
 def chatter() -> str:
-    """Print to standard output, with `print` and directly to file descriptor 1, and return an answer."""
+    """Prints to standard output, with `print` and directly to file descriptor 1, and returns an answer."""
     print("x" * 100_000)
     os.write(1, b"y" * 100_000)
     sys.stdout.flush()
@@ -60,7 +60,7 @@ def chatter() -> str:
 
 
 def stay(file: str) -> None:
-    """Write the process id into a file and sleep."""
+    """Writes the process id into a file and sleeps."""
     Path(file).write_text(str(os.getpid()))
     time.sleep(3600.0)
 
@@ -79,7 +79,7 @@ def leave() -> None:
 
 
 def multiply() -> int:
-    """Start a process that does not end, and return its id."""
+    """Starts a process that does not end, and returns its id."""
     child = os.fork()
     if child == 0:
         time.sleep(3600.0)

@@ -1,4 +1,4 @@
-"""Every robot of the catalog agrees with the data of its sources."""
+"""Every robot of the catalog agrees with the published data from which it was made."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The plant with geometry: contacts, joint stops, and the solids they use."""
+"""A plant with geometry computes contacts and joint stops, with the collision solids of its robot."""
 
 from __future__ import annotations
 
@@ -28,7 +28,8 @@ TOUCHING = PlantSettings(contacts=True, joint_stops=True)
 
 @pytest.mark.parametrize("name", CATALOG)
 def test_nothing_touches_at_home(name: str) -> None:
-    """Held at home the robot feels no contact, and moves, to the last bit, as without contacts."""
+    """A robot that is held at home has no contact, and its positions equal those without contacts to the last
+    bit."""
     robot = load_robot(name)
     plants = Plant(robot), Plant(robot, TOUCHING, world=standing_floor(robot))
     for plant in plants:
@@ -41,7 +42,8 @@ def test_nothing_touches_at_home(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["baxter", "ridgeback-ur10"])
 def test_what_touches_at_home_is_excluded_and_told(name: str) -> None:
-    """Without the list of excluded pairs these robots would press against themselves at home."""
+    """Without the list of excluded pairs, the links of these robots would press against each other at
+    home."""
     robot = load_robot(name)
     pairs = [pair for pair in robot.collision.excluded if pair.why == "home"]
     found = replace(robot, collision=replace(robot.collision, excluded=()))
@@ -56,7 +58,7 @@ FALLING = {"iiwa14": np.radians([0, 60, 0, -30, 0, 30, 0]), "panda": np.radians(
 
 @pytest.mark.parametrize("name", FALLING)
 def test_an_arm_that_falls_stays_above_the_floor(name: str) -> None:
-    """Without torque it lies on the floor in the end; it is never deeper than 5 mm."""
+    """The arm has no torque and lies on the floor in the end; the penetration is never deeper than 5 mm."""
     robot = load_robot(name)
     plant = Plant(robot, replace(TOUCHING, damping=2.0), world=standing_floor(robot))
     plant.reset(FALLING[name], tau=np.zeros(robot.n))
@@ -78,7 +80,8 @@ def test_an_arm_that_falls_stays_above_the_floor(name: str) -> None:
 
 
 def test_a_changed_diagonal_does_not_hide_contacts() -> None:
-    """The plant integrates such a robot by itself, and it lies on the floor all the same."""
+    """Our own code integrates a plant with a changed diagonal, and the arm lies on the floor in the same
+    way."""
     robot = load_robot("panda")
     plant = Plant(robot, replace(TOUCHING, damping=2.0, diagonal_scale=1.1), world=standing_floor(robot))
     plant.reset(FALLING["panda"], tau=np.zeros(robot.n))
@@ -92,7 +95,8 @@ def test_a_changed_diagonal_does_not_hide_contacts() -> None:
 
 
 def test_the_links_of_a_robot_touch_each_other() -> None:
-    """A forearm that is folded without a joint stop is stopped by the upper arm; both links are named."""
+    """The forearm is folded without joint stops until the upper arm stops it; the contact names both
+    links."""
     plant = Plant(load_robot("iiwa14"), PlantSettings(contacts=True))
     for _ in range(1500):
         torque = plant.holding_torque()
@@ -104,7 +108,8 @@ def test_the_links_of_a_robot_touch_each_other() -> None:
 
 @pytest.mark.parametrize("stops", [True, False])
 def test_a_joint_stops_at_its_limit(stops: bool) -> None:
-    """The torque of the motor cannot push it further, and without stops it moves on."""
+    """With stops, the motor torque cannot push the joint beyond its limit; without stops, the joint moves
+    on."""
     robot = load_robot("iiwa14")
     plant = Plant(robot, PlantSettings(joint_stops=stops, gravity=False))
     for _ in range(1500):
@@ -114,8 +119,8 @@ def test_a_joint_stops_at_its_limit(stops: bool) -> None:
 
 
 def test_without_contacts_the_model_is_as_before(tmp_path: Path) -> None:
-    """No geometry, no limit, no other body: only the joints, sites and motors of the robot, contacts
-    disabled."""
+    """Without contacts the model contains only the joints, sites and motors of the robot: no geometry, no
+    limit and no other body; MuJoCo's contacts are disabled."""
     world: World = (Thing(Floor()), Thing(Ball("ball", (1.0, 0.0, 1.0), 0.1), mass_kg=1.0))
     for name in CATALOG:
         robot = load_robot(name)
@@ -132,8 +137,8 @@ def test_without_contacts_the_model_is_as_before(tmp_path: Path) -> None:
 
 
 def test_free_objects_move_and_return() -> None:
-    """A ball falls on a table and stays there; a reset puts it back; the robot's own quantities stay n
-    long."""
+    """A ball and a box fall on a table and stay there, and a reset puts them back. The quantities of the
+    robot keep their length n."""
     robot = load_robot("iiwa14")
     world: World = (
         *standing_floor(robot),
@@ -197,7 +202,7 @@ def test_worlds_that_cannot_be_are_refused() -> None:
 
 
 def test_the_stored_solids_are_those_of_the_meshes() -> None:
-    """They contain all that is drawn, to 3 mm, and the pairs that are left out are found again."""
+    """The stored solids contain all drawn shapes, to 3 mm, and the excluded pairs are found again."""
     robot = load_robot("iiwa14")
     shapes = link_shapes(robot)
     if shapes[0].name.startswith("base/pedestal"):
@@ -212,7 +217,7 @@ def test_the_stored_solids_are_those_of_the_meshes() -> None:
 
 
 def own(shapes: str) -> Robot:
-    """An arm of two links; the second has the given shapes."""
+    """Returns an arm of two links; the second has the given shapes."""
     text = urdf(
         link("base", ""),
         link("a"),
@@ -227,7 +232,7 @@ BOX = '<collision><origin xyz="0 0 0.1"/><geometry><box size="0.1 0.2 0.3"/></ge
 
 
 def test_an_own_robot_gets_solids_and_a_line_in_the_report() -> None:
-    """Collision shapes of the URDF come first; bodies without any shape get capsules."""
+    """Collision shapes of the URDF are used first; bodies without any shape get capsules."""
     robot = own(BOX)
     kinds = {(solid.link, solid.kind, solid.source) for solid in robot.collision.solids}
     assert ("b", "box", "collision") in kinds
@@ -251,11 +256,11 @@ HOSTILE = {
 
 @pytest.mark.parametrize("case", HOSTILE)
 def test_bad_collision_shapes_are_left_out(case: str) -> None:
-    """The robot can be used all the same, with contacts, and has few solids."""
+    """The robot can still be used with contacts, and has few solids."""
     try:
         robot = own(HOSTILE[case])
     except InputError:
-        assert case == "far"  # no robot is that large
+        assert case == "far"  # the importer refuses a robot of this size
         return
     assert 1 <= len(robot.collision.solids) <= 20
     plant = Plant(robot, TOUCHING)

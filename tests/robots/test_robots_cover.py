@@ -1,4 +1,5 @@
-"""The capsules that distances use contain what one sees and what the plant collides with."""
+"""The capsules with which distances are computed contain the drawn shapes and the collision solids of the
+plant."""
 
 from __future__ import annotations
 
@@ -22,11 +23,12 @@ from robots.geometry.cover import Cover, cover_as_json, stored_cover
 from robots.mechanics.exclusions import touching
 from robots.shapes.link_shapes import link_shapes
 
-ROUNDING = 1e-7  # m: drawn vertices are float32
+ROUNDING = 1e-7  # m; drawn vertices are float32
 
 
 def outside(cover: Cover, joint: int, points: np.ndarray) -> float:
-    """How far the farthest of points (V, 3), in the axes of a joint, lies outside of all its capsules, m."""
+    """Returns how far the farthest of points (V, 3), in the axes of a joint, lies outside of all its
+    capsules, m."""
     least = np.full(len(points), np.inf)
     for capsule in cover.capsules:
         if capsule.joint == joint:
@@ -38,13 +40,13 @@ def outside(cover: Cover, joint: int, points: np.ndarray) -> float:
 
 
 def worst(robot: Robot) -> float:
-    """How far surfaces of the solids and of the visual shapes stand out of the cover, m."""
+    """Returns how far surfaces of the solids and of the visual shapes protrude from the cover, m."""
     cover = cover_of(robot)
     return max(outside(cover, patch.joint, on(patch.corners)) + patch.swell for patch in patches(robot))
 
 
 def on(corners: np.ndarray) -> np.ndarray:
-    """Points of triangles (F, 3, 3): their corners, and points between them."""
+    """Returns points of triangles (F, 3, 3): their corners, and points inside."""
     inner = np.random.default_rng(0).dirichlet((1.0, 1.0, 1.0), 20)
     between = np.concatenate([np.eye(3), inner]) @ corners[:: max(1, len(corners) // 2000)]
     return np.concatenate([corners.reshape(-1, 3), between.reshape(-1, 3)])
@@ -52,21 +54,22 @@ def on(corners: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("name", CATALOG)
 def test_the_stored_cover_contains_the_robot(name: str) -> None:
-    """No vertex of the meshes stands out, and no point of the surfaces that the plant collides with."""
+    """The capsules contain every vertex of the meshes and every point on the surfaces of the collision
+    solids."""
     robot = load_robot(name)
     cover = cover_of(robot)
     for patch in patches(replace(robot, urdf_text="<robot/>")):
         assert outside(cover, patch.joint, on(patch.corners)) + patch.swell <= ROUNDING, patch.link
     shapes = link_shapes(robot)
     if any(shape.name.startswith("body") for shape in shapes):
-        return  # drawn capsules, whose drums at the joints are decoration, because there are no meshes
+        return  # without meshes capsules are drawn; their drums at the joints are only decoration
     for shape in shapes:
         assert outside(cover, shape.joint, shape.vertices.astype(float)) <= ROUNDING, shape.name
 
 
 @pytest.mark.parametrize("name", CATALOG)
 def test_a_thinner_cover_would_not_contain_it(name: str) -> None:
-    """With capsules that are 2 mm thinner, surfaces of every body stand out."""
+    """If the capsules are 2 mm thinner, surfaces of every body protrude from them."""
     robot = load_robot(name)
     cover = cover_of(robot)
     thinner = tuple(replace(each, radius=each.radius - 2e-3) for each in cover.capsules)
@@ -82,7 +85,8 @@ MOST = {"planar3": 12, "iiwa14": 20, "panda": 20, "ridgeback-ur10": 26, "baxter"
 
 @pytest.mark.parametrize("name", CATALOG)
 def test_few_capsules_are_far_apart_at_home(name: str) -> None:
-    """All distances are computed in every tick, and a pair that touches at home could not keep a distance."""
+    """Every tick computes all distances, so capsules must be few. A pair that touches at home could not keep
+    a distance, so only excluded pairs touch."""
     robot = load_robot(name)
     cover = cover_of(robot)
     assert {capsule.joint for capsule in cover.capsules} == {each.joint for each in robot.collision.solids}
@@ -95,7 +99,7 @@ def test_few_capsules_are_far_apart_at_home(name: str) -> None:
 
 
 def test_the_stored_cover_is_the_generated_one() -> None:
-    """`python -m robots.loading.write` writes it."""
+    """A cover that is generated as by `python -m robots.loading.write` equals the stored cover."""
     robot = load_robot("planar3")
     assert made_cover(robot, tries=2) == robot.cover
 
@@ -125,7 +129,8 @@ def with_shapes(*shapes: str, tag: str = "visual", at: str = "0.1 0 0.05") -> Ro
 
 @pytest.mark.parametrize("tag", ["visual", "collision"])
 def test_primitives_are_contained(tag: str) -> None:
-    """Of one and of three shapes; all that is drawn, and the true sphere and cylinder."""
+    """The cover of one shape and of three shapes contains all drawn vertices, and the exact sphere and
+    cylinder."""
     for shapes in (SHAPES[:1], SHAPES):
         robot = with_shapes(*shapes, tag=tag)
         assert worst(robot) <= 1e-9
@@ -142,7 +147,8 @@ def test_a_sphere_is_its_own_cover() -> None:
 
 
 def test_a_robot_without_shapes_has_the_capsules_of_its_kinematics() -> None:
-    """The straight parts from joint to joint; each is one capsule, as thick as the drawn one."""
+    """The capsules cover the straight parts from joint to joint; each is one capsule, as thick as the drawn
+    one."""
     robot = load(two_joint_arm())
     cover = cover_of(robot)
     assert worst(robot) <= 1e-9
@@ -189,7 +195,7 @@ HOSTILE = {
 
 @pytest.mark.parametrize("case", HOSTILE)
 def test_bad_shapes_cost_no_distance(case: str) -> None:
-    """The robot has few capsules, all finite, that contain what can be used."""
+    """The robot has few capsules. All are finite, and they contain the shapes that can be used."""
     robot = load(two_joint_arm(l2=link("l2", INERTIAL + HOSTILE[case])))
     cover = cover_of(robot)
     assert 1 <= len(cover.capsules) <= 12
@@ -198,7 +204,7 @@ def test_bad_shapes_cost_no_distance(case: str) -> None:
 
 
 def test_the_import_report_tells_of_the_cover() -> None:
-    """The number of capsules, and the pairs whose distance is not kept."""
+    """The report contains the number of capsules, and the pairs whose distance is not kept."""
     names = [f"l{k}" for k in range(4)]
     joints = [joint(f"j{a}", a, b) for a, b in pairwise(names)]
     robot = load_urdf_text(urdf(*map(link, names), *joints))
@@ -211,7 +217,8 @@ def test_the_import_report_tells_of_the_cover() -> None:
 
 
 def test_bodies_that_only_their_capsules_join_are_left_out() -> None:
-    """A plate and a ball in a corner above it: the capsules of the plate contain the ball in all postures."""
+    """A small ball is near a large plate. The bodies do not touch, but the capsules of the plate contain the
+    ball in all postures; therefore the pair is excluded."""
     plate = '<collision><geometry><box size="2 2 0.01"/></geometry></collision>'
     ball = '<collision><origin xyz="0 0 -0.15"/><geometry><sphere radius="0.005"/></geometry></collision>'
     still = '<limit lower="-0.001" upper="0.001" velocity="3" effort="50"/>'

@@ -1,4 +1,4 @@
-"""The literal reading of Table V: only the diagonal of M(q) in the dynamics is changed."""
+"""`diagonal_scale` follows Table V literally: only the diagonal of M(q) in the dynamics is changed."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ IIWA = load_robot("iiwa14")
 
 
 def altered_mass_matrix(robot: Robot, q: Array) -> Array:
-    """Returns M'(q) from Pinocchio, independent of MuJoCo."""
+    """Returns the changed matrix M'(q), computed with Pinocchio and without MuJoCo."""
     M = full_mass_matrix(robot.model, q)
     return M + np.diag((np.array(TABLE_V) - 1.0) * M.diagonal())
 
@@ -62,7 +62,8 @@ def test_the_motion_is_that_of_the_altered_equation() -> None:
 
 
 def test_it_is_not_what_scaled_links_do() -> None:
-    """The two readings of the paper's sentence give different plants."""
+    """The two possible readings of the paper's sentence, scaled diagonal and scaled link inertias, give
+    different plants."""
     matrices = []
     for settings in (PlantSettings(diagonal_scale=TABLE_V), PlantSettings(inertia_scale=TABLE_V)):
         plant = Plant(IIWA, settings)
@@ -74,10 +75,10 @@ def test_it_is_not_what_scaled_links_do() -> None:
     "settings", [PlantSettings(), PlantSettings(friction=0.3, damping=0.1, armature=0.02)]
 )
 def test_our_integration_is_mujocos(settings: PlantSettings) -> None:
-    """A diagonal that differs by 1e-13, integrated by our own code, moves like the plant that MuJoCo
-    integrates.
+    """A plant whose diagonal differs by 1e-13 is integrated by our own code, and moves like the plant that
+    MuJoCo integrates.
 
-    The tolerance is 1e-8, as MuJoCo solves friction iteratively and not to rounding.
+    The tolerance is 1e-8, because MuJoCo solves friction iteratively and not to rounding.
     """
     plants = [Plant(IIWA, settings), Plant(IIWA, replace(settings, diagonal_scale=1.0 + 1e-13))]
     for plant in plants:

@@ -1,4 +1,5 @@
-"""Every malformed or malicious file is imported as a robot that runs, or refused by one clear sentence."""
+"""Every malformed or malicious file is either imported as a robot that runs, or refused by one clear
+sentence."""
 
 from __future__ import annotations
 
@@ -19,7 +20,7 @@ from robots.meshes.surfaces import read_meshes
 from robots.shapes.link_shapes import MAX_TOTAL, link_shapes
 
 DOCUMENTS = hostile.documents()
-GROUPS = 8  # number of tests; one test per kind would be 400, most of them of a millisecond
+GROUPS = 8  # number of tests; with one test per kind there would be 400, most of them of one millisecond
 
 
 @pytest.mark.parametrize("group", range(GROUPS))
@@ -105,8 +106,8 @@ MESHES = {
 
 
 def test_bad_meshes_are_left_out(tmp_path: Path) -> None:
-    """Meshes are read in a separate process, as by `link_shapes`, and one by one: a bad mesh does not affect
-    the others."""
+    """A separate process reads the meshes one by one, as in `link_shapes`; a bad mesh does not affect the
+    others."""
     for name, content in MESHES.items():
         (tmp_path / name).write_bytes(content)
     good = stl(2, TRIANGLE + TRIANGLE)

@@ -1,4 +1,4 @@
-"""The suggested M̄ converges at all configurations, and the gauge shows an M̄ that does not."""
+"""The suggested M̄ gives convergence at all configurations, and the gauge shows an M̄ without convergence."""
 
 from __future__ import annotations
 
@@ -24,7 +24,8 @@ def test_suggestion_is_stable_at_unseen_configurations(name: str) -> None:
 
 @pytest.mark.parametrize("name", CATALOG)
 def test_catalog_M_bar_is_stable_at_home(name: str) -> None:
-    """The M̄ of the planar arm is stable only with the rotor inertia that its scenes give to the plant."""
+    """Every M̄ of the catalog is stable at home; that of the planar arm needs the rotor inertia that its
+    scenes give to the plant."""
     robot = load_robot(name)
     rotors = np.array([0.05, 0.05, 0.03]) if name == "planar3" else np.zeros(robot.n)
     M = full_mass_matrix(robot.model, robot.home) + np.diag(rotors)

@@ -1,5 +1,5 @@
-"""Work on untrusted files runs in separate processes: every failure is one sentence, and no process
-remains."""
+"""Work on untrusted files runs in separate processes: every failure is reported in one sentence, and no
+process remains."""
 
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ def test_the_deadline_is_a_sentence(monkeypatch, tmp_path: Path) -> None:
 
 
 def test_waiting_for_a_core_does_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The time that a process waits for a core does not count for its deadline, but the total time has a
-    limit as well."""
+    """The deadline does not include the time in which a process waits for a core; another limit applies to
+    the total time."""
     monkeypatch.setattr(isolation, "waited", lambda pid: 100.0)
     assert isolated(time.sleep, 3.0, within=isolation.Allowance(2.0)) is None
     monkeypatch.setattr(isolation, "PATIENCE", 2.0)
@@ -59,7 +59,7 @@ def test_what_libraries_print_does_not_spoil_the_answer() -> None:
 
 @pytest.fixture(scope="module")
 def alone() -> Iterator[ProcessPoolExecutor]:
-    """A process with one thread, which can be copied."""
+    """A process with one thread; only such a process can be copied."""
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
         yield pool
 
@@ -82,7 +82,8 @@ def test_a_copy_that_crashes_is_a_sentence(work, words: str, alone: ProcessPoolE
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems make no copies")
 def test_a_copy_has_what_is_imported_and_nothing_that_is_open(alone: ProcessPoolExecutor) -> None:
-    """Changes that a copy makes to itself do not affect the original, either."""
+    """A copy has the imported modules, but no open file of the original except its standard streams. Changes
+    in the copy do not affect the original."""
     for _ in range(2):
         seen = alone.submit(misbehaving.apart, misbehaving.seen_by, "a copy").result(60)
         assert seen == ["the original", "a copy"]
@@ -92,7 +93,7 @@ def test_a_copy_has_what_is_imported_and_nothing_that_is_open(alone: ProcessPool
 
 
 def test_a_process_with_two_threads_is_not_copied() -> None:
-    """A lock that the other thread holds would stay locked in the copy."""
+    """A lock that the second thread holds would stay locked in a copy; therefore no copy is made."""
     over = threading.Event()
     other = threading.Thread(target=over.wait)
     other.start()
@@ -160,7 +161,8 @@ def test_check_and_load_go_the_same_way(tmp_path: Path) -> None:
 
 
 def test_a_file_is_read_again_when_it_changed_or_names_a_mesh(monkeypatch, tmp_path: Path) -> None:
-    """What a mesh contains may change while the file that names it stays."""
+    """A mesh file may change while the file that names it stays the same; therefore a file that names a mesh
+    is always read again."""
     read: list[object] = []
 
     def here(work, *told: object):
@@ -176,7 +178,7 @@ def test_a_file_is_read_again_when_it_changed_or_names_a_mesh(monkeypatch, tmp_p
 
 
 def test_a_crash_while_loading_is_reported_and_refused(monkeypatch, tmp_path: Path) -> None:
-    # A lambda cannot be sent to a process.
+    # A lambda cannot be sent to another process.
     monkeypatch.setattr("robots.loading.load.import_robot", lambda *_: None)
     monkeypatch.setattr("robots.loading.load.isolated", _faulty)
     file = tmp_path / "arm.urdf"

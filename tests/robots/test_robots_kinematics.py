@@ -1,4 +1,4 @@
-"""Kinematics of every catalog robot agree with an independent URDF library."""
+"""The kinematics of every catalog robot agree with an independent URDF library."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from robots import CATALOG, load_robot
 
 @pytest.mark.parametrize("name", CATALOG)
 def test_every_link_is_where_another_reader_puts_it(name: str) -> None:
-    """At random configurations, yourdfpy and Pinocchio place every link of the canonical URDF equally."""
+    """At random configurations, yourdfpy and Pinocchio give the same pose of every link of the canonical
+    URDF."""
     robot = load_robot(name)
     other = yourdfpy.URDF.load(io.StringIO(robot.urdf_text), load_meshes=False, build_scene_graph=True)
     data = robot.model.createData()

@@ -1,4 +1,4 @@
-"""The mobile manipulator of the catalog, its velocity servos, and its distances to obstacles."""
+"""The mobile manipulator of the catalog, its velocity servos, and its distances to obstacles are tested."""
 
 from __future__ import annotations
 
@@ -35,7 +35,8 @@ def tool(robot: Robot, q: np.ndarray) -> np.ndarray:
 
 
 def by_denavit_hartenberg(q: np.ndarray) -> np.ndarray:
-    """Returns the position of the tool from the arm's parameters alone: base, mount, six joints, tool."""
+    """Returns the position of the tool, computed only from the parameters of the base, the mount, the six
+    joints and the tool."""
     x, y, yaw = q[:3]
     T = pin.SE3(pin.rpy.rpyToMatrix(0, 0, yaw), np.array([x, y, 0.0]))
     T = T * pin.SE3(pin.rpy.rpyToMatrix(0, 0, np.pi / 2), np.array([0.27, 0.01, 0.666]))
@@ -54,8 +55,8 @@ def test_tool_follows_the_arms_denavit_hartenberg_parameters(robot: Robot) -> No
 
 
 def test_horizontal_reach(robot: Robot) -> None:
-    """The reach is the largest distance of the tool from the centre of the base, at the tool's height at
-    home."""
+    """The reach is the largest horizontal distance of the tool from the centre of the base, with the tool at
+    the height that it has at home."""
     height = tool(robot, robot.home)[2]
 
     def away(arm: np.ndarray) -> np.ndarray:
@@ -110,7 +111,7 @@ def command(t: float) -> np.ndarray:
 
 
 def driven(plant: VelocityPlant, seconds: float, h: float = 0.01) -> np.ndarray:
-    """Returns the largest joint difference between v and the command, at every step."""
+    """Returns, for every step, the largest difference of a joint between v and the command."""
     gaps = []
     for _ in range(round(seconds / h)):
         wanted = command(plant.t + h)
@@ -120,8 +121,8 @@ def driven(plant: VelocityPlant, seconds: float, h: float = 0.01) -> np.ndarray:
 
 
 def test_ideal_kinematics_are_the_double_integrator(robot: Robot) -> None:
-    """With commands that sample constant accelerations, positions follow q + vh + ½uh², and velocities are
-    exact."""
+    """If the commands are samples of constant accelerations, positions follow q + vh + ½uh², and velocities
+    are exact."""
     plant = VelocityPlant(robot)
     q, v = robot.home.copy(), np.zeros(9)
     rng = np.random.default_rng(2)
@@ -146,8 +147,8 @@ def test_servo_tracks_better_with_more_bandwidth(robot: Robot) -> None:
 
 
 def test_lag_and_delay_act_in_both_modes(robot: Robot) -> None:
-    """After a step of the command the velocity is zero during the delay, and 1 − e^(−t/lag) of the command
-    afterwards."""
+    """After a step of the command the velocity is zero during the delay, and then 1 − e^(−t/lag) of the
+    command."""
     wanted = np.full(9, 0.1)
     for mode in ("ideal", "servo"):
         settings = VelocityPlantSettings(mode=mode, bandwidth=300.0, lag_ms=50.0, delay_ms=40.0)

@@ -1,4 +1,4 @@
-"""The plant's mechanics equal Pinocchio's."""
+"""The mechanics of the plant equal those of Pinocchio."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from robots.truth import joint_axis
 def independently_changed(
     robot: Robot, payload: float, scales: np.ndarray, armature: float, gravity: bool
 ) -> pin.Model:
-    """Returns the changed mechanics without `robots.truth`: scaled dynamic parameters and a body for the
-    payload."""
+    """Returns the changed mechanics without using `robots.truth`: scaled dynamic parameters and one more body
+    for the payload."""
     model = robot.model.copy()
     for k in range(robot.n):
         parameters = robot.model.inertias[k + 1].toDynamicParameters()
@@ -134,8 +134,8 @@ def test_a_robot_from_a_urdf_with_prismatic_and_branched_joints() -> None:
 
 @pytest.mark.parametrize("altered", [False, True])
 def test_what_is_faster_than_numbers_can_follow_stays_where_it_was(altered: bool) -> None:
-    """The plant reports the overflow until the next reset. With an altered M(q) our own integrator is the one
-    that diverges."""
+    """The state stays unchanged when its numbers would overflow, and the plant reports this until the next
+    reset. With an altered M(q) our own integrator is the one that diverges."""
     robot = load_robot("planar3")
     plant = Plant(robot, PlantSettings(saturate=False, diagonal_scale=0.9 if altered else 1.0))
     plant.step(np.zeros(3), 1e-3)
@@ -153,10 +153,11 @@ def test_what_is_faster_than_numbers_can_follow_stays_where_it_was(altered: bool
 
 @pytest.mark.parametrize("kind", [pin.JointModelRevoluteUnaligned, pin.JointModelPrismaticUnaligned])
 def test_a_joints_axis_is_read_from_no_configuration(kind: type) -> None:
-    """Pinocchio's joints do not check sizes: a read past the end of a short vector once ended a process."""
+    """The axis is found without a configuration vector. Pinocchio's joints do not check sizes, and a read
+    past the end of a short vector once ended a process."""
     model = pin.Model()
     model.addJoint(0, kind(np.array([0.6, 0.0, 0.8])), pin.SE3.Identity(), "skew")
-    model.joints[1].setIndexes(1, 10**9, 10**9)  # no configuration of this length exists in memory
+    model.joints[1].setIndexes(1, 10**9, 10**9)  # no configuration of this length fits into memory
     prismatic, axis = joint_axis(model, 1)
     assert prismatic == (kind is pin.JointModelPrismaticUnaligned)
     np.testing.assert_allclose(axis, [0.6, 0.0, 0.8])

@@ -1,4 +1,4 @@
-"""Inverse kinematics finds reachable targets, and says which targets are out of reach."""
+"""Inverse kinematics finds joint positions for reachable targets, and reports targets out of reach."""
 
 from __future__ import annotations
 

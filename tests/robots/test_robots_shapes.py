@@ -1,4 +1,4 @@
-"""Shapes of a robot, with meshes and without."""
+"""Shapes of a robot are made with meshes and without."""
 
 from __future__ import annotations
 
@@ -130,7 +130,7 @@ def test_the_owner_of_the_machine_uses_meshes_beside_a_urdf(tmp_path) -> None:
 
 
 def test_an_uploaded_urdf_sees_no_file_of_the_server(tmp_path, monkeypatch) -> None:
-    """A relative, absolute or file:// mesh counts as missing, whether it exists or not."""
+    """A mesh with a relative, absolute or file:// path counts as missing, whether its file exists or not."""
     package = tmp_path / "my_robot"
     package.mkdir()
     a_ball(package / "ball.stl")

@@ -1,4 +1,5 @@
-"""Effects of motors on a command and of encoders on a position; determinism; changes during a run."""
+"""The plant models how motors change a command and how encoders change a position. It is deterministic, and
+its settings may change during a run."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""The canonical import repairs, completes, fixes or refuses parts of a URDF, and reports each of these
-changes."""
+"""The import repairs, completes, fixes or refuses parts of a URDF, and reports each of these changes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Mutated URDFs and random bytes raise only an InputError, and every repaired inertia is physical."""
+"""Mutated URDFs and random bytes raise no exception but InputError, and every repaired inertia is
+physical."""
 
 from __future__ import annotations
 
