@@ -1,4 +1,4 @@
-"""Checks of a solved hierarchy, and distances between two solutions."""
+"""Checks of a solved hierarchy, and the differences of two solutions."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ def assert_within(rows: Rows, U: Array, tolerance: float = 1e-8) -> None:
 
 
 def torque_rows(hierarchy: Hierarchy) -> Rows:
-    """Returns the torque rows (32f) alone."""
+    """Returns only the torque rows (32f)."""
     rows, (N, _) = hierarchy.rows, hierarchy.shape
     return Rows(rows.L[:N], rows.lower[:N], rows.upper[:N], rows.constraints[:1])
 
 
 def assert_agree(one: list[LevelSolution], other: list[LevelSolution], tolerance: float = 1e-6) -> None:
-    """Checks for equal increments, level by level. After a level whose points differ slightly, the levels
-    below solve different problems and are not compared."""
+    """Checks that the increments of two solutions are equal, level by level. If the points of a level differ
+    slightly, the levels below it solve different problems and are not compared."""
     for a, b in zip(one, other, strict=True):
         difference = largest_difference([a], [b])
         assert difference <= tolerance
@@ -63,13 +63,13 @@ def exact_increments(hierarchy: Hierarchy, *guesses: list[LevelSolution]) -> lis
 
 
 def off(solutions: list[LevelSolution], exact: list[Array]) -> float:
-    """Returns the largest distance of solutions from the optima, N·m."""
+    """Returns the largest difference between solutions and the optima, N·m."""
     return max(float(np.abs(one.U - U).max()) for one, U in zip(solutions, exact, strict=True))
 
 
 def second_opinion(hierarchy: Hierarchy, compiled: list[LevelSolution]) -> list[Array]:
-    """Returns the optima of the explicit route; if it has no verified optimum at a level, those of
-    `exact_increments`."""
+    """Returns the optima of the explicit route. If it has no verified optimum at some level, returns those of
+    `exact_increments` instead."""
     explicit = hierarchy.solve("explicit")
     if all(solution.fallback == "solve" for solution in explicit):
         return [solution.U for solution in explicit]

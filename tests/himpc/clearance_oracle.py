@@ -1,4 +1,4 @@
-"""The reference for the clearances: the same distances by a collision library, pair by pair."""
+"""The reference for the clearances: a collision library computes the same distances, pair by pair."""
 
 # pyright: reportAttributeAccessIssue=false
 # coal is a compiled module without type information.
@@ -25,13 +25,13 @@ _NOWHERE = np.zeros(3)
 
 
 class Touched(NamedTuple):
-    """Distances between pairs at knots, nearest pairs only.
+    """Distances between the nearest pairs at all knots.
 
     Attributes:
         knot: (r,) index of the configuration.
-        distance: (r,) m, negative inside.
+        distance: (r,) m, negative if the shapes penetrate.
         gradient: (r, n) of the distance with respect to q, m/rad.
-        pairs: (sphere's link, obstacle's name) of each.
+        pairs: (link of the sphere, name of the obstacle) of each.
     """
 
     knot: NDArray[np.int64]
@@ -62,7 +62,7 @@ class _Touch(NamedTuple):
 
 
 class _Placed(NamedTuple):
-    """Positions of spheres and joints at every configuration."""
+    """Positions of spheres and joints for every configuration."""
 
     centres: Array
     rotations: Array
@@ -71,7 +71,7 @@ class _Placed(NamedTuple):
 
 
 class Oracle:
-    """Distances of a robot's spheres to obstacles, and of its arm's spheres to its own base.
+    """Computes distances of a robot's spheres to obstacles, and of its arm's spheres to its own base.
 
     A coarse test with bounding balls selects the pairs whose exact distance is computed.
     """
@@ -93,7 +93,7 @@ class Oracle:
         self._moves = np.zeros((robot.n + 1, robot.n))
         for joint in range(1, robot.n + 1):
             self._moves[joint, [k - 1 for k in robot.model.supports[joint] if k > 0]] = 1.0
-        # The spheres of a mobile base, a body that some unbounded joints move over the floor.
+        # A mobile base is a body that several unbounded joints move over the floor.
         free = np.isinf(robot.q_lower) & np.isinf(robot.q_upper)
         mobile = [joint for joint in range(robot.n + 1) if joint > 2 and free[:joint].all()]
         base = max(mobile, default=0)
@@ -127,8 +127,8 @@ class Oracle:
         return _Pair(obstacle.name, shape, coal.Transform3s(turn, centre), 0, every, centre, reach)
 
     def _own_base(self, base: int) -> _Pair:
-        """Returns the base as the box around its own spheres; the links next to it are not checked against
-        it."""
+        """Returns the own base as a box around its spheres; the links next to the base are not checked
+        against it."""
         own = self._joints == base
         low = (self._local[own] - 0.6 * self._radius[own, None]).min(axis=0)
         high = (self._local[own] + 0.6 * self._radius[own, None]).max(axis=0)
@@ -139,8 +139,8 @@ class Oracle:
         return _Pair("base", coal.Box(x, y, z), coal.Transform3s(np.eye(3), centre), base, far, centre, reach)
 
     def clearances(self, q: Array, within: float, gradients: bool = True) -> Touched:
-        """Returns all pairs nearer than `within`, m, at configurations q (K, n); without gradients that array
-        is empty."""
+        """Returns all pairs with a distance below `within`, m, at configurations q (K, n). Without gradients,
+        the array of gradients is empty."""
         placed = self._kinematics(q, gradients)
         centres = placed.centres
         touches: list[_Touch] = []
@@ -215,7 +215,7 @@ class Oracle:
 
     @staticmethod
     def _along(normal: Array, point: Array, J: Array) -> Array:
-        """Returns the speed along a normal, per joint velocity, of a point that all joints move."""
+        """Returns the velocity along a normal, per joint velocity, of a point that all joints move."""
         return np.einsum("ri,rij->rj", np.hstack([normal, np.cross(point, normal)]), J)
 
 

@@ -1,4 +1,4 @@
-"""A controller and the plant in a loop, written with `himpc` alone, without `lessons`."""
+"""A closed loop of a controller and the plant, written only with `himpc` and without `lessons`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ GEARED = PlantSettings(armature=(0.05, 0.05, 0.03))
 
 
 class Loop:
-    """A loop that starts at rest; each tick measures, previews, computes and applies a torque."""
+    """A loop that starts at rest. Each tick measures, computes the previews and the torque, and applies
+    it."""
 
     def __init__(
         self,
@@ -43,7 +44,7 @@ class Loop:
 
 
 def holding(name: str, controller: str, horizon: int = 5, nominal: NominalSettings | None = None) -> Loop:
-    """Returns a robot of the catalog that holds hand and posture, with targets that can be moved."""
+    """Returns a loop in which a robot of the catalog holds hand and posture; its targets can be moved."""
     robot = load_robot(name)
     flat = name == "planar3"
     position = FramePosition(name="position", axes="xy" if flat else "xyz", K_p=100.0, K_v=20.0)

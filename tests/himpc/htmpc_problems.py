@@ -1,5 +1,5 @@
-"""Shared functions for tests of HTMPC: a stack, previews, and as reference Algorithm 1 solved by a general
-NLP solver."""
+"""Shared functions for tests of HTMPC: a stack, previews, and a reference solution of Algorithm 1 by a
+general NLP solver."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def mobile_settings(**changes: Any) -> HTMPCSettings:
 
 
 def point(robot: Robot, q: Array, frame: str = "") -> Array:
-    """Returns the world position of a frame, (3,), by Pinocchio alone."""
+    """Returns the world position of a frame, (3,), computed only with Pinocchio."""
     data = robot.model.createData()
     pin.framesForwardKinematics(robot.model, data, q)
     return data.oMf[robot.frame_id(frame or robot.tip)].translation.copy()
@@ -63,7 +63,8 @@ def closed_loop(
     seconds: float,
     before: Callable[[int], None] | None = None,
 ) -> tuple[list[VelocityPlan], Array]:
-    """Returns plans and true positions (ticks, n) with a plant that follows the commands exactly."""
+    """Runs the controller with a plant that follows the commands exactly; returns plans and true positions
+    (ticks, n)."""
     v = np.zeros_like(q)
     plans, path = [], []
     period = controller.settings.period
@@ -79,13 +80,14 @@ def closed_loop(
 
 
 def at_home(robot: Robot, base: Array) -> dict[str, Reference]:
-    """Returns references: the end-effector stays where it is at home, the base goes to a point (2,)."""
+    """Returns references: the end-effector stays at its position at home, and the base goes to a point
+    (2,)."""
     return {"ee": Hold(point(robot, robot.home)), "base": Hold(base)}
 
 
 class Oracle:
-    """Algorithm 1 on (9), with an independent implementation of kinematics, costs and constraints, solved by
-    SLSQP."""
+    """Solves Algorithm 1 on (9) with SLSQP, with an independent implementation of kinematics, costs and
+    constraints."""
 
     def __init__(
         self, robot: Robot, settings: HTMPCSettings, goals: list[tuple[str, list[int], Array]]
@@ -126,7 +128,7 @@ class Oracle:
         return 0.5 * float(S * (self.states(u)[1] ** 2).sum() + R * (u**2).sum() + W * (change**2).sum())
 
     def solve(self, delta: float, start: Array) -> list[Array]:
-        """Returns the inputs after every level, with (12) relaxed by δ; upper levels have a share of the
+        """Returns the inputs after every level, with (12) relaxed by δ. Upper levels have a share of the
         effort, and the robot starts at rest."""
         found: list[Array] = []
         constraints: list[dict[str, Any]] = []
@@ -157,7 +159,8 @@ class Oracle:
 
 
 def lexicographically_less(one: Array, other: Array, tolerance: Array) -> bool:
-    """Definition III.1, where entries whose difference is within the tolerance count as equal."""
+    """Whether `one` is lexicographically less than `other` by Definition III.1; entries whose difference is
+    within the tolerance count as equal."""
     for a, b, equal in zip(one, other, tolerance, strict=True):
         if abs(a - b) > equal:
             return bool(a < b)

@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 def level_problem(
     name: str, B: Array, C: Array, free: Array, Q: Array, R: Array, knots: int | None = None
 ) -> LevelProblem:
-    """Returns a level's data from the weights as the paper prints them."""
+    """Returns the data of a level, computed from its weights as the paper prints them."""
     K = len(B) if knots is None else knots
     return LevelProblem(
         name=name,
@@ -40,14 +40,14 @@ def level_problem(
 
 
 def shifted(problem: LevelProblem, change: Array) -> LevelProblem:
-    """Returns the same level with another free residual."""
+    """Returns the same level with a different free residual."""
     free = problem.free + change
     return problem._replace(free=free, weighted_free=problem.root_Q * free)
 
 
 @dataclass(frozen=True, eq=False)
 class Hierarchy:
-    """Problems 1 … r with their bounds."""
+    """Problems 1 … r and their bounds."""
 
     problems: list[LevelProblem]
     rows: Rows
@@ -69,12 +69,12 @@ class Hierarchy:
 
 
 def row_blocks(N: int, constraints: Sequence[Constraint]) -> Array:
-    """Returns the coefficients of the increments in torque, velocity and position: sums, sums of sums, and so
-    on."""
+    """Returns the coefficients of the increments for torque, velocity and position: sums, sums of sums, and
+    so on."""
     torque = np.tril(np.ones((N, N)))
     velocity = torque @ torque
     position = np.vstack([np.zeros((1, N)), (torque @ velocity)[:-1]]) if N > 1 else np.zeros((1, 1))
-    # The printed Euler step: q at knot j+1 contains the velocity up to knot j.
+    # In the printed Euler step, q at knot j+1 contains the velocity up to knot j.
     own = {TORQUE: torque, VELOCITY: velocity, POSITION: position}
     return np.vstack([own[constraint] for constraint in constraints])
 
@@ -82,10 +82,10 @@ def row_blocks(N: int, constraints: Sequence[Constraint]) -> Array:
 def random_hierarchy(
     seed: int, n: int, N: int, levels: int, position_rows: bool = False, room: float = 1.0, even: bool = False
 ) -> Hierarchy:
-    """Returns regular levels with M̄ over decades, and feasible bounds of which some are active.
+    """Returns regular levels, with M̄ over several decades, and feasible bounds of which some are active.
 
-    room: width of the bounds, relative to the motion of the levels without them.
-    even: the same R for all joints of a level, and the same horizon for all levels.
+    room: the width of the bounds, relative to the motion of the levels without bounds.
+    even: whether all joints of a level have the same R, and all levels the same horizon.
     """
     rng = np.random.default_rng(seed)
     M_bar = 10 ** rng.uniform(-3.0, 0.0, n)
@@ -108,12 +108,12 @@ def random_hierarchy(
 
 
 def bounds_around(rng: np.random.Generator, problems: list[LevelProblem], rows: Rows, room: float) -> Rows:
-    """Returns bounds in proportion to the increments of the unbounded levels, with a point strictly
-    inside."""
+    """Returns bounds in proportion to the increments of the levels without bounds; a point is strictly inside
+    them."""
     N, _, n = problems[0].B.shape
     reach = sum(np.abs(unbounded_optimum(problem)) for problem in problems) + 1e-3
     inside = 0.3 * rng.normal(0, 1, (N, n)) * reach
-    # a point beyond level 1's horizon must not require increments, because level 1 has none there
+    # a point beyond the horizon of level 1 must not require increments, because level 1 has none there
     inside[problems[0].knots :] = 0.0
     size = rows.L @ reach + 1e-3
     margin = [10 ** rng.uniform(-1.5, 0.5, size.shape) * size * room for _ in range(2)]
@@ -123,7 +123,7 @@ def bounds_around(rng: np.random.Generator, problems: list[LevelProblem], rows: 
 
 
 def quadratic(problem: LevelProblem) -> tuple[Array, Array]:
-    """Returns H and f of ½UᵀHU + fᵀU = half of (32a), summed literally over knots."""
+    """Returns H and f of ½UᵀHU + fᵀU, which is half of (32a), summed literally over the knots."""
     N, m, n = problem.B.shape
     H, f = np.zeros((N * n, N * n)), np.zeros(N * n)
     Q = np.diag(problem.root_Q**2)
@@ -138,7 +138,7 @@ def quadratic(problem: LevelProblem) -> tuple[Array, Array]:
 
 
 def unbounded_optimum(problem: LevelProblem) -> Array:
-    """Returns the level's increments if it is solved alone and without bounds."""
+    """Returns the increments of the level if it is solved alone and without bounds."""
     H, f = quadratic(problem)
     N, _, n = problem.B.shape
     used = problem.knots * n
@@ -148,8 +148,8 @@ def unbounded_optimum(problem: LevelProblem) -> Array:
 
 
 def equalities(problems: Sequence[LevelProblem], level: int) -> Array:
-    """Returns orthonormal rows that span those of (33) for a level and the knots beyond its horizon, (k,
-    N·n)."""
+    """Returns orthonormal rows, (k, N·n), that span the equalities (33) of a level and those for the knots
+    beyond its horizon."""
     N, _, n = problems[0].B.shape
     blocks = []
     for j in range(N):
@@ -165,7 +165,7 @@ def equalities(problems: Sequence[LevelProblem], level: int) -> Array:
 
 
 def row_space(A: Array, tolerance: float = 1e-9) -> Array:
-    """Returns orthonormal rows that span those of A."""
+    """Returns orthonormal rows that span the rows of A."""
     if not A.size:
         return A
     _, singular, Vt = np.linalg.svd(A)

@@ -29,8 +29,8 @@ def motion(robot: Robot, t: float) -> tuple[Array, Array]:
 
 
 def planar() -> tuple[Robot, Settings, dict[str, Reference]]:
-    """Returns a problem in which the planar arm's hand follows a circle, and its first joint has the second
-    priority."""
+    """Returns a problem for the planar arm: on the first level the hand follows a circle, and the first joint
+    has the second priority."""
     robot = load_robot("planar3")
     hand = FramePosition(name="hand", axes="xy")
     stack = (Level((hand,)), Level((Joints(name="q1", joints=robot.joint_names[:1]),)))

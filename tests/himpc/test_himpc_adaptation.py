@@ -1,4 +1,5 @@
-"""Adaptation of M̄: the estimated payload, the limits of M̄, and the effect of a payload."""
+"""The adaptation of M̄ estimates the payload and keeps the limits of M̄; its effect with a payload is
+tested."""
 
 from __future__ import annotations
 
@@ -28,8 +29,8 @@ def largest(M: Array, M_bar: Array) -> float:
 
 @pytest.mark.parametrize("seed", range(8))
 def test_the_largest_eigenvalue_is_one_at_the_payload_and_less_at_a_heavier_one(seed: int) -> None:
-    """The largest eigenvalue is 1 at the payload unless a joint is limited by LARGEST; with links above half
-    the nominal mass the eigenvalue stays below 2."""
+    """With the payload, the largest eigenvalue is 1 unless LARGEST limits a joint; with a heavier payload it
+    is at most 1. With links above half the nominal mass it stays below 2."""
     rng = np.random.default_rng(seed)
     n, m = int(rng.integers(1, 9)), float(rng.uniform(0.0, 6.0))
     M, Phi = inertias(rng, n)
@@ -41,7 +42,7 @@ def test_the_largest_eigenvalue_is_one_at_the_payload_and_less_at_a_heavier_one(
     assert (found <= LARGEST * M_bar * (1 + 1e-12)).all()
     assert largest(M + (m + 2.0) * Phi, found) <= 1.0 + 1e-9
     assert largest(0.51 * (M + m * Phi), found) < 2.0
-    # The result depends on the shape of the set value, not on its scale.
+    # The result depends on the ratios of the entries of the set value, not on their scale.
     twice = wanted(M, Phi, m, 2.0 * M_bar)
     if (found < LARGEST * M_bar * (1 - 1e-9)).all():
         np.testing.assert_allclose(twice, found)
@@ -65,7 +66,7 @@ def test_a_payload_is_weighed(payload_kg: float) -> None:
 
 
 def test_M_bar_rises_slowly() -> None:
-    """M̄ grows from the set value by at most RISE per second."""
+    """M̄ starts at the set value, and per second grows by at most the share RISE."""
     M_bar = np.array([each.M_bar for each in weighed(4.0)])
     np.testing.assert_array_equal(M_bar[:EVERY], np.tile(M_bar[0], (EVERY, 1)))
     assert (M_bar[1:] / M_bar[:-1]).max() <= 1.0 + RISE * EVERY * PERIOD + 1e-12

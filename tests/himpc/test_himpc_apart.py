@@ -1,5 +1,5 @@
-"""Distances that contradict the limits of the joints give way first, by least squares; the joints' own rows
-do not."""
+"""If rows of distances contradict the limits of the joints, they are relaxed first, by least squares; the
+rows of torque, velocity and position are not relaxed."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ CONSTRAINTS = (TORQUE, VELOCITY, DISTANCE)
 
 
 def rows_with(least: float, torque: float = 10.0) -> Rows:
-    """Two rows of distances, in opposite directions of the first two joints, of which each asks for `least`
+    """Returns two rows of distances, in opposite directions of the first two joints; each requires `least`
     N·m at every knot."""
     D = np.zeros((n, n))
     D[0], D[1] = (0.6, 0.8, 0.0), (-0.6, -0.8, 0.0)
@@ -31,7 +31,8 @@ def rows_with(least: float, torque: float = 10.0) -> Rows:
 
 @pytest.mark.parametrize("torque", [10.0, 0.1])
 def test_rows_that_contradict_each_other_give_way_alike(torque: float) -> None:
-    """Neither row can be met: both are missed by as much, and torque and velocity hold."""
+    """Neither row can be satisfied: both are violated by the same amount, and the rows of torque and velocity
+    hold."""
     rows = rows_with(2.0, torque)
     left = missed(rows, braking(rows))
     assert left[: 2 * N].max() == 0.0
@@ -41,7 +42,7 @@ def test_rows_that_contradict_each_other_give_way_alike(torque: float) -> None:
 
 
 def test_a_row_beyond_what_the_joints_can_do_is_met_as_far_as_they_can() -> None:
-    """One distance alone asks for more than the velocity limit allows: the joints go to their limits."""
+    """A single distance requires more than the velocity limit permits, so the joints move at their limits."""
     rows = rows_with(100.0)
     rows.lower[2 * N :, 1] = -np.inf
     U = braking(rows)

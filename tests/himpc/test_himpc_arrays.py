@@ -39,7 +39,7 @@ def test_every_view_is_the_array_of_its_name(monkeypatch: pytest.MonkeyPatch) ->
 
 @pytest.mark.quick
 def test_the_table_names_the_files_that_use_an_array() -> None:
-    """Every array has a unit, and its annotation names exactly those files of himpc/tick that use it."""
+    """Every array has a unit, and its annotation names exactly the files of himpc/tick that use the array."""
     for name, hint in HINTS.items():
         _, unit, files = hint.__metadata__
         used = re.compile(rf'\bt\.{name}\b|AT\.{name}\b|"{name}"')

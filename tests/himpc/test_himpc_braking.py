@@ -1,5 +1,5 @@
-"""Increments that are computed joint by joint: they satisfy all bounds if these are feasible (compared with
-linear programs), and they brake."""
+"""Increments that are computed joint by joint satisfy all bounds if these are feasible (linear programs are
+the reference), and they brake the joints."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 def slack_needed(rows: Rows, joint: int) -> float:
-    """Returns by how much the most violated row of a joint must be relaxed, by linear programming in (U,
-    slack); 0 if none."""
+    """Returns the amount by which the most violated row of a joint must be relaxed, computed by linear
+    programming in (U, slack); it is 0 if no row must be relaxed."""
     from scipy.optimize import linprog
 
     N = rows.L.shape[1]
@@ -59,8 +59,8 @@ def random_rows(seed: int, n: int, N: int, position_rows: bool) -> tuple[Rows, f
 def test_braking_meets_all_rows_whenever_any_increments_do(
     seed: int, n: int, N: int, position_rows: bool
 ) -> None:
-    """All rows are satisfied whenever a linear program finds them feasible, for wide, very narrow and
-    infeasible rows; torque rows are always satisfied."""
+    """Whenever a linear program finds the rows feasible, all of them are satisfied. The rows are wide, very
+    narrow or infeasible; torque rows are always satisfied."""
     rows, room = random_rows(seed, n, N, position_rows)
     U = braking(rows)
     value = rows.L @ U
@@ -79,7 +79,7 @@ def test_braking_meets_all_rows_whenever_any_increments_do(
 @pytest.mark.parametrize("position", ["viability", "paper", "off"])
 @pytest.mark.parametrize("N", [1, 5, 30])
 def test_braking_brakes(N: int, position: str) -> None:
-    """From fast joints and random torques, the velocities at the last knot are close to those that `BRAKING`
+    """For fast joints and random torques, the velocities at the last knot are close to those that `BRAKING`
     prescribes, and no joint becomes faster."""
     robot = load_robot("iiwa14")
     rng = np.random.default_rng(N)

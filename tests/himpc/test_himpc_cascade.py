@@ -1,4 +1,4 @@
-"""The cascade: two routes give the same optimum, priorities are strict, and points are verified."""
+"""Two routes of the cascade give the same optimum, priorities are strict, and every point is verified."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def test_the_random_hierarchies_bind() -> None:
 
 
 def test_proxqp_agrees_where_it_solves() -> None:
-    """ProxQP on the explicit QPs finds the same increments if its point is accurate, which is the case for
+    """ProxQP finds the same increments on the explicit QPs if its point is accurate, which is the case for
     about one in eight of these stacks."""
     compared = 0
     for seed in range(200):
@@ -77,7 +77,7 @@ def accurate(problem: LevelProblem, solution: LevelSolution) -> bool:
 @pytest.mark.skipif(not is_installed("qpoases"), reason="CasADi, which brings qpOASES, is not installed")
 @pytest.mark.parametrize("seed", range(8))
 def test_qpoases_agrees(seed: int) -> None:
-    """The paper's own solver finds the same increments on the explicit QPs."""
+    """qpOASES, the paper's own solver, finds the same increments on the explicit QPs."""
     hierarchy = random_hierarchy(seed, 5, 4, 3)
     qpoases = hierarchy.solve("explicit", "qpoases")
     assert all(solution.fallback == "solve" for solution in qpoases)
@@ -87,7 +87,7 @@ def test_qpoases_agrees(seed: int) -> None:
 @given(seeds, joints, horizons, st.integers(2, 4))
 @settings(max_examples=80)
 def test_lower_levels_change_nothing_above(seed: int, n: int, N: int, levels: int) -> None:
-    """Level 1's optimum, its cost and its acceleration B₁U do not depend on the levels below."""
+    """The optimum of level 1, its cost and its acceleration B₁U do not depend on the levels below."""
     hierarchy = random_hierarchy(seed, n, N, levels)
     alone = Hierarchy(hierarchy.problems[:1], hierarchy.rows).solve()[0]
     solutions = hierarchy.solve()
@@ -112,12 +112,11 @@ decades = st.floats(-15, -12.001) | st.floats(-7.999, -2) | st.none()
 @given(seeds, st.integers(2, 8), st.integers(1, 6), decades)
 @settings(max_examples=120)
 def test_routes_agree_on_rank_deficient_stacks(seed: int, n: int, N: int, decade: float | None) -> None:
-    """With a level that repeats another, exactly or nearly, both routes are equal, except near the rank
-    tolerance.
+    """If a level repeats another, exactly or nearly, both routes are equal, except near the rank tolerance.
 
     A direction of relative size s is known with an accuracy of rounding divided by s, and this limits the
-    accuracy of lower levels: with s = 1.3e-8 the explicit route was 2.8e-6 N·m and the compiled one 8e-8 N·m
-    from the optimum by 300 bits.
+    accuracy of lower levels. With s = 1.3e-8 the explicit route was 2.8e-6 N·m and the compiled one 8e-8 N·m
+    from the optimum that was computed with 300 bits.
     """
     size = 0.0 if decade is None else 10**decade
     assert size < 0.01 * RANK_TOLERANCE or size > 100 * RANK_TOLERANCE
@@ -132,7 +131,7 @@ def test_routes_agree_on_rank_deficient_stacks(seed: int, n: int, N: int, decade
 @given(seeds, st.integers(2, 8), st.integers(1, 6), st.floats(-12, -8))
 @settings(max_examples=80)
 def test_near_the_rank_tolerance_points_are_still_sound(seed: int, n: int, N: int, decade: float) -> None:
-    """Near the rank tolerance both ranks are acceptable; residual, leak and bounds hold."""
+    """Near the rank tolerance, either rank is acceptable; residual, leak and bounds hold."""
     hierarchy = singular_hierarchy(seed, n, N, 10**decade)
     for solution in hierarchy.solve():
         assert solution.fallback == "solve"
@@ -142,7 +141,7 @@ def test_near_the_rank_tolerance_points_are_still_sound(seed: int, n: int, N: in
 
 
 def test_no_freedom_left_keeps_the_upper_levels() -> None:
-    """A level below a full stack has no freedom and changes nothing."""
+    """If the levels above use all freedom, a level changes nothing."""
     hierarchy = random_hierarchy(3, 4, 5, 1)
     everything = random_hierarchy(4, 4, 5, 1).problems[0]
     full = replace_rows(everything, np.random.default_rng(0).normal(0, 1, (5, 4, 4)))
@@ -162,7 +161,8 @@ def replace_rows(problem: LevelProblem, B: Array) -> LevelProblem:
 @given(seeds, st.integers(2, 8), st.integers(1, 6), st.integers(1, 3))
 @settings(max_examples=60)
 def test_warm_starts_change_nothing(seed: int, n: int, N: int, levels: int) -> None:
-    """The active set of the previous tick only saves time: the same optimum of the new problem is found."""
+    """The active set of the previous tick only saves time; the solver finds the same optimum of the new
+    problem."""
     hierarchy = random_hierarchy(seed, n, N, levels)
     before = {solution.name: solution for solution in hierarchy.solve()}
     changed = with_other_errors(hierarchy, seed)
@@ -176,7 +176,7 @@ def test_warm_starts_change_nothing(seed: int, n: int, N: int, levels: int) -> N
     [(161, 7, 6, 2), (29, 8, 6, 2), (17, 7, 6, 2), (98, 8, 6, 2), (75, 8, 6, 2), (26, 8, 6, 3)],
 )
 def test_corners_that_many_bounds_make_are_found(seed: int, n: int, N: int, levels: int) -> None:
-    """If nearly all freedom is used by active bounds, rounding errors can look like an infeasible bound."""
+    """If active bounds use nearly all freedom, rounding errors can make a feasible bound look infeasible."""
     hierarchy = with_other_errors(random_hierarchy(seed, n, N, levels), seed)
     found = hierarchy.solve()
     assert_sound(hierarchy, found)
@@ -201,14 +201,14 @@ def test_a_level_that_is_tried_once_more_still_follows_its_own_tasks(seed: int) 
 
 
 def with_other_errors(hierarchy: Hierarchy, seed: int) -> Hierarchy:
-    """The same hierarchy with other free residuals."""
+    """Returns the same hierarchy with different free residuals."""
     rng = np.random.default_rng(seed)
     moved = [shifted(p, rng.normal(0, 3, p.free.shape)) for p in hierarchy.problems]
     return Hierarchy(moved, hierarchy.rows)
 
 
 def test_multipliers_tell_what_room_is_worth() -> None:
-    """Twice a multiplier is the decrease of the level's cost per N·m by which the bound is relaxed."""
+    """Twice a multiplier is the decrease of the cost of the level per N·m by which the bound is relaxed."""
     compared = 0
     for seed in range(12):
         hierarchy = random_hierarchy(seed, 5, 4, 1)

@@ -1,5 +1,5 @@
-"""Controllers and plant in a loop: they hold, follow, and use only the model that they are documented to
-use."""
+"""In closed loop with the plant, controllers hold and follow targets, and use only the model that their
+documentation names."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ HEAVY = NominalSettings(payload_kg=3.0, damping=0.4, armature=0.2, inertia_scale
 @pytest.mark.parametrize("name", ["iiwa14", "planar3"])
 @pytest.mark.parametrize("horizon", [1, 2, 20])
 def test_any_horizon_holds_and_follows(name: str, horizon: int) -> None:
-    """N = 1 (HIQP) and long horizons hold the arm at its targets and move it to a moved target."""
+    """With N = 1 (HIQP) and with long horizons, the arm holds its targets and follows a moved target."""
     loop = holding(name, "himpc", horizon)
     loop.tick()
     target = loop.references["position"]
@@ -57,7 +57,7 @@ def torques(name: str, nominal: NominalSettings | None = None) -> Array:
 
 @pytest.mark.parametrize("name", [name for name in CONTROLLERS if name not in MODEL_BASED])
 def test_model_free_controllers_never_read_the_nominal_model(name: str) -> None:
-    """The torques are bitwise equal for every nominal model."""
+    """The torques are bitwise equal for all nominal models."""
     np.testing.assert_array_equal(torques(name), torques(name, HEAVY))
 
 

@@ -1,4 +1,4 @@
-"""Compilation happens once, in one process, wherever the code can be stored, and never during a run."""
+"""Code is compiled once, by one process, if it can be stored anywhere; it is never compiled during a run."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ print(len(found), small.twice.stats.cache_path)
 
 
 def like_anybody() -> None:
-    """Removes root's permission to write everywhere, from the next program on."""
+    """Removes root's permission to write everywhere, starting with the next program."""
     if os.getuid() == 0:
         assert ctypes.CDLL(None).prctl(PR_CAPBSET_DROP, CAP_DAC_OVERRIDE, 0, 0, 0) == 0
 
@@ -58,8 +58,8 @@ def like_anybody() -> None:
 def start(
     folder: Path, script: str = LOAD, before: Callable[[], None] | None = None, **environment: str
 ) -> subprocess.Popen[str]:
-    """Starts a process that can read everything, but can write only to a temporary folder of the test;
-    `before`: a function that is called first in that process."""
+    """Starts a process that can read everything, but can write only to a temporary folder of the test. If
+    `before` is given, the process calls this function first."""
 
     def prepare() -> None:
         like_anybody()
@@ -99,8 +99,8 @@ def compiled_and_place(process: subprocess.Popen[str]) -> tuple[int, str]:
 
 
 def test_what_cannot_be_kept_here_goes_to_a_temporary_folder_of_ones_own(tmp_path: Path) -> None:
-    """With a read-only installation and home folder, functions are still compiled once and stored where
-    nobody else can write."""
+    """If the installation and the home folder are read-only, functions are still compiled only once, and
+    stored where no other user can write."""
     first, place = compiled_and_place(start(tmp_path))
     assert first == 2
     assert Path(place).is_relative_to(tmp_path / "tmp")
@@ -125,7 +125,7 @@ def test_without_any_folder_it_is_compiled_and_not_kept(tmp_path: Path) -> None:
 
 
 def test_processes_that_start_together_compile_once(tmp_path: Path) -> None:
-    """The other processes wait, and then load the code from disk."""
+    """One process compiles; the other processes wait and then load the code from disk."""
     shared = tmp_path / "shared"
     shared.mkdir()
     together = [start(tmp_path, NUMBA_CACHE_DIR=str(shared)) for _ in range(3)]
@@ -133,8 +133,8 @@ def test_processes_that_start_together_compile_once(tmp_path: Path) -> None:
 
 
 def test_who_has_it_compiled_runs_what_is_on_disk(tmp_path: Path) -> None:
-    """The process that compiled a function loads it from disk, because its code in memory differs in the last
-    digit."""
+    """A process that compiled a function then loads it from disk, because the code in memory gives results
+    that differ in the last digit."""
     script = LOAD + "print(sum(small.twice.stats.cache_hits.values()), file=sys.stderr)"
     for _ in range(2):
         process = start(tmp_path, script)
@@ -142,8 +142,8 @@ def test_who_has_it_compiled_runs_what_is_on_disk(tmp_path: Path) -> None:
 
 
 def test_what_is_on_disk_needs_no_compiler() -> None:
-    """Loading compiled functions imports no part of Numba's compiler: its preparation takes longer than
-    loading all functions, and imports SciPy."""
+    """Loading compiled functions imports no part of Numba's compiler. Its preparation takes longer than
+    loading all functions, and it imports SciPy."""
     compile_all(lambda *_: None)
     script = (
         "import sys\n"
@@ -159,7 +159,7 @@ def test_what_is_on_disk_needs_no_compiler() -> None:
 
 def test_a_piece_from_another_folder_is_part_of_what_is_kept(tmp_path: Path) -> None:
     """When an inline kernel or a constant in another folder changes, the functions that use it are compiled
-    anew."""
+    again."""
     for folder in ("install/parts/below", "home", "tmp"):
         (tmp_path / folder).mkdir(parents=True)
     above, below = SMALL.split("\n\n@kernel")
@@ -183,7 +183,7 @@ def test_a_piece_from_another_folder_is_part_of_what_is_kept(tmp_path: Path) -> 
 
 def test_all_that_is_compiled_in_is_part_of_what_is_kept() -> None:
     """The digest of a compiled function includes all files of this package that its module imports, directly
-    or not."""
+    or through others."""
 
     def imported(file: Path, known: set[Path]) -> set[Path]:
         known.add(file)
@@ -206,8 +206,8 @@ def test_all_that_is_compiled_in_is_part_of_what_is_kept() -> None:
 
 
 def test_nobody_but_compiled_code_calls_a_piece() -> None:
-    """A call of an inline kernel from Python raises TypeError, also after the kernel was compiled in this
-    process as a part of a function, as for an export."""
+    """A call of an inline kernel from Python raises TypeError, also after this process compiled the kernel as
+    a part of a function, as for an export."""
 
     def caller(a: Any, b: Any, n: int) -> float:
         return dot(a, b, n)
@@ -219,7 +219,7 @@ def test_nobody_but_compiled_code_calls_a_piece() -> None:
 
 
 def test_the_first_run_equals_the_second(first_and_second_run: tuple[tuple[Path, str], ...]) -> None:
-    """On a machine with nothing compiled, the first run gives bitwise the same numbers as the second."""
+    """With an empty cache, the first run gives bitwise the same numbers as the second run."""
     runs = []
     for (file, said), compiles in zip(first_and_second_run, (True, False), strict=True):
         assert ("compiling" in said) == compiles
@@ -236,7 +236,7 @@ def test_one_word_tells_of_it_once(tmp_path: Path) -> None:
 
 
 def test_everything_compiled_is_counted() -> None:
-    """The list for the progress contains every function that Numba compiles."""
+    """The list that is used to show the progress contains every function that Numba compiles."""
     told_of: list[tuple[int, int]] = []
     compile_all(lambda ready, total: told_of.append((ready, total)))
     listed = compiled_functions()

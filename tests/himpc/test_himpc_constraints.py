@@ -1,4 +1,5 @@
-"""Constraints with directions of their own: both routes solve them, and they tell what binds."""
+"""Both routes solve constraints whose directions combine several joints, and report which of them are
+active."""
 
 from __future__ import annotations
 
@@ -30,8 +31,8 @@ COUPLED = Constraint(
 
 
 def coupled(seed: int, n: int, N: int, levels: int, room: float = 0.3) -> Hierarchy:
-    """A random hierarchy with two more directions, each of all joints, between bounds around a point that
-    meets all other rows; the rest of the columns is not used."""
+    """Returns a random hierarchy with two more directions, each of which contains all joints. Their bounds
+    are around a point that satisfies all other rows; the remaining columns are not used."""
     hierarchy = random_hierarchy(seed, n, N, levels, even=True)
     rng, rows = np.random.default_rng(seed), hierarchy.rows
     D = np.zeros((n, n))
@@ -57,7 +58,7 @@ def coupled(seed: int, n: int, N: int, levels: int, room: float = 0.3) -> Hierar
 
 
 def inside_of(rows: Rows) -> Array:
-    """The increments of least size that meet all rows, (N, n)."""
+    """Returns the increments of least norm that satisfy all rows, (N, n)."""
     N, n = rows.L.shape[1], rows.lower.shape[1]
     A, lower, upper = every_row(rows, n), rows.lower.ravel(), rows.upper.ravel()
     found = solve_qp(np.eye(N * n), np.zeros(N * n), A, lower, upper)
@@ -66,14 +67,14 @@ def inside_of(rows: Rows) -> Array:
 
 
 def active(level: LevelSolution) -> set[tuple[int, int]]:
-    """The rows and columns that bind."""
+    """Returns the rows and columns that are active."""
     return set(zip(level.active.row.tolist(), level.active.joint.tolist(), strict=True))
 
 
 @pytest.mark.parametrize("seed", range(8))
 def test_both_routes_and_a_plain_qp_agree_on_coupled_rows(seed: int) -> None:
-    """Each level's optimum is that of the QP written out in full, with (33) as equalities and the rows one by
-    one; some coupled row binds, or the increments would be those without coupled rows."""
+    """The optimum of each level is that of the complete QP, with (33) as equalities and all rows one by one.
+    Some coupled row is active; without one, the increments would not depend on the coupled rows."""
     n, N, levels = 3 + seed % 4, 1 + seed % 5, 1 + seed % 3
     hierarchy = coupled(seed, n, N, levels)
     compiled, explicit = hierarchy.solve("compiled"), hierarchy.solve("explicit")
@@ -95,7 +96,8 @@ def test_both_routes_and_a_plain_qp_agree_on_coupled_rows(seed: int) -> None:
 
 
 def least(H: Array, f: Array, A: Array, lower: Array, upper: Array, E: Array, above: Array) -> Array:
-    """The step from `above` to the least ½UᵀHU + fᵀU with E U as it is and A U between bounds."""
+    """Returns the step from `above` to the minimum of ½UᵀHU + fᵀU, with E U unchanged and A U between its
+    bounds."""
     free = np.linalg.svd(E)[2][len(E) :].T if len(E) else np.eye(len(H))
     if not free.shape[1]:
         return np.zeros_like(above)
@@ -110,7 +112,8 @@ def least(H: Array, f: Array, A: Array, lower: Array, upper: Array, E: Array, ab
 
 @pytest.mark.parametrize("seed", range(3))
 def test_an_active_coupled_row_says_its_name(seed: int) -> None:
-    """Evidence tells the label, the direction's name and the knot, and which joints it bounds."""
+    """The evidence contains the label, the name of the direction and the knot, and the joints that the row
+    bounds."""
     hierarchy = coupled(seed, 4, 3, 1, room=0.05)
     rows = hierarchy.rows
     (solution,) = hierarchy.solve()
@@ -122,7 +125,7 @@ def test_an_active_coupled_row_says_its_name(seed: int) -> None:
 
 
 def test_every_constraint_has_a_bit_and_a_label_of_its_own() -> None:
-    """Two with the same could not be told apart where they bind."""
+    """Bits and labels are unique; otherwise two active constraints could not be distinguished."""
     assert [bit_of(each) for each in CONSTRAINTS] == [1 << place for place in range(len(CONSTRAINTS))]
     assert len({each.label for each in CONSTRAINTS}) == len(CONSTRAINTS)
     assert bit_of(COUPLED) == 0

@@ -1,4 +1,4 @@
-"""The controller in its loop: its levels, its robustness to any input, and its evidence."""
+"""The controller in closed loop: its levels, its robustness to any input, and its evidence."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ Array = NDArray[np.float64]
 
 
 def test_the_damping_level_fills_what_is_left(iiwa: Robot) -> None:
-    """The damping level is added as the last level if the enabled levels leave freedom, is absent otherwise,
-    and can be switched off."""
+    """The damping level is added as the last level if the enabled levels leave freedom, and can be switched
+    off. If they leave no freedom, it is absent."""
     previews = holds(iiwa, 5)
 
     def names(**changes: Any) -> list[str]:
@@ -32,7 +32,7 @@ def test_the_damping_level_fills_what_is_left(iiwa: Robot) -> None:
         return [level.name for level in controller.step(iiwa.home, np.zeros(7), previews).levels]
 
     stack = iiwa_settings(iiwa).stack
-    # 3 + 3 + 1 rows of full rank leave no freedom to a 7-joint arm.
+    # 3 + 3 + 1 rows of full rank leave no freedom to an arm with 7 joints.
     assert names() == ["position", "orientation", "q1"]
     assert names(stack=stack[:2]) == ["position", "orientation", "damping"]
     off = tuple(replace(level, enabled=False) for level in stack)
@@ -75,7 +75,7 @@ kinds = st.sampled_from(["fine", "fine", "huge", "nan", "inf", "tiny"])
 def test_whatever_comes_in_the_torque_is_finite_and_in_bounds(
     iiwa: Robot, seed: int, states: list[tuple[str, ...]], N: int, route: Any, solver: Any, position: Any
 ) -> None:
-    """Random, huge or not finite states, references and torques raise no exception."""
+    """Random, huge or non-finite states, references and torques raise no exception."""
     rng = np.random.default_rng(seed)
     torque_scale, velocity_scale = 10 ** rng.uniform([-2, -3], [1, 2])
     limits = Limits(position=position, velocity_scale=velocity_scale, torque_scale=torque_scale)
@@ -113,8 +113,8 @@ def test_whatever_comes_in_the_torque_is_finite_and_in_bounds(
 
 
 def test_a_state_that_is_not_finite_holds_the_torque(iiwa: Robot) -> None:
-    """The plan reports the fallback "hold" and one unsolved QP; at the next finite state the controller
-    starts anew."""
+    """The plan reports the fallback "hold" and one unsolved QP. At the next finite state the controller
+    starts again."""
     controller = HIMPC(iiwa, iiwa_settings(iiwa))
     tau = np.linspace(-5, 5, 7)
     controller.reset(tau)
@@ -127,7 +127,7 @@ def test_a_state_that_is_not_finite_holds_the_torque(iiwa: Robot) -> None:
 
 
 def test_the_controller_sees_no_mass(iiwa: Robot) -> None:
-    """On a robot with the same geometry and other masses the torques are bitwise equal."""
+    """For a robot with the same geometry and different masses the torques are bitwise equal."""
     model = iiwa.model.copy()
     for k in range(1, model.njoints):
         model.inertias[k].mass *= 7.0
@@ -145,7 +145,7 @@ def test_the_controller_sees_no_mass(iiwa: Robot) -> None:
 
 
 def test_wrong_settings_change_nothing(iiwa: Robot) -> None:
-    """After a refused `configure` the controller's torques are bitwise unchanged."""
+    """After a refused call of `configure` the torques of the controller are bitwise unchanged."""
     one, other = HIMPC(iiwa, iiwa_settings(iiwa)), HIMPC(iiwa, iiwa_settings(iiwa))
     previews = holds(iiwa, 5)
     for _ in range(3):

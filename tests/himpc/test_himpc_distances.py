@@ -1,4 +1,5 @@
-"""Distances at torque level: those of the collision library, and rows that keep them."""
+"""At torque level, the computed distances agree with those of a collision library, and the rows keep the
+required distances."""
 
 # pyright: reportAttributeAccessIssue=false
 # coal is a compiled module without type information.
@@ -64,8 +65,8 @@ def between(one: tuple, other: tuple) -> float:
 @settings(max_examples=25, deadline=None)
 @given(st.integers(0, 10**6))
 def test_distances_are_those_of_the_collision_library(seed: int) -> None:
-    """The chosen pairs of links and objects, and of links, have the library's distances, and no object is
-    nearer than the room that is reported."""
+    """The distances of the chosen pairs (link and object, or two links) are those of the library. The
+    reported room is at most the smallest distance to an object."""
     robot = load_robot("iiwa14")
     q = np.random.default_rng(seed).uniform(robot.q_lower, robot.q_upper)
     distances = Distances(robot, Avoidance(on=True))
@@ -93,7 +94,7 @@ def test_distances_are_those_of_the_collision_library(seed: int) -> None:
             else [solid for solid, each in zip(solids, capsules, strict=True) if each.link == other]
         )
         exact = [between(one, two) for one in mine for two in theirs]
-        if distance > 1e-3:  # inside, a library tells the way out of convex solids, and not of segments
+        if distance > 1e-3:  # for penetration the library uses convex solids, and our code uses segments
             assert min(abs(each - distance) for each in exact) < 1e-5
     exact = [between(one, two) for one in solids[2:] for two in things.values()]
     assert distances.room <= max(min(exact), 0.0) - 0.01 + 1e-6
@@ -101,7 +102,7 @@ def test_distances_are_those_of_the_collision_library(seed: int) -> None:
 
 
 def test_gradients_are_the_derivatives_of_the_distances(robot: Robot) -> None:
-    """Between two neighbouring postures the distances change as the gradients say."""
+    """Between two neighbouring postures the distances change as the gradients predict."""
     rng, h, checked = np.random.default_rng(3), 1e-6, 0
     distances = Distances(robot, Avoidance(on=True))
     for _ in range(20):
@@ -118,8 +119,8 @@ def test_gradients_are_the_derivatives_of_the_distances(robot: Robot) -> None:
 
 
 def test_pairs_that_meet_soonest_have_the_rows() -> None:
-    """Seven pairs of a panda's wrist and elbow are nearer than a ball, and hardly move against each other:
-    the rows are those of the ball, whether it moves or not."""
+    """Seven pairs of a panda's wrist and elbow are nearer than a ball, but hardly move relative to each
+    other. The rows are those of pairs with the ball, whether it moves or not."""
     panda = load_robot("panda")
     q = np.array([-0.11, -0.54, 0.51, -2.27, -0.37, 1.33, 0.63])
     data = panda.model.createData()
@@ -136,7 +137,8 @@ def test_pairs_that_meet_soonest_have_the_rows() -> None:
 
 
 def test_an_object_that_comes_closer_must_be_evaded(robot: Robot) -> None:
-    """Its velocity towards the link is added to the least rate; one that goes away takes from it."""
+    """The velocity of the object towards the link is added to the least rate; if the object moves away, its
+    velocity is subtracted."""
     ball = Ball("ball", (0.56, 0.0, 0.6), 0.05)
     still, coming, going_away = (
         Distances(robot, Avoidance(on=True)).at(robot.home, Observed((ball,), velocity))
@@ -154,8 +156,8 @@ def pairs(*distance: float) -> Near:
 
 
 def test_from_the_least_rate_a_stop_is_possible() -> None:
-    """Reaction and deceleration from it use up the room and no more; inside d_safe the rate is positive; a
-    pair that enters the set has no bound yet."""
+    """When the distance changes at the least rate, reaction and deceleration need exactly the room that is
+    left. Inside d_safe the rate is positive. A pair that has just entered the set has no bound yet."""
     kept = Avoidance(on=True, d_safe=0.02, margin=0.01, reaction=0.1, deceleration=1.5)
     far, middle, inside, entering = least_rates(pairs(0.18, 0.05, 0.01, 0.2499999), kept)
     for distance, rate in ((0.18, far), (0.05, middle)):
@@ -167,7 +169,8 @@ def test_from_the_least_rate_a_stop_is_possible() -> None:
 
 
 def test_joints_that_a_motor_with_little_torque_left_carries_become_slow(robot: Robot) -> None:
-    """Only the motor whose mean torque is large slows its joints down; a short peak of torque does not."""
+    """Only a motor with a large mean torque lowers the velocity limits of the joints that it carries; a short
+    peak of torque does not."""
     limits = in_force(robot, Limits())
     tau, load = 0.4 * limits.tau_upper, np.zeros(robot.n)
     for tick in range(1000):
@@ -182,8 +185,8 @@ def test_joints_that_a_motor_with_little_torque_left_carries_become_slow(robot: 
 
 
 def test_a_joint_that_accelerates_towards_its_limit_gets_a_lower_one(robot: Robot) -> None:
-    """Only a joint that becomes faster gets a lower limit, at least half of its own; one that brakes keeps
-    its limit."""
+    """Only a joint that becomes faster gets a lower limit, at least half of its own limit. A joint that
+    brakes keeps its limit."""
     limits = in_force(robot, Limits())
     assert anticipated(limits, 0.4 * limits.v_limit, 0.4 * limits.v_limit) is limits
     v = 0.8 * limits.v_limit
@@ -202,7 +205,8 @@ def test_a_joint_that_accelerates_towards_its_limit_gets_a_lower_one(robot: Robo
 
 
 def test_a_robot_without_progress_becomes_slow(robot: Robot) -> None:
-    """Only while something is near, nothing moves, a task is away from its target, and none comes closer."""
+    """The joints become slower only if something is near, nothing moves, a task is away from its target, and
+    no error decreases."""
     cases = {
         "stalled": (0.3, False, 0.01),
         "a little inside": (0.3, False, -0.012),
@@ -228,10 +232,10 @@ def test_a_robot_without_progress_becomes_slow(robot: Robot) -> None:
     stall = going(1)
     for error in [*[0.3] * 1000, 0.35]:
         stall = stalled(stall, np.array([error]), False, 0.01, 1e-3)
-    assert stall.due == [0.35]  # it was pushed away, and may come back
+    assert stall.due == [0.35]  # the robot was pushed away and may return
     stall = going(1)
     for error in [*[0.3] * 300, *np.linspace(0.3, 0.2, 100), *[0.2] * 1000]:
         stall = stalled(stall, np.array([error]), False, 0.01, 1e-3)
-    assert stall.share < 0.01  # what changes while it brakes does not set it going again
+    assert stall.share < 0.01  # an error that decreases while the robot brakes does not make it faster again
     slow = slowed(in_force(robot, Limits()), stall._replace(share=0.0))
     assert slow.v_limit == pytest.approx(SLOWEST)

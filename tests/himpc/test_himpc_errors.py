@@ -1,5 +1,5 @@
-"""Errors of all kinds of tasks, differentiated numerically up to 179°: their derivative is ẋ − ẋ_d, and that
-of ẋ_d is ẍ_d."""
+"""The errors of all kinds of tasks are differentiated numerically up to 179°: their derivative is ẋ − ẋ_d,
+and the derivative of ẋ_d is ẍ_d."""
 
 from __future__ import annotations
 
@@ -64,8 +64,8 @@ def test_every_class_is_among_them() -> None:
 
 
 class Motion:
-    """A moving robot and a moving target: q = q₀ + vt and, in the coordinates of the task's target, y_d with
-    ẏ_d and ÿ_d."""
+    """The motion of a robot and of a target: q = q₀ + vt, and y_d with ẏ_d and ÿ_d in the coordinates of the
+    task's target."""
 
     def __init__(self, task: Task, seed: int, angle: float) -> None:
         """angle: the angle between value and target, or between axis and direction to the point, at t = 0,
@@ -143,7 +143,8 @@ def test_what_controllers_take_for_its_derivative_is_the_errors_own(
 @given(seed=st.integers(0, 2**32 - 1), angle=st.floats(-np.radians(179.0), np.radians(179.0)))
 @settings(max_examples=25)
 def test_a_free_rotation_does_not_turn_the_error(task: OrientationTask, seed: int, angle: float) -> None:
-    """On two axes: at x̃ = 0 the derivative of x̃ is ẋ − ẋ_d for every rotation about the third axis."""
+    """For two controlled axes and x̃ = 0, the derivative of x̃ is ẋ − ẋ_d for every rotation about the third
+    axis."""
     motion = Motion(task, seed, 0.0)
     free = np.array([float(axis not in task.axes) for axis in "xyz"])
     motion.y = exp3(angle * free) @ motion.y
@@ -174,8 +175,8 @@ def test_accelerations_of_references_are_derivatives_of_their_velocities(
 
 @pytest.mark.parametrize("axes", SUBSETS)
 def test_errors_end_at_180_degrees(axes: str) -> None:
-    """At 180°, also with rounding errors, the error is finite and at most π; if the controlled axes contain
-    the axis of rotation, it is π."""
+    """At 180°, also with rounding errors, the error is finite and at most π. If the axis of rotation is among
+    the controlled axes, the error is π."""
     rng = np.random.default_rng(3)
     task = FrameOrientation(name="turn", axes=axes)
     for noise in (0.0, 1e-15, 1e-12, 1e-9, 1e-6):

@@ -1,5 +1,5 @@
-"""The fallbacks for a level without a verified solution: softened rows, the previous plan, and braking,
-within all bounds if these are feasible."""
+"""If a level has no verified solution, the fallbacks are softened rows, the previous plan, and braking. They
+satisfy all bounds if these are feasible."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 def unreachable(hierarchy: Hierarchy, excess: float = 1.0) -> Hierarchy:
-    """Returns the hierarchy with a velocity bound at the first knot that no torque within its bounds
-    satisfies."""
+    """Returns the hierarchy with a velocity bound at the first knot that no torque within its bounds can
+    satisfy."""
     rows = hierarchy.rows
     N, n = hierarchy.shape
     lower, upper = rows.lower.copy(), rows.upper.copy()
@@ -43,7 +43,7 @@ def unreachable(hierarchy: Hierarchy, excess: float = 1.0) -> Hierarchy:
 @pytest.mark.parametrize("route", ["compiled", "explicit"])
 @pytest.mark.parametrize("seed", range(6))
 def test_infeasible_rows_are_softened_by_the_least(seed: int, route: Route) -> None:
-    """State rows are relaxed by the smallest feasible amount; lower levels stay feasible (Theorem 2)."""
+    """State rows are relaxed by the smallest feasible amount, and lower levels stay feasible (Theorem 2)."""
     hierarchy = unreachable(random_hierarchy(seed, 5, 4, 3))
     N, _ = hierarchy.shape
     solutions = hierarchy.solve(route)
@@ -60,7 +60,7 @@ def test_infeasible_rows_are_softened_by_the_least(seed: int, route: Route) -> N
 
 @pytest.mark.parametrize("seed", range(4))
 def test_softened_routes_agree(seed: int) -> None:
-    """Both routes use the same slack and then find the same increments."""
+    """Both routes compute the same slack, and then the same increments."""
     hierarchy = unreachable(random_hierarchy(seed, 4, 3, 2))
     assert largest_difference(hierarchy.solve("compiled"), hierarchy.solve("explicit")) <= 1e-6
 
@@ -69,8 +69,8 @@ def test_softened_routes_agree(seed: int) -> None:
 def test_rows_without_a_solution_are_not_solved_as_printed(
     monkeypatch: pytest.MonkeyPatch, seed: int
 ) -> None:
-    """The rows are softened at once: the printed QP has no solution either, and an attempt takes
-    milliseconds in every tick of a robot that presses against something."""
+    """The rows are softened without an attempt to solve the printed QP, which has no solution. Such an
+    attempt would take milliseconds in every tick in which a robot presses against something."""
     asked: list[object] = []
     monkeypatch.setattr(fallbacks, "solve_explicit", lambda *given: asked.append(given))
     solutions = unreachable(random_hierarchy(seed, 5, 4, 3)).solve("compiled")
@@ -91,7 +91,7 @@ def boxed(hierarchy: Hierarchy, past: float = 0.0) -> Hierarchy:
 
 @pytest.fixture(scope="module")
 def pressed() -> Hierarchy:
-    """Three levels with active bounds, which the undisturbed cascade solves."""
+    """Returns three levels with active bounds; the normal cascade solves them."""
     tight = boxed(random_hierarchy(11, 5, 4, 3, room=0.3))
     rows = containing(tight.rows, np.zeros(tight.shape))
     hierarchy = Hierarchy(tight.problems, rows.widened(np.full(rows.lower.shape, 0.01)))
@@ -107,7 +107,8 @@ def pressed() -> Hierarchy:
 def test_a_broken_solver_falls_to_the_previous_plan(
     monkeypatch: pytest.MonkeyPatch, pressed: Hierarchy, kind: str, solver: qp.Solver
 ) -> None:
-    """Level 1 continues its shifted plan, lower levels inherit it, and all rows are satisfied."""
+    """Level 1 continues its shifted plan, lower levels use the same increments, and all rows are
+    satisfied."""
     previous = {s.name: s._replace(U=1e-4 * s.U) for s in pressed.solve()}
     break_solver(monkeypatch, kind)
     solutions = pressed.solve("explicit", solver, previous)
@@ -123,8 +124,8 @@ def test_a_broken_solver_falls_to_the_previous_plan(
 def test_a_previous_plan_outside_any_row_or_no_optimum_is_not_gone_on_with(
     monkeypatch: pytest.MonkeyPatch, pressed: Hierarchy, stale: str
 ) -> None:
-    """The joints are braked if the shifted plan satisfies the torque rows but violates a velocity row, or if
-    it was a fallback itself; otherwise they would continue their motion."""
+    """The shifted plan satisfies the torque rows. If it violates a velocity row, or was itself a fallback,
+    the joints are braked; otherwise they would continue their motion."""
     rows, (N, n) = pressed.rows, pressed.shape
     sound = {s.name: s._replace(U=np.zeros((N, n))) for s in pressed.solve()}
     if stale == "rung":
@@ -165,7 +166,7 @@ def test_a_broken_solver_without_a_plan_brakes(
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 def test_a_level_whose_solver_fails_inherits(monkeypatch: pytest.MonkeyPatch) -> None:
-    """If only a lower level fails, it keeps the increments of the level above, and reports the fallback."""
+    """If only a lower level fails, it uses the increments of the level above, and reports the fallback."""
     hierarchy = random_hierarchy(11, 6, 4, 3, room=0.3)
     sound = hierarchy.solve()
     assert all(len(solution.active) for solution in sound[:2])
@@ -181,8 +182,8 @@ def test_a_level_whose_solver_fails_inherits(monkeypatch: pytest.MonkeyPatch) ->
 @given(seeds, st.integers(1, 6), st.integers(1, 5), st.booleans())
 @settings(max_examples=60)
 def test_whatever_the_rows_the_torque_rows_hold(seed: int, n: int, N: int, position_rows: bool) -> None:
-    """For random, mostly contradictory state rows a fallback returns a finite point within the torque bounds,
-    and no level leaks."""
+    """For random, mostly contradictory state rows, a fallback returns a finite point within the torque
+    bounds, and no level leaks."""
     hierarchy = random_hierarchy(seed, max(n, 2), N, 3, position_rows)
     rng = np.random.default_rng(seed)
     rows = hierarchy.rows
@@ -214,7 +215,7 @@ def test_least_slack_makes_any_rows_feasible(seed: int, n: int, N: int, position
 
 
 def feasible(rows: Rows) -> bool:
-    """Whether all rows are feasible, by linear programming joint by joint."""
+    """Whether all rows are feasible, computed by linear programming joint by joint."""
     from scipy.optimize import linprog
 
     N = rows.L.shape[1]
@@ -230,7 +231,8 @@ def feasible(rows: Rows) -> bool:
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 @pytest.mark.parametrize("limit", [1, 7, 40])
 def test_a_qp_takes_no_more_iterations_than_it_may(monkeypatch: pytest.MonkeyPatch, limit: int) -> None:
-    """All attempts of DAQP together stay within their budget; a QP that is ended does not count as solved."""
+    """All attempts of DAQP together stay within their budget of iterations; a QP that was ended does not
+    count as solved."""
     rng = np.random.default_rng(0)
     used: list[int] = []
     healthy = daqp.solve

@@ -1,5 +1,5 @@
-"""The safety filter: the torque of an independent QP, within the bounds, for every state, and it says when
-its rows cannot be met."""
+"""For every state, the torque of the safety filter is that of an independent QP and within its bounds, and
+the filter reports when its rows cannot be satisfied."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def keeping(torque_scale: float = 1.0) -> Settings:
 
 
 def filtered(rng: np.random.Generator, wild: float, speed: float) -> tuple[Filtered, dict[str, np.ndarray]]:
-    """One torque through the filter, at a random state."""
+    """Returns the result of the filter for one torque at a random state, and its inputs."""
     robot = load_robot("iiwa14")
     asked = keeping()
     q = rng.uniform(robot.q_lower, robot.q_upper)
@@ -54,7 +54,8 @@ def filtered(rng: np.random.Generator, wild: float, speed: float) -> tuple[Filte
 def test_the_torque_is_that_of_an_independent_QP_and_within_its_bounds(
     seed: int, wild: float, speed: float
 ) -> None:
-    """The same filter written in τ, with rows from the rates and gradients, by another solver."""
+    """The reference is the same filter, written in τ with rows from the rates and gradients, and solved by
+    another solver."""
     robot = load_robot("iiwa14")
     found, given_ = filtered(np.random.default_rng(seed), wild, speed)
     assert np.isfinite(found.tau).all()
@@ -84,8 +85,9 @@ def test_the_torque_is_that_of_an_independent_QP_and_within_its_bounds(
 
 
 def test_rows_that_cannot_be_met_give_way_by_least_squares_and_say_so() -> None:
-    """An arm that falls onto the floor with two thousandths of its torque cannot brake as the rows ask: the
-    misses are the least possible, and each is told with its pair."""
+    """An arm falls onto the floor with two thousandths of its torque and cannot brake as much as the rows
+    require. The sum of squared violations is the least possible, and each violation is reported with its
+    pair."""
     robot = load_robot("iiwa14")
     asked = keeping(torque_scale=0.002)
     q = robot.home.copy()

@@ -1,5 +1,5 @@
-"""Compiled code on disk: a file that is damaged, belongs to another user or cannot be written does not
-prevent a start, and is never executed."""
+"""If a file with compiled code is damaged, belongs to another user or cannot be written, the program still
+starts, and the code in this file is never executed."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from himpc.tick.kernel.target import roll
 
 @pytest.fixture(scope="module")
 def compiled(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An installation of a small function that was compiled once and is loaded from disk since."""
+    """An installation of a small function. It was compiled once and is now loaded from disk."""
     folder = tmp_path_factory.mktemp("compiled")
     assert [again(folder), again(folder)] == [2, 0]
     return folder
@@ -46,7 +46,7 @@ def code_of(folder: Path) -> list[Path]:
 
 
 def again(folder: Path, before: Callable[[], None] | None = None) -> int:
-    """Starts again and returns how many functions are compiled; the start succeeds without an error
+    """Starts a new process and returns how many functions it compiles; it must end without an error
     message."""
     process = start(folder, before=before)
     errors = process.communicate(timeout=120)
@@ -73,14 +73,14 @@ def test_a_damaged_file_is_compiled_anew_and_replaced(place: Path, kind: str) ->
 
 
 def loaded() -> bool:
-    """Whether one of our functions can be loaded from its file."""
+    """Whether one of our compiled functions can be loaded from its file."""
     return roll._cache.load_overload(roll.signatures[0], roll.targetctx) is not None
 
 
 @pytest.fixture(scope="module")
 def kept(tmp_path_factory: pytest.TempPathFactory) -> Iterator[list[Path]]:
-    """The files with that function's code, one for each processor that it was compiled for, in a folder of
-    this test."""
+    """The files with the code of that function, one for each processor that it was compiled for, copied to a
+    folder of this test."""
     files = sorted(Path(roll.stats.cache_path).glob("target.roll-*.code"))
     with pytest.MonkeyPatch.context() as monkeypatch:
         monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path_factory.mktemp("kept")))

@@ -1,4 +1,5 @@
-"""Limits: a joint can always still stop, bounds never cross, and limits are tightened without a jump."""
+"""A joint can always stop before its limit, lower and upper bounds never cross, and limits are tightened
+without a jump."""
 
 from __future__ import annotations
 
@@ -51,7 +52,7 @@ def test_a_joint_inside_the_viable_set_never_passes_its_limit(
         q += T_s * v
         lower, upper = bounds_at(q, low, high, v_max, a, reaction)
         assert lower <= upper
-        # The bound must never require a deceleration above a_max.
+        # The bound must never require a deceleration greater than a_max.
         assert upper >= v - a * T_s - 1e-9 or v < 0
         assert lower <= v + a * T_s + 1e-9 or v > 0
         v = min(max(wanted, lower, v - a * T_s), upper, v + a * T_s)
@@ -62,7 +63,7 @@ def test_a_joint_inside_the_viable_set_never_passes_its_limit(
 @given(seeds, st.booleans())
 @settings(max_examples=100)
 def test_bounds_never_cross(seed: int, unbounded: bool) -> None:
-    """lower ≤ upper for every joint, also far beyond the limits and without limits."""
+    """For every joint, lower ≤ upper holds, also far beyond the limits and without limits."""
     rng = np.random.default_rng(seed)
     n = 6
     low, high = np.sort(rng.normal(0, 10 ** rng.uniform(-6, 2), (2, n)), axis=0)
@@ -76,8 +77,8 @@ def test_bounds_never_cross(seed: int, unbounded: bool) -> None:
 
 
 def test_beyond_a_limit_the_joint_must_return() -> None:
-    """Beyond the limit the bound requires a velocity back, in proportion to the excess and within the
-    velocity limit."""
+    """Beyond the limit, the bound requires a velocity towards the limit, in proportion to the excess and
+    within the velocity limit."""
     assert bounds_at(1.1, -1.0, 1.0, 2.0, 10.0, 1e-3)[1] == pytest.approx(-RETURN_RATE * 0.1)
     assert bounds_at(-1.1, -1.0, 1.0, 2.0, 10.0, 1e-3)[0] == pytest.approx(RETURN_RATE * 0.1)
     assert bounds_at(9.0, -1.0, 1.0, 2.0, 10.0, 1e-3) == (-2.0, -2.0)
@@ -121,7 +122,7 @@ def test_rows_say_what_the_prediction_does(seed: int, n: int, N: int, position: 
     [
         ("viability", 0.0, "velocity", "velocity"),
         ("viability", 0.98, "position", "velocity"),
-        # beyond the limit it must return, within the velocity limit
+        # beyond the limit the joint must return, within the velocity limit
         ("viability", 1.2, "position", "velocity"),
         ("paper", 0.98, "velocity", "velocity"),  # this variant has separate rows for positions
         ("off", 0.98, "velocity", "velocity"),
@@ -130,7 +131,8 @@ def test_rows_say_what_the_prediction_does(seed: int, n: int, N: int, position: 
 def test_a_velocity_row_tells_which_limit_it_stands_for(
     position: Any, q: float, upper: str, lower: str
 ) -> None:
-    """Near its end a joint is limited by its position limit at every velocity."""
+    """With `viability`, a velocity row near the end of a joint stands for the position limit at every
+    velocity."""
     one = np.ones(1)
     force = LimitsInForce(-9 * one, 9 * one, 0.5 * one, -one, one, 10 * one)
     state = JointState(q * one, 0 * one, 0 * one)
@@ -160,7 +162,7 @@ def test_rows_that_can_be_met_need_no_slack(seed: int, N: int, position: Any, ap
     low, high = viability_bounds(q, force.q_lower, force.q_upper, force.v_limit, force.a_max, 0.06)
     state = JointState(q, 0.9 * rng.uniform(low, high), rng.normal(0, 5, n))
     tau_0 = 0.5 * rng.uniform(force.tau_lower, force.tau_upper)
-    # Enough torque to cancel q̈ and to brake with 200 1/s times the remaining velocity.
+    # The torque is enough to cancel q̈ and to brake with 200 1/s times the remaining velocity.
     strong = np.maximum(force.tau_upper, 2 * np.abs(tau_0) + 1e3 * (1 + np.abs(state.v) + np.abs(state.a)))
     force = LimitsInForce(-strong, strong, force.v_limit, force.q_lower, force.q_upper, force.a_max)
     limits = Limits(position=position, velocity_approach=approach)
@@ -184,7 +186,7 @@ FIELDS = ("tau_lower", "tau_upper", "v_limit", "q_lower", "q_upper")
 
 
 def settled(now: LimitsInForce, goal: LimitsInForce, tau: float, q: float, v: float) -> list[LimitsInForce]:
-    """Returns the limits in force at each tick, at a constant state, until they reach the goal."""
+    """Returns the limits in force at each tick, for a constant state, until they reach the goal."""
     path = [now]
     for _ in range(20_000):
         if path[-1] is goal:
@@ -194,7 +196,7 @@ def settled(now: LimitsInForce, goal: LimitsInForce, tau: float, q: float, v: fl
 
 
 def test_loosened_limits_hold_at_once() -> None:
-    """Wider limits cannot be violated, so they are in force at the next tick."""
+    """Wider limits cannot be violated, so they apply at the next tick."""
     wide = force_of(tau=20.0, v=4.0, q_low=-2.0, q_high=2.0)
     assert len(settled(force_of(), wide, 9.0, 0.5, 1.0)) == 2
 
@@ -202,7 +204,7 @@ def test_loosened_limits_hold_at_once() -> None:
 @given(st.floats(-10, 10), st.floats(-1, 1), st.floats(-2, 2))
 @settings(max_examples=15)
 def test_tightened_limits_close_in_and_arrive(tau: float, q: float, v: float) -> None:
-    """Tightened limits never exclude the present value within one tick, never become wider again, and reach
+    """In one tick, tightened limits do not pass the present value. They never become wider again, and reach
     the goal."""
     goal = force_of(tau=3.0, v=0.5, q_low=-0.2, q_high=0.3)
     path = settled(force_of(), goal, tau, q, v)
@@ -226,7 +228,7 @@ def test_tightened_limits_close_in_and_arrive(tau: float, q: float, v: float) ->
 
 
 def test_limits_switched_on_start_from_the_present() -> None:
-    """When limits are switched on, the first bound is the present value and not the limit itself."""
+    """When limits are switched on, the first bound is the present value and not yet the limit."""
     nothing = force_of(tau=np.inf, v=np.inf, q_low=-np.inf, q_high=np.inf)
     first = ramp(nothing, force_of(), np.array([15.0]), np.array([1.4]), np.array([-3.0]), 1e-3)
     assert first.tau_upper[0] == pytest.approx(15.0, abs=0.05)

@@ -190,7 +190,7 @@ def test_a_hold_counts_from_arrival_and_starts_again_when_the_point_leaves() -> 
 
 
 def test_being_at_the_goal_early_does_not_count_as_holding() -> None:
-    """The EE is at its goal while the base task is still first: its hold begins when its task is first."""
+    """The EE reaches its goal while the base task is first; its hold begins later, when its task is first."""
     mission = (MissionTask("base", "base", Go((1.0,))), MissionTask("ee", "ee", Go((2.0,)), hold=1.0))
     progress = advanced(Progress(mission), 2, 0.0, at(2, 0), STILL)
     progress = advanced(progress, 2, 5.0, at(2, 1), STILL)

@@ -1,4 +1,4 @@
-"""Both routes are compared with `benchmarks.exact`, a third evaluation of (32) to (34) with many more
+"""Both routes are compared with `benchmarks.exact`, an independent evaluation of (32) to (34) with many more
 digits."""
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ def test_random_stacks_on_a_robot_have_the_optimum(robot: str) -> None:
 
 
 def test_where_nothing_binds_it_is_the_closed_form() -> None:
-    """The entries of M̄ of base and wrist of a mobile manipulator differ by 10⁴: H has a condition number of
-    10¹³ and more."""
+    """For base and wrist of a mobile manipulator, the entries of M̄ differ by a factor of 10⁴, and H has a
+    condition number of 10¹³ and more."""
     compared = 0
     for seed in range(40):
         stack = random_stack("ridgeback-ur10", seed, 3)
@@ -58,7 +58,7 @@ def test_where_nothing_binds_it_is_the_closed_form() -> None:
 
 
 def by_fractions(problem: LevelProblem) -> Array:
-    """Returns the optimum of a level alone and without bounds, by Gaussian elimination with rational
+    """Returns the optimum of a level alone and without bounds, computed by Gaussian elimination with rational
     numbers."""
     exact: Any = np.frompyfunc(Fraction, 1, 1)
     (N, m, n), K = problem.B.shape, problem.knots
@@ -86,8 +86,8 @@ def by_fractions(problem: LevelProblem) -> Array:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_the_judge_needs_no_good_guess(seed: int) -> None:
-    """`benchmarks.exact` finds the same point from a guess with a wrong row and without a right one, and no
-    neighbour within the bounds has a lower cost."""
+    """`benchmarks.exact` finds the same point from a guess in which a wrong row replaces a right one, and no
+    neighbour of this point within the bounds has a lower cost."""
     hierarchy = random_hierarchy(seed, 4, 3, 1)
     solution = hierarchy.solve()[0]
     (exact,) = exact_increments(hierarchy, [solution])
@@ -107,9 +107,9 @@ def test_the_judge_needs_no_good_guess(seed: int) -> None:
 
 
 def test_the_judge_decides_where_rows_nearly_depend() -> None:
-    """A row of level 3 is independent of the active rows by only 1e-10 of its length: the optimum is found,
-    with active bounds. The explicit route is accurate to 1e-5 N·m there; the compiled one exceeds the row by
-    less than 1e-10 N·m, which changes the optimum by 0.04 N·m."""
+    """A row of level 3 is independent of the active rows by only 1e-10 of its length; the optimum, with
+    active bounds, is found. The explicit route is accurate to 1e-5 N·m there. The compiled one violates the
+    row by less than 1e-10 N·m, which changes the optimum by 0.04 N·m."""
     stack = random_stack("baxter", 163, 30)
     assert stack is not None
     levels = judged(stack)
@@ -133,7 +133,7 @@ def test_a_level_below_one_that_used_up_nearly_all_freedom_is_solved(
     seed: int, n: int, N: int, levels: int, position_rows: bool, room: float
 ) -> None:
     """If U_{i−1} is almost the only feasible point, rounding errors can make the rows look contradictory. An
-    earlier explicit route found no point for 210 of 49,095 such hierarchies."""
+    earlier version of the explicit route found no point for 210 of 49,095 such hierarchies."""
     hierarchy = random_hierarchy(seed, n, N, levels, position_rows, room)
     explicit = hierarchy.solve("explicit")
     assert all(solution.fallback == "solve" for solution in explicit)

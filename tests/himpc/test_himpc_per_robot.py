@@ -1,5 +1,5 @@
-"""Results that are computed once for each robot are deleted with it, because a server loads a robot for every
-page."""
+"""Results that are computed once for each robot are deleted together with it, because a server loads a robot
+for every page."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ USES: tuple[Callable[[Robot], Any], ...] = (
 
 @pytest.mark.parametrize("use", USES)
 def test_a_robot_is_forgotten(use: Callable[[Robot], Any]) -> None:
-    """No function keeps a robot to which nothing else refers."""
+    """No function keeps a robot in memory to which nothing else refers."""
     robot = replace(load_robot("planar3"))
     gone = weakref.ref(robot)
     use(robot)
@@ -42,7 +42,7 @@ def test_a_robot_is_forgotten(use: Callable[[Robot], Any]) -> None:
 
 
 def test_a_result_is_computed_once_for_each_robot() -> None:
-    """The same robot and arguments give the same result object; another robot has its own results."""
+    """The same robot and arguments give the same result object; a different robot has its own results."""
     calls = []
 
     @per_robot

@@ -1,4 +1,4 @@
-"""The predictions equal those of the printed matrices of (14), (15), (18) and (28)."""
+"""The predictions agree with the printed matrices of (14), (15), (18) and (28)."""
 
 from __future__ import annotations
 
@@ -29,7 +29,8 @@ def printed_task_system(m: int, T_s: float) -> tuple[Array, Array]:
 
 
 def printed_joint_system(n: int, T_s: float, M_bar: Array) -> tuple[Array, Array]:
-    """Returns A₂ and B₂ of (18), (4n, 4n) and (4n, n), with M̄⁻¹ where (17) misprints M̄."""
+    """Returns A₂ and B₂ of (18), (4n, 4n) and (4n, n), with M̄⁻¹ instead of M̄, which is a misprint in
+    (17)."""
     eye, zero = np.eye(n), np.zeros((n, n))
     A_21 = np.block([[eye, T_s * eye], [zero, 2 * eye]])
     A_22 = np.block([[zero, zero], [zero, -eye]])
@@ -59,7 +60,7 @@ def printed_residuals(
 @given(seed=seeds, N=horizons, m=st.integers(1, 4), n=st.integers(1, 7), T_s=periods)
 @settings(max_examples=80)
 def test_residuals_equal_the_printed_system(seed: int, N: int, m: int, n: int, T_s: float) -> None:
-    """For all gains, the scalar effects c_l give the same e as powers of the printed A₁."""
+    """For all gains, the scalar effects c_l give the same e as the powers of the printed A₁."""
     rng = np.random.default_rng(seed)
     K_p, K_v = rng.uniform(0, 500, m), rng.uniform(0, 50, m)
     x, v, a = rng.normal(0, [[1], [3], [10]], (3, m))
@@ -81,7 +82,7 @@ def test_residuals_equal_the_printed_system(seed: int, N: int, m: int, n: int, T
 @given(seed=seeds, N=horizons, n=st.integers(1, 9), T_s=periods)
 @settings(max_examples=80)
 def test_joint_predictions_equal_the_printed_system(seed: int, N: int, n: int, T_s: float) -> None:
-    """q and q̇ over the horizon equal those of the printed A₂ and B₂."""
+    """q and q̇ over the horizon are those that the printed A₂ and B₂ give."""
     rng = np.random.default_rng(seed)
     q, v, a = rng.normal(0, [[1], [3], [30]], (3, n))
     M_bar, U = 10 ** rng.uniform(-3.5, 1, n), rng.normal(0, 1, (N, n))
@@ -105,7 +106,7 @@ def test_joint_predictions_equal_the_printed_system(seed: int, N: int, n: int, T
 @given(seed=seeds, N=st.integers(1, 10), m=st.integers(1, 4), n=st.integers(1, 7), shorter=st.integers(0, 9))
 @settings(max_examples=60)
 def test_cost_is_the_printed_sum(seed: int, N: int, m: int, n: int, shorter: int) -> None:
-    """`cost` is Σ ‖e‖²_Q + ‖Δτ‖²_R of (31) over the level's own knots."""
+    """`cost` is Σ ‖e‖²_Q + ‖Δτ‖²_R of (31), summed over the knots of the level."""
     rng = np.random.default_rng(seed)
     knots = max(1, N - shorter)
     Q, R = 10 ** rng.uniform(-1, 3, m), 10 ** rng.uniform(-2, 2, n)
@@ -124,8 +125,8 @@ def test_cost_is_the_printed_sum(seed: int, N: int, m: int, n: int, shorter: int
 
 
 def test_position_at_the_first_knot_has_no_input() -> None:
-    """In the printed Euler step, Δτ₀ changes q only at knot 2, so with N = 1 the effect of the input does not
-    contain K_p."""
+    """In the printed Euler step, Δτ₀ changes q only from knot 2 on. With N = 1, therefore, the effect of the
+    input does not contain K_p."""
     state = JointState(np.zeros(2), np.ones(2), np.zeros(2))
     U = np.array([[1.0, -1.0], [0.0, 0.0]])
     np.testing.assert_array_equal(predict_positions(state, U, np.ones(2), 1e-3)[1], 1e-3 * np.ones(2))

@@ -1,5 +1,5 @@
-"""All functions also run with Numba's documented interface alone, without our own tool chain, and give the
-same numbers."""
+"""All functions also run with only the documented interface of Numba, without our own tool chain, and give
+the same numbers."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ if __name__ == "__main__":
 
 
 def on_numba_alone(folder: Path, *arguments: str, **environment: str) -> None:
-    """Runs a program with the public tool chain and its code in a folder of the test; no module of the other
+    """Runs a program with the public tool chain, with its code in a folder of the test. No module of our own
     tool chain is loaded."""
     done = subprocess.run(
         [sys.executable, "-c", NO_PRIVATE, *arguments],
@@ -66,7 +66,7 @@ def on_numba_alone(folder: Path, *arguments: str, **environment: str) -> None:
     assert done.stdout.split() == []
 
 
-# Compiled without LLVM's optimizations: with them, the cascade alone takes three minutes of a core here.
+# LLVM's optimizations are switched off: with them, the cascade alone takes three minutes of a core here.
 @pytest.mark.parametrize(
     ("names", "environment"),
     [(("osf", "himpc", "htmpc"), {"NUMBA_OPT": "0"}), (("himpc",), {"NUMBA_DISABLE_JIT": "1"})],

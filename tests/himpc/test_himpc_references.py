@@ -1,5 +1,5 @@
-"""References: consistent derivatives, previews that agree with the later motion, and a dragged target within
-its caps."""
+"""References have consistent derivatives, their previews agree with the later motion, and a dragged target
+keeps its caps."""
 
 from __future__ import annotations
 
@@ -100,8 +100,8 @@ def test_an_eased_phase_rests_at_both_ends_of_a_turn() -> None:
 @given(seeds, st.booleans(), st.integers(1, 12))
 @settings(max_examples=30)
 def test_a_target_shows_the_kernel_what_it_previews(seed: int, turns: bool, N: int) -> None:
-    """A target that is read by `show` moves bitwise as one that is read by `preview`, also through rest and
-    new targets."""
+    """A target that is read by `show` moves bitwise like a target that is read by `preview`, also at rest and
+    after a new target."""
     rng = np.random.default_rng(seed)
     start = np.eye(3) if turns else np.zeros(3)
     one, other = Target(start), Target(start)
@@ -274,8 +274,8 @@ def test_jump_rests_at_the_new_value() -> None:
 
 
 def test_a_rotation_turns_about_all_axes() -> None:
-    """The preview of a rotation has all components of ω_d, also for a task on fewer axes; one at rest may
-    have only the task's components."""
+    """The preview of a rotation has all components of ω_d, also for a task on fewer axes. The preview of a
+    target at rest may have only the components of the task."""
     target = Target(np.eye(3))
     target.move(exp3(np.array([0.0, 0.0, 0.5])))
     preview = drive(target, 50, lambda k: None)[-1]

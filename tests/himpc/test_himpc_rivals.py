@@ -1,5 +1,4 @@
-"""OSF, TDEOSF and HQP: comparison with independent evaluations of their laws, and robustness to invalid
-input."""
+"""OSF, TDEOSF and HQP agree with independent evaluations of their laws, and are robust to invalid input."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""The compiled guard slows joints down as the theory says, in every case of the theory."""
+"""The compiled guard slows the joints down by the same amount as the theory, in every case that the theory
+has."""
 
 from __future__ import annotations
 
@@ -18,7 +19,7 @@ from robots import load_robot
 
 @dataclass
 class Pairs:
-    """What a guard reads of `Distances`."""
+    """The fields of `Distances` that a guard reads."""
 
     carried: np.ndarray
     velocity_margin: float = 0.08
@@ -29,8 +30,8 @@ class Pairs:
 def phases(
     rng: np.random.Generator, n: int
 ) -> list[tuple[np.ndarray, float, bool, float, np.ndarray, float]]:
-    """For each of 3,000 ticks of 1 ms: the tension, the room (m), whether an object moves, the speed of the
-    reference (m/s), the errors, and the speed of the joints as a share of their limits."""
+    """Returns, for each of 3,000 ticks of 1 ms: the tension, the room (m), whether an object moves, the speed
+    of the reference (m/s), the errors, and the speed of the joints as a share of their limits."""
     found = []
     for _ in range(12):
         tension = rng.uniform(0.0, 1.0) * rng.uniform(-1.0, 1.0, n)
@@ -45,8 +46,8 @@ def phases(
 
 @pytest.mark.parametrize("velocity", [True, False])
 def test_the_compiled_guard_does_what_the_theory_says(velocity: bool) -> None:
-    """With random torques, velocities and errors, over all kinds of stall. Without velocity limits, the
-    limits stay infinite."""
+    """Random torques, velocities and errors cover all kinds of stall. Without velocity limits, the limits
+    stay infinite."""
     robot = load_robot("iiwa14")
     pairs: Distances = Pairs(Distances(robot, Avoidance(on=True)).carried)  # pyright: ignore[reportAssignmentType]
     limits = in_force(robot, Limits(velocity=velocity))
@@ -66,7 +67,7 @@ def test_the_compiled_guard_does_what_the_theory_says(velocity: bool) -> None:
             loads.append(float(theory.load.max()))
             ratios.append(float(np.max(np.abs(v) / robot.v_limit)))
             theory.errors, theory.fastest = compiled.errors, compiled.fastest = errors, fastest
-    # All three reasons for a lower limit occurred.
+    # All three reasons for a lower limit have occurred.
     assert min(stalls) < 0.1
     assert max(loads) > 0.85
     assert max(ratios) > 0.5

@@ -1,4 +1,4 @@
-"""Every kind of task: its Jacobian is the derivative of its value, and the torque depends on its rows."""
+"""For every kind of task, the Jacobian is the derivative of the value, and the torque depends on its rows."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def robot_of(name: str) -> Robot:
 
 
 def tasks_of(robot: Robot, rng: np.random.Generator) -> list[Task]:
-    """Returns one task of every class, on randomly chosen links."""
+    """Returns one task of every class, for randomly chosen links."""
     frame, root = (str(each) for each in rng.choice(robot.frames, 2, replace=False))
     axes = str(rng.choice(["xyz", "xy", "z"]))
     normal = tuple(rng.normal(size=3).tolist())
@@ -58,13 +58,13 @@ def tasks_of(robot: Robot, rng: np.random.Generator) -> list[Task]:
 
 
 def test_every_class_is_among_them() -> None:
-    """The list above must contain every class of task."""
+    """`tasks_of` returns a task of every class."""
     made = {type(task) for task in tasks_of(robot_of("iiwa14"), np.random.default_rng(0))}
     assert made == {kind for each in KINDS.values() for kind in each.makes}
 
 
 def change(after: Array, before: Array) -> Array:
-    """Returns after ⊖ before, for coordinates or rotations."""
+    """Returns the difference after ⊖ before, for coordinates or rotations."""
     return pin.log3(after @ before.T) if after.ndim == 2 else after - before
 
 
@@ -72,8 +72,8 @@ def change(after: Array, before: Array) -> Array:
 @given(seed=st.integers(0, 2**32 - 1))
 @settings(max_examples=15)
 def test_jacobians_are_derivatives(name: str, seed: int) -> None:
-    """The Jacobian equals central differences of the value along every joint, at the measured state and at a
-    knot."""
+    """The Jacobian equals central differences of the value along every joint, at the measured state and at
+    one knot."""
     robot, rng = robot_of(name), np.random.default_rng(seed)
     data, n = robot.model.createData(), robot.n
     q, knot = rng.uniform(-1.5, 1.5, (2, n))
@@ -91,7 +91,7 @@ def test_jacobians_are_derivatives(name: str, seed: int) -> None:
         for place, where in enumerate((q, knot)):
             value = task.value(at(where))
             if isinstance(task, Pointing) and np.linalg.norm(value) > 3.0:
-                continue  # near the opposite direction the value is not differentiable
+                continue  # near the opposite direction the value cannot be differentiated
             for joint, nudge in enumerate(H * np.eye(n)):
                 moved = change(task.value(at(where + nudge)), task.value(at(where - nudge))) / (2 * H)
                 if moved.size != m:
@@ -105,8 +105,8 @@ def test_jacobians_are_derivatives(name: str, seed: int) -> None:
 
 
 def test_the_centre_of_mass_is_that_of_what_moves() -> None:
-    """The centre of mass does not include Baxter's torso and head, 36.3 kg, which are fixed to the world; the
-    task's docstring says so."""
+    """The centre of mass excludes Baxter's torso and head, 36.3 kg, which are fixed to the world; the
+    docstring of the task says so."""
     robot = robot_of("baxter")
     model, data = robot.model, robot.model.createData()
     assert model.inertias[0].mass == pytest.approx(36.3, abs=0.05)
@@ -119,8 +119,8 @@ def test_the_centre_of_mass_is_that_of_what_moves() -> None:
 
 
 def test_pointing_is_told_by_its_angle() -> None:
-    """‖x‖ is the angle between axis and direction to the point; it is zero at the initial target, and finite
-    everywhere."""
+    """‖x‖ is the angle between the axis and the direction to the point. It is zero at the initial target, and
+    finite everywhere."""
     robot = robot_of("iiwa14")
     task, data = Pointing(name="look"), robot.model.createData()
     here = Configuration(robot, data, robot.home, np.zeros(7))

@@ -1,4 +1,4 @@
-"""The compiled tick: its kinematics agree with Pinocchio's, and its torques with those of the printed
+"""The kinematics of the compiled tick agree with Pinocchio's, and its torques with those of the printed
 route."""
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 def random_tree(seed: int) -> Robot:
-    """Returns a tree of revolute and prismatic joints about random axes, each on a random earlier link. It is
-    read in this process, because the file is not from an untrusted source."""
+    """Returns a tree of revolute and prismatic joints about random axes, each on a random earlier link. The
+    URDF is read in this process, because it comes from a trusted source."""
     rng = np.random.default_rng(seed)
 
     def joint(number: int) -> str:
@@ -68,7 +68,7 @@ def _origin(place: Array, turn: Array) -> str:
 @given(seeds)
 @settings(max_examples=60)
 def test_kinematics_are_pinocchio_s(seed: int) -> None:
-    """Positions, rotations, log₃ and Jacobians of random trees at random states agree to 1e-12."""
+    """Positions, rotations, log₃ and Jacobians of random trees in random states agree to 1e-12."""
     robot = random_tree(seed)
     rng = np.random.default_rng(seed)
     stack = (
@@ -106,8 +106,8 @@ def a_tick_later(hierarchy: Hierarchy, seed: int) -> Hierarchy:
 @given(seeds, st.integers(2, 9), st.integers(1, 8), st.integers(1, 4), st.sampled_from([1.0, 5.0, 30.0]))
 @settings(max_examples=150)
 def test_the_next_tick_has_the_printed_optimum(seed: int, n: int, N: int, levels: int, room: float) -> None:
-    """With the active rows of the previous tick, the optimum satisfies the literal KKT conditions and agrees
-    with the explicit route."""
+    """Started with the active rows of the previous tick, the optimum satisfies the literal KKT conditions and
+    agrees with the explicit route."""
     hierarchy = random_hierarchy(seed, n, N, levels, room=room, even=True)
     before = {solution.name: solution for solution in hierarchy.solve()}
     later = a_tick_later(hierarchy, seed)
@@ -118,8 +118,8 @@ def test_the_next_tick_has_the_printed_optimum(seed: int, n: int, N: int, levels
 
 @pytest.mark.parametrize("seed", range(20))
 def test_the_optimum_does_not_depend_on_where_it_started(seed: int) -> None:
-    """The increments are the same with the active rows of the previous tick, with none, and with multipliers
-    of the wrong sign."""
+    """The increments are the same when the solver starts with the active rows of the previous tick, with
+    none, or with multipliers of the wrong sign."""
     hierarchy = random_hierarchy(seed, 7, 6, 3, even=True)
     cold = hierarchy.solve()
     warm = {solution.name: solution for solution in cold}
@@ -135,7 +135,8 @@ def test_the_optimum_does_not_depend_on_where_it_started(seed: int) -> None:
 @given(seeds)
 @settings(max_examples=20)
 def test_the_kernel_s_references_are_the_printed_ones(law: Literal["uniform", "eased"], seed: int) -> None:
-    """A curve that the kernel evaluates agrees with its own preview, at all times, phases and periods."""
+    """A curve that the kernel evaluates agrees with the preview of its reference, at all times, phases and
+    periods."""
     rng = np.random.default_rng(seed)
     robot = load_robot("planar3")
     stack = (Level((FramePosition(name="position", axes="xy"),)), Level((Posture(name="posture"),)))

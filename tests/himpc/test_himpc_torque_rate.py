@@ -1,4 +1,5 @@
-"""The torque rate, and a constraint that only this test knows, in the loop: kept, told, on both routes."""
+"""In closed loop, both routes keep and report the bound on the torque rate and a constraint that only this
+test defines."""
 
 from __future__ import annotations
 
@@ -29,7 +30,7 @@ FASTEST = 0.02
 
 
 def pulled(name: str, route: Route = "compiled", rate: float = 0.0, controller: str = "himpc") -> Loop:
-    """A robot whose hand is asked to be 5 cm to the side at once."""
+    """Returns a loop in which the target of the hand jumps by 5 cm."""
     loop = holding(name, controller)
     settings = loop.controller.settings
     loop.controller.configure(
@@ -46,7 +47,8 @@ def names(loop: Loop) -> tuple[str, ...]:
 
 @pytest.mark.parametrize("controller", ["himpc", "nhimpc", "hiqp", "weighted"])
 def test_a_torque_rate_is_kept_and_binds(controller: str) -> None:
-    """Without it the torque of a pulled arm changes faster; with it never, and it binds."""
+    """Without the bound, the torque of the arm changes faster. With it, the rate never exceeds the bound, and
+    reaches it."""
     free, bound = (pulled("iiwa14", rate=rate, controller=controller) for rate in (0.0, RATE))
     fastest = [
         np.array([np.abs(plan.tau - plan.tau_0).max() for plan in (loop.tick().freeze() for _ in range(40))])
@@ -58,8 +60,8 @@ def test_a_torque_rate_is_kept_and_binds(controller: str) -> None:
 
 
 def test_who_binds_and_telemetry_tell_of_it() -> None:
-    """The joint, its label and its knot in the plan, and its bit at the same joints in the row, compiled and
-    field by field."""
+    """The plan contains the joint, its label and its knot. The row has the bit of the constraint at the same
+    joints, both when it is written by compiled code and field by field."""
     loop = pulled("iiwa14", rate=RATE)
     robot, stack = loop.controller.robot, loop.controller.settings.stack  # pyright: ignore[reportAttributeAccessIssue]
     layout, told = layout_of(robot, stack), 0
@@ -78,7 +80,8 @@ def test_who_binds_and_telemetry_tell_of_it() -> None:
 
 @pytest.mark.parametrize("rate", [0.0, RATE])
 def test_both_routes_agree_in_the_loop(rate: float) -> None:
-    """At every tick, on the same problems and rows; the explicit controller gives the same torques."""
+    """At every tick both routes agree on the same problems and rows, and the explicit controller gives the
+    same torques."""
     loop, other = pulled("planar3", rate=rate), pulled("planar3", "explicit", rate)
     for _ in range(25):
         plan, explicit = loop.tick().freeze(), other.tick()
@@ -93,7 +96,8 @@ def assert_same(loop: Loop, plan: Plan) -> None:
 
 
 def test_without_any_optimum_the_arm_brakes_within_torque_and_rate(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The kernel breaks while the arm moves: it comes to rest, no torque changes faster or is too large."""
+    """The kernel is broken while the arm moves. The arm comes to rest, and no torque or torque rate exceeds
+    its bound."""
     loop = pulled("iiwa14", rate=10 * RATE)
     for _ in range(60):
         loop.tick()
@@ -108,7 +112,7 @@ def test_without_any_optimum_the_arm_brakes_within_torque_and_rate(monkeypatch: 
 
 
 def _bounds(now: Moment) -> Block:
-    """|q̇_1 + q̇_2| ≤ FASTEST at every knot."""
+    """Returns the block of |q̇_1 + q̇_2| ≤ FASTEST at every knot."""
     N, n = now.N, now.tau_0.size
     gradient = np.zeros(n)
     gradient[:2] = 1.0
@@ -128,8 +132,9 @@ SUM = Constraint("sum of velocities", summed_twice, 1, hard=False, is_on=lambda 
 def test_a_constraint_that_couples_joints_is_one_entry_of_the_list(
     monkeypatch: pytest.MonkeyPatch, route: Route
 ) -> None:
-    """Listed, it is kept by the controller, told by its name and marked at both joints; not listed, not kept.
-    Time-delay estimation overruns a velocity bound by some percent, see `velocity_approach`."""
+    """In the list, the constraint is kept by the controller, reported by its name and marked at both joints;
+    outside the list, it is violated. Time-delay estimation overruns a velocity bound by some percent, see
+    `velocity_approach`."""
 
     def fastest(loop: Loop) -> tuple[float, list[str]]:
         found, told = 0.0, []

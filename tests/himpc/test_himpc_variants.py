@@ -1,4 +1,4 @@
-"""HIQP, NHIMPC and the weighted controller: their differences from HIMPC."""
+"""The tests show how HIQP, NHIMPC and the weighted controller differ from HIMPC."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ VARIANTS = {"hiqp": HIQP, "nhimpc": NHIMPC, "weighted": Weighted}
 
 
 def moved(robot: Robot, N: int) -> dict[str, Preview]:
-    """Returns a target 5 cm away that moves at 0.3 m/s: the first plan then differs strongly from the
-    prediction before it."""
+    """Returns previews of a target that is 5 cm away and moves at 0.3 m/s, so that the first plan differs
+    strongly from the prediction before it."""
     previews = holds(robot, N)
     there = previews["position"]
     velocity = np.tile([0.0, 0.3, -0.1], (N + 1, 1))
@@ -49,7 +49,7 @@ def first_plan(controller: HIMPC, previews: dict[str, Preview]) -> Plan:
 
 
 def alone(settings: Settings, levels: int) -> Settings:
-    """Returns the settings with only the first levels enabled, and no damping level."""
+    """Returns the settings with only the first levels enabled, and without a damping level."""
     stack = tuple(replace(level, enabled=place < levels) for place, level in enumerate(settings.stack))
     return replace(settings, stack=stack, damping=False)
 
@@ -62,7 +62,7 @@ def test_a_variant_is_made_by_its_name(iiwa: Robot, name: str) -> None:
 
 @pytest.mark.parametrize("name", VARIANTS)
 def test_whatever_comes_in_the_torque_is_finite_and_in_bounds(iiwa: Robot, name: str) -> None:
-    """For any state the variants raise no exception, and no torque is NaN or beyond its bound."""
+    """For any state the variants raise no exception, and no torque is NaN or exceeds its bound."""
     controller = make_controller(name, iiwa, iiwa_settings(iiwa))
     rng = np.random.default_rng(0)
     for size in (0.1, 10.0, 1e4, 1e12, np.nan, 1.0):
@@ -75,8 +75,8 @@ def test_whatever_comes_in_the_torque_is_finite_and_in_bounds(iiwa: Robot, name:
 
 
 def test_hiqp_is_himpc_with_one_knot(iiwa: Robot) -> None:
-    """The torques are bitwise equal over many ticks for every horizon of the settings, also after a change of
-    it."""
+    """Over many ticks, the torques are bitwise equal for every horizon in the settings, also after the
+    horizon changes."""
     one = HIMPC(iiwa, iiwa_settings(iiwa, horizon=1))
     hiqp = HIQP(iiwa, iiwa_settings(iiwa, horizon=5))
     v = np.linspace(0.6, -0.6, 7)
@@ -95,8 +95,8 @@ def test_hiqp_is_himpc_with_one_knot(iiwa: Robot) -> None:
 
 
 def own_leak(robot: Robot, settings: Settings, plan: Plan) -> float:
-    """Returns ‖J_p(q_{k+j|k}) M̄⁻¹(Δτ_i − Δτ_p)‖∞: (33) with the Jacobians along the plan's own
-    prediction."""
+    """Returns ‖J_p(q_{k+j|k}) M̄⁻¹(Δτ_i − Δτ_p)‖∞, the leak of (33) with the Jacobians along the prediction
+    of the plan itself."""
     along = Configuration(robot, robot.model.createData(), plan.q[0], plan.q[0], plan.q[1:-1])
     leak = 0.0
     for p, level in enumerate(settings.stack[:-1]):
@@ -108,7 +108,7 @@ def own_leak(robot: Robot, settings: Settings, plan: Plan) -> float:
 
 
 def test_nhimpc_keeps_the_priorities_along_its_own_prediction(iiwa: Robot) -> None:
-    """(33) holds with the Jacobians along the plan itself; HIMPC, which uses those of the previous plan,
+    """(33) holds with the Jacobians along the plan itself; HIMPC uses the Jacobians of the previous plan and
     violates it."""
     settings = iiwa_settings(iiwa, horizon=20)
     previews = moved(iiwa, 20)
@@ -131,7 +131,7 @@ def test_one_iteration_of_nhimpc_is_himpc(iiwa: Robot) -> None:
 
 
 def test_the_tolerance_of_nhimpc_is_kept(iiwa: Robot) -> None:
-    """A loose tolerance needs fewer iterations; its error is at most the tolerance."""
+    """A loose tolerance needs fewer iterations, and its error is at most the tolerance."""
     settings, previews = iiwa_settings(iiwa, horizon=20), moved(iiwa, 20)
     exact = first_plan(NHIMPC(iiwa, settings, tolerance=1e-12), previews)
     loose = first_plan(NHIMPC(iiwa, settings, tolerance=1e-2), previews)
@@ -143,7 +143,7 @@ def test_the_tolerance_of_nhimpc_is_kept(iiwa: Robot) -> None:
 
 
 def test_a_level_fades_in_as_fast_as_under_himpc(iiwa: Robot) -> None:
-    """The weight of a level that was just enabled grows with each tick, not with each iteration."""
+    """The weight of a level that was just enabled grows once in each tick, not in each iteration."""
     settings = iiwa_settings(iiwa)
     plans = []
     for kind in (HIMPC, NHIMPC):
@@ -163,7 +163,8 @@ def test_a_level_fades_in_as_fast_as_under_himpc(iiwa: Robot) -> None:
 
 @given(seed=st.integers(0, 10_000), levels=st.integers(1, 4))
 def test_the_weighted_problem_is_the_sum_of_the_costs(seed: int, levels: int) -> None:
-    """H and f of the combined problem are the sums over the levels, and so is its cost at every U."""
+    """H and f of the combined problem are sums over the levels, and its cost is the sum of their costs at
+    every U."""
     hierarchy = random_hierarchy(seed, n=5, N=4, levels=levels, even=True)
     one = sum_of_costs(hierarchy.problems)
     H, f = quadratic(one)
@@ -176,7 +177,8 @@ def test_the_weighted_problem_is_the_sum_of_the_costs(seed: int, levels: int) ->
 
 @given(seed=st.integers(0, 10_000))
 def test_a_level_with_a_horizon_of_its_own_sees_no_further(seed: int) -> None:
-    """In the combined problem, the level's residual beyond its own horizon has no effect, on both routes."""
+    """In the combined problem, the residual of a level beyond its own horizon has no effect, on both
+    routes."""
     hierarchy = random_hierarchy(seed, n=5, N=4, levels=2, even=True)
     first, second = hierarchy.problems
     short = second._replace(knots=2, weighted_C=second.weighted_C[:2, :, :2])
@@ -206,8 +208,8 @@ def test_under_weights_the_order_of_the_levels_is_nothing(iiwa: Robot) -> None:
 
 
 def test_the_weighted_evidence_is_that_of_the_levels_above_alone(iiwa: Robot) -> None:
-    """Entry p equals the result of this controller with the levels below p disabled, as the documented leak
-    assumes."""
+    """Entry p equals the result of this controller with the levels below p disabled; the documented leak
+    assumes this."""
     settings, previews = iiwa_settings(iiwa), moved(iiwa, 5)
     plan = first_plan(Weighted(iiwa, settings), previews)
     for levels in (1, 2, 3):
@@ -221,7 +223,7 @@ def test_the_weighted_evidence_is_that_of_the_levels_above_alone(iiwa: Robot) ->
 
 
 def test_a_heavier_level_comes_closer_to_a_strict_one(iiwa: Robot) -> None:
-    """Level 1's cost under the common increments approaches its optimum as its Q grows."""
+    """When the Q of level 1 grows, its cost under the common increments approaches its optimum."""
     previews, excess = moved(iiwa, 5), []
     for factor in (1.0, 1e2, 1e4):
         settings = iiwa_settings(iiwa)

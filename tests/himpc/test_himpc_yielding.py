@@ -1,5 +1,5 @@
-"""Rows that couple joints: what is applied without an optimum meets them if anything does, and else the hard
-ones, while the others give way by least squares."""
+"""If a level has no optimum, the increments that are applied satisfy all rows that couple joints, if this is
+possible. If not, they satisfy the hard rows, and the others are relaxed by least squares."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def coupling(hard: bool) -> Constraint:
 
 
 def random_rows(seed: int, n: int, N: int, hard: bool, missed: float) -> Rows:
-    """Rows around a point, of which some soft ones are moved away from it by up to `missed` N·m."""
+    """Returns rows around a point; some soft rows are moved away from it by up to `missed` N·m."""
     rng = np.random.default_rng(seed)
     constraints = (TORQUE, VELOCITY, TORQUE_RATE, coupling(hard))
     D = np.zeros((n, n))
@@ -62,7 +62,7 @@ seeds = st.integers(0, 2**32 - 1)
 @given(seeds, st.integers(2, 5), st.integers(1, 8), st.booleans())
 @settings(max_examples=40, deadline=None)
 def test_whatever_can_be_met_is_met(seed: int, n: int, N: int, hard: bool) -> None:
-    """There is a point inside all rows: the increments found are inside, and no row gives way."""
+    """If some point satisfies all rows, the increments satisfy them as well, and no row is relaxed."""
     rows = random_rows(seed, n, N, hard, missed=0.0)
     assert excess(rows, braking(rows)).max() <= 2e-7
     assert not (least_slack(rows) > 2e-7).any()
@@ -73,7 +73,8 @@ def test_whatever_can_be_met_is_met(seed: int, n: int, N: int, hard: bool) -> No
 def test_hard_rows_hold_and_the_others_give_way_by_least_squares(
     seed: int, n: int, N: int, hard: bool
 ) -> None:
-    """The slack of soft rows is least: its slope is a push of hard rows at their bounds."""
+    """The violation of soft rows is least: its gradient is a nonnegative combination of hard rows at their
+    bounds."""
     from scipy.optimize import nnls
 
     rows = random_rows(seed, n, N, hard, missed=20.0)
@@ -91,7 +92,7 @@ def test_hard_rows_hold_and_the_others_give_way_by_least_squares(
 
 
 def test_joints_that_share_a_direction_are_a_group() -> None:
-    """Used directions only."""
+    """Joints form a group if they share a direction that has a bound."""
     D = np.zeros((5, 5))
     D[0, [0, 3]], D[1, [3, 4]], D[2, [1, 2]] = 0.7, 0.7, 0.7
     rows = random_rows(0, 5, 2, True, 0.0)
@@ -106,7 +107,7 @@ def test_joints_that_share_a_direction_are_a_group() -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_long_plan_of_many_joints_stays_within_torque_and_rate(seed: int) -> None:
-    """Too many unknowns for one QP, between bounds of which some leave next to no room: the hard rows hold
+    """The plan has too many unknowns for one QP, and some bounds leave almost no room; the hard rows hold
     nevertheless."""
     rows = random_rows(seed, 7, 40, hard=False, missed=20.0)
     assert excess(rows, braking(rows))[rows.is_hard].max() <= 1e-9

@@ -1,5 +1,5 @@
-"""The compiled dual method compared with a QP solver: the same points and multipliers, with and without a
-warm start."""
+"""The compiled dual method finds the same points and multipliers as a QP solver, with and without a warm
+start."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_points_and_residuals_are_those_of_a_solver(seed: int, n: int, count: in
 @settings(max_examples=40)
 @given(seed=st.integers(0, 10**6))
 def test_a_warm_start_ends_where_a_cold_one_does(seed: int) -> None:
-    """The next QPs have other bounds, another gradient, and other rows at the end."""
+    """The subsequent QPs have different bounds, another gradient, and other rows at the end."""
     rng = np.random.default_rng(seed)
     H, g, A, lower, upper = problem(rng, 12, 40, 1)
     warm, cold = ActiveSetSolver(), ActiveSetSolver()

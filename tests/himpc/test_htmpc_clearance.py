@@ -1,4 +1,4 @@
-"""Closed-form clearances: compared with values by hand, finite differences and a collision library."""
+"""Closed-form clearances agree with values by hand, finite differences and a collision library."""
 
 from __future__ import annotations
 
@@ -48,7 +48,8 @@ def test_gradients_of_the_distances(robot: Robot) -> None:
 
 
 def test_distances_by_hand(robot: Robot) -> None:
-    """The tool's distances to a ball next to it, to the floor and to a ball around it are as expected."""
+    """The distances of the tool to a ball next to it, to the floor and to a ball around it have the values
+    that were computed by hand."""
     at = point(robot, robot.home)
     radius = next(sphere.radius for sphere in covering_spheres(robot) if sphere.link == "tool")
     x, y, z = at
@@ -114,7 +115,7 @@ def test_clearances_are_those_of_the_collision_library(
     height: float,
     within: float,
 ) -> None:
-    """Distances, signs and pairs agree, for separate, touching and deeply penetrating shapes."""
+    """Distances, signs and pairs agree for separate, touching and deeply penetrating shapes."""
     robot = load_robot(name)
     obstacles = (
         Floor("floor", height),

@@ -1,4 +1,4 @@
-"""The parts of HTMPC compared with independent evaluations: prediction (4), costs (8) and (10), rows (7d),
+"""The parts of HTMPC agree with independent evaluations: prediction (4), costs (8) and (10), rows (7d),
 (12)."""
 
 from __future__ import annotations
@@ -149,7 +149,7 @@ def test_a_joint_beyond_its_range_is_sent_back(robot: Robot) -> None:
 
 
 def test_motion_under_way_is_what_was_commanded(robot: Robot) -> None:
-    """Three plans, each followed for 0.1 s; the motion over the last 0.17 s is computed."""
+    """The robot follows three plans for 0.1 s each; the motion over the last 0.17 s is computed."""
     rng = np.random.default_rng(4)
     plans, start = [], start_of(robot, 4)
     for _ in range(3):
@@ -182,7 +182,7 @@ def test_effort_is_the_sum_it_is_written_as(robot: Robot) -> None:
     numerical = numerical_gradient(lambda x: effort.relative(x.reshape(4, 9), plan)[0], U.ravel())
     np.testing.assert_allclose(slope, numerical, atol=1e-6)
     assert effort.relative(plan, plan)[0] == 0.0
-    # Both use the same Hessian.
+    # Absolute and relative effort have the same Hessian.
     np.testing.assert_allclose(effort.hessian @ (U - plan).ravel(), slope, atol=1e-9)
 
 

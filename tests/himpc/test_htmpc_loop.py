@@ -1,4 +1,4 @@
-"""HTMPC in its loop: bounds, evidence, determinism, recovery, live changes, reach, and its variants."""
+"""HTMPC in closed loop: bounds, evidence, determinism, recovery, live changes, reach, and its variants."""
 
 from __future__ import annotations
 

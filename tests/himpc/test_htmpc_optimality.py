@@ -1,4 +1,4 @@
-"""Lexicographic optimality: HTMPC with many iterations, compared with Algorithm 1 solved by a general NLP
+"""The lexicographic optimum of HTMPC with many iterations agrees with Algorithm 1, solved by a general NLP
 solver."""
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def mobile() -> Robot:
 
 
 def converged(settings: HTMPCSettings) -> HTMPCSettings:
-    """Returns settings with (9) and (12) alone and many iterations. From rest, the proximal effort equals the
+    """Returns settings with only (9) and (12), and many iterations. From rest, the proximal effort equals the
     absolute one."""
     return replace(
         settings,
@@ -42,8 +42,8 @@ def converged(settings: HTMPCSettings) -> HTMPCSettings:
 
 
 def planar_problem(robot: Robot, y: float) -> tuple[HTMPCSettings, Oracle, dict[str, Hold]]:
-    """Returns a problem in which level 1 controls the tip's x and level 2 its y, which is unreachable for a
-    large y."""
+    """Returns a problem in which level 1 controls x of the tip and level 2 controls y, which is unreachable
+    for a large y."""
     stack = (
         Level((FramePosition(name="x", axes="x"),), Q=20.0),
         Level((FramePosition(name="y", axes="y"),), Q=20.0),
@@ -57,7 +57,7 @@ def planar_problem(robot: Robot, y: float) -> tuple[HTMPCSettings, Oracle, dict[
 
 @pytest.mark.parametrize("y", [0.35, 0.55, 0.9])
 def test_agrees_with_algorithm_1(planar: Robot, y: float) -> None:
-    """Level 1 agrees with the reference; level 2 is between the reference with and without use of the
+    """Level 1 agrees with the reference. Level 2 is between the references with and without use of the
     tolerance."""
     settings, oracle, references = planar_problem(planar, y)
     plan = HTMPC(planar, settings).step(planar.home, np.zeros(3), previews(references, 0.0, settings))
@@ -71,13 +71,13 @@ def test_agrees_with_algorithm_1(planar: Robot, y: float) -> None:
     assert best - 1e-6 * worst <= found <= worst * 1.01
     assert plan.leak is not None
     assert plan.leak <= DELTA + 1e-9
-    # The order has an effect: alone, level 2 would increase the error of level 1.
+    # The order of the levels has an effect: alone, level 2 would increase the error of level 1.
     alone = oracle.solve(10.0, start)[1]
     assert (np.abs(oracle.errors(0, alone)) - np.abs(oracle.errors(0, strict[0]))).max() > 5 * DELTA
 
 
 def test_no_neighbour_is_lexicographically_less(planar: Robot) -> None:
-    """Definition III.2, locally: random neighbours that keep level 1 are no better at level 2."""
+    """By Definition III.2, applied locally, random neighbours that keep level 1 are no better at level 2."""
     settings, oracle, references = planar_problem(planar, 0.55)
     plan = HTMPC(planar, settings).step(planar.home, np.zeros(3), previews(references, 0.0, settings))
 
@@ -116,7 +116,7 @@ def test_agrees_with_algorithm_1_on_the_mobile_manipulator(mobile: Robot) -> Non
 
 
 def test_an_unreachable_first_level_is_not_given_up_for_the_second(planar: Robot) -> None:
-    """If level 1 is out of reach, its errors are large; level 2 does not increase them."""
+    """If the target of level 1 is out of reach, its errors are large, but level 2 does not increase them."""
     settings, _, _ = planar_problem(planar, 0.3)
     settings = replace(settings, delta_m=1e-4)
     references = {"x": Hold(np.array([3.0])), "y": Hold(np.array([0.9]))}

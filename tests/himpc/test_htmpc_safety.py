@@ -41,7 +41,8 @@ def robot() -> Robot:
 
 
 def assert_permitted(robot: Robot, plan: VelocityPlan, period: float) -> None:
-    """Checks all velocities that the servos receive in this period, and the accelerations between them."""
+    """Checks all velocities that the servos receive in this period, and the accelerations between these
+    velocities."""
     every = (plan.command, plan.u, plan.q, plan.v, *(level.final for level in plan.levels))
     assert all(np.isfinite(each).all() for each in every)
     for share in (0.01, 0.1, 0.5, 1.0):
@@ -52,7 +53,7 @@ def assert_permitted(robot: Robot, plan: VelocityPlan, period: float) -> None:
 
 @st.composite
 def measurements(draw: st.DrawFn) -> tuple[dict[int, float], dict[int, float]]:
-    """Returns offsets for the measured positions and velocities of some joints."""
+    """Returns changes of the measured positions and velocities of some joints."""
     wrong = st.dictionaries(st.integers(0, 8), st.sampled_from(HOSTILE), max_size=3)
     return draw(wrong), draw(wrong)
 
@@ -71,7 +72,7 @@ def measurements(draw: st.DrawFn) -> tuple[dict[int, float], dict[int, float]]:
 def test_bounds_hold_on_every_command(
     robot: Robot, kind: Any, readings: list[tuple[dict[int, float], dict[int, float]]], **changes: Any
 ) -> None:
-    """Every command is within its bounds for valid measurements, for invalid ones, and for valid ones
+    """Every command is within its bounds: for valid measurements, for invalid ones, and when they are valid
     again."""
     balls = (Ball("ball", (1.0, 1.0, 0.8), 0.2),) if changes.pop("obstacle") else ()
     controller = kind(robot, mobile_settings(horizon=5, obstacles=balls, **changes))
@@ -85,7 +86,7 @@ def test_bounds_hold_on_every_command(
                 seen[joint] += value
         plan = controller.step(seen_q, seen_v, previews(references, tick * period, controller.settings))
         assert_permitted(robot, plan, period)
-        # The robot follows the command from its true state.
+        # The robot follows the command, starting from its true state.
         q, v = q + 0.5 * period * (v + plan.command), plan.command
 
 
@@ -93,8 +94,8 @@ def test_bounds_hold_on_every_command(
 @pytest.mark.parametrize("speed", [1e200, 1e150, 1e6, 300.0])
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 def test_a_huge_speed_is_forgotten_at_the_next_tick(robot: Robot, formulation: Any, speed: float) -> None:
-    """In an earlier version one huge measured speed changed all later commands; now the robot stays within
-    centimetres of one without this measurement."""
+    """In an earlier version, one huge measured speed changed all later commands. Now the robot stays within
+    centimetres of a robot without this measurement."""
     calm, hit = (HTMPC(robot, mobile_settings(formulation=formulation)) for _ in range(2))
     references = at_home(robot, NEAR)
     states = [(robot.home.copy(), np.zeros(9)) for _ in range(2)]
@@ -124,7 +125,7 @@ def test_hostile_references_leave_the_bounds_alone(robot: Robot, kind: Any, form
 
 
 def test_a_push_beyond_the_speed_limit_is_not_commanded_on(robot: Robot) -> None:
-    """The commanded speed is inside the limit although the robot was pushed to a higher speed."""
+    """The commanded speed is within the limit, although a push made the robot faster than this limit."""
     controller = HTMPC(robot, mobile_settings())
     references = at_home(robot, NEAR)
     for speed in (0.0, 3.0, 0.0):
@@ -136,8 +137,8 @@ def test_a_push_beyond_the_speed_limit_is_not_commanded_on(robot: Robot) -> None
 
 @pytest.mark.parametrize(("before", "after"), [(50.0, 10.0), (10.0, 50.0)])
 def test_a_change_of_rate_is_not_taken_for_a_jump(robot: Robot, before: float, after: float) -> None:
-    """Without a usable state, the robot is assumed to have followed the last plan for the period that was set
-    then."""
+    """Without a usable state, the controller assumes that the robot followed the last plan for the period
+    that was set at that time."""
     controller = HTMPC(robot, mobile_settings(rate_hz=before))
     references = at_home(robot, NEAR)
     plan = controller.step(robot.home, np.full(9, 0.1), previews(references, 0.0, controller.settings))
