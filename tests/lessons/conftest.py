@@ -1,4 +1,4 @@
-"""The scene with which most tests of the session start, and all runs of the course."""
+"""Fixtures: the scene with which most tests of the session start, and all runs of the course."""
 
 from __future__ import annotations
 

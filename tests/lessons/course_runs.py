@@ -1,4 +1,4 @@
-"""All runs of the course, computed once for all tests that measure them."""
+"""Computes all runs of the course once, for all tests that measure them."""
 
 from __future__ import annotations
 
@@ -23,14 +23,15 @@ from robots import InputError
 
 
 class CourseRuns(NamedTuple):
-    """The check's verdicts of all lessons, and the values of `QUOTED` and of the interventions, by run."""
+    """The verdicts of the check on all lessons, and, by run, the values of `QUOTED` and of the
+    interventions."""
 
     verdicts: list[Verdict]
     values: dict[RunSpec, dict[Measure, float]]
 
 
 def course_runs() -> CourseRuns:
-    """Computes every run once; a run that is the beginning of a longer one is read from the longer one. Runs
+    """Computes every run once. A run that is the beginning of a longer run is taken from the longer one. Runs
     that end early are computed again to their full duration, because the check stops at their end and
     sentences quote later values."""
     wanted: dict[RunSpec, dict[Measure, None]] = {}
@@ -73,7 +74,7 @@ def alike(all_of_them: Iterable[RunSpec]) -> list[list[RunSpec]]:
         try:
             scene = spec.prepared()
         except InputError:
-            groups[spec].append(spec)  # running it tells what is wrong
+            groups[spec].append(spec)  # an execution of this run will report what is wrong
             continue
         start = replace(spec, controller=None, set=(), duration=None)
         groups[start, scene.events, scene.settings, scene.q_0.tobytes()].append(spec)
@@ -81,8 +82,9 @@ def alike(all_of_them: Iterable[RunSpec]) -> list[list[RunSpec]]:
 
 
 def recorded(group: Sequence[RunSpec], to_the_end: bool = False) -> dict[RunSpec, Recording]:
-    """Returns the recordings of runs that differ in their durations, the longest first. A shorter run is the
-    beginning of the longest one, unless an event changes the period or the stack; then it is computed."""
+    """Returns the recordings of runs that differ only in their durations; the longest run is the first of the
+    group. A shorter run is the beginning of the longest one, unless an event changes the period or the stack;
+    then it is computed."""
     scene = group[0].prepared()
     session = begin(scene, group[0].seed)
     layout = session.layout
@@ -97,20 +99,20 @@ def recorded(group: Sequence[RunSpec], to_the_end: bool = False) -> dict[RunSpec
 
 
 def ticks(spec: RunSpec) -> int:
-    """Number of control periods of a run that does not end early."""
+    """Returns the number of control periods of a run that does not end early."""
     scene = spec.prepared()
     return max(1, round(scene.duration / scene.settings.T_s))
 
 
 def whole(spec: RunSpec, recording: Recording) -> bool:
-    """Whether a run was completed: its last period, which begins at the last time that is recorded, is the
-    last one of its duration."""
+    """Whether a run was completed: its last period, which begins at the last recorded time, is the last one
+    of its duration."""
     scene = spec.prepared()
     return float(recording["t"][-1, 0]) > scene.duration - 1.5 * scene.settings.T_s
 
 
 def judged(spec: RunSpec, measures: Iterable[Measure], recording: Recording) -> Outcome:
-    """Returns what the check measures of a run, and the number of events that were not accepted."""
+    """Returns what the check measures in a run, and the number of events that were not accepted."""
     until = recording.duration - 1e-9
     due = sum(t < until for t, _ in spec.events or ())
     accepted = sum(t < until for t, _ in recording.session.log)

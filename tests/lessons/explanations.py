@@ -1,4 +1,4 @@
-"""Finds every sentence that gives a reason, in all texts that users read, with its place.
+"""Finds every sentence that gives a reason, in all texts that users read, and the place of the sentence.
 
 `passages` yields the texts of the page, the command line and the site; `causal` selects the sentences that
 give a reason.
@@ -76,23 +76,23 @@ _END = re.compile(
 
 
 def sentences(text: str) -> list[str]:
-    """Returns the sentences of a Markdown text, each in one line; displayed formulas and programs are left
-    out."""
+    """Returns the sentences of a Markdown text, each in one line; displayed formulas and programs are
+    omitted."""
     plain = _LABEL.sub("\n\n", _PROGRAM.sub(" … ", text))
     found = (" ".join(each.split()).strip("| ") for each in _END.split(plain) if each)
     return [each for each in found if each]
 
 
 def causal(text: str) -> list[str]:
-    """Returns the sentences that give a reason, without questions and without reasons that are marked as
-    given."""
+    """Returns the sentences that give a reason. Questions, and reasons that are marked as given, are
+    omitted."""
     found = [each for each in sentences(text) if CAUSE.search(each) and not GIVEN.search(each)]
     return [each for each in found if not each.endswith("?")]
 
 
 def of_step(step: Step) -> Iterator[str]:
-    """Yields the statements of a step. The options of a prediction are not statements; the run under a
-    claim's `fails_with` tests its reason."""
+    """Yields the statements of a step. The options of a prediction are not statements. The reason of a claim
+    is tested by the run of its `fails_with`."""
     yield from (step.text, step.do, step.why)
     if step.prediction is not None:
         yield step.prediction.question
@@ -101,8 +101,8 @@ def of_step(step: Step) -> Iterator[str]:
 
 
 def passages() -> Iterator[tuple[str, str]]:
-    """Yields (place, text) of all texts. The place is as in `interventions.Intervention.at`, "exercise/name",
-    or a source file."""
+    """Yields (place, text) of all texts. The place is written as in `interventions.Intervention.at`, as
+    "exercise/name", or as the name of a source file."""
     for name in COURSE:
         lesson, more = load_lesson(name), further(name)
         yield name, lesson.card.question

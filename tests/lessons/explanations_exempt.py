@@ -1,7 +1,8 @@
-"""Sentences with a reason that no intervention tests, and the tests that hold them instead.
+"""Sentences with a reason that no intervention tests, and the tests that check them instead.
 
-A sentence is named by its place and its beginning. Each names the test that holds it, except for three kinds
-that cannot be false: a definition, an instruction to the reader, and the purpose of a part of the program.
+A sentence is identified by its place and its beginning. Each entry names the test that checks its sentences,
+except for three kinds that cannot be false: a definition, an instruction to the reader, and the purpose of a
+part of the program.
 """
 
 from __future__ import annotations
@@ -18,9 +19,9 @@ class Exempt:
 
     Attributes:
         kind: "definition", "instruction", "purpose" (of a part of the program: in sources only),
-            "mathematics" (it follows from equations), "measured" (a test of its own takes the cause away), or
+            "mathematics" (it follows from equations), "measured" (a separate test removes the cause), or
             "software" (what the program does).
-        held_by: "file::test" that holds them, "" for the first three kinds.
+        held_by: "file::test", the test that checks them; "" for the first three kinds.
         sentences: (place, beginning of the sentence).
     """
 
@@ -108,7 +109,7 @@ TEXTS = (
     Exempt("mathematics", LESSONS + "geometry.py::test_geometry_and_solver_find_the_same_points", (
         ("inside-the-qp/0", "With $N = 1$ the unknowns are three torque changes"),
     )),
-    # ---------------------------------------- causes that a test of their own takes away
+    # ---------------------------------------- causes that a separate test removes
     Exempt("measured", LESSONS + "interventions.py::test_a_hand_without_a_damper_swings_like_the_wish", (
         ("one-task/1", "Equation (4) has become a weakly damped oscillator"),
     )),

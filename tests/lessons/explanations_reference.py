@@ -1,4 +1,5 @@
-"""The same as `explanations_exempt` for texts in the source: the reference, and messages of the program."""
+"""The same entries as in `explanations_exempt`, for texts in the source: the reference, and messages of the
+program."""
 
 from __future__ import annotations
 
@@ -8,7 +9,7 @@ ROBOTS, HTMPC = "tests/robots/test_robots_", "tests/himpc/test_htmpc_"
 
 # fmt: off
 REFERENCE = (
-    # ---------------------------------------- nothing that could be wrong
+    # ---------------------------------------- sentences that cannot be false
     Exempt("definition", "", (
         ("himpc/cascade/null_space.py", "Nothing is inverted: the bases come from an SVD"),
         ("himpc/cascade/polish.py", "None if the point is too inaccurate"),

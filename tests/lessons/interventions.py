@@ -1,9 +1,9 @@
-"""Explanations tested by intervention: the cause is taken away, and the effect must disappear.
+"""Explanations are tested by intervention: when the cause is removed, the effect must disappear.
 
-Each row quotes a sentence, names a run that shows the effect, the assignments that take the cause away, and
-the measured values with and without it. `interventions_all` has all of them: the course's are in
-`interventions_tasks`, `interventions_limits` and `interventions_mobile`, the documents' in
-`interventions_documents`, and those that replace refuted sentences in
+Each row quotes a sentence and names a run that shows the effect, the assignments that remove the cause, and
+the measured values with and without it. `interventions_all` contains all rows: those of the course are in
+`interventions_tasks`, `interventions_limits` and `interventions_mobile`, those of the documents in
+`interventions_documents`, and those for sentences that replace refuted ones in
 `interventions_reader`, `interventions_fourth_reader`, `interventions_fifth_reader` and
 `interventions_sixth_reader`.
 """
@@ -26,16 +26,16 @@ class Intervention:
     """A sentence that names a cause and its effect.
 
     Attributes:
-        at: its place: "lesson/place" for a step, "further/lesson" for a derivation on the lesson's page, or
-            the name of a document of `test_lessons_interventions.DOCUMENTS`.
+        at: the place of the sentence: "lesson/place" for a step, "further/lesson" for a derivation on the
+            page of the lesson, or the name of a document of `test_lessons_interventions.DOCUMENTS`.
         says: the sentence, or the part of it that names the cause, word for word.
-        measure: the effect.
-        there: its range with the cause, in the measure's unit.
-        without: assignments that take the cause away.
-        gone: its range then; it does not overlap `there`.
-        of: assignments of the run that shows the effect, in addition to the step's.
+        measure: the measure of the effect.
+        there: the range of the measure with the cause, in its unit.
+        without: assignments that remove the cause.
+        gone: the range of the measure without the cause; it does not overlap `there`.
+        of: assignments of the run that shows the effect, in addition to those of the step.
         on: the step or scene that is run, if it is not the step of `at`.
-        seconds: duration, if it is not that of the step.
+        seconds: the duration, if it is not that of the step.
         stays: the sentence says that this is *not* the cause: the effect also exists without it.
     """
 
@@ -52,7 +52,7 @@ class Intervention:
 
     @property
     def runs(self) -> tuple[RunSpec, RunSpec]:
-        """The runs with the cause, and without it."""
+        """The run with the cause, and the run without it."""
         base = _base(self.on or self.at)
         if self.seconds is not None:
             base = replace(base, duration=self.seconds)
@@ -76,5 +76,5 @@ def of(
     until: float = math.inf,
     column: int | None = None,
 ) -> Measure:
-    """Returns a measure; the function abbreviates the constructors."""
+    """Returns a measure; this function is a short form of the constructors."""
     return Measure(Signal(name, unit, column), statistic, after, until)

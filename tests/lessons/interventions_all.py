@@ -1,4 +1,4 @@
-"""All rows."""
+"""The rows of all files of interventions."""
 
 from __future__ import annotations
 

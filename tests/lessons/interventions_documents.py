@@ -1,4 +1,4 @@
-"""Interventions for the causes in the glossary, on the page of disagreements and in the results."""
+"""Interventions for the causes that the glossary, the page of disagreements and the results name."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""Interventions for sentences that replaced others which a fifth independent reader had refuted or found half
-true."""
+"""Interventions for the sentences that replaced those which a fifth independent reader had refuted or found
+half true."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Interventions for sentences that replaced others which a fourth independent reader had refuted or found
+"""Interventions for the sentences that replaced those which a fourth independent reader had refuted or found
 half true."""
 
 from __future__ import annotations

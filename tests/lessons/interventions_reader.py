@@ -1,4 +1,4 @@
-"""Interventions for sentences that replaced others which an independent reader had refuted by an
+"""Interventions for the sentences that replaced those which an independent reader had refuted by an
 experiment."""
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Interventions for sentences that replaced others which a sixth independent reader had found half true or
+"""Interventions for the sentences that replaced those which a sixth independent reader had found half true or
 hard to read."""
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ SIXTH_ROWS = (
     ),
     *(
         VIABLE(
-            says=says,  # q_s lies 0.40° before 150°
+            says=says,  # q_s is 0.40° before 150°
             measure=JOINT_2, there=(149.6, 149.603), without=("M_bar_scale=0.3",), gone=(149.625, 149.64),
             of=NO_DELAY,
         )

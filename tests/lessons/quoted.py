@@ -1,7 +1,7 @@
-"""Numbers in the course's texts besides those of its claims, and the runs that measure them.
+"""Numbers that texts of the course state in addition to those of the claims, and the runs that measure them.
 
 A claim says "at most" or "at least"; a sentence like "it dips by a few millimetres" implies both bounds.
-`quoted_all` has every such number of the steps' texts that a run gives; `course_runs` computes all the runs.
+`quoted_all` contains every such number of the steps' texts that a run gives; `course_runs` computes all runs.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ class Quoted:
         step: "lesson/place" of the step.
         phrase: words of its texts, its question or its claims.
         measure: the quantity that the phrase names.
-        low, high: the range that the phrase states, in the measure's unit.
-        of: settings of the run in addition to the step's; None: the ghost's.
+        low, high: the range that the phrase states, in the unit of the measure.
+        of: settings of the run in addition to those of the step; None: the settings of the ghost.
     """
 
     step: str
@@ -40,7 +40,7 @@ def step_of(name: str) -> Step:
 
 
 def specs(quoted: Quoted) -> tuple[RunSpec, RunSpec | None]:
-    """Returns its run, and the ghost's if the measure compares with it."""
+    """Returns the run, and the run of the ghost if the measure compares with it."""
     step = step_of(quoted.step)
     own = load_lesson(quoted.step.split("/")[0]).run_of(step)
     ghost = None if step.ghost is None else own.but(*step.ghost.set)

@@ -1,4 +1,4 @@
-"""Every number in the steps' texts that a run gives, see `quoted`."""
+"""Every number in the texts of the steps that a run gives; see `quoted`."""
 
 from __future__ import annotations
 

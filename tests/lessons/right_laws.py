@@ -1,4 +1,4 @@
-"""Correct solutions of the exercises, each in three styles."""
+"""Correct solutions of the exercises, each in three styles of programming."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ RIGHT = {
     "distance-row": DISTANCE,
 }
 
-# The same laws in other styles of programming.
+# The following solutions are the same laws in other styles of programming.
 _PD_CLASS = """
 class Controller:
     def torque(self, now):

@@ -1,4 +1,4 @@
-"""Reading a row of telemetry by name."""
+"""Functions that read a row of telemetry by name."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Submissions of students: correct ones, known mistakes, and misbehaving programs."""
+"""Submissions of students: correct solutions, known mistakes, and misbehaving programs."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ class Mistake:
 
     Attributes:
         good, bad: the lines that are replaced and their replacement; good "": `bad` is the whole text.
-        most: the largest allowed number of points.
+        most: the largest permitted number of points.
         words: words that name the mistake.
-        fails: words of a check that it must fail; "": any.
+        fails: words of a check that the submission must fail; "": any check.
     """
 
     good: str
@@ -26,7 +26,7 @@ class Mistake:
     fails: str = ""
 
     def text(self, exercise: str) -> str:
-        """Returns the submission."""
+        """Returns the text of the submission."""
         if not self.good:
             return self.bad
         assert self.good in RIGHT[exercise], self.good
@@ -195,7 +195,7 @@ class Submission:
 
 
 def _bad(line: str, points: int, words: str) -> Submission:
-    """Returns a submission for the joint PD that executes the given line instead."""
+    """Returns a submission for the joint PD that executes the given line instead of a solution."""
     return Submission("joint-pd", f"def torque(now):\n    {line}\n    return now.gravity\n", points, words)
 
 

@@ -1,4 +1,4 @@
-"""Effects of the adaptation of M̄ on the robots of the scenes."""
+"""The adaptation of M̄ has these effects on the robots of the scenes."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ def session_of(name: str, **settings: object) -> TorqueSession:
 
 
 def error(name: str, payload_kg: float, adapt: bool) -> float:
-    """Returns the RMS of the hand's distance from its reference after the first second of four, m; a target
-    that can be dragged jumps by up to 10 cm every half second."""
+    """Returns the RMS of the distance of the hand from its reference, m, from the end of the first to the end
+    of the fourth second. A target that can be dragged jumps by up to 10 cm every half second."""
     session = session_of(name, plant__payload_kg=payload_kg, M_bar_adapt=adapt)
     target, rng = session.target("position"), np.random.default_rng(0)
     start = None if target is None else np.array(target.raw)
@@ -41,8 +41,8 @@ def error(name: str, payload_kg: float, adapt: bool) -> float:
 
 @pytest.mark.parametrize("name", ["iiwa14-circle", "iiwa14-hold"])
 def test_a_payload_costs_no_error(name: str) -> None:
-    """With 0.5 to 6 kg at the flange, the hand's error with adaptation is smaller than that without payload
-    and adaptation; on the circle, 2 kg make the arm unstable with the scene's M̄."""
+    """With 0.5 to 6 kg at the flange and adaptation, the error of the hand is smaller than without payload
+    and without adaptation. On the circle, 2 kg make the arm unstable with the M̄ of the scene."""
     alone = error(name, 0.0, adapt=False)
     for payload_kg in (0.0, 0.5, 2.0, 6.0):
         assert error(name, payload_kg, adapt=True) < alone, payload_kg
@@ -60,8 +60,8 @@ def test_a_payload_costs_no_error(name: str) -> None:
     ],
 )
 def test_no_eigenvalue_passes_2(setting: str, later: float | None) -> None:
-    """λ_max(M⁻¹M̄) is below 2 at every tick for a heavy payload, a payload that changes or is dropped during
-    the run, and coarse encoders."""
+    """λ_max(M⁻¹M̄) is below 2 at every tick: for a heavy payload, for a payload that changes or falls off
+    during the run, and for coarse encoders."""
     spec = RunSpec("iiwa14-circle", set=(setting, "M_bar_adapt=true"))
     told = EigenvalueJob(spec, payload_later=later).do().summary
     assert told["largest"] < 2.0
@@ -70,8 +70,8 @@ def test_no_eigenvalue_passes_2(setting: str, later: float | None) -> None:
 
 @pytest.mark.parametrize("on", [True, False])
 def test_the_switch_does_not_jump_the_torque(on: bool) -> None:
-    """When adaptation is switched on in the middle of the circle, the torque of that tick is bitwise
-    unchanged; after switching it on or off, no tick changes the torque by more than twice the largest change
+    """If adaptation is switched on in the middle of the circle, the torque of that tick is bitwise unchanged.
+    After a switch in either direction, no tick changes the torque by more than twice the largest change
     before."""
     sessions = [session_of("iiwa14-circle", M_bar_adapt=not on) for _ in range(2)]
     before, _ = (rows_of(session, 1500) for session in sessions)
@@ -87,7 +87,8 @@ def test_the_switch_does_not_jump_the_torque(on: bool) -> None:
 
 @pytest.mark.parametrize("controller", ["himpc", "hiqp", "nhimpc"])
 def test_both_routes_take_the_same_M_bar(controller: str) -> None:
-    """Torques agree to 1e-8 N·m while M̄ changes, and the same run gives bitwise the same torques."""
+    """The torques of both routes agree to 1e-8 N·m while M̄ changes, and a repeated run gives bitwise the
+    same torques."""
     runs = [
         session_of(
             "iiwa14-circle", M_bar_adapt=True, plant__payload_kg=2.0, controller=controller, route=route
@@ -104,7 +105,7 @@ def test_both_routes_take_the_same_M_bar(controller: str) -> None:
 
 
 def test_the_gauge_shows_the_M_bar_in_force() -> None:
-    """The gauge decreases while M̄ is raised, and is that of the set M̄ without adaptation."""
+    """The gauge decreases while M̄ grows; without adaptation, it is the gauge of the set M̄."""
     moving, fixed = (session_of("iiwa14-circle", M_bar_adapt=adapt) for adapt in (True, False))
     gauges = [field(each, rows_of(each, 800), "gauge_radius")[:, 0] for each in (moving, fixed)]
     assert gauges[0][0] == gauges[1][0]
@@ -113,7 +114,7 @@ def test_the_gauge_shows_the_M_bar_in_force() -> None:
 
 
 def test_a_payload_that_is_dropped_is_noticed() -> None:
-    """When 4 kg fall off in the middle of the circle, the hand stays within 5 cm and becomes as accurate as
+    """If 4 kg fall off in the middle of the circle, the hand stays within 5 cm and becomes as accurate as
     before."""
     session = session_of("iiwa14-circle", M_bar_adapt=True, plant__payload_kg=4.0)
     rows_of(session, 2000)
@@ -124,7 +125,8 @@ def test_a_payload_that_is_dropped_is_noticed() -> None:
 
 
 def test_switched_on_early_it_brings_an_arm_back() -> None:
-    """Adaptation that is switched on after one second of growing errors brings the arm back to its circle."""
+    """If adaptation is switched on after one second of growing errors, it brings the arm back to its
+    circle."""
     session = session_of("iiwa14-circle", M_bar_adapt=False, plant__payload_kg=2.0)
     lost = np.linalg.norm(field(session, rows_of(session, 1000), "error/position"), axis=1)
     session.post(Set("M_bar_adapt", True))
@@ -134,7 +136,7 @@ def test_switched_on_early_it_brings_an_arm_back() -> None:
 
 
 def test_coarse_encoders_do_not_disturb_it() -> None:
-    """With 2 kg and encoders of 0.001° the error is below 3 mm RMS, and above 30 mm without adaptation."""
+    """With 2 kg and encoders of 0.001°, the error is below 3 mm RMS; without adaptation it is above 30 mm."""
     spec = RunSpec("iiwa14-circle", set=("plant.payload_kg=2", "plant.encoder_resolution_deg=0.001"))
     assert EigenvalueJob(spec.but("M_bar_adapt=true")).do().summary["rms_mm"] < 3.0
     assert EigenvalueJob(spec).do().summary["rms_mm"] > 30.0

@@ -1,7 +1,7 @@
-"""Two tasks at a time compared with one: nothing else differs, and the difference has the causes that the
-lessons name.
+"""Two tasks at a time are compared with one task: nothing else differs, and the difference has the causes
+that the lessons name.
 
-Each cause that *Deliveries* and related lessons name is taken away, and the effect disappears.
+Each cause that *Deliveries* and related lessons name is removed, and the effect disappears.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def of_step(
     events: tuple[tuple[float, Event], ...] | None = None,
     duration: float | None = None,
 ) -> Recording:
-    """Returns the recording of a step's run with changed settings."""
+    """Returns the recording of the run of a step with changed settings."""
     step = load_lesson(lesson).steps[place]
     spec = load_lesson(lesson).run_of(step).but(*assignments)
     spec = spec if events is None else replace(spec, events=events)
@@ -71,7 +71,7 @@ def seconds(*assignments: str) -> float:
 
 @pytest.mark.parametrize("rule", [(), STRICT, ("base_tolerance=0.25",)])
 def test_all_architectures_have_one_mission(rule: tuple[str, ...]) -> None:
-    """All architectures have the same tasks, goals, paths, holds and rules of completion."""
+    """The missions of all architectures have the same tasks, goals, paths, holds and rules of completion."""
     missions = [
         [
             (task.name, task.role, task.motion, task.tolerance, task.hold, task.rest)
@@ -86,8 +86,8 @@ def test_all_architectures_have_one_mission(rule: tuple[str, ...]) -> None:
 
 @pytest.mark.parametrize("rule", [(), STRICT])
 def test_waypoints_have_one_rule(rule: tuple[str, ...]) -> None:
-    """Fig. 8: the missions of the architectures differ, as in the paper, but their tasks are completed by the
-    same rules. The task 'stay', which only keeps the base at its last place, has no rule."""
+    """For Fig. 8 the missions of the architectures differ, as in the paper, but the same rules decide when
+    their tasks are completed. The task 'stay', which only keeps the base at its last place, has no rule."""
 
     def rules(architecture: str) -> dict[str, set[tuple[float, float | None, float]]]:
         options = scene_of("ridgeback-ur10-waypoints", f"architecture={architecture}", *rule).settings.options
@@ -104,7 +104,7 @@ def test_waypoints_have_one_rule(rule: tuple[str, ...]) -> None:
 
 @pytest.mark.parametrize("name", ["ridgeback-ur10-delivery", "ridgeback-ur10-handover"])
 def test_nothing_but_the_architecture_differs(name: str) -> None:
-    """Settings, robot, start, script and the controller's settings are equal, except for the levels in the
+    """Settings, robot, start, script and controller settings are equal, except for the levels in the
     window."""
     one, two = (scene_of(name, f"architecture={a}") for a in ("single_task", "hierarchical"))
     own, other = (scene.settings for scene in (one, two))
@@ -128,7 +128,7 @@ def test_nothing_but_the_architecture_differs(name: str) -> None:
 
 
 def test_a_base_is_there_by_the_rule() -> None:
-    """The task is completed within the tolerance at any speed, or only at rest, according to the setting."""
+    """Depending on the setting, the task is completed within the tolerance at any speed, or only at rest."""
     for rule, rest in (("false", np.inf), ("true", REST)):
         options = scene_of(
             "ridgeback-ur10-delivery", "base_tolerance=0.25", f"base_at_rest={rule}"
@@ -141,15 +141,15 @@ def test_a_base_is_there_by_the_rule() -> None:
 
 
 def test_the_factor_hangs_on_the_rule() -> None:
-    """The ratio of times for one round is 1.6 where 80 cm are enough, 1.2 where the base has to stop, and 2.1
-    with a different rule for each."""
+    """The ratio of the times for one round is 1.6 if 80 cm are enough, 1.2 if the base has to stop, and 2.1
+    if each architecture has a different rule."""
     single = [seconds("architecture=single_task", *rule) for rule in ((), STRICT)]
     both = [seconds(*rule) for rule in ((), STRICT)]
     assert single[0] / both[0] == pytest.approx(1.6, abs=0.05)
     assert single[1] / both[1] == pytest.approx(1.2, abs=0.05)
     assert single[1] / both[0] == pytest.approx(2.1, abs=0.05)
     # The text says that the rule saves "about half" of the 22 s, of 41 s. Its share is below one half if the
-    # rule is changed first, and above if it is changed after the number of tasks.
+    # rule is changed first, and above one half if it is changed after the number of tasks.
     assert single[1] == pytest.approx(41.0, abs=0.5)
     saved = single[1] - both[0]
     assert saved == pytest.approx(22.0, abs=0.5)
@@ -159,15 +159,16 @@ def test_the_factor_hangs_on_the_rule() -> None:
 
 
 def test_who_pays_for_effort_is_not_what_makes_the_factor() -> None:
-    """In formulation C only the last level has the full effort, and a single level is the last one. If every
-    level has the effort, the ratios are almost the same."""
+    """In formulation C only the last level has the full effort, and a single level is the last level. If
+    every level has the effort, the ratios are almost the same."""
     for rule, factor in (((), 1.55), (STRICT, 1.29)):
         single = seconds("architecture=single_task", "formulation=paper", *rule)
         assert single / seconds("formulation=paper", *rule) == pytest.approx(factor, abs=0.05)
 
 
 def test_each_half_of_the_overlap_saves_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The second task is removed from the window while the base is first, or while the hand is first."""
+    """The window has two tasks only while the base is first, only while the hand is first, or in both
+    cases."""
     when: set[str] = set()
 
     def watched(
@@ -192,8 +193,8 @@ def test_each_half_of_the_overlap_saves_time(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_a_base_that_stays_behind_the_hand_drives_no_farther() -> None:
-    """With one task at a time and the base at rest while the arm reaches, the base's path is as long as with
-    two tasks."""
+    """With one task at a time and the base at rest while the arm reaches, the path of the base is as long as
+    with two tasks."""
     ways = {a: Measure(WAY).value(of_step("deliveries", 0, f"architecture={a}")) for a in ALL}
     assert ways["decoupled"] < 1.1 * ways["hierarchical"]
     assert ways["single_task"] > 1.5 * ways["hierarchical"]
@@ -206,22 +207,22 @@ def test_a_base_that_stays_behind_the_hand_drives_no_farther() -> None:
 
 
 def test_the_base_turns_because_the_goal_does() -> None:
-    """*People move*: without the movement of the goal the base stays in place after 8 s."""
+    """*People move*: if the goal does not move, the base stays in place after 8 s."""
     still = Measure(WAY, "range", after=8.0, until=14.0)
     moved = still.value(of_step("deliveries", 3, duration=14.2))
     assert moved > 0.1 and still.value(of_step("deliveries", 3, events=(), duration=14.2)) < 0.6 * moved
 
 
 def test_the_authors_gain_is_what_makes_the_last_stretch_long() -> None:
-    """*People move*: HTIDKC with gains of 3 and 1 1/s instead of 0.5 and 0.3 arrives in time."""
+    """*People move*: with gains of 3 and 1 1/s instead of 0.5 and 0.3, HTIDKC arrives in time."""
     late = Measure(HAND, after=18.5, until=19.5)
     assert late.value(of_step("deliveries", 3, "controller=htidkc")) > 100.0
     assert late.value(of_step("deliveries", 3, "controller=htidkc", "gains=[3,1]")) < 5.0
 
 
 def test_it_is_effort_that_lets_the_hand_slip() -> None:
-    """*A person who takes the ball late*: with the paper's formulation the hand slips, and with a hundredth
-    of the relative effort it does not."""
+    """*A person who takes the ball late*: with the paper's formulation the hand slips; with a hundredth of
+    the relative effort it does not."""
     waiting = Measure(HAND, after=5.0, until=14.0)
     assert waiting.value(of_step("deliveries", 2, "formulation=paper", duration=14.0)) > 10.0
     light = of_step("deliveries", 2, "formulation=paper", "levels.ee.Q=1000", duration=14.0)
@@ -229,7 +230,8 @@ def test_it_is_effort_that_lets_the_hand_slip() -> None:
 
 
 def test_the_base_gets_there_because_the_arm_gives_way() -> None:
-    """*First hold, then reach*: if the arm's joints are held at rest, the base does not reach its place."""
+    """*First hold, then reach*: if the joints of the arm are held at rest, the base does not reach its
+    place."""
     names = scene_of("ridgeback-ur10-drag").robot.joint_names[3:]
     last = Measure(Signal("error/base", "m"), "mean", after=5.0)
     assert last.value(of_step("first-hold-then-reach", 0)) < 0.01
@@ -240,7 +242,7 @@ def test_the_base_gets_there_because_the_arm_gives_way() -> None:
 
 
 def test_the_papers_rule_is_quoted_and_not_printed() -> None:
-    """docs/disagreements.md quotes every statement of the paper about it."""
+    """docs/disagreements.md quotes every statement of the paper about the rule."""
     text = " ".join((Path(__file__).parents[2] / "docs" / "disagreements.md").read_text().split())
     section = re.search(r"## Deliveries: .*?(?=## |$)", text)
     assert section is not None

@@ -1,4 +1,4 @@
-"""The benchmark of control steps: every route and solver on the same scenes."""
+"""The benchmark of control steps compares every route and solver on the same scenes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sweeps on a Dask cluster of two workers: stopped, continued, and with a worker that dies during the
+"""Sweeps run on a Dask cluster of two workers; they are stopped and continued, and a worker dies during a
 sweep."""
 
 from __future__ import annotations
@@ -30,7 +30,8 @@ CELLS = 8
 @pytest.fixture(scope="module")
 def cluster() -> Iterator[Any]:
     """A scheduler with two worker processes; an item that kills two workers is not tried again. With the
-    usual time limit of 15 s, a worker that is still missing after a death would not be started again."""
+    usual time limit of 15 s, a worker that is still missing after another one has died would not be started
+    again."""
     from dask.config import set as configured
 
     with (
@@ -48,7 +49,7 @@ def cluster() -> Iterator[Any]:
 
 
 def until(condition: Callable[[], bool], what: str) -> None:
-    """Waits for a condition; fails after two minutes."""
+    """Waits for a condition, and fails after two minutes."""
     deadline = time.monotonic() + 120
     while not condition():
         assert time.monotonic() < deadline, what
@@ -61,7 +62,7 @@ def lines(folder: Path) -> int:
 
 
 def begin(out: Path, *more: str) -> subprocess.Popen[bytes]:
-    """Starts `himpc-lab sweep` of δ on the mobile manipulator's square as a separate program."""
+    """Starts `himpc-lab sweep` over δ, on the square of the mobile manipulator, as a separate program."""
     what = [
         "ridgeback-ur10-square",
         "--over",
@@ -78,7 +79,7 @@ def begin(out: Path, *more: str) -> subprocess.Popen[bytes]:
 
 
 def test_a_sweep_of_htmpc_survives_a_kill_and_a_dead_worker(cluster: Any, tmp_path: Path) -> None:
-    """A sweep is killed after its first cell and continued, and one worker is killed meanwhile: the results
+    """A sweep is killed after its first cell and continued, and one worker is killed meanwhile. The results
     equal those on local cores, and no cell is lost or computed twice."""
     local, out = tmp_path / "local", tmp_path / "cluster"
     scheduler = ("--scheduler", cluster.scheduler_address)
@@ -104,8 +105,8 @@ def test_a_sweep_of_htmpc_survives_a_kill_and_a_dead_worker(cluster: Any, tmp_pa
 
 
 def test_a_worker_that_dies_costs_its_item_a_retry(cluster: Any, tmp_path: Path) -> None:
-    """If a worker dies once, another worker does its item. If workers die repeatedly with one item, it fails,
-    and the other items do not."""
+    """If one worker dies, another worker computes its item. If workers die repeatedly with the same item,
+    this item fails and the other items succeed."""
     with on_cluster(cluster.scheduler_address) as spread:
         items = [(tmp_path / "once", value) for value in range(6)]
         assert dict(spread(_dies_once, items)) == {value: value for value in range(6)}
@@ -130,7 +131,7 @@ def _dies_at_one(value: int) -> int:
 
 @pytest.fixture
 def deserted() -> Iterator[Any]:
-    """A scheduler without workers."""
+    """A scheduler that has no workers."""
     with distributed.LocalCluster(
         n_workers=0, processes=False, dashboard_address=None, protocol="tcp"
     ) as found:

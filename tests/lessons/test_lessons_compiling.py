@@ -1,4 +1,4 @@
-"""Sessions need no compilation during a run."""
+"""A session compiles nothing during a run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Scenes with a world: whoever drags a target meets it, and the summary tells how hard."""
+"""In scenes with a world, a robot whose target is dragged touches the objects, and the summary reports the
+contact force."""
 
 from __future__ import annotations
 
@@ -25,7 +26,8 @@ def load(name: str) -> TorqueScene:
 
 @pytest.mark.parametrize("name", DRAGGED)
 def test_scenes_that_people_drag_in_have_contacts(name: str) -> None:
-    """They run with them, begin without a contact, and who stands on a floor has one."""
+    """These scenes run with contacts and begin without one. Their world is a floor, except for the planar
+    robot."""
     scene = load(name)
     assert scene.settings.plant.contacts
     assert scene.settings.plant.joint_stops
@@ -37,7 +39,8 @@ def test_scenes_that_people_drag_in_have_contacts(name: str) -> None:
 
 @pytest.mark.parametrize("name", [name for name in PAPERS if not name.startswith("baxter")])
 def test_the_papers_scenes_have_none(name: str) -> None:
-    """Their numbers are those of a robot without geometry."""
+    """The scenes of the papers have no contacts, because the papers' numbers are those of a robot without
+    geometry."""
     scene = load(name)
     assert not scene.settings.plant.contacts
     assert not scene.settings.plant.joint_stops
@@ -48,8 +51,8 @@ DOWN = ((0.0, MoveTarget("position", (0.55, 0.1, -0.15))),)
 
 
 def test_a_hand_that_is_dragged_into_the_floor_presses_on_it() -> None:
-    """With contacts it stays above, and the summary says how deep, how hard and how long; without, it
-    passes."""
+    """With contacts the hand stays above the floor, and the summary states depth, force and duration. Without
+    contacts it passes through the floor."""
     scene = replace(load("panda-hold"), events=DOWN)
     pressing = run(scene, 2.0, to_the_end=True)
     bare = replace(scene.settings, plant=replace(scene.settings.plant, contacts=False))
@@ -64,7 +67,7 @@ def test_a_hand_that_is_dragged_into_the_floor_presses_on_it() -> None:
     assert lowest[1] < -0.1
     touching = pressing["contact_force"][:, 0] > 0.0
     first = int(np.argmax(touching))
-    # Until the first contact the two runs are the same to the last bit.
+    # Until the first contact the two runs are equal to the last bit.
     np.testing.assert_array_equal(pressing["q"][: first + 1], through["q"][: first + 1])
 
 

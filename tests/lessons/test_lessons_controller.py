@@ -1,4 +1,4 @@
-"""HIMPC in the sessions of scenes: all horizons, a full stack, and active constraints."""
+"""HIMPC runs in the sessions of scenes with all horizons, a full stack, and active constraints."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from lessons.session.torque import TorqueSession
 
 
 def test_six_joints_under_a_full_stack(example_urdf: Callable[[str], str]) -> None:
-    """A 6-DoF arm with 3+3+1 rows: level 3 has no freedom, changes nothing and raises no error."""
+    """On an arm with six joints and 3+3+1 rows, level 3 has no freedom; it changes nothing and raises no
+    error."""
     scene = torque_scene("hold", example_urdf("ur_description/urdf/ur10_robot.urdf"))
     assert scene.robot.n == 6
     third = Level((Joints(name="q1", joints=scene.robot.joint_names[:1]),))
@@ -37,7 +38,7 @@ def test_six_joints_under_a_full_stack(example_urdf: Callable[[str], str]) -> No
 
 
 def test_binding_constraints_are_named(scene: TorqueScene) -> None:
-    """During a fast move with an active velocity bound, the plan names level, joint, kind, side and
+    """During a fast motion with an active velocity bound, the plan names level, joint, kind, side and
     multiplier."""
     session = TorqueSession(scene)
     session.post(Set("limits.velocity_scale", 0.05))

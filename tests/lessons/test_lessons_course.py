@@ -1,4 +1,4 @@
-"""The course: every card is complete, every number on it is measured, and every claim can fail."""
+"""In the course, every card is complete, every number on it is measured, and every claim can fail."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ HAND = Signal("error/position", "mm")
 
 @pytest.mark.parametrize("name", COURSE)
 def test_everything_a_lesson_states_is_so(name: str, course_runs: CourseRuns) -> None:
-    """Claims hold, and fail under their wrong setting; answers are measured; challenges can be solved."""
+    """Claims hold, and fail with their wrong setting; answers are measured; challenges can be solved."""
     own = [verdict for verdict in course_runs.verdicts if verdict.lesson == name]
     assert sum(bool(verdict.wrong) for verdict in own) == sum(
         len(step.claims) for step in load_lesson(name).steps
@@ -81,13 +81,13 @@ def test_equations_can_be_rendered(name: str) -> None:
         assert text.count("$") % 2 == 0, text
         for display, inline in re.findall(r"\$\$(.+?)\$\$|\$(.+?)\$", text, re.DOTALL):
             assert "<math" in convert(display or inline)
-        # A forgotten backslash in a Python string turns \t and \b into control characters.
+        # If a backslash is missing in a Python string, \t and \b become control characters.
         assert not re.search(r"[\x00-\x09\x0b-\x1f]", text), text
 
 
 @pytest.mark.parametrize("name", COURSE)
 def test_no_text_is_shown_as_code(name: str) -> None:
-    """Markdown interprets an indented paragraph as code, and an equation in it would not be rendered."""
+    """Markdown interprets an indented paragraph as code, and would not render an equation in it."""
     for step in load_lesson(name).steps:
         for text in (step.text, step.do, step.why):
             assert not any(line.startswith(" ") or "  " in line for line in text.splitlines())
@@ -95,7 +95,7 @@ def test_no_text_is_shown_as_code(name: str) -> None:
 
 @pytest.mark.parametrize("name", COURSE)
 def test_controls_and_plots_exist_in_the_scene(name: str) -> None:
-    """Each control's path is a setting, and the control can show its value; each signal is recorded."""
+    """The path of each control is a setting, and the control can show its value; each signal is recorded."""
     lesson = load_lesson(name)
     for step in lesson.steps:
         scene = lesson.run_of(step).prepared()
@@ -117,7 +117,7 @@ def assert_takes(scene: Scene, control: Control) -> None:
 
 
 def test_lessons_can_be_sent_to_another_process() -> None:
-    """Runs and measures are plain data: they are equal after pickling, and usable as keys."""
+    """Runs and measures are plain data: they are equal after pickling, and can be used as keys."""
     for name in COURSE:
         lesson = load_lesson(name)
         runs = {lesson.run_of(step): step.claims[0].measure for step in lesson.steps}
@@ -201,14 +201,14 @@ def test_a_sound_lesson_has_no_faults() -> None:
     ],
 )
 def test_the_check_finds(step: Step, fault: str) -> None:
-    """Each fault of a lesson is reported with its own sentence."""
+    """Each fault of a lesson is reported with a sentence of its own."""
     (found,) = faults(lesson_with(step))
     assert fault in found
 
 
 def test_the_check_judges_challenges() -> None:
     """The check finds a challenge that passes at its start, a solution that does not pass, and a solution
-    that changes a setting which is no knob."""
+    that changes a setting which is not among the knobs."""
     goal = Claim("Close.", Measure(HAND), "at most", 1e-3)
     knob = Control("horizon", "N", 1, 10)
     challenge = Challenge("?", (goal,), (knob,), Score(Measure(HAND), 1.0, 0.0), (("horizon=1",), OFF))
@@ -222,8 +222,7 @@ def test_the_check_judges_challenges() -> None:
 
 
 def test_claims_are_judged_on_a_run_half_done() -> None:
-    """Before the window begins there is no value; after that the claim is true or false; NaN is never
-    true."""
+    """Before the window begins there is no value; later the claim is true or false; NaN is never true."""
     rows = {"t": np.arange(10.0)[:, None] / 10, "error/position": np.arange(10.0)[:, None] * 1e-3}
     late = Claim("…", Measure(HAND, after=0.5), "at most", 7.0)
     assert math.isnan(late.measure.value({name: field[:4] for name, field in rows.items()}))
@@ -244,7 +243,7 @@ def test_claims_are_judged_on_a_run_half_done() -> None:
     ],
 )
 def test_statistics(statistic: str, value: float) -> None:
-    """Values 1, −2, −4, 0, NaN; the first is before the window, and NaN is ignored."""
+    """The values are 1, −2, −4, 0, NaN; the first is before the window, and NaN is ignored."""
     rows = {"t": np.arange(5.0)[:, None], "v": np.array([[1.0], [-2.0], [-4.0], [0.0], [np.nan]])}
     measure = Measure(Signal("v"), statistic, after=1.0)  # pyright: ignore[reportArgumentType]
     assert measure.value(rows) == pytest.approx({"rms": math.sqrt(20 / 3)}.get(statistic, value))
@@ -260,7 +259,8 @@ def test_a_measure_over_the_ghost_is_a_ratio() -> None:
 
 
 def test_signals_of_missions() -> None:
-    """The base's path length is the sum along its path; the time at work is constant when no task is left."""
+    """The path length of the base is the sum along its path; the time at work is constant after the last
+    task."""
     x = np.array([[0.0, 0.0], [3.0, 4.0], [3.0, 4.0], [3.0, 3.0]])
     rows = {"t": np.arange(4.0)[:, None], "x/base": x, "left": np.array([[2.0], [1.0], [0.0], [0.0]])}
     way = Signal("way of the base", "m")

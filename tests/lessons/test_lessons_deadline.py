@@ -1,4 +1,5 @@
-"""Deadline mode: a late torque acts one tick later, and a headless run never measures computing times."""
+"""In deadline mode, a late torque is applied one tick later. A run without the page never measures computing
+times."""
 
 from __future__ import annotations
 
@@ -32,10 +33,10 @@ def with_settings(scene: TorqueScene, *assignments: str) -> TorqueScene:
     ("late", "applied"),
     [
         ([0, 0, 0], [1, 2, 3]),
-        ([1, 0, 0], [0, 2, 3]),  # held; the next torque replaces the late one
+        ([1, 0, 0], [0, 2, 3]),  # the previous torque is held, and the next one replaces the late one
         ([0, 1, 0], [1, 1, 3]),
         ([0, 1, 1, 0], [1, 1, 2, 4]),  # the second late tick applies the first one's torque
-        ([1, 1, 1, 1], [0, 1, 2, 3]),  # always late: one tick of delay
+        ([1, 1, 1, 1], [0, 1, 2, 3]),  # every tick is late: the delay is one tick
         ([0, 1, 1, 0, 1], [1, 1, 2, 4, 4]),  # the waiting torque is discarded
     ],
 )
@@ -50,7 +51,8 @@ def test_a_queue_of_one(late: list[int], applied: list[int]) -> None:
 
 
 def test_always_late_is_one_tick_of_delay(planar: TorqueScene) -> None:
-    """The torques are bitwise equal to those with motors that receive commands 1 ms later."""
+    """If every tick is late, the torques are bitwise equal to those with motors that receive commands 1 ms
+    later."""
     late = run(with_settings(planar, "deadline_ms=1", "solve_ms_per_knot=0.3"), 0.2)
     delayed = run(with_settings(planar, "plant.delay_ms=1"), 0.2)
     assert late["late"].all()
@@ -60,15 +62,15 @@ def test_always_late_is_one_tick_of_delay(planar: TorqueScene) -> None:
 
 
 def test_in_time_is_lockstep(planar: TorqueScene) -> None:
-    """A deadline that is just met changes nothing."""
+    """If every tick just meets the deadline, the deadline changes nothing."""
     plain, met = run(planar, 0.2), run(with_settings(planar, "deadline_ms=0.5"), 0.2)
     assert not met["late"].any()
     np.testing.assert_array_equal(plain["tau"], met["tau"])
 
 
 def test_the_horizon_decides_what_is_late(planar: TorqueScene) -> None:
-    """A longer horizon that is set during the run misses the deadline from that tick on; with the previous
-    horizon the deadline is met again."""
+    """When a longer horizon is set during the run, the deadline is missed from that tick on; with the
+    previous horizon it is met again."""
     session = TorqueSession(with_settings(planar, "deadline_ms=1"))
     late = []
     for horizon in (10, 11, 10):
@@ -95,7 +97,7 @@ def session_holding(scene: TorqueScene) -> np.ndarray:
 
 
 def test_the_clock_decides_only_if_asked_to(planar: TorqueScene) -> None:
-    """Without an assumed time the measured one is used: more than a nanosecond, less than a second."""
+    """Without an assumed time, the measured time is used: more than a nanosecond, less than a second."""
     measured = planar.settings.changed("solve_ms_per_knot", 0)
     assert replace(measured, deadline_ms=1e-6).is_late(0.5)
     assert not replace(measured, deadline_ms=1e3).is_late(0.5)

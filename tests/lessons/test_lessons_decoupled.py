@@ -1,4 +1,5 @@
-"""The decoupled architecture of the delivery scene: either the base drives or the arm reaches, never both."""
+"""In the decoupled architecture of the delivery scene, either the base drives or the arm reaches, but never
+both."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Numbers and equations of the lessons' texts that no run can check, recomputed.
+"""Numbers and equations in the texts of the lessons that no run can check are computed again.
 
 The predictions (14), (15), (18), (28) with c_l are compared with the printed matrices in
 `test_himpc_prediction`, (31) to (35) in `test_himpc_cascade`, (8) to (13) of HTMPC in `test_htmpc_equations`.
@@ -47,8 +47,8 @@ def iiwa() -> tuple[Array, Array]:
 
 
 def test_an_error_of_acceleration_is_mapped_by_I_minus_M_inverse_M_bar(iiwa: tuple[Array, Array]) -> None:
-    """(8), (12): with H_q from a millisecond ago and Δτ = M̄(wanted − q̈₀), the error is (I − M⁻¹M̄)(q̈₀ −
-    wanted)."""
+    """By (8) and (12), with H_q from a millisecond ago and Δτ = M̄(wanted − q̈₀), the error is (I −
+    M⁻¹M̄)(q̈₀ − wanted)."""
     rng = np.random.default_rng(0)
     M, M_bar = iiwa[0], np.diag(iiwa[1])
     forces, tau_0, wanted = rng.normal(size=(3, len(M)))
@@ -71,7 +71,8 @@ def test_at_six_times_M_bar_both_ends_of_the_spectrum_are_alike(iiwa: tuple[Arra
 
 
 def test_a_norm_below_1_is_enough_and_not_necessary(iiwa: tuple[Array, Array]) -> None:
-    """With 4 M̄ the norm of Remark 4 is 1.21: the error may grow in one step, but vanishes after many."""
+    """With 4 M̄ the norm of Remark 4 is 1.21: the error may grow in one step, but it vanishes after many
+    steps."""
     norm, radius = convergence_gauge(iiwa[0], 4.0 * iiwa[1])
     assert norm == pytest.approx(1.21, abs=0.02) and radius < 0.95
     left = np.eye(7) - np.linalg.solve(iiwa[0], np.diag(4.0 * iiwa[1]))
@@ -97,7 +98,7 @@ def test_remark_4_as_printed_is_for_a_diagonal_M(iiwa: tuple[Array, Array]) -> N
 
 
 def bound_at(degrees: float, reaction: float, margin: float) -> float:
-    """Returns the allowed speed, deg/s, at this angle before the limit of joint 2 of the planar arm."""
+    """Returns the permitted speed, deg/s, at this angle before the limit of joint 2 of the planar arm."""
     robot = load_robot("planar3")
     q = robot.q_upper - math.radians(degrees)
     force = in_force(robot, Limits(velocity=False))
@@ -108,8 +109,8 @@ def bound_at(degrees: float, reaction: float, margin: float) -> float:
 
 
 def test_the_speeds_of_stopping_takes_distance() -> None:
-    """5° before the limit the bound is 106°/s with an exact model and 13.5°/s with our margins; the text
-    states the values in use."""
+    """At 5° before the limit, the bound is 106°/s with an exact model and 13.5°/s with our margins; the text
+    states the margins in use."""
     reaction = 1e-3 + REACTION / Limits().velocity_approach
     assert bound_at(5.0, 1e-3, 0.0) == pytest.approx(105.9, abs=0.1)
     assert bound_at(5.0, reaction, POSITION_MARGIN) == pytest.approx(13.5, abs=0.1)
@@ -122,7 +123,7 @@ def test_the_speeds_of_stopping_takes_distance() -> None:
 @pytest.mark.parametrize("reaction", [1e-3, 0.1, 0.334])
 @pytest.mark.parametrize("room", [0.01, 0.1, 1.0])
 def test_from_the_viable_speed_the_joint_stops_at_the_limit(reaction: float, room: float) -> None:
-    """The printed root solves v·t + v²/2a = q_s − q."""
+    """The printed root is a solution of v·t + v²/2a = q_s − q."""
     one, a = np.ones(1), 20.0
     v = viability_bounds(0.0 * one, -one, room * one, np.inf * one, a * one, reaction)[1, 0]
     assert v * reaction + v**2 / (2 * a) == pytest.approx(room, rel=1e-9)
@@ -132,7 +133,7 @@ def test_from_the_viable_speed_the_joint_stops_at_the_limit(reaction: float, roo
 
 
 def test_at_rest_the_residual_is_K_P_times_the_error() -> None:
-    """(28): a weighted sum weighs 200 m/s² per metre and 50 rad/s² per radian."""
+    """By (28), the terms of a weighted sum are 200 m/s² per metre and 50 rad/s² per radian."""
     model = residual_model(np.array([200.0, 50.0]), np.array([10.0, 5.0]), 5, 1e-3)
     still = np.zeros((5, 2))
     e = model.free(np.ones(2), np.zeros(2), np.zeros(2), still, still, still)
@@ -141,8 +142,8 @@ def test_at_rest_the_residual_is_K_P_times_the_error() -> None:
 
 @pytest.mark.parametrize(("K_p", "Q", "share"), [(50.0, 200.0, 0.2), (50.0, 800.0, 0.5), (12.5, 200.0, 0.06)])
 def test_two_wishes_about_one_coordinate_count_with_their_gains(K_p: float, Q: float, share: float) -> None:
-    """*Two tasks, one arm*, derivation: joint 1 comes to rest between two targets in proportion to Q K_P, not
-    to Q K_P²."""
+    """*Two tasks, one arm*, derivation: joint 1 comes to rest between two targets, in proportion to Q K_P and
+    not to Q K_P²."""
     wishes = [("a", 200.0, 28.0, 200.0), ("b", K_p, 2.0 * math.sqrt(K_p), Q)]
     stack = [
         {"task": "joints", "name": name, "joints": ["joint_1"], "K_p": p, "K_v": v, "Q": weight, "R": 10.0}
@@ -159,7 +160,7 @@ def test_two_wishes_about_one_coordinate_count_with_their_gains(K_p: float, Q: f
 
 
 def test_with_links_2_and_3_in_line_any_motion_of_joint_1_moves_the_hand() -> None:
-    """J_{2|1} = J₂P₁ of *When tasks fight* vanishes at q₃ = 0, and does not near 90°."""
+    """J_{2|1} = J₂P₁ of *When tasks fight* vanishes at q₃ = 0, but not near 90°."""
     robot = load_robot("planar3")
     plant = Plant(robot)
 
@@ -174,7 +175,7 @@ def test_with_links_2_and_3_in_line_any_motion_of_joint_1_moves_the_hand() -> No
 
 
 def test_R_weighs_as_much_as_the_error_around_1e5() -> None:
-    """*One task under MPC*: Q‖J M̄⁻¹Δτ‖² and R‖Δτ‖² are of equal size for R of the order of 10⁵."""
+    """*One task under MPC*: for R of the order of 10⁵, Q‖J M̄⁻¹Δτ‖² and R‖Δτ‖² are of equal size."""
     scene = torque_scene("planar3-hold")
     robot = scene.robot
     plant = Plant(robot)
@@ -190,7 +191,7 @@ def test_R_weighs_as_much_as_the_error_around_1e5() -> None:
 )
 def test_a_direction_that_is_nobodys_keeps_its_torque(change: str, kept: bool) -> None:
     """Step *A motion without a task*: during a push, Δτ has no component in a direction that moves no task,
-    unless a bound or another level requires it."""
+    unless a bound or another level requires one."""
     lesson = load_lesson("one-task")
     assert "in that direction the torque stays what it is, as long as no bound changes it" in " ".join(
         lesson.steps[3].text.split()
@@ -211,15 +212,15 @@ def test_a_direction_that_is_nobodys_keeps_its_torque(change: str, kept: bool) -
 
 
 def test_joint_2_turns_round_where_the_held_hand_lets_it_go_no_further() -> None:
-    """*One task*, fourth step, without speed limits: when joint 2 turns round, the last link lies on the line
-    from joint 1 to the hand. There the distance from joint 1 to joint 3, and with it |q₂|, is extreme."""
+    """*One task*, fourth step, without speed limits: when joint 2 reverses, the last link lies on the line
+    from joint 1 to the hand. There the distance from joint 1 to joint 3, and therefore |q₂|, is extreme."""
     lesson = load_lesson("one-task")
     scene = lesson.run_of(lesson.steps[3]).but("limits.velocity=false").prepared()
     found = run(scene)
     t, v = found["t"][:, 0], found["v"]
     turned = int(np.argmax((t > 0.4) & (v[:, 1] > 0.0)))
     assert t[turned] == pytest.approx(0.3 + 0.75, abs=0.02)
-    assert np.abs(v[turned, [0, 2]]).min() > 1.0  # rad/s: the elbow goes on
+    assert np.abs(v[turned, [0, 2]]).min() > 1.0  # rad/s: the elbow continues to move
     assert isinstance(scene, TorqueScene)
     plant = Plant(scene.robot, scene.settings.plant)
     plant.reset(found["q"][turned])
@@ -230,8 +231,8 @@ def test_joint_2_turns_round_where_the_held_hand_lets_it_go_no_further() -> None
 
 
 def test_the_first_of_twenty_changes_is_not_alone() -> None:
-    """*How far ahead*, second step: in one coordinate the first of twenty changes acts as with N = 1 and 0.17
-    R or so; if it were the only one, as with R/20."""
+    """*How far ahead*, second step: in one coordinate, the first of twenty changes has about the effect of N
+    = 1 with 0.17 R; if it were the only change, the effect would be that of R/20."""
     assert "It does not act like $10/20$" in " ".join(load_lesson("how-far-ahead").steps[1].why.split())
     c, g = 0.19 * effects(20)[:, 0], 0.19  # of R = Q = 1
     alone = 1.0 - c[0] * c.sum() / (c @ c + 1.0)
@@ -242,7 +243,8 @@ def test_the_first_of_twenty_changes_is_not_alone() -> None:
 
 
 def test_RT4_asks_joint_1_for_more_than_its_data_sheet_allows() -> None:
-    """The page of disagreements says that the reference requires 141°/s, and the data sheet allows 85."""
+    """The page of disagreements says that the reference requires 141°/s and that the data sheet permits
+    85."""
     scene = torque_scene("iiwa14-circle-paper")
     q1 = scene.references(scene.robot, scene.settings.levels)["q1"]
     asked = np.abs(q1.preview(0.0, 1e-3, 4000).velocity).max()
@@ -251,13 +253,13 @@ def test_RT4_asks_joint_1_for_more_than_its_data_sheet_allows() -> None:
 
 
 def test_one_digit_of_a_coarse_encoder_is_almost_3_newton_metres() -> None:
-    """*Sensors are coarse*: M̄ δ/T_s²."""
+    """*Sensors are coarse*: the size of one digit in the torque is M̄ δ/T_s²."""
     M_bar = float(torque_scene("planar3-circle").settings.M_bar[0])
     assert M_bar * math.radians(0.005) / 1e-6 == pytest.approx(2.9, abs=0.05)
 
 
 def test_texts_that_name_a_step_time_name_the_readmes() -> None:
-    """*How far ahead* and *Deadlines* quote the results of `benchmarks/` that the README prints."""
+    """*How far ahead* and *Deadlines* quote the results of `benchmarks/` that are printed in the README."""
     text = load_lesson("how-far-ahead").steps[0].text
     readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
     quoted = re.findall(r"0\.\d\d", text)

@@ -1,4 +1,5 @@
-"""The exercise of the distance row: `now.near` is what it says, and its mistakes are told apart."""
+"""In the exercise of the distance row, `now.near` contains what is documented, and the mistakes are
+distinguished."""
 
 from __future__ import annotations
 
@@ -28,7 +29,7 @@ RIGHT = law_of(execute(Source("right.py", DISTANCE)))()
 
 
 def seen_by(views: list[View], law: Law, settings: TorqueSettings, robot: Robot) -> OwnController:
-    """A controller that runs a law and keeps every view."""
+    """Returns a controller that runs a law and stores every view that the law receives."""
 
     def call(law: Law, view: View) -> object:
         views.append(view)
@@ -38,7 +39,7 @@ def seen_by(views: list[View], law: Law, settings: TorqueSettings, robot: Robot)
 
 
 def seen(law: Law) -> list[View]:
-    """What a law sees on the way past the post."""
+    """Returns the views that a law receives while the robot passes the post."""
     found: list[View] = []
     scene = as_torque_scene(EXERCISE.checks(0)[-1].run.prepared(), "it")
     session = TorqueSession(scene, controllers=partial(seen_by, found, law))
@@ -50,13 +51,13 @@ def seen(law: Law) -> list[View]:
 
 @pytest.fixture(scope="module")
 def views() -> list[View]:
-    """What the right solution sees."""
+    """The views that the right solution receives."""
     return seen(RIGHT)
 
 
 def test_a_known_mistake_of_the_distance_row_is_named_and_a_right_row_is_not(views: list[View]) -> None:
-    """Each mistake is recognised by its torques where a right solution leads, and where one without rows
-    does."""
+    """Each mistake is recognised by its torques at the views of a right solution and of a solution without
+    rows."""
     blind = next(each for each in EXERCISE.mistakes if "no pair" in each.says).make()
     chosen = [*views[::20], *seen(blind)[::20]]
     told = []
@@ -70,7 +71,7 @@ def test_a_known_mistake_of_the_distance_row_is_named_and_a_right_row_is_not(vie
 
 
 def test_every_check_of_the_distance_row_is_failed_by_a_mistake() -> None:
-    """The mistakes name the check that they must fail, which the test of all mistakes holds them to."""
+    """Each mistake names the check that it must fail; another test of all mistakes verifies that it does."""
     named = [each.fails for each in MISTAKES["distance-row"].values() if each.fails]
     for check in EXERCISE.checks(0):
         assert any(words in check.text for words in named), check.text

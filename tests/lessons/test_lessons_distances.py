@@ -1,4 +1,5 @@
-"""Scenes that keep distances: what is dragged into something stops before it, and both routes agree."""
+"""In scenes that keep distances, a robot that is dragged towards an object stops before it, and both routes
+agree."""
 
 from __future__ import annotations
 
@@ -28,7 +29,8 @@ def scene(name: str, *changes: str) -> TorqueScene:
 
 
 def test_an_arm_that_is_dragged_into_the_floor_stops_before_it_and_comes_to_rest() -> None:
-    """With rows it touches nothing, is within its limits, and rests; without rows it hits the floor."""
+    """With rows of distances the arm touches nothing, stays within its limits, and comes to rest; without
+    them it hits the floor."""
     found = run(replace(scene("iiwa14-hold", "avoidance.on=true"), events=DOWN), 4.0)
     session = found.session
     assert isinstance(session, TorqueSession)
@@ -40,12 +42,13 @@ def test_an_arm_that_is_dragged_into_the_floor_stops_before_it_and_comes_to_rest
 
 
 def by_theory(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Makes controllers use `StallGuard`, parts of which a test can replace, on the compiled route too."""
+    """Makes controllers use `StallGuard` on the compiled route as well; a test can replace parts of it."""
     monkeypatch.setattr(stall_guard, "CompiledStallGuard", stall_guard.StallGuard)
 
 
 def test_without_the_stall_the_arm_would_not_come_to_rest(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The same drag, with joints that stay as fast as their limits allow: they move on above the floor."""
+    """The arm is dragged in the same way, but its joints may be as fast as their limits permit. They continue
+    to move above the floor."""
     by_theory(monkeypatch)
     monkeypatch.setattr(stall_guard, "slowed", lambda limits, _: limits)
     found = run(replace(scene("iiwa14-hold", "avoidance.on=true"), events=DOWN), 4.0)
@@ -56,9 +59,9 @@ def test_without_the_stall_the_arm_would_not_come_to_rest(monkeypatch: pytest.Mo
 def test_a_joint_that_others_accelerate_stays_within_its_velocity_limit(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Two drags with a turn move five joints of a panda near their limits at once; the true inertia of the
-    third one is 70 times M̄, so that its torque acts late. Without the look ahead and the margin it overruns
-    its limit, although every row is met at every tick."""
+    """Two drags with a turn move five joints of a panda near their limits at the same time. The true inertia
+    of the third joint is 70 times M̄, so that its torque acts late. Without the look ahead and the margin,
+    this joint overruns its limit, although every row is satisfied at every tick."""
     drags = (
         (0.0, MoveTarget("position", (0.3506, -0.1572, 0.3096))),
         (0.0, MoveTarget("orientation", (0.8861, 0.3817, -0.1184, 0.2346))),
@@ -80,8 +83,8 @@ def test_a_joint_that_others_accelerate_stays_within_its_velocity_limit(
 
 
 def test_both_routes_keep_the_same_distances() -> None:
-    """Near the floor, with rows of distances that hold a level, torques and bounds of the two routes are
-    those of one problem."""
+    """Near the floor, active rows of distances limit a level; both routes have the torques and bounds of the
+    same problem."""
     quick = replace(scene("iiwa14-hold", "avoidance.on=true"), events=DOWN)
     leader = TorqueSession(quick)
     while not any(each.kind == "distance" for each in leader.binding()):
@@ -115,8 +118,9 @@ def test_both_routes_keep_the_same_distances() -> None:
 
 
 def test_a_filter_behind_the_levels_is_listed_and_recorded() -> None:
-    """Where it acts, its pair has a name, its leak into the levels and the bits of its bounds are in the
-    row, and the recorded distance is the nearest one of that pair; both routes write the same row."""
+    """When the filter is active, its pair has a name, and the row contains its leak into the levels and the
+    bits of its bounds. The recorded distance is the nearest one of that pair, and both routes write the same
+    row."""
     for route in ("compiled", "explicit"):
         session = TorqueSession(
             replace(
@@ -144,8 +148,8 @@ def test_a_filter_behind_the_levels_is_listed_and_recorded() -> None:
 
 
 def test_distances_are_measured_where_there_is_something_to_measure() -> None:
-    """Not in a scene with a floor alone, unless distances are kept; among objects always, but the bound is
-    NaN where none is kept."""
+    """With only a floor, distances are measured only if they are kept. Among objects they are always
+    measured, but the bound is NaN if none is kept."""
     rows = [TorqueSession(each).tick().copy() for each in (
         scene("iiwa14-hold"), scene("iiwa14-hold", "avoidance.on=true"), scene("iiwa14-table"),
     )]  # fmt: skip
@@ -155,15 +159,15 @@ def test_distances_are_measured_where_there_is_something_to_measure() -> None:
 
 
 def test_a_scene_without_rows_of_distances_is_as_before() -> None:
-    """Switched off, neither d_safe nor any other of the settings changes a bit of the run."""
+    """If avoidance is switched off, neither d_safe nor another of its settings changes a bit of the run."""
     plain = run(scene("iiwa14-hold"), 0.1)
     changed = run(scene("iiwa14-hold", "avoidance.d_safe=0.1", "avoidance.pull=0.01"), 0.1)
     assert np.array_equal(plain["tau"], changed["tau"])
 
 
 def test_an_own_robot_gets_contacts_and_rows_from_its_urdf_alone(tmp_path: Path) -> None:
-    """A generated arm, and a lamp without a collision shape, both dragged into their foot: without rows they
-    press on it, with rows they touch nothing, by MuJoCo's geometry."""
+    """A generated arm, and a lamp without a collision shape, are dragged into their own foot. According to
+    MuJoCo's geometry, they press on it without rows of distances, and touch nothing with them."""
     arm = tmp_path / "arm.urdf"
     arm.write_text(generated(3))
     drag = ((0.0, MoveTarget("position", (0.03, 0.0, 0.02))),)

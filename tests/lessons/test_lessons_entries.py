@@ -1,4 +1,4 @@
-"""The table of settings, from which the page, lists and messages are made."""
+"""The page, lists and messages are made from one table of settings."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_every_setting_stands_in_the_table_and_its_ends_are_allowed(scene: str) 
     settings = settings_of(scene)
     for path in settings.paths():
         if re.fullmatch(r"levels\.\d+\..*", path):
-            continue  # by place, which is the same as by name
+            continue  # the path with the place of a level is equivalent to the path with its name
         assert any(entry.at(path) for entry in settings.entries), f"no entry for {path}"
         entry, form = settings.entry(path), settings.place(path).form
         assert entry.label and entry.name, path
@@ -44,7 +44,7 @@ def test_every_setting_stands_in_the_table_and_its_ends_are_allowed(scene: str) 
 
 
 def test_the_tables_hold_nothing_else() -> None:
-    """An entry that no scene has is a typing error, or belongs to a removed setting."""
+    """An entry that no scene has is a typing error, or belongs to a setting that was removed."""
     known = {path for scene in SCENES for path in settings_of(scene).paths()} | {"gains.1"}
     for entry in (*TORQUE_ENTRIES, *VELOCITY_ENTRIES):
         assert any(entry.at(path) for path in known), entry.path
@@ -94,7 +94,7 @@ def test_one_gain_of_several() -> None:
 
 
 def test_a_level_is_read_by_its_name_wherever_it_stands() -> None:
-    """A control of the page keeps its path while the order of the levels changes."""
+    """A control of the page keeps its path when the order of the levels changes."""
     settings = settings_of("planar3-hold")
     read = settings.place("levels.position.Q").read
     names = settings.value_at("order")

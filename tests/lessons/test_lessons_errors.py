@@ -1,4 +1,4 @@
-"""Errors of orientations and pointing axes in the closed loops of sessions."""
+"""The errors of orientations and pointing axes decay in the closed loops of sessions."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from lessons.session.torque import TorqueSession
 )
 def test_a_large_free_rotation_does_not_undo_the_orientation(turn: OrientationTask) -> None:
     """With K_p = 50 and K_v = 5 on x and y and a rotation of 120° about z, an error of 3° decays within a
-    second. As components of log₃ it would have grown to 14° (real part 1.6 1/s)."""
+    second. If its components were those of log₃, it would have grown to 14° (real part 1.6 1/s)."""
     scene = torque_scene("iiwa14-hold")
     levels = (Level((FramePosition(name="position"),)), Level((turn,)), Level((Posture(name="posture"),)))
     session = TorqueSession(replace(scene, settings=replace(scene.settings, levels=levels)))
@@ -48,8 +48,8 @@ def test_a_large_free_rotation_does_not_undo_the_orientation(turn: OrientationTa
 
 
 def test_an_axis_follows_a_point_that_moves() -> None:
-    """The point moves on a circle at 0.45 m/s, under a model-based controller; without second-order terms the
-    error would be 1.6°."""
+    """The point moves on a circle at 0.45 m/s, and the controller is model-based; without second-order terms
+    the error would be 1.6°."""
     scene = torque_scene("iiwa14-hold")
     look = Pointing(name="look", K_p=50.0, K_v=14.0)
     levels = (Level((look,)), Level((FramePosition(name="position"),)), Level((Posture(name="posture"),)))

@@ -1,4 +1,4 @@
-"""Events are data in a mailbox; at their tick they take effect or are refused in one sentence."""
+"""Events are data in a mailbox. At their tick they take effect, or are refused in one sentence."""
 
 from __future__ import annotations
 
@@ -39,7 +39,8 @@ def test_what_is_no_event_is_refused(data: dict[str, Any]) -> None:
 
 
 def test_an_event_waits_for_the_next_tick(session: TorqueSession) -> None:
-    """Nothing changes before the tick that reads the mailbox; then the event is in the log with its time."""
+    """Nothing changes before the tick that reads the mailbox; then the log contains the event with its
+    time."""
     session.tick()
     session.post(Set("horizon", 8))
     assert session.settings.horizon == 5
@@ -89,7 +90,7 @@ REFUSED: list[Event] = [
 
 @pytest.mark.parametrize("event", REFUSED, ids=str)
 def test_a_refused_event_leaves_a_notice_and_changes_nothing(scene: TorqueScene, event: Event) -> None:
-    """The learner reads one sentence; settings, plant and motion are the same as without the event."""
+    """The learner reads one sentence. Settings, plant and motion are the same as without the event."""
     session, quiet = TorqueSession(scene), TorqueSession(scene)
     session.tick()
     quiet.tick()
@@ -111,7 +112,7 @@ def test_a_fixed_motion_cannot_be_dragged() -> None:
 
 
 def test_reset_goes_back_to_the_start_and_keeps_the_settings(session: TorqueSession) -> None:
-    """After a reset the first rows are the same again, with the present settings."""
+    """After a reset the first rows are repeated, with the present settings."""
     session.post(Set("horizon", 3))
     first = session.tick().copy()
     session.post(MoveTarget("position", (0.5, 0.3, 0.5)))
@@ -140,7 +141,7 @@ def test_a_push_ends(session: TorqueSession) -> None:
 
 
 def test_pushes_of_two_lengths_do_not_add_up(session: TorqueSession) -> None:
-    """A new push replaces the previous one and its duration."""
+    """A new push replaces the previous push and its duration."""
     session.tick()
     session.post(Push(session.robot.joint_names[3], force=(0.0, 5.0, 0.0), seconds=10.0))
     session.tick()
@@ -153,7 +154,7 @@ def test_pushes_of_two_lengths_do_not_add_up(session: TorqueSession) -> None:
 
 
 def test_scripted_events_come_in_their_time(scene: TorqueScene) -> None:
-    """A scene's own events take effect at the tick of their time, also after a reset."""
+    """The events of a scene take effect at the tick of their time, also after a reset."""
     scripted = replace(scene, events=((0.005, Set("horizon", 2)), (0.01, Set("horizon", 3))))
     session = TorqueSession(scripted)
     horizons = []

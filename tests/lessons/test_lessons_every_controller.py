@@ -26,8 +26,8 @@ def record(robot: str, controller: str, seconds: float) -> Recording:
 @pytest.mark.parametrize("robot", ROBOTS)
 @pytest.mark.parametrize("controller", CONTROLLERS)
 def test_every_controller_holds_every_robot(controller: str, robot: str) -> None:
-    """In 2 s of the hold scene the values are finite and the robot stays in place; a second run gives bitwise
-    the same first 0.3 s."""
+    """For 2 s of the hold scene the values are finite and the robot stays in place. A second run gives
+    bitwise the same first 0.3 s."""
     first, again = record(robot, controller, SECONDS), record(robot, controller, AGAIN)
     assert first.session.settings.controller == controller
     assert len(first.rows) == round(SECONDS / first.session.settings.T_s)

@@ -1,4 +1,4 @@
-"""Every kind of task on every robot of the catalog is held, and dragged to a reachable target."""
+"""Every kind of task is held on every robot of the catalog, and dragged to a reachable target."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ ROBOTS = {"planar3": 2.0, "iiwa14": 1.3, "panda": 1.5, "baxter": 1.5, "ridgeback
 
 @pytest.mark.parametrize("first", range(len(ROBOTS)), ids=list(ROBOTS))
 def test_every_kind_of_task_settles(first: int) -> None:
-    """Errors are within 1 mm or 0.1°; each kind of task runs under each controller on some robot. `python -m
-    benchmarks.every_task` tests all combinations."""
+    """Errors are within 1 mm or 0.1°, and each kind of task runs with each controller on some robot. `python
+    -m benchmarks.every_task` tests all combinations."""
     robot, seconds = list(ROBOTS.items())[first]
     for place, kind in enumerate(KINDS):
         found = measured(robot, kind, CONTROLLERS[(first + place) % 2], seconds=seconds)

@@ -1,5 +1,5 @@
-"""Every sentence that gives a reason is tested: an intervention quotes it, it says that the reason is given,
-or it is exempt by name, with the test that holds it instead."""
+"""Every sentence that gives a reason is tested: an intervention quotes it, the sentence says that the reason
+is given, or it is exempt by name, together with the test that checks it instead."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def test_every_reason_is_held() -> None:
 
 
 def test_a_reason_whose_row_is_missing_is_found() -> None:
-    """If the only row that quotes a sentence is removed, the sentence is found."""
+    """If the only row that quotes a sentence is removed, the test reports the sentence."""
     says = "because by then the torques had changed so as to push back"
     (lost,) = left(told(), [row for row in ROWS if row.says != says], EXEMPT)
     assert lost[0] == "one-task/0" and says in lost[1]
@@ -88,7 +88,7 @@ def test_an_exemption_names_the_test_that_holds_it() -> None:
 
 
 def test_every_step_is_measured_beyond_its_claims() -> None:
-    """Each step has a row of the interventions, a number that is quoted, or a test of its own."""
+    """For each step there is a row of the interventions, a number that is quoted, or a separate test."""
     named = {at for group in EXEMPT if group.held_by for at, _ in group.sentences}
     held = named | {row.at for row in ROWS} | {each.step for each in QUOTED}
     steps = {f"{name}/{k}" for name in COURSE for k in range(len(load_lesson(name).steps))}
@@ -96,8 +96,7 @@ def test_every_step_is_measured_beyond_its_claims() -> None:
 
 
 def test_every_likely_cause_is_held_or_not_known() -> None:
-    """On the page of disagreements, each likely cause is tested by a run, or the text says that it is not
-    known."""
+    """On the page of disagreements, a run tests each likely cause, or the text says that it is not known."""
     own = ("The cost (41) contains", "The rule.", "How wrong the paper's identified model was")
     for name, topic in topics().items():
         cause = " ".join(topic.cause.split())
@@ -106,7 +105,7 @@ def test_every_likely_cause_is_held_or_not_known() -> None:
 
 
 def test_the_walk_reaches_every_page_of_the_site() -> None:
-    """The texts include the site's documents, and each of these words counts as a reason."""
+    """The texts include the documents of the site, and each of these words counts as a reason."""
     assert set(texts.IN_DOCS) <= set(DOCUMENTS)
     assert all((ROOT / file).exists() for file in DOCUMENTS.values())
     places = {place.split("/")[0] for place, _ in walked()}

@@ -1,4 +1,4 @@
-"""Exported scripts: run as separate programs, they repeat a live run bitwise."""
+"""Exported scripts run as separate programs and repeat a live run bitwise."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ Events = Sequence[tuple[float, Event]]
 
 
 def live(state: RunSpec, events: Events, seconds: float) -> tuple[Any, dict[str, np.ndarray]]:
-    """Runs a session by its mailbox, as the page does. Returns the session and its rows since the reset."""
+    """Runs a session through its mailbox, as the page does. Returns the session and its rows since the
+    reset."""
     scene = state.prepared()
     session: Any
     if isinstance(scene, TorqueScene):
@@ -41,7 +42,7 @@ def live(state: RunSpec, events: Events, seconds: float) -> tuple[Any, dict[str,
         while waiting and waiting[0][0] <= ran + 1e-9:
             session.post(waiting.pop(0)[1])
         before = session.t
-        # While paused, events take effect before the next tick.
+        # While the session is paused, events take effect before the next tick.
         session.drain()
         rows = [] if session.t < before else rows
         before = session.t
@@ -53,7 +54,7 @@ def live(state: RunSpec, events: Events, seconds: float) -> tuple[Any, dict[str,
 
 
 def repeated(text: str, folder: Path) -> dict[str, np.ndarray]:
-    """Returns the data that the script saves when it is run as a separate program."""
+    """Runs the script as a separate program and returns the data that it saves."""
     path, out = folder / "run.py", folder / "run.npz"
     path.write_text(text)
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
@@ -117,8 +118,8 @@ MOBILE: Events = (
 def test_a_script_repeats_the_run_to_the_last_bit(
     state: RunSpec, events: Events, seconds: float, tmp_path: Path
 ) -> None:
-    """The run contains drags, pushes, level moves, settings and a reset; the rows since the reset are
-    equal."""
+    """The run contains drags, pushes, level moves, settings and a reset; the script gives the same rows after
+    the reset."""
     session, rows = live(state, events, seconds)
     assert session.notices == []
     assert len(session.log) == len(events)
@@ -132,7 +133,7 @@ def test_a_script_repeats_the_run_to_the_last_bit(
 
 
 def test_a_script_is_short_and_reads_like_one(tmp_path: Path) -> None:
-    """The script of an unchanged run has thirty lines; each setting or drag adds one."""
+    """The script of an unchanged run has thirty lines, and each setting or drag adds one line."""
     state = RunSpec("planar3-hold", set=("horizon=7",))
     plain = script(state, (), 0.5)
     assert len(plain.splitlines()) <= 30
@@ -144,7 +145,7 @@ def test_a_script_is_short_and_reads_like_one(tmp_path: Path) -> None:
 
 
 def test_settings_before_a_reset_become_settings_of_the_script() -> None:
-    """Events that a reset undoes are left out; lasting changes are among the settings, once each."""
+    """Events that a reset undoes are omitted; each lasting change is among the settings once."""
     log: Events = [
         (0.1, Set("horizon", 9)),
         (0.2, Set("horizon", 8)),

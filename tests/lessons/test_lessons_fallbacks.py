@@ -1,4 +1,4 @@
-"""The largest cost of a tick of a session."""
+"""The cost of a tick of a session is limited, also if levels have no solution."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from lessons.session.torque import TorqueSession
 
 
 def test_a_cycle_at_a_small_problem_ends_early() -> None:
-    """At N = 1 on a planar arm with random states, cycling ends before the budget of a large problem is used
-    (it once took 44 ms, found by `benchmarks.fuzz`)."""
+    """For N = 1 on a planar arm with random states, cycling ends before the budget of a large problem is
+    used. It once took 44 ms, found by `benchmarks.fuzz`."""
     scene = torque_scene("planar3-singular")
     session = TorqueSession(replace(scene, settings=replace(scene.settings, horizon=1)))
     session.tick()
@@ -30,7 +30,8 @@ def test_a_cycle_at_a_small_problem_ends_early() -> None:
 
 @pytest.mark.parametrize("controller", ["himpc", "nhimpc", "weighted"])
 def test_a_hostile_state_costs_no_more_than_the_budget_of_a_tick(controller: str) -> None:
-    """For all states, the kernel's changes of active rows stay within the budget of the tick."""
+    """For all states, the number of changes of active rows in the kernel stays within the budget of the
+    tick."""
     scene = torque_scene("iiwa14-hold")
     session = TorqueSession(
         replace(scene, settings=replace(scene.settings, horizon=20, controller=controller))
@@ -45,14 +46,14 @@ def test_a_hostile_state_costs_no_more_than_the_budget_of_a_tick(controller: str
         plan = session.controller.step(q, v, outlook, session.robot.tau_limit * rng.normal(size=7))
         assert (np.abs(plan.tau) <= session.robot.tau_limit).all()
         spent.append(BUDGET - kernel.arena.f["budget"][0])
-    # A change of rows that has begun is completed; it costs far less than a tenth of the budget.
+    # A change of rows that has begun is completed; its cost is far below a tenth of the budget.
     assert max(spent) <= 1.1 * BUDGET
     assert max(spent) > 0.0
 
 
 def test_nhimpc_asks_the_printed_route_a_few_times_a_tick(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Ten iterations of three unsolved levels could call the printed route thirty times, each call a
-    millisecond or more (`benchmarks.fuzz` once found 24 calls, 33 ms); the number is limited."""
+    """Ten iterations of three unsolved levels could call the printed route thirty times, and each call takes
+    a millisecond or more. `benchmarks.fuzz` once found 24 calls, 33 ms; now the number is limited."""
     asked: list[str] = []
 
     def counted(*given: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Files and scenes: a row per tick, settings that reproduce a run, and the list of scenes."""
+"""Recorded files have a row per tick and settings that reproduce the run; every scene of the list loads."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def recorded(scene: TorqueScene) -> dict[str, Any]:
 
 
 def test_npz_holds_a_row_per_tick(recorded: dict[str, Any]) -> None:
-    """The file has times, joints, references and errors of every task, with their names."""
+    """The file contains times, joints, references and errors of every task, with their names."""
     assert recorded["t"].shape == (200,)
     np.testing.assert_allclose(np.diff(recorded["t"]), 1e-3)
     for name in ("q", "v", "tau", "tau_demand", "tau_lower", "tau_upper", "v_limit", "q_lower", "q_upper"):
@@ -45,7 +45,7 @@ def test_npz_holds_a_row_per_tick(recorded: dict[str, Any]) -> None:
 
 
 def test_the_settings_beside_it_reproduce_the_run(recorded: dict[str, Any]) -> None:
-    """Scene, settings, seed and timestamped events give bitwise the same torques."""
+    """A run with the same scene, settings, seed and timestamped events gives bitwise the same torques."""
     how = json.loads(str(recorded["settings"]))
     assert [event["event"] for event in how["events"]] == ["MoveTarget", "Set"]
     assert how["in_force"]["horizon"] == 3
@@ -58,7 +58,7 @@ def test_the_settings_beside_it_reproduce_the_run(recorded: dict[str, Any]) -> N
 
 
 def test_every_scene_loads_and_ticks() -> None:
-    """All scenes of the list load; 'hold' accepts any robot, also by its catalog name."""
+    """All scenes of the list load; 'hold' accepts any robot, also by its name in the catalog."""
     for name in SCENES:
         session = TorqueSession(torque_scene(name, "planar3" if name == "hold" else None))
         session.tick()

@@ -1,5 +1,5 @@
-"""All modules and compiled functions are loaded before the first tick, so that a moving robot waits for no
-import."""
+"""All modules and compiled functions are loaded before the first tick, so that a moving robot never waits for
+an import."""
 
 from __future__ import annotations
 
@@ -48,8 +48,8 @@ for name in sys.argv[1:]:
 
 
 def test_no_tick_imports_or_loads_anything() -> None:
-    """No import happens in the first tick of each controller, or when targets are first dragged. One process
-    runs all, because the first run would show a late import."""
+    """Nothing is imported in the first tick of a controller, or when targets are dragged for the first time.
+    One process executes all runs, because the first run would show a late import."""
     done = subprocess.run(
         [sys.executable, "-c", LOOK, *RUNS], capture_output=True, text=True, timeout=300, check=True
     )
