@@ -26,7 +26,7 @@ WITHOUT = TorqueBox(np.full(2, -np.inf), np.full(2, np.inf), ((None, None), (Non
 def running(
     *assignments: str, ticks: int = 30, by: float = 0.1, scene: str = "planar3-plane"
 ) -> TorqueSession:
-    """Returns a session in the middle of a motion, after its target was dragged aside."""
+    """Returns a session in the middle of a motion that began when its target was dragged aside."""
     session = TorqueSession(prepared(torque_scene(scene), None, assignments))
     name = session.layout.tasks[0].name
     target = session.target(name)
@@ -52,7 +52,7 @@ def test_geometry_and_solver_find_the_same_points(assignments: tuple[str, ...]) 
         assert plane.apart < 1e-6
         _, second, third = plane.levels
         assert max(level.apart for level in plane.levels) < 1e-9
-        # Only level 3 uses joint 3: the result of levels 1 and 2 is applied.
+        # Only level 3 uses joint 3, and the result of levels 1 and 2 is applied.
         assert np.allclose(second.solved, third.solved, atol=1e-9)
         assert [level.name for level in plane.levels] == ["reach", "pose", "wrist"]
 
@@ -61,7 +61,8 @@ def test_geometry_and_solver_find_the_same_points(assignments: tuple[str, ...]) 
     ("scene", "horizon"), [("planar3-hold", 1), ("iiwa14-hold", 1), ("planar3-circle", 1)]
 )
 def test_each_level_is_best_in_the_cut_through_its_own_solution(scene: str, horizon: int) -> None:
-    """In the plane of two joints, with the other joints at the level's solution, this solution is optimal."""
+    """In the plane of two joints, with the other joints at the solution of the level, this solution is
+    optimal."""
     session = TorqueSession(prepared(torque_scene(scene), None, (f"horizon={horizon}",)))
     for _ in range(200):
         session.advance()
@@ -73,8 +74,8 @@ def test_each_level_is_best_in_the_cut_through_its_own_solution(scene: str, hori
 
 
 def test_the_cost_is_the_solvers() -> None:
-    """The cost of a level at a point of the plane is the cost of its problem, (32a) or (34a), also with a
-    horizon of more than one knot; the ellipse through the point has this cost."""
+    """The cost of a level at a point of the plane is the cost of its problem, (32a) or (34a), also for a
+    horizon with more than one knot. The ellipse through the point has this cost."""
     session = running("horizon=4", scene="iiwa14-hold")
     tick = tick_of(session)
     held = np.array(tick.strict[-1].U)
@@ -113,7 +114,7 @@ def test_dragging_moves_both_optima_and_the_line() -> None:
     assert line.span.shape == (2, 1) and one.levels[0].allowed.span.shape == (2, 2)
     assert line.at is not None
     away = one.levels[1].solved - line.at
-    assert np.abs(away - line.span[:, 0] * (line.span[:, 0] @ away)).max() < 1e-9  # level 2 lies on it
+    assert np.abs(away - line.span[:, 0] * (line.span[:, 0] @ away)).max() < 1e-9  # level 2 is on the line
 
 
 def test_swapping_levels_swaps_their_roles() -> None:
@@ -124,7 +125,7 @@ def test_swapping_levels_swaps_their_roles() -> None:
     after = plane_of(session, JOINTS, "applied")
     assert [level.name for level in after.levels[:2]] == ["pose", "reach"]
     pose, reach = after.levels[:2]
-    assert np.allclose(pose.solved, pose.centre, atol=1e-6)  # level 1 has its least cost
+    assert np.allclose(pose.solved, pose.centre, atol=1e-6)  # level 1 has its lowest cost
     assert reach.allowed.span.shape == (2, 0)  # with two coordinates, only a point is left
     assert np.allclose(reach.solved, pose.solved, atol=1e-6)
     was = before.levels[1]
@@ -133,8 +134,8 @@ def test_swapping_levels_swaps_their_roles() -> None:
 
 
 def test_a_torque_bound_cuts() -> None:
-    """Level 2 would move further along the freedom that level 1 leaves, but the bound limits it. Level 1 is
-    not affected."""
+    """Level 2 would move further in the directions that level 1 leaves free, but the bound stops it. Level 1
+    is not affected."""
     free, tight = (
         plane_of(running(*set_, ticks=150), JOINTS, "applied") for set_ in ((), ("limits.torque_scale=0.01",))
     )
@@ -158,7 +159,7 @@ def test_what_one_cost_of_all_would_ask_for_is_what_weighted_asks_for() -> None:
     plane = plane_of(session, JOINTS, "applied")
     assert plane.weighted is not None and session.plan is not None and guess is not None
     assert np.allclose(plane.weighted, session.plan.levels[-1].U[0, :2])
-    assert plane.apart < 1e-6  # the strict hierarchy of the same tick
+    assert plane.apart < 1e-6  # the solution of the strict hierarchy in the same tick
     strict = plane.levels[1]
     assert np.linalg.norm(plane.weighted - strict.solved) > 1e-4
 
@@ -173,7 +174,7 @@ def test_a_controller_without_such_a_qp_says_so() -> None:
     fresh.advance()
     fresh.post(Set("horizon", 2))
     fresh.drain()
-    with pytest.raises(InputError):  # the new settings have not been solved yet
+    with pytest.raises(InputError):  # the problem with the new settings has not been solved yet
         plane_of(fresh, JOINTS, "applied")
 
 
@@ -219,8 +220,8 @@ def test_a_cut_that_misses_what_is_allowed_says_so() -> None:
 
 
 def test_ellipsoids_hold_every_velocity_that_is_left() -> None:
-    """Joint velocities of unit length, projected off the levels above, are inside the ellipsoids and reach
-    their boundary."""
+    """Joint velocities of unit length, projected on the null space of the levels above, are inside the
+    ellipsoids and reach their boundary."""
     scene = torque_scene("iiwa14-hold")
     robot, stack = scene.robot, scene.settings.levels
     here = Configuration(robot, robot.model.createData(), robot.home, np.zeros(robot.n))

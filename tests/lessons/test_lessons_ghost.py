@@ -1,4 +1,4 @@
-"""A ghost follows the script of its leader, tick by tick and bitwise."""
+"""A ghost repeats the script of its leader, tick by tick and bitwise."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def scene() -> TorqueScene:
 
 
 class Pair:
-    """A leader that receives events, and a ghost that receives only the leader's log."""
+    """A leader that receives events, and a ghost that receives only the log of the leader."""
 
     def __init__(self, scene: TorqueScene, *own: str) -> None:
         self.leader = TorqueSession(scene)
@@ -52,7 +52,7 @@ class Pair:
             self.leader.post(event)
 
     def compare(self) -> tuple[np.ndarray, np.ndarray]:
-        """Returns the rows of both with the measured times set to zero."""
+        """Returns the rows of both, with zeros in place of the measured times."""
         timed = [self.leader.layout.fields["step_us"]]
         timed += [self.leader.layout.fields[f"time_us/{name}"] for name in self.leader.layout.levels]
         both = tuple(np.array(rows) for rows in self.rows)
@@ -67,7 +67,7 @@ def hand(pair: Pair) -> np.ndarray:
 
 
 def test_equal_settings_give_equal_rows_whatever_happens(scene: TorqueScene) -> None:
-    """Events of every kind at arbitrary times reach the ghost in portions of different sizes, also during
+    """Events of every kind at arbitrary times reach the ghost in groups of different sizes, also during
     pauses."""
     pair = Pair(scene)
     rng = np.random.default_rng(3)
@@ -87,7 +87,7 @@ def test_equal_settings_give_equal_rows_whatever_happens(scene: TorqueScene) -> 
             pair.follow()  # otherwise the ghost would skip rows before a reset
         pair.post(*events)
         if rng.random() < 0.5:
-            pair.leader.drain()  # posted while paused, so it takes effect before the next tick
+            pair.leader.drain()  # posted during a pause, so it takes effect before the next tick
             pair.tell()
         pair.lead(int(rng.integers(1, 60)))
         pair.follow()
@@ -122,7 +122,7 @@ def test_what_makes_the_difference_stays_and_all_else_carries_over(scene: Torque
 
 
 def test_a_change_of_the_difference_itself_is_not_even_noticed(scene: TorqueScene) -> None:
-    """The leader changes N; a ghost with its own N is not affected."""
+    """The leader changes N; a ghost that has its own N is not affected."""
     moved, left = Pair(scene, "horizon=2"), Pair(scene, "horizon=2")
     for N in (7, 9, 3):
         moved.post(Set("horizon", N))

@@ -1,4 +1,4 @@
-"""Grading: a correct solution gets all points, and a known mistake fails the check for it."""
+"""Grading gives all points to a correct solution, and a known mistake fails the check that is made for it."""
 
 from __future__ import annotations
 
@@ -43,15 +43,15 @@ def file(tmp_path: Path):
 
 @pytest.fixture(scope="module")
 def marked() -> Iterator[Callable[..., Grade]]:
-    """Runs `grade` or `grade_apart` in a process with one thread, like the command; it imports the common
-    modules once."""
+    """Runs `grade` or `grade_apart` in a process with one thread, as the command does; the process imports
+    the common modules once."""
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
         yield lambda grader, *args: pool.submit(grader, *args).result()
 
 
 @dataclass(frozen=True)
 class Graded:
-    """The results of a folder: its table, as returned and as written, and each file's grade."""
+    """The results of a folder: its table, as returned and as written, and the grade of each file."""
 
     rows: list[Row]
     table: str
@@ -61,7 +61,7 @@ class Graded:
 
 @pytest.fixture(scope="module")
 def thirty(tmp_path_factory: pytest.TempPathFactory) -> Graded:
-    """The grades of all submissions, on all cores."""
+    """The grades of all submissions, computed on all cores."""
     place, shares, grades = tmp_path_factory.mktemp("thirty"), [], {}
 
     def kept(function: Callable[[Any], Any], items: Sequence[Any]) -> Generator[tuple[int, Any]]:
@@ -76,8 +76,8 @@ def thirty(tmp_path_factory: pytest.TempPathFactory) -> Graded:
 
 @dataclass(frozen=True)
 class Near:
-    """Runs a submission in this process and starts no new process, for submissions that are wrong but do not
-    misbehave."""
+    """Runs a submission in this process and starts no new process; it is used for submissions that are wrong
+    but do not misbehave."""
 
     source: Source
 
@@ -98,7 +98,7 @@ class Near:
 
 
 def here(text: str, exercise: str, about: str = "") -> tuple[CheckResult, ...]:
-    """Returns the results of the checks whose text contains `about`, without a separate process."""
+    """Returns the results of the checks whose text contains `about`, computed without a separate process."""
     whole = load_exercise(exercise)
     chosen = replace(whole, checks=lambda seed: tuple(c for c in whole.checks(seed) if about in c.text))
     return judged_by(chosen, Near(Source("mine.py", text)), 0)
@@ -115,7 +115,7 @@ def test_right_solution_gets_every_grade_point(exercise: str, thirty: Graded) ->
 
 @pytest.mark.parametrize("exercise", EXERCISES)
 def test_a_right_solution_in_any_style_gets_every_grade_point(exercise: str) -> None:
-    """Each exercise has at least three styles; the first is the one in `thirty`."""
+    """Each exercise has at least three styles of solutions; `thirty` contains the first of them."""
     first, *others = STYLES[exercise]
     assert SUBMISSIONS[f"right_{exercise.replace('-', '_')}"].text == first
     assert len(others) >= 2
@@ -138,7 +138,7 @@ def test_a_known_mistake_costs_grade_points_and_is_named(exercise: str, name: st
 
 @pytest.mark.parametrize("exercise", EXERCISES)
 def test_every_grade_check_is_told_apart_by_a_mistake(exercise: str) -> None:
-    """Each exercise has at least eight mistakes, and the events of its checks are accepted."""
+    """For each exercise there are at least eight mistakes, and the events of its checks are accepted."""
     assert len(MISTAKES[exercise]) >= 8
     for check in load_exercise(exercise).checks(0):
         session = TorqueSession(as_torque_scene(check.run.prepared(), "it"))
@@ -180,7 +180,7 @@ def test_what_cannot_be_graded_is_a_sentence(what: str, file, marked) -> None:
         ("import subprocess; subprocess.run(['true'])", "may not do that"),
         ("import os; os.system('true')", "may not do that"),
         ("now.q[0] = 3", "read-only"),
-        ("print('x' * 10**5)", ""),  # more than fits into a pipe
+        ("print('x' * 10**5)", ""),  # more than a pipe can hold
         ("[0] * 10**13", "memory"),
     ],
 )
@@ -220,7 +220,7 @@ def test_what_never_ends_is_ended_and_its_grade_is_a_sentence(
 
 
 def test_a_grade_needs_no_file_where_it_is_made(tmp_path: Path) -> None:
-    """A worker of a cluster does not have the file system of the grading machine."""
+    """A worker on another machine of a cluster cannot read the files of the grading machine."""
     source = Source("far/away/mine.py", "def torque(now):\n    return now.q[:2]\n")
     found = grade_apart(Submission(source, "joint-pd"))
     assert found.file == "far/away/mine.py"
@@ -235,7 +235,7 @@ def folder_of(place: Path, names: Sequence[str]) -> Path:
 
 
 def test_thirty_submissions_get_the_grades_they_deserve(thirty: Graded, tmp_path: Path, marked) -> None:
-    """No submission loses points because of another one, and a second grading gives the same table."""
+    """No submission loses points because of another submission, and a second grading gives the same table."""
     assert len(thirty.rows) == len(SUBMISSIONS)
     found = {row["file"].removesuffix(".py"): row for row in thirty.rows}
     assert {name: int(row["points"]) for name, row in found.items()} == {
@@ -256,7 +256,7 @@ def test_thirty_submissions_get_the_grades_they_deserve(thirty: Graded, tmp_path
 
 
 def test_grades_of_a_folder_are_carried_on(tmp_path: Path, marked) -> None:
-    """After an interruption and a change of one file, finished files are not graded again."""
+    """After an interruption and a change of one file, files that were already graded are not graded again."""
     graded: list[str] = []
 
     def counted(function, items) -> Generator:

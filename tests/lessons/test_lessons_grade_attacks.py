@@ -1,4 +1,4 @@
-"""Attacks by graded submissions are refused, with the protection of the operating system and without it."""
+"""Attacks by graded submissions are refused, with and without the protection of the operating system."""
 
 from __future__ import annotations
 
@@ -58,8 +58,8 @@ def once(line: str) -> str:
 
 
 def said(text: str, now: View, kernel: bool = True, **limits) -> str:
-    """Returns the error message of a submission at its loading or at its first tick, or "" if there is
-    none."""
+    """Returns the error message of a submission when it is loaded or at its first tick, or "" if there is no
+    error."""
     try:
         with apart(text, kernel, **limits) as one:
             one.fresh()(now)
@@ -88,7 +88,8 @@ def test_a_grade_is_made_of_the_same_numbers_on_both_sides(now: View) -> None:
 
 
 def test_a_grade_needs_what_a_solution_may_use(now: View) -> None:
-    """A graded submission may use packages, the lab's QP solver, and the model at other configurations."""
+    """A graded submission may use packages, the QP solver of the lab, and the model at other
+    configurations."""
     text = """
 import dataclasses, pinocchio, scipy.linalg, scipy.optimize
 from himpc.qp import solve_qp
@@ -122,7 +123,7 @@ CHEATS = {
 
 @pytest.mark.parametrize("cheat", CHEATS)
 def test_a_grade_cannot_be_taken_from_the_grader(cheat: str, now: View) -> None:
-    """The process of a submission contains nothing of the grader."""
+    """The process of a submission contains no data of the grader."""
     refused = not CHEATS[cheat].startswith("def")
     assert ("cannot be imported during grading" in said(CHEATS[cheat], now)) == refused
     assert refused or said(CHEATS[cheat], now) == ""
@@ -144,7 +145,7 @@ ATTACKS = {
 @pytest.mark.parametrize("kernel", [True, False])
 @pytest.mark.parametrize("attack", ATTACKS)
 def test_a_grade_is_not_for_those_who_attack(attack: str, kernel: bool, now: View, tmp_path: Path) -> None:
-    """An attack is refused from every thread, and the message names it."""
+    """An attack is refused in every thread, and the message names the attack."""
     (tmp_path / "theirs.txt").write_text("def torque")
     answer = said(ATTACKS[attack].format(tmp_path), now, kernel)
     assert "a submission may not do that" in answer
@@ -175,7 +176,7 @@ def test_a_grade_is_not_for_those_who_go_below_python(now: View) -> None:
 @linux
 @pytest.mark.parametrize("how", ["sleep 100", "setsid sleep 100"])
 def test_a_grade_leaves_no_process_behind_without_the_systems_help(how: str, now: View) -> None:
-    """Child processes are ended with the submission, also those that moved to a session of their own."""
+    """Child processes are ended together with the submission, also those that moved to another session."""
     text = SPAWN.format(how) + once("spawn()")
     one = apart(text, kernel=False)
     try:
@@ -255,8 +256,8 @@ def test_a_grade_process_ends_with_the_lab(now: View) -> None:
 
 
 def test_a_table_of_grades_is_no_program_of_a_spreadsheet(tmp_path: Path) -> None:
-    """Cells of the table never begin with a sign of a formula. A submission in another encoding, or with a
-    file name that is not UTF-8, does not end the grading of a folder."""
+    """Cells of the table never begin with a character that starts a formula. A submission in another
+    encoding, or with a file name that is not UTF-8, does not stop the grading of a folder."""
     folder, out = tmp_path / "all", tmp_path / "grades.csv"
     folder.mkdir()
     for name in ("=1+cmd|calc", "+1", "-1", "@x"):

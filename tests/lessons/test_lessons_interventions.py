@@ -1,4 +1,5 @@
-"""Every explanation that names a cause is tested by runs with and without this cause: the effect disappears.
+"""Every explanation that names a cause is tested by runs with and without this cause: without it, the effect
+disappears.
 
 `interventions` describes the rows, and `interventions_all` contains them.
 """
@@ -42,7 +43,7 @@ COMPARED = ("himpc", "tdeosf", "hiqp")
 
 @cache
 def told(at: str) -> str:
-    """Returns all text of a step, a derivation or a document, in one line."""
+    """Returns the complete text of a step, a derivation or a document, in one line."""
     kind, _, name = at.partition("/")
     if kind in COURSE:
         found = [texts(step_of(at))]
@@ -66,8 +67,8 @@ def test_an_explanation_stands_there(row: Intervention) -> None:
 
 @pytest.mark.parametrize("row", ROWS, ids=named)
 def test_a_row_can_fail(row: Intervention) -> None:
-    """The two ranges of a row do not overlap, or they overlap if the row says that the quantity is not the
-    cause; and the two runs of a row differ."""
+    """The two ranges of a row overlap only if the row says that the quantity is not the cause. The two runs
+    of a row differ."""
     (low, high), (low_gone, high_gone) = row.there, row.gone
     assert low < high and low_gone < high_gone
     apart = high < low_gone or high_gone < low
@@ -83,8 +84,8 @@ def test_without_its_cause_an_effect_goes(row: Intervention, course_runs: Course
 
 
 def test_a_multiplier_is_half_of_what_a_bound_costs_a_level() -> None:
-    """The glossary is right: for the costs (31), which have no factor one half, the price is twice the
-    multiplier."""
+    """The statement of the glossary is correct: for the costs (31), which have no factor one half, the price
+    is twice the multiplier."""
     scene = load_lesson("inside-the-qp").run_of(step_of("inside-the-qp/2")).prepared()
 
     def after(ticks: int, change: float) -> TorqueSession:
@@ -102,14 +103,15 @@ def test_a_multiplier_is_half_of_what_a_bound_costs_a_level() -> None:
     session.tick()
     layout, (bound,) = session.layout, session.binding()
     assert (bound.level, bound.kind) == ("pose", "torque")
-    room = 1e-5 * 4.0  # N·m: the motors give 4
+    room = 1e-5 * 4.0  # N·m: the limit of the motors is 4
     price = (cost(231, -1e-5) - cost(231, 1e-5)) / (2.0 * room)
     assert price == pytest.approx(2.0 * bound.multiplier, rel=1e-4)
     assert "by twice the bound's multiplier, per N·m" in told("inside-the-qp/2")
 
 
 def test_clipped_torques_do_not_lie_on_the_line() -> None:
-    """*Inside the QP*: OSF's torque, clipped joint by joint, changes the acceleration of level 1."""
+    """*Inside the QP*: if the torque of OSF is clipped joint by joint, the acceleration of level 1
+    changes."""
     assert "the clipped torques no longer lie on the orange line" in told("inside-the-qp/2")
     scene = load_lesson("inside-the-qp").run_of(step_of("inside-the-qp/2")).but("controller=osf").prepared()
     found = run(scene)
@@ -119,7 +121,7 @@ def test_clipped_torques_do_not_lie_on_the_line() -> None:
     plant.reset(found["q"][worst])
 
     def leak(room: float) -> float:
-        """Returns the change of level 1's acceleration by clipping, along x, m/s²."""
+        """Returns by how much clipping changes the acceleration of level 1 along x, m/s²."""
         lost = np.clip(tau[worst], -room * limit, room * limit) - tau[worst]
         return abs(float((plant.jacobian(scene.robot.tip) @ np.linalg.solve(plant.mass_matrix(), lost))[0]))
 
@@ -129,7 +131,7 @@ def test_clipped_torques_do_not_lie_on_the_line() -> None:
 
 @pytest.mark.parametrize(("K_p", "period"), [(100.0, 0.628), (400.0, 0.314)])
 def test_a_hand_without_a_damper_swings_like_the_wish(K_p: float, period: float) -> None:
-    """*One task*: the hand oscillates with ω = √K_P, also with another K_P."""
+    """*One task*: the hand oscillates with ω = √K_P, also for another K_P."""
     assert "thus a period of 0.63 s" in told("one-task/1")
     spec = load_lesson("one-task").run_of(step_of("one-task/1")).but(f"tasks.position.K_p={K_p}")
     found = run(replace(spec, duration=3.0).prepared())
@@ -140,8 +142,8 @@ def test_a_hand_without_a_damper_swings_like_the_wish(K_p: float, period: float)
 
 
 def test_the_average_cost_of_a_noisy_run_is_noise() -> None:
-    """The page of disagreements is right: the average cost (41) contains a measured acceleration, whose noise
-    is nearly equal for the three controllers."""
+    """The statement of the page of disagreements is correct: the average cost (41) contains a measured
+    acceleration, and its noise is nearly equal for the three controllers."""
     assert "whose noise is nearly the same for all three" in told("disagreements")
 
     def costs(*more: str) -> list[float]:
@@ -154,7 +156,8 @@ def test_the_average_cost_of_a_noisy_run_is_noise() -> None:
 
 
 def test_TDEOSF_gets_through_without_leaving_out_singular_values(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The page of disagreements is right: TDEOSF starts equally well if no singular values are left out."""
+    """The statement of the page of disagreements is correct: TDEOSF starts equally well if all singular
+    values are kept."""
     assert "with all of them kept it starts as well" in told("disagreements")
 
     def largest() -> float:

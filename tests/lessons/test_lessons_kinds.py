@@ -1,4 +1,4 @@
-"""Tasks of every kind hold a robot at rest in a closed loop, and reach a target that is dragged a little."""
+"""In closed loop, tasks of every kind hold a robot at rest, and reach a target that is dragged a little."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Settings that change while the robot of a session moves."""
+"""Settings may change while the robot of a session moves."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from lessons.session.torque import TorqueSession
 
 
 def change_events(scene: TorqueScene) -> dict[str, list[Event]]:
-    """Returns every setting that a learner can change, each as events from the start of the scene."""
+    """Returns every setting that a learner can change, each as events for a session at its start."""
     names = [level.name for level in scene.settings.levels]
     M_bar = [1.5 * m for m in scene.settings.M_bar]
     singles = {
@@ -58,8 +58,8 @@ CASES = [
 
 @pytest.mark.parametrize(("name", "change"), CASES)
 def test_changes_at_rest_are_bumpless(name: str, change: str) -> None:
-    """On satisfied targets a change of a setting changes no torque by 5 % of its limit and moves the tip by
-    less than 1 mm."""
+    """If all targets are reached, a change of a setting changes no torque by 5 % of its limit and moves the
+    tip by less than 1 mm."""
     scene = torque_scene(name)
     session = TorqueSession(scene)
     rows_of(session, 20)
@@ -81,8 +81,8 @@ def test_changes_at_rest_are_bumpless(name: str, change: str) -> None:
 
 
 def test_a_level_enabled_with_a_large_error_fades_in(scene: TorqueScene) -> None:
-    """The weight Q of an enabled level increases over half a second: the torques change little at first, and
-    the task reaches its target."""
+    """The weight Q of a level that is enabled increases for half a second. The torques change little at
+    first, and the task reaches its target."""
     session = TorqueSession(scene)
     session.post(Set("levels.orientation.enabled", False))
     session.post(Set("levels.posture.enabled", False))
@@ -100,7 +100,7 @@ def test_a_level_enabled_with_a_large_error_fades_in(scene: TorqueScene) -> None
 
 def test_a_torque_limit_tightened_below_the_present_torque_closes_in(scene: TorqueScene) -> None:
     """The bound starts at the present torque and decreases without a step, and the demanded torque stays
-    inside it."""
+    within it."""
     session = TorqueSession(scene)
     rows_of(session, 20)
     present = np.abs(session.plant.tau / session.robot.tau_limit).max()

@@ -1,5 +1,5 @@
-"""Long horizons with many active bounds are solved; torques meet all rows also if a solver fails, and the arm
-brakes."""
+"""Long horizons with many active bounds are solved. If a solver fails, the torques still satisfy all rows,
+and the arm brakes."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ BOUND = {"0.3 of the speed": (30, 0.3, 110), "0.2": (30, 0.2, 50), "0.1": (20, 0
 
 @pytest.mark.parametrize("case", BOUND)
 def test_a_long_horizon_with_low_velocity_bounds_is_solved(case: str) -> None:
-    """With more than a hundred active rows the compiled route solves all but 1 % of the levels. (An earlier
-    version found no optimum from tick 97, or 40, on, all levels below inherited their solution, and the arm
-    reached up to 19 times its velocity limit.)"""
+    """With more than a hundred active rows, the compiled route solves all but 1 % of the levels. (An
+    earlier version found no optimum from tick 97, or 40, on. All levels below inherited the solution, and the
+    arm reached up to 19 times its velocity limit.)"""
     N, scale, ticks = BOUND[case]
     session = bound_circle(N, scale)
     unsolved, most, speed = 0, 0, 0.0
@@ -51,7 +51,7 @@ def bound_circle(N: int, scale: float) -> TorqueSession:
 
 
 def rows_kept(rows: Rows, U: Array) -> bool:
-    """Whether increments meet all rows, except for the slack that no increments can avoid."""
+    """Whether increments satisfy all rows, except for the slack that no increments can avoid."""
     slack = least_slack(rows)
     value = rows.L @ U
     return bool(((value <= rows.upper + slack + 1e-6) & (value >= rows.lower - slack - 1e-6)).all())
@@ -59,7 +59,7 @@ def rows_kept(rows: Rows, U: Array) -> bool:
 
 def test_a_larger_budget_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
     """A level uses the budget that the tick grants, and no other limit stops the solver. With a very small
-    budget the applied increments still meet all rows, and the arm stays near its velocity limit."""
+    budget, the applied increments still satisfy all rows, and the arm stays near its velocity limit."""
     found = {}
     for budget in (2e5, 1e9):
         monkeypatch.setattr(tick, "budget_of", lambda _, budget=budget: budget)
@@ -78,7 +78,7 @@ def test_a_larger_budget_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize("route", ["compiled", "explicit"])
 def test_an_arm_whose_solver_always_fails_is_braked(monkeypatch: pytest.MonkeyPatch, route: Route) -> None:
-    """If no QP is solved from one tick on, the joints come to rest within all rows."""
+    """If no QP is solved from one tick on, all rows hold and the joints come to rest."""
     scene = torque_scene("iiwa14-circle")
     session = TorqueSession(replace(scene, settings=replace(scene.settings, route=route)))
     for _ in range(150):

@@ -1,4 +1,4 @@
-"""A robot with a single moving joint can be loaded, holds its position and follows a dragged target."""
+"""A robot with only one moving joint can be loaded, holds its position and follows a dragged target."""
 
 from __future__ import annotations
 
@@ -27,7 +27,8 @@ KINDS = ("revolute", "prismatic")
 
 @cache
 def scene_of(kind: str) -> Scene:
-    """Returns the scene with the imported robot, cached, as each import starts a process."""
+    """Returns the scene with the imported robot. The result is cached, because each import starts a
+    process."""
     return load_scene("hold", urdf_text=ONE_JOINT.format(kind=kind))
 
 
@@ -42,7 +43,7 @@ def test_one_joint_holds_under_every_controller(controller: str, kind: str) -> N
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_one_joint_follows_a_dragged_target(kind: str) -> None:
-    """A target on the path of the joint is reached; a target beside the path leads to no error."""
+    """A target on the path of the joint is reached; a target beside the path causes no error message."""
     scene = scene_of(kind)
     there = (0.3 * np.cos(0.4), 0.3 * np.sin(0.4), 0.0) if kind == "revolute" else (0.3, 0.0, 0.4)
     moves = ((0.01, MoveTarget("position", there)),)

@@ -1,4 +1,5 @@
-"""OSF, TDEOSF and HQP compute the same torques with the kernel's kinematics as with Pinocchio's."""
+"""OSF, TDEOSF and HQP compute the same torques with the kinematics of the kernel and with those of
+Pinocchio."""
 
 from __future__ import annotations
 
@@ -18,8 +19,8 @@ from lessons.session.torque import TorqueSession
 def test_torques_are_those_of_pinocchio_s_kinematics(
     monkeypatch: pytest.MonkeyPatch, name: str, controller: str
 ) -> None:
-    """Two controllers receive the same states of a robot while targets are dragged and a level is off; their
-    torques agree to 1e-9 of the largest torque."""
+    """Two controllers receive the same states of a robot while targets are dragged and one level is disabled.
+    Their torques agree to 1e-9 of the largest torque."""
     scene = torque_scene(name)
     session = TorqueSession(replace(scene, settings=replace(scene.settings, controller=controller)))
     other = TorqueSession(session.scene).controller
@@ -48,8 +49,8 @@ def test_torques_are_those_of_pinocchio_s_kinematics(
 
 
 def test_a_wild_torque_reading_does_not_raise_the_limit_of_hqp() -> None:
-    """The first state is invalid, and a torque sensor reads thirteen times the limit: the held torque and the
-    torques after it stay within the robot's limit (found by `benchmarks.fuzz`)."""
+    """The first state is invalid, and a torque sensor reads thirteen times the limit. The torque that is held
+    and the torques after it stay within the limit of the robot (found by `benchmarks.fuzz`)."""
     scene = torque_scene("iiwa14-hold")
     session = TorqueSession(replace(scene, settings=replace(scene.settings, controller="hqp")))
     limit = session.robot.tau_limit

@@ -1,4 +1,4 @@
-"""Worker processes end themselves after their owner was killed, whether they sleep or compute."""
+"""Worker processes end when their owner was killed, whether they sleep or compute."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def work(task: tuple[str, str]) -> None:
 
 
 def run(folder: str) -> None:
-    """Runs the owner of two workers."""
+    """Starts two workers; the process that calls this function is their owner."""
     list(on_cores(work, [(folder, "asleep"), (folder, "busy")]))
 
 
@@ -77,8 +77,7 @@ def test_workers_end_with_their_owner(tmp_path: Path, number: signal.Signals) ->
 
 
 def test_a_worker_takes_sigterm(tmp_path: Path) -> None:
-    """A worker that receives SIGTERM ends, its work becomes an outcome, and the second attempt at this work
-    as well."""
+    """A worker that receives SIGTERM ends. Its work has an outcome, also after the second attempt."""
     script = tmp_path / "owner.py"
     script.write_text(OWNER.format(paths=[str(HERE), str(HERE.parents[1])], folder=str(tmp_path)))
     owner = subprocess.Popen([sys.executable, str(script)], stderr=subprocess.DEVNULL)

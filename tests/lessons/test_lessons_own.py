@@ -1,5 +1,5 @@
-"""A user's own file is a controller, a scene, a task or a lesson by what it defines; each error is one
-sentence."""
+"""A user's own file is a controller, a scene, a task or a lesson, depending on what it defines; each error is
+one sentence."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ def test_own_file_is_what_it_defines(kind, file) -> None:
 
 
 def test_own_controller_sees_what_the_paper_names(file) -> None:
-    """The view of an own controller has the shapes of the paper, and numbers that agree with an independent
-    computation."""
+    """The view of a user's own controller has the shapes of the paper, and its numbers agree with an
+    independent computation."""
     text = """
         import numpy as np
 
@@ -72,8 +72,8 @@ def test_own_controller_sees_what_the_paper_names(file) -> None:
 
 
 def test_own_rows_of_torques_tell_the_leak(file) -> None:
-    """The leak is measured from one torque per level; a controller that returns a single torque has no leak
-    value."""
+    """The leak is computed from one torque per level; a controller that returns a single torque has no
+    leak."""
     rows = "def torque(now):\n    return [now.bias, now.bias + 0.1]\n"
     scene = load_scene("planar3-circle")
     assert summary(run(prepared(scene, file(rows), ()), 0.05))["priority_leak_max"] > 0.01
@@ -161,8 +161,8 @@ def test_own_controller_that_is_wrong_is_one_sentence(what: str, tmp_path: Path)
 
 
 def test_own_call_may_wait_for_a_core_but_not_sleep(file, monkeypatch) -> None:
-    """The deadline of a call does not count the time in which the process waits for a core, but it counts
-    sleep."""
+    """The deadline of a call counts the time in which the process sleeps, but not the time in which it waits
+    for a core."""
     from lessons.own import deadline
 
     scene = load_scene("planar3-hold")
@@ -196,7 +196,7 @@ def torque(now):
 
 @pytest.mark.parametrize("where", ["main", "thread"])
 def test_own_second_import_that_never_ends_is_ended(where: str, file, monkeypatch) -> None:
-    """The second import of a file is also limited in time, although the first import ended well."""
+    """The time of the second import of a file is limited as well, also if the first import ended normally."""
     from concurrent.futures import ThreadPoolExecutor
 
     from lessons.session import controllers
@@ -267,7 +267,7 @@ def test_own_code_that_is_saved_takes_over_without_a_bump(file) -> None:
 
 
 def test_own_files_are_run_only_where_the_command_line_says_so(file) -> None:
-    """A state code, a setting or an event cannot choose a file of the computer."""
+    """A state code, a setting or an event cannot make the lab run a file of the computer."""
     path = file("import os\nos._exit(1)\n")
     scene = load_scene("planar3-hold")
     with pytest.raises(InputError, match=r"--controller FILE\.py"):
@@ -324,7 +324,7 @@ def test_own_lesson_is_named_after_its_file(file) -> None:
 
 
 def test_own_controller_is_made_afresh_for_every_robot(file) -> None:
-    """Global variables of a file are not shared between two runs."""
+    """Two runs of the same file do not share its global variables."""
     path = file("seen = []\ndef torque(now):\n    seen.append(1)\n    return now.bias + len(seen)\n")
     scene = prepared(torque_scene("planar3-hold"), path, ())
     first, second = run(scene, 0.05), run(scene, 0.05)

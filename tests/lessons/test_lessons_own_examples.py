@@ -1,4 +1,4 @@
-"""The example controllers that are shipped agree with the lab's own controllers to 1e-6 N·m."""
+"""The example controllers of the package agree with the lab's own controllers to 1e-6 N·m."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def beside(session: TorqueSession, name: str, ticks: int) -> float:
     ("scene", "ticks"), [("planar3-conflict", 2500), ("iiwa14-circle", 1000), ("iiwa14-hold", 1000)]
 )
 def test_own_himpc_on_one_page_agrees_with_the_lab(scene: str, ticks: int) -> None:
-    """The example agrees with active bounds, a target that jumps and a push."""
+    """The example agrees also with active bounds, a target that jumps and a push."""
     session = TorqueSession(torque_scene(scene))
     if scene == "iiwa14-hold":
         position = session.references["position"].preview(0.0, 1e-3, 1).value

@@ -1,5 +1,5 @@
-"""Exercises of a teacher's own: the template is one, its proof finds what is wrong with an exercise, and
-submissions to it are graded like those to the lab's."""
+"""A teacher's own exercises: the template is a valid exercise, the proof finds what is wrong with an
+exercise, and submissions are graded like those for the exercises of the lab."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from robots import InputError
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """The template, as `himpc-lab new exercise` writes it."""
+    """The template in the form in which `himpc-lab new exercise` writes it."""
     path = tmp_path_factory.mktemp("own") / "pd.py"
     path.write_text(text_of("exercise", None, "pd.py"))
     return str(path)
@@ -53,7 +53,7 @@ def with_points(grade: Grade, *given: int, why: str = "because") -> Grade:
 
 
 def test_the_proof_names_everything_that_must_be_mended(proof: Proof) -> None:
-    """Each fault is made in the measured grades, one at a time."""
+    """The measured grades are changed such that the exercise has one fault at a time."""
     (first, grade), *others = proof.mistakes
     changed = {
         "the solution misses the check": replace(proof, solution=with_points(proof.solution, 6, 0)),
@@ -76,7 +76,8 @@ def test_the_proof_names_everything_that_must_be_mended(proof: Proof) -> None:
 def test_a_submission_to_an_own_exercise_is_graded_in_a_process_that_cannot_read_it(
     file: str, tmp_path: Path
 ) -> None:
-    """A folder of two: one is wrong in a known way, and one reads the exercise for its solution."""
+    """The folder contains two submissions: one has a known mistake, and the other reads the solution in the
+    exercise."""
     whole = exercise_in(file)
     (tmp_path / "wrong.py").write_text(whole.mistakes[0].text)
     (tmp_path / "cheat.py").write_text(f"text = open({file!r}).read()\n{whole.solution}")
@@ -100,7 +101,7 @@ def test_a_submission_to_an_own_exercise_is_graded_in_a_process_that_cannot_read
     ],
 )
 def test_another_file_is_no_exercise(text: str, words: str, tmp_path: Path) -> None:
-    """The first is a student's file that a teacher named by mistake: nothing of it is executed."""
+    """The first file is a student's file that a teacher named by mistake; none of its code is executed."""
     path = tmp_path / "mine.py"
     path.write_text(text)
     with pytest.raises(InputError, match=words):

@@ -1,5 +1,5 @@
-"""A task of a user's own file is part of the stack: it is named by file or class, exported, and refused if
-wrong."""
+"""A task in a user's own file is part of the stack: it is named by its file or class, exported, and refused
+if wrong."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def test_a_script_repeats_a_run_with_an_own_task(file: str, tmp_path: Path) -> N
 
 
 def test_an_own_task_is_run_only_if_it_was_named_at_the_start(tmp_path: Path) -> None:
-    """A code, an event or a page cannot choose a file of the computer."""
+    """A state code, an event or a page cannot make the lab run a file of the computer."""
     path = tmp_path / "evil.py"
     path.write_text("import os\nos._exit(1)\n")
     with pytest.raises(InputError, match=r"start himpc-lab with --task FILE\.py"):

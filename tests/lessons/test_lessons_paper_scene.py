@@ -1,4 +1,5 @@
-"""`iiwa14-circle-paper`: its start, the results of the paper that it reproduces, and Tables V to VIII."""
+"""`iiwa14-circle-paper`: its start, the results of the paper that it reproduces, and Tables V to VIII are
+tested."""
 
 from __future__ import annotations
 
@@ -38,7 +39,8 @@ def result(*assignments: str, controller: str = "himpc") -> dict[str, Any]:
 
 
 def test_it_starts_on_the_reference() -> None:
-    """At the start, position and velocity of levels 1 and 2 equal the reference, and no joint accelerates."""
+    """At the start, position and velocity of levels 1 and 2 equal those of the reference, and no joint
+    accelerates."""
     session = TorqueSession(torque_scene(NAME))
     row = session.tick()
     at = session.layout.fields
@@ -52,7 +54,8 @@ def test_it_starts_on_the_reference() -> None:
 
 
 def test_what_the_paper_left_open_is_switchable() -> None:
-    """Gravity, velocity limits, barrier and position rows are settings of the scene, and a run uses them."""
+    """Gravity, velocity limits, barrier and position rows are settings of the scene, and a run applies
+    them."""
     choices = (
         "plant.gravity=true",
         "limits.velocity=true",
@@ -83,28 +86,28 @@ def test_the_paper_run_is_sound_and_near_the_printed_figures() -> None:
 @pytest.mark.parametrize("reading", ["inertia_scale", "diagonal_scale"])
 @pytest.mark.parametrize("scene", [NAME, "iiwa14-circle"])
 def test_table_5_a_disturbed_inertia_costs_little(scene: str, reading: str) -> None:
-    """With scaled link inertias, or a scaled diagonal of M(q) in the dynamics, no RMSE of level 1 increases
-    by 10 %."""
+    """If link inertias are scaled, or the diagonal of M(q) in the dynamics is scaled, no RMSE of level 1
+    increases by 10 %."""
     nominal = summary(record(scene))
     disturbed = summary(record(scene, f"plant.{reading}={TABLE_V}"))
     for key in ("rmse", "rmse_after_1s"):
         ratio = np.array(disturbed["tasks"][0][key]) / np.array(nominal["tasks"][0][key])
         assert ratio.max() <= 1.10
         assert np.abs(ratio - 1).max() > 1e-4  # the disturbance has an effect
-    # The position rows as printed, which only the paper's scene has, are softened a few times.
+    # The printed position rows, which only the scene of the paper has, are softened a few times.
     assert disturbed["solver"]["unsolved"] <= (10 if scene == NAME else 0)
 
 
 def test_a_speed_from_which_one_can_stop_leaves_no_qp_unsolved() -> None:
-    """With the lab's own position limits the RMSE of q₁ is 4 % above the paper's value, and every QP has a
-    solution."""
+    """With the position limits of the lab, the RMSE of q₁ is 4 % above the value of the paper, and every QP
+    has a solution."""
     found = result("limits.position=viability")
     assert found["solver"]["unsolved"] == 0
     assert found["tasks"][2]["rmse"][0] == pytest.approx(9.15, rel=0.01)
 
 
 def test_table_6_a_longer_horizon_does_not_hurt_if_R_weighs_accelerations() -> None:
-    """With R on M̄⁻¹Δτ the RMSE of x decreases from N = 5 to 10 to 20 by the paper's ratios, ± 5 %."""
+    """With R on M̄⁻¹Δτ, the RMSE of x decreases from N = 5 to 10 to 20 by the ratios of the paper, ± 5 %."""
     soft = ("R_on=acceleration", "limits.position=viability")
     errors = [result(f"horizon={N}", *soft)["tasks"][0]["rmse"][0] for N in (5, 10, 20)]
     for before, after in pairwise(errors):
@@ -114,8 +117,8 @@ def test_table_6_a_longer_horizon_does_not_hurt_if_R_weighs_accelerations() -> N
 
 
 def test_table_6_with_R_as_printed_a_longer_horizon_helps_a_little() -> None:
-    """Over the whole run, with position rows as printed, the RMSE decreases by 3 to 6 %, a third of the
-    paper's 8 to 17 %."""
+    """Over the whole run, with the printed position rows, the RMSE decreases by 3 to 6 %, which is a third of
+    the paper's 8 to 17 %."""
     errors = [result(f"horizon={N}")["tasks"][0]["rmse"][0] for N in (5, 10, 20)]
     assert errors[2] < errors[1] < errors[0]
     assert 0.93 < errors[2] / errors[0] < 0.97
@@ -130,8 +133,8 @@ def test_table_6_new_jacobians_change_next_to_nothing() -> None:
 
 
 def test_strict_against_weighted_is_one_switch() -> None:
-    """With the same scene, weights and bounds, but without priorities, the error of level 3 falls and that of
-    level 1 rises."""
+    """With the same scene, weights and bounds, but without priorities, the error of level 3 decreases and
+    that of level 1 increases."""
     strict, weighted = (
         result("limits.position=viability", controller=each) for each in ("himpc", "weighted")
     )
@@ -148,8 +151,8 @@ def smoothness(torque: Array, benchmark: Array) -> float:
 
 
 def test_table_8_coarser_encoders_make_the_torque_rougher() -> None:
-    """S increases with every step of the resolution and is within 30 % of the paper's five values, without
-    state bounds."""
+    """Without state bounds, S increases with every step of the resolution and is within 30 % of the five
+    values of the paper."""
     printed = {0.5: 0.93, 1.0: 2.20, 2.0: 4.54, 5.0: 11.62, 10.0: 22.81}
 
     def torque(thousandths: float) -> Array:

@@ -1,4 +1,4 @@
-"""The reproduction: every item can be run, failed runs are data, and the reports contain the measured
+"""In the reproduction, every item can be run, failed runs are data, and reports contain the measured
 values."""
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def failed(jobs: Iterable[Work]) -> Results:
 
 @pytest.fixture(scope="module")
 def short() -> dict[str, JobResult]:
-    """Runs of 1.2 s of RT1 with two controllers."""
+    """Returns runs of 1.2 s of RT1 with two controllers."""
     jobs = {name: Job(RunSpec("planar3-circle", controller=name, duration=1.2)) for name in ("himpc", "osf")}
     found = perform_all(jobs.values())
     return {name: found[job] for name, job in jobs.items()}
@@ -57,15 +57,15 @@ def test_the_papers_tables_and_figures_are_there() -> None:
 
 @pytest.fixture(scope="module")
 def prepared() -> dict[RunSpec, Scene]:
-    """Every scene that an item runs, prepared once."""
+    """Every scene that an item runs is prepared once."""
     jobs = (job for item in ITEMS.values() for quick in QUICK for job in item.jobs(quick))
     return {spec: spec.prepared() for spec in dict.fromkeys(job.spec for job in jobs)}
 
 
 @pytest.mark.parametrize("quick", QUICK)
 def test_no_two_jobs_compute_the_same(quick: bool, prepared: dict[RunSpec, Scene]) -> None:
-    """Two jobs with different keys never describe the same run, for example by a setting that equals the
-    scene's own; such a run would be computed twice."""
+    """Two jobs with different keys never describe the same run, for example by a setting that equals that of
+    the scene. Such a run would be computed twice."""
     seen: dict[str, Work] = {}
     for job in dict.fromkeys(job for item in ITEMS.values() for job in item.jobs(quick)):
         scene, spec = prepared[job.spec], job.spec
@@ -87,8 +87,8 @@ def test_no_two_jobs_compute_the_same(quick: bool, prepared: dict[RunSpec, Scene
 @pytest.mark.parametrize("quick", QUICK)
 @pytest.mark.parametrize("name", ITEMS)
 def test_every_job_can_be_set_up(name: str, quick: bool, prepared: dict[RunSpec, Scene]) -> None:
-    """The scene, the controller and every assigned setting exist; thus no item fails because of a misspelled
-    name."""
+    """The scene, the controller and every assigned setting exist, so that no item fails because of a
+    misspelled name."""
     for job in ITEMS[name].jobs(quick):
         scene = prepared[job.spec]
         assert scene.settings.controller == job.spec.controller
@@ -132,7 +132,7 @@ def test_every_table_has_its_printed_values(number: int) -> None:
 
 
 def test_printed_values_are_what_the_paper_prints() -> None:
-    """One number per table equals the value that was read from the paper a second time."""
+    """One number per table equals the value that was read from the paper independently a second time."""
     assert printed("himpc_table_2")["hqp"] == {"x": 3.11e-3, "y": 2.39e-3, "q1": 1.05}
     assert printed("himpc_table_3")["Input constraints"]["hqp"] is True
     assert printed("himpc_table_5")["disturbed"]["orientation"] == [3.388e-2, 2.290e-2, 2.122e-1]
@@ -159,7 +159,7 @@ def ticks(error: float, torque: float, speed: float, lost: float | None = None) 
 
 
 def test_ticks_are_decided_by_the_runs() -> None:
-    """Each property changes with its own number, and a failed run decides none of them."""
+    """Each property depends on its own number, and failed runs decide none of them."""
     assert ticks(1e-5, 1.0, 1.0) == dict.fromkeys(CRITERIA, True)
     assert ticks(1e-3, 1.0, 1.0)["High accuracy"] is False
     assert ticks(0.05, 1.0, 1.0)["Singularity-free"] is False
@@ -214,22 +214,21 @@ def test_a_job_that_cannot_be_done_is_a_run_with_a_sentence() -> None:
 
 
 def test_the_incremental_model_is_better_than_a_model_20_percent_off(short: dict[str, JobResult]) -> None:
-    """Section III-B by its own definitions: γ of (21) is at least ten times as large as δ of (25)."""
+    """With the definitions of section III-B, γ of (21) is at least ten times as large as δ of (25)."""
     errors = model_errors(short["himpc"])
     assert errors.gamma > 10 * errors.delta > 0
     assert errors.beta > 10 * errors.epsilon > 0
 
 
 def test_an_exact_nominal_model_has_no_error() -> None:
-    """γ vanishes if the nominal model agrees with the plant; thus its definition measures only the error of
-    the model."""
+    """γ vanishes if the nominal model agrees with the plant; its definition measures only the model error."""
     exact = tuple(
         f"nominal.{key}" for key in ("mass_scale=1", "inertia_scale=1", "armature=[0.05,0.05,0.03]")
     )
     bare = ("plant.friction=0", "plant.damping=0")
     job = Job(RunSpec("planar3-circle", controller="himpc", set=(*exact, *bare), duration=1.2))
     wrong = Job(RunSpec("planar3-circle", controller="himpc", set=bare, duration=1.2))
-    # The remainder is the change of M and C within a tick.
+    # The remaining difference is the change of M and C within one tick.
     assert model_errors(job.do()).gamma < 0.01 * model_errors(wrong.do()).gamma
 
 
@@ -241,8 +240,8 @@ def test_smoothness_is_the_rms_distance() -> None:
 
 
 def test_the_decrease_of_the_value_function_is_measured() -> None:
-    """A geometric decay yields its rate; a single tick that rises far from the reference makes the rate
-    negative."""
+    """For a geometric decay, the measured rate is the rate of the decay; with one increase far from the
+    reference, the rate is negative."""
     t = np.array([1e-3 * k for k in range(2000)])
     V = np.maximum(100.0 * 0.9 ** np.arange(len(t)), 1e-3)
     epsilon, alpha = decrease(V, t)
@@ -253,8 +252,8 @@ def test_the_decrease_of_the_value_function_is_measured() -> None:
 
 
 def test_weighing_the_torque_costs_accuracy_where_gravity_pulls() -> None:
-    """Section IV-C: at rest the weight on ‖Δτ‖² leads to no error for any R; the weight on ‖τ‖² leads to an
-    error that increases with R."""
+    """Section IV-C: at rest the weight on ‖Δτ‖² causes no error for any R; the weight on ‖τ‖² causes an error
+    that increases with R."""
     still = EffortJob(
         RunSpec("iiwa14-circle", controller="himpc", duration=1.2),
         hold_deg=(0.0, 90.0, 0.0, 10.0, 0.0, 10.0, 0.0),
@@ -284,7 +283,7 @@ def picture(name: str) -> Picture:
 
 
 def test_a_report_holds_what_was_measured(tmp_path: Path) -> None:
-    """report.md, results.json and the picture agree with the section, and NaN is written as null."""
+    """report.md, results.json and the picture agree with the section; NaN is written as null."""
     section = Section(
         notes=("A note.",),
         rows=(Row("x", "m", 2.0, 4.0, "differs | because"), Row("y", "m", None, math.nan, "none")),

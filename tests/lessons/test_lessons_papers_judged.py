@@ -1,5 +1,5 @@
-"""Judgement without runs: verdicts, two-sided checks, mutations of every printed number, and the generated
-page."""
+"""Results are judged without runs: verdicts, two-sided checks, changes of every printed number, and the
+generated page."""
 
 from __future__ import annotations
 
@@ -54,8 +54,8 @@ def test_a_row_has_a_verdict(row: Row, verdict: str) -> None:
 
 
 def test_a_number_is_held_against_the_stored_one_on_both_sides() -> None:
-    """A number that is better or worse than the stored one by more than the tolerance, missing, new or of the
-    opposite verdict fails, and nothing else does."""
+    """A number fails if it is better or worse than the stored one by more than the tolerance, missing, new or
+    of the opposite verdict; all other numbers pass."""
     row = Row("x", "m", 2.0, 4.0, topic="chatter")
     check = between("y", 1.0, 0.0, 10.0)
     section = Section(rows=(row,), checks=(check,))
@@ -81,7 +81,7 @@ def test_a_number_is_held_against_the_stored_one_on_both_sides() -> None:
 
 
 def leaves(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
-    """Yields the paths of all numbers, truth values and sides in a values file."""
+    """Yields the paths of all numbers, truth values and sides in a file of values."""
     if isinstance(value, dict):
         for key, each in value.items():
             yield from leaves(each, (*path, key))
@@ -106,7 +106,7 @@ def at(data: Any, path: tuple[Any, ...]) -> Any:
 
 
 def turned(name: str, path: tuple[Any, ...], value: Any) -> list[Any]:
-    """Returns the wrong values that a misreading of a printed value could give."""
+    """Returns the wrong values that could result if a printed value was misread."""
     if isinstance(value, bool):
         return [not value]
     if isinstance(value, str):
@@ -127,7 +127,8 @@ def faults(quick: bool, items: dict[str, Item], memory: dict[str, StoredItem]) -
 
 
 def test_what_is_stored_is_sound() -> None:
-    """Every stored check passed, every row equals the stored one, and every item with numbers is stored."""
+    """Every stored check has passed, every row equals the stored one, and every item with numbers is
+    stored."""
     for quick in (True, False):
         assert not faults(quick, ITEMS, stored(quick))
         for name, memory in stored(quick).items():
@@ -139,7 +140,7 @@ def test_what_is_stored_is_sound() -> None:
 
 
 def with_values(patch: pytest.MonkeyPatch, name: str, data: Any, seen: list[str] | None = None) -> None:
-    """Replaces the content of file `name` by `data` for the rest of the test, and notes in `seen` the files
+    """Replaces the content of file `name` by `data` for the rest of the test, and records in `seen` the files
     that are read."""
 
     def read(table: str) -> Any:
@@ -152,7 +153,7 @@ def with_values(patch: pytest.MonkeyPatch, name: str, data: Any, seen: list[str]
 
 @pytest.mark.parametrize("name", sorted({name for name, _ in PRINTED}))
 def test_no_printed_number_can_be_turned_around_unnoticed(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """If any printed value is negated, doubled, halved or inverted, some check fails."""
+    """If any printed value is negated, doubled, halved or inverted, at least one check fails."""
     text = (VALUES / f"{name}.toml").read_text(encoding="utf-8")
     whole, quick = stored(False), stored(True)
     memory = {item: (kept, item not in whole) for item, kept in {**quick, **whole}.items()}
@@ -185,7 +186,7 @@ def test_no_printed_number_can_be_turned_around_unnoticed(name: str, monkeypatch
 
 
 def test_every_disagreement_is_explained_and_can_be_seen() -> None:
-    """Each topic has its texts, and its state can be prepared."""
+    """Each topic has its texts, and the state that shows it can be prepared."""
     for topic in topics().values():
         assert topic.title and topic.evidence and topic.cause and topic.look
         if topic.state is not None:
@@ -193,7 +194,7 @@ def test_every_disagreement_is_explained_and_can_be_seen() -> None:
 
 
 def test_every_number_in_a_topic_is_measured_or_said_to_be_given() -> None:
-    """A number of ours in a text refers to a stored row; other numbers, of a paper or of a setting, are
+    """A number of ours in a text refers to a stored row. Other numbers, of a paper or of a setting, are
     listed as given."""
     memory = stored(False)
     for topic in topics().values():
@@ -223,8 +224,8 @@ def test_a_measured_number_is_written_into_its_text() -> None:
 
 
 def test_what_needs_hardly_a_run_is_measured_again() -> None:
-    """The ratios of Q to R and of M̄ to M follow from the settings, and OSF loses control at the stored time
-    on RT4."""
+    """The ratios of Q to R and of M̄ to M follow from the settings, and on RT4 OSF loses control at the
+    stored time."""
     kept = stored(False)
     for row in ITEMS["himpc-weights"].report({}, False).rows:
         assert row.ours == pytest.approx(kept["himpc-weights"].rows[row.quantity][0], rel=1e-4), row.quantity

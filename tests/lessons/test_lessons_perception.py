@@ -1,4 +1,4 @@
-"""The scene in which a crate is reported where it is not: the robot makes way for it and comes back."""
+"""The scene reports a crate at a wrong place: the robot makes way for it and comes back."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def session() -> VelocitySession:
 
 
 def crate_told(running: VelocitySession) -> tuple[float, ...]:
-    """Returns the place of the crate that the controller knows, m."""
+    """Returns the place of the crate that the controller receives, m."""
     assert running.controller is not None
     (crate,) = [each for each in running.controller.settings.obstacles if isinstance(each, Box)]
     assert crate.name == CRATE
@@ -67,20 +67,22 @@ def test_without_a_false_report_nobody_makes_way() -> None:
 
 
 def test_a_crate_that_is_reported_right_is_never_touched() -> None:
-    """Also where it stands on the way, and where its place becomes known with a metre left."""
+    """This also holds if the crate is on the way, and if its place becomes known when the robot is one metre
+    away."""
     for settings in (("obstacles.crate=[1.9,0.3,0.25]", "false_report=false"), (*ON_THE_WAY, "report_end=5")):
         assert told(*settings)["clearance_min_m"] >= KEPT
 
 
 def test_a_crate_where_none_is_reported_is_run_into() -> None:
-    """The controller does not know better: the scene has no contacts, and the robot drives through."""
+    """The controller receives a wrong place. The scene has no contacts, so the robot drives through the
+    crate."""
     found = told(*ON_THE_WAY)
     assert found["clearance_min_m"] < -0.3
     assert found["report"]["base"]["max_wrong_m"] < 0.005
 
 
 def test_rivals_run_in_it_too() -> None:
-    """HTIDKC knows no obstacles; with the hand as the only task, the base does not come back."""
+    """HTIDKC does not consider obstacles. If the hand is the only task, the base does not come back."""
     blind, single = told(controller="htidkc"), told(controller="stmpc")
     assert blind["clearance_reported_min_m"] < -0.3
     assert blind["report"]["base"]["max_wrong_m"] < 0.02
@@ -131,7 +133,7 @@ def test_wrong_settings_of_the_report_are_refused() -> None:
 
 
 def test_the_results_page_has_what_is_measured() -> None:
-    """Each row of its table is a run."""
+    """For each row of the table there is a run."""
     runs = {
         "HTMPC": told(),
         "HTMPC, base first": told("order=base,ee"),

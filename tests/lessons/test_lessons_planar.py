@@ -26,7 +26,7 @@ LEAST = 1.0
 
 
 def record(scene: str, controller: str, *assignments: str, duration: float | None = None) -> Recording:
-    """Returns a run, cached for all tests that use it."""
+    """Returns the recording of a run, cached for all tests that use it."""
     return _record(scene, controller, assignments, duration)
 
 
@@ -42,7 +42,7 @@ def result(*how: str, duration: float | None = None) -> dict[str, Any]:
 
 
 def rmse(recording: Recording, task: str, until: float) -> float:
-    """Returns the RMSE of a task's worst coordinate between LEAST and a time."""
+    """Returns the RMSE of the worst coordinate of a task between LEAST and a time."""
     t = recording["t"][:, 0]
     error = recording[f"error/{task}"][(t >= LEAST) & (t < until)]
     return float(np.sqrt((error**2).mean(axis=0)).max())
@@ -53,8 +53,7 @@ def rmse(recording: Recording, task: str, until: float) -> float:
 
 @pytest.mark.parametrize(("controller", "duration"), [("himpc", None), ("tdeosf", 3.0)])
 def test_rt1_time_delay_estimation_is_accurate(controller: str, duration: float | None) -> None:
-    """With a plant that is 25 % heavier than the nominal model, and friction: level 1 ≤ 0.1 mm, q₁ ≤
-    0.05°."""
+    """The plant is 25 % heavier than the nominal model and has friction: level 1 ≤ 0.1 mm, q₁ ≤ 0.05°."""
     found = result("planar3-circle", controller, duration=duration)
     position, q1 = found["tasks"]
     assert max(position["rmse_after_1s"]) <= 1e-4
@@ -66,8 +65,7 @@ def test_rt1_time_delay_estimation_is_accurate(controller: str, duration: float 
 
 @pytest.mark.parametrize("controller", ["osf", "hqp"])
 def test_rt1_a_wrong_model_costs_accuracy(controller: str) -> None:
-    """OSF and HQP follow the reference with at least 20 times the level-1 error of HIMPC (paper: 30 to 40
-    times)."""
+    """With OSF and HQP, the error of level 1 is at least 20 times that of HIMPC (paper: 30 to 40 times)."""
     wrong = record("planar3-circle", controller, duration=3.0)
     assert summary(wrong)["diverged"] is False
     found = rmse(wrong, "position", 3.0)
@@ -90,7 +88,7 @@ def test_rt1_with_the_right_model_they_are_accurate(controller: str) -> None:
 
 
 def test_rt1_himpc_is_no_rougher_than_tdeosf() -> None:
-    """The RMS of Δτ of HIMPC, with encoders of 1.25e-3° over the whole scene, is not above that of TDEOSF.
+    """With encoders of 1.25e-3°, over the whole scene, the RMS of Δτ of HIMPC is not above that of TDEOSF.
 
     The paper describes HIMPC as smoother; here the difference is 1 %: relative to Q = 200 times (J M̄⁻¹)² the
     printed R = 10 has a weight of less than a thousandth.
@@ -109,7 +107,7 @@ def test_rt2_himpc_keeps_level_1_inside_all_bounds() -> None:
     found = result("planar3-conflict", "himpc")
     position, q1 = found["tasks"]
     assert max(position["rmse_after_1s"]) <= 5e-4
-    assert max(q1["rmse_after_1s"]) > 20.0  # the error of level 2: the tasks do conflict
+    assert max(q1["rmse_after_1s"]) > 20.0  # the error of level 2 shows that the tasks conflict
     assert found["limits"]["torque"]["max_ratio"] <= 1.000
     assert found["limits"]["velocity"]["max_ratio"] <= 1.05
     assert found["limits"]["position"]["max_ratio"] <= 1.000
@@ -126,7 +124,7 @@ def test_rt2_costs_himpc_at_most_fifteen_times_rt1() -> None:
 
 @pytest.mark.parametrize("controller", ["osf", "tdeosf"])
 def test_rt2_null_space_projection_loses_it_at_the_conflict(controller: str) -> None:
-    """The torque exceeds four times its bound when the projected Jacobian vanishes; all numbers stay
+    """When the projected Jacobian vanishes, the torque exceeds four times its bound; all numbers stay
     finite."""
     found = result("planar3-conflict", controller)
     assert found["limits"]["torque"]["max_ratio"] > 4.0
@@ -137,8 +135,8 @@ def test_rt2_null_space_projection_loses_it_at_the_conflict(controller: str) -> 
 
 @pytest.mark.parametrize("controller", ["osf_damped", "tdeosf_damped"])
 def test_rt2_damping_saves_null_space_projection(controller: str) -> None:
-    """The damped laws pass the conflict with control of level 1, but several times the error, torque and
-    speed of HIMPC."""
+    """With the damped laws, level 1 stays controlled through the conflict, but error, torque and speed are
+    several times those of HIMPC."""
     damped = record("planar3-conflict", controller, duration=3.0)
     found = summary(damped)
     assert not found["diverged"]
@@ -150,7 +148,7 @@ def test_rt2_damping_saves_null_space_projection(controller: str) -> None:
 
 def test_rt2_hqp_keeps_level_1_roughly_and_not_its_speeds() -> None:
     """HQP has at least four times the error of HIMPC or more than 1.5 times the velocity limit; its torque is
-    bounded."""
+    within its bound."""
     recording = record("planar3-conflict", "hqp", duration=4.0)
     found = summary(recording)
     assert not found["diverged"] and found["solver"]["unsolved"] == 0
@@ -166,8 +164,8 @@ def test_rt2_hqp_keeps_level_1_roughly_and_not_its_speeds() -> None:
 
 
 def test_rt3_himpc_passes_the_straight_arm() -> None:
-    """In 16 s from the straight start the RMSE of level 1 is at most 1 mm over the whole run, and every QP is
-    solved."""
+    """From the straight start, in 16 s, the RMSE of level 1 is at most 1 mm over the whole run, and every QP
+    is solved."""
     found = result("planar3-singular", "himpc")
     assert max(found["tasks"][0]["rmse"]) <= 1e-3
     assert found["solver"]["unsolved"] == 0 and found["solver"]["fallbacks"] == {}
@@ -178,7 +176,7 @@ def test_rt3_himpc_passes_the_straight_arm() -> None:
 
 @pytest.mark.parametrize("controller", ["osf", "tdeosf"])
 def test_rt3_undamped_projection_cannot_start(controller: str) -> None:
-    """With motors without a limit the arm is out of control within a few milliseconds, and the run ends
+    """If the motors have no limit, the arm is out of control within a few milliseconds, and the run ends
     without NaN in τ."""
     found = result("planar3-singular", controller, "plant.saturate=false", duration=0.1)
     assert found["diverged"] and found["diverged_at_s"] < 0.02
@@ -188,8 +186,8 @@ def test_rt3_undamped_projection_cannot_start(controller: str) -> None:
 
 @pytest.mark.parametrize("controller", ["osf", "tdeosf", "hqp"])
 def test_rt3_what_happens_between_saturated_motors(controller: str) -> None:
-    """With a plant that clips the torque all three keep control. OSF and TDEOSF demand thousands of times the
-    bound; HQP, which inverts no Jacobian, demands less than the bound."""
+    """If the plant clips the torque, all three controllers keep control. OSF and TDEOSF demand thousands of
+    times the bound; HQP, which inverts no Jacobian, demands less than the bound."""
     found = result("planar3-singular", controller, duration=1.0)
     demand = found["limits"]["torque"]["max_ratio"]
     assert not found["diverged"]
@@ -233,7 +231,7 @@ def test_velocity_and_acceleration_belong_to_the_path(name: str, assignments: tu
 
 
 def test_rt3_switches_circles_in_the_singular_point() -> None:
-    """The path passes (0.9, 0), the only point on the straight arm, at 0, 8 and 16 s, and the speed doubles
+    """At 0, 8 and 16 s the path passes (0.9, 0), its only point on the straight arm, and the speed doubles
     there."""
     scene = torque_scene("planar3-singular")
     position = scene.references(scene.robot, scene.settings.levels)["position"]
@@ -251,8 +249,8 @@ def test_rt3_switches_circles_in_the_singular_point() -> None:
 
 
 def test_options_are_settings() -> None:
-    """Options are listed among the paths, accept only their own type, and a misspelled name suggests the
-    nearest one."""
+    """Options are among the paths and accept only their own type; for a misspelled name the nearest one is
+    suggested."""
     circle, singular = (torque_scene(name).settings for name in ("planar3-circle", "planar3-singular"))
     assert "q1_amplitude_deg" in circle.paths() and "smooth" not in circle.paths()
     assert singular.changed("smooth", True).options == SingularOptions(smooth=True)
@@ -277,7 +275,7 @@ def test_the_amplitude_reaches_the_reference() -> None:
 
 @pytest.mark.parametrize("controller", ["osf", "tdeosf"])
 def test_who_loses_control_goes_on_with_numbers(controller: str) -> None:
-    """Far beyond the speed of any robot the plant stops at its present state, and no number becomes NaN."""
+    """Far beyond the speed of any robot, the plant stops at its present state, and no number becomes NaN."""
     scene = torque_scene("planar3-conflict")
     session = TorqueSession(replace(scene, settings=scene.settings.changed("controller", controller)))
     fields = session.layout.fields

@@ -1,4 +1,4 @@
-"""A poll as data: votes, rounds, histograms, and who was right."""
+"""A poll is data: votes, rounds, histograms, and the answers that were right."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def test_every_number_on_the_scale_is_in_one_bar(numbers: list[float]) -> None:
 
 @pytest.mark.parametrize("asked", ASKED, ids=lambda each: each.question[:30])
 def test_who_was_right_agrees_with_the_bars(asked: Choice | Value) -> None:
-    """One answer of every question of the course is right for a measured number, and its bar is marked."""
+    """In every question of the course, one answer is right for a measured number, and its bar is marked."""
     match asked:
         case Choice():
             option = asked.options[0]

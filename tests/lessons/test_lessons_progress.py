@@ -1,5 +1,5 @@
-"""A learner's submission of progress is read back as it was written, checked by its signature, and refused if
-damaged."""
+"""A learner's submission of progress is read as it was written, its signature is checked, and it is refused
+if damaged."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_a_signature_is_of_one_key() -> None:
 
 
 def test_what_was_changed_is_not_signed() -> None:
-    """A better score with the signature of a worse one is not accepted, nor is any change of a single
+    """A better score with the signature of a worse one is not accepted, and neither is any change of a single
     character."""
     better = HandedIn(HANDED.name, HANDED.at, DONE.with_points("deadlines", 100.0))
     seal = written(HANDED, KEY)[-64:]
@@ -73,8 +73,8 @@ def test_damage_to_what_is_handed_in_is_a_sentence(text: str, words: str) -> Non
 
 
 def test_the_account_is_signed_with_the_progress() -> None:
-    """The text names the account that the proxy told. What one account's browser stored is nothing for
-    another account, nor for a lab without accounts."""
+    """The text names the account that the proxy reported. The data that the browser of one account stored are
+    not accepted for another account, and not by a lab without accounts."""
     text = written(replace(HANDED, account="zoe"), KEY)
     handed, proof = read_handed_in(text, KEY)
     assert (handed.account, proof) == ("zoe", "signed")

@@ -1,4 +1,4 @@
-"""Every number in a sentence of a lesson is measured, to the number of digits that the sentence gives.
+"""Every number in a sentence of a lesson is measured, to the number of digits in the sentence.
 
 `quoted_all.QUOTED` contains the numbers that runs give. Numbers that follow from settings alone are tested at
 the end of this file, or in `test_lessons_derivations`.
@@ -32,7 +32,7 @@ from robots import Plant
 
 
 def texts(step: Step) -> str:
-    """Returns all text of a step, in one line."""
+    """Returns the complete text of a step, in one line."""
     question = "" if step.prediction is None else step.prediction.question
     options = [each.text for each in getattr(step.prediction, "options", ())]
     claims = [word for claim in step.claims for word in (claim.text, claim.because)]
@@ -50,7 +50,7 @@ def test_a_number_in_a_sentence_is_measured(quoted: Quoted, course_runs: CourseR
     assert quoted.low <= value <= quoted.high, value
 
 
-# -------------------------------------------------- numbers that follow from settings, or are the papers'
+# -------------------------------------------------- numbers that follow from settings or are from papers
 
 
 WORDS = "half|third|quarter|fifth|tenth|thousand|million|doubles|halves"
@@ -61,21 +61,21 @@ REFERENCE = re.compile(
     r"[\dIVX]+(?: and \d)?"
 )
 GIVEN: dict[str, tuple[str, ...]] = {
-    # Numbers of the step's own text and script.
+    # Numbers in the text or script of the same step.
     "a-redundant-arm/1": ("60",),
     "when-tasks-fight/2": ("2",),
-    "seeing-ahead/2": ("8", "0.3", "1", "42"),  # and the paper's improvement
+    "seeing-ahead/2": ("8", "0.3", "1", "42"),  # one of them is the improvement of the paper
     "seeing-ahead/3": ("20",),
     "deliveries/3": ("8", "16.5"),
     "sensors-are-coarse/0": ("4",),
     "inside-the-qp/0": ("2",),
     "inside-the-qp/2": ("tenth",),
-    "first-hold-then-reach/2": ("1.63",),  # a number of the step before
-    # Numbers of the edge of stability.
+    "first-hold-then-reach/2": ("1.63",),  # a number of the previous step
+    # Numbers at the limit of stability.
     "no-model-needed/1": ("1", "1", "−1"),
     "no-model-needed/2": ("1",),
-    "no-model-needed/3": ("−1", "0.91", "−0.89"),  # eigenvalues: tested below
-    "the-model-is-wrong/2": ("1", "0.01", "1"),  # and a setting
+    "no-model-needed/3": ("−1", "0.91", "−0.89"),  # eigenvalues, which are tested below
+    "the-model-is-wrong/2": ("1", "0.01", "1"),  # one of them is a setting
     # Numbers that follow from settings and equations, which are tested below.
     "two-tasks/1": ("200", "50"),
     "stretched-out/0": ("0.06", "million"),
@@ -87,12 +87,12 @@ GIVEN: dict[str, tuple[str, ...]] = {
     "inside-the-qp/3": ("10", "14", "half"),  # numbers of the first step
     # Counts of torques, or computed numbers.
     "deadlines/0": ("2",),
-    "deadlines/1": ("half", "half", "0.005", "1", "1", "8"),  # and the paper's period and step time
+    "deadlines/1": ("half", "half", "0.005", "1", "1", "8"),  # some are the paper's period and step time
     # Numbers of the papers, which are tested below.
     "how-far-ahead/0": ("17", "4", "third", "1.2"),
     "how-strict-is-strict/1": ("3", "1"),
     "how-strict-is-strict/2": ("3.07", "3.42", "3.24", "6.25"),
-    # Numbers of several runs, which are tested in test_lessons_architectures; and the paper's 2.3.
+    # Numbers of several runs, which are tested in test_lessons_architectures, and 2.3 of the paper.
     "deliveries/0": ("9", "31", "7", "11"),
     "deliveries/1": ("11", "14", "80", "half", "tenth", "1.6", "1.2", "22", "41", "half", "11", "14", "2.3"),
 }
@@ -124,7 +124,7 @@ def test_numbers_of_the_papers_are_printed_there() -> None:
 
 
 def test_a_longer_horizon_gains_a_third_of_what_the_paper_prints() -> None:
-    """*How far ahead*: the improvement in Table VI is 17 %; ours over the whole 4 s is a third of it."""
+    """*How far ahead*: Table VI has an improvement of 17 %; ours over the whole 4 s is a third of it."""
     rows = stored(False)["himpc-table-6"].rows
     near, far = (rows[f"R on Δτ, as printed: HIMPC, N = {N}"] for N in (5, 30))
     ours = 1.0 - far[0] / near[0]
@@ -140,8 +140,8 @@ def test_joint_3_swings_a_little_more_than_once_a_second() -> None:
 
 
 def test_a_printed_bound_on_speed_is_overrun() -> None:
-    """docs/house.md and the docstring of `Limits` are right: the speed exceeds its bound by 17 %, with a
-    barrier by 0.2 %."""
+    """docs/house.md and the docstring of `Limits` are correct: the speed exceeds its bound by 17 %, and with
+    a barrier by 0.2 %."""
     house = (Path(__file__).parents[2] / "docs/house.md").read_text(encoding="utf-8")
     assert "with 0, as printed, the limit is overrun by 17 %" in " ".join(house.split())
     told = " ".join((Limits.__doc__ or "").split())
@@ -156,8 +156,8 @@ def test_a_printed_bound_on_speed_is_overrun() -> None:
 
 
 def test_a_gentler_bound_on_speed_helps_level_1_under_conflict() -> None:
-    """`CONFLICT_LIMITS`: the velocity approach of the scene gives half the error of the printed one; the
-    default, more."""
+    """`CONFLICT_LIMITS`: with the velocity approach of the scene, the error is half that with the printed
+    one; with the default, it is larger than with the printed one."""
     rows = stored(False)["himpc-table-3"].rows
     of = {
         rate: next(row[0] for name, row in rows.items() if f"velocity_approach = {rate}," in name)
@@ -175,17 +175,17 @@ def test_the_inverse_of_a_straight_arm_magnifies_many_million_times() -> None:
     J = plant.jacobian(scene.robot.tip)[:2]
     assert np.linalg.cond(J @ np.linalg.solve(plant.mass_matrix(), J.T)) > 1e7
     asked = begin(scene).tick()[begin(scene).layout.fields["a_d/position"]]
-    np.testing.assert_allclose(asked, [-0.06, 0.0], atol=5e-3)  # along the arm
+    np.testing.assert_allclose(asked, [-0.06, 0.0], atol=5e-3)  # in the direction of the arm
 
 
 def test_a_late_stop_asks_for_more_than_the_motors_can_do() -> None:
     """*Stopping takes distance*: a stop from 57°/s within the path of 5 ms needs 100 rad/s², and the motor
-    yields 35."""
+    can produce 35."""
     v = math.radians(57.0)
     d = 5e-3 * v
     assert math.degrees(d) == pytest.approx(0.3, abs=0.02)
     assert v**2 / (2.0 * d) == pytest.approx(100.0, abs=1.0)
-    assert v / 20.0 == pytest.approx(0.05, abs=1e-3)  # the 50 steps of a gentle stop
+    assert v / 20.0 == pytest.approx(0.05, abs=1e-3)  # a gentle stop takes 50 steps
     step = step_of("stopping-takes-distance/0")
     found = run(load_lesson("stopping-takes-distance").run_of(step).prepared())
     speed, tau, q = found["v"][:, 1], found["tau_demand"][:, 1], found["q"][:, 1]

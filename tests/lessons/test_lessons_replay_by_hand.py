@@ -1,5 +1,5 @@
-"""The file of a run suffices to recompute every torque: NumPy alone repeats each tick, without code of the
-lab."""
+"""The file of a run is sufficient to compute every torque again: NumPy alone repeats each tick, without code
+of the lab."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ TICKS = 300
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    """The file that the command line writes for RT1 with one knot and coarse encoders."""
+    """The file that the command line writes for RT1, with one knot and coarse encoders."""
     folder = tmp_path_factory.mktemp("replay")
     what = [
         "--set",
@@ -34,7 +34,8 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
 
 
 def test_every_torque_follows_from_the_file(file: dict[str, Any]) -> None:
-    """(28), (31) and the null space (33), written out for the planar arm, give each demanded torque."""
+    """The demanded torque of each tick follows from (28), (31) and the null space (33), written out for the
+    planar arm."""
     told = json.loads(str(file["settings"]))["in_force"]
     T, M_bar = told["T_s"], np.array(told["M_bar"]) * told["M_bar_scale"]
     q, v = file["q_measured"], file["v_measured"]
@@ -60,14 +61,14 @@ def test_every_torque_follows_from_the_file(file: dict[str, Any]) -> None:
 
 
 def test_what_acted_is_what_acts_next(file: dict[str, Any]) -> None:
-    """τ₀ of a tick is the torque that was applied at the previous one; the first tick has a finite τ₀."""
+    """τ₀ of a tick is the torque that was applied in the previous tick; in the first tick τ₀ is finite."""
     np.testing.assert_array_equal(file["tau_0"][1:], file["tau"][:-1])
     assert np.isfinite(file["tau_0"][0]).all()
 
 
 def test_no_bound_was_near(file: dict[str, Any]) -> None:
-    """All bounds are far away, as the recomputation leaves them out; this includes the velocity bound near a
-    joint's limit, which is rebuilt from the constants in the file."""
+    """All bounds are far away, because the recomputation omits them. This includes the velocity bound near
+    the limit of a joint, which is computed from the constants in the file."""
     q, v, a, t = file["q_measured"], file["v_measured"], file["a_max"], float(file["position_reaction"])
     room = np.minimum(file["q_upper"] - q, q - file["q_lower"]) - float(file["position_margin"])
     reach = np.minimum(file["v_limit"], a * (np.sqrt(t**2 + 2 * room / a) - t))
@@ -76,7 +77,7 @@ def test_no_bound_was_near(file: dict[str, Any]) -> None:
 
 
 def test_a_file_names_what_else_it_stands_on(file: dict[str, Any]) -> None:
-    """The file contains the frame of tasks that name none, and the constants of the position bound."""
+    """The file contains the frame of tasks that do not name one, and the constants of the position bound."""
     assert str(file["tip"]) == "ee"
     assert float(file["position_reaction"]) == pytest.approx(1e-3 + 5 / 15)
     assert float(file["position_margin"]) > 0

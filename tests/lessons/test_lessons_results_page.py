@@ -50,7 +50,7 @@ def trend(what: str) -> str:
 
 
 def expected() -> dict[str, str]:
-    """Returns the entries of our column by those of the first column."""
+    """Returns the entries of our column, each with the entry of the first column as its key."""
     fig_11, table_5 = "himpc-fig-11", "himpc-table-5"
     ratios = [of("himpc-table-2", f"{c} over HIMPC, {axis}") for c in ("OSF", "HQP") for axis in "xy"]
     own = of("himpc-table-3", "HIMPC, RT2, velocity_approach = 8, the scene's own: level-1 RMSE")
@@ -115,7 +115,7 @@ def test_the_table_is_what_was_measured() -> None:
 
 
 def test_the_payloads_are_what_was_measured() -> None:
-    """The table of M̄ adapted to the payload equals the stored numbers, to three digits each."""
+    """The table of M̄ that is adapted to the payload equals the stored numbers, to three digits each."""
 
     def cell(case: Case, words: str, what: str) -> str:
         value = of("himpc-adaptation", quantity(case, words, what))
@@ -127,7 +127,7 @@ def test_the_payloads_are_what_was_measured() -> None:
 
 
 def test_one_round_is_what_the_table_says() -> None:
-    """The table of the deliveries contains the measured seconds per rule and architecture."""
+    """The table of the deliveries contains the measured seconds for each rule and architecture."""
     rules = {"within 80 cm": (), "within 5 cm and at rest": ("base_tolerance=0.05", "base_at_rest=true")}
     for words, rule in rules.items():
         times = []

@@ -1,4 +1,4 @@
-"""OSF, TDEOSF and HQP in the scenes."""
+"""OSF, TDEOSF and HQP run in the scenes, also near a singularity."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 
 def straight(name: str, **changes: Any) -> Plan:
-    """Returns the plan of one tick of the straight planar arm with a target that pulls its tip towards the
+    """Returns the plan of one tick for the straight planar arm, with a target that pulls its tip towards the
     base."""
     loaded = torque_scene("planar3-singular")
     chosen = replace(loaded.settings.for_controller(), **changes)
@@ -33,8 +33,8 @@ def straight(name: str, **changes: Any) -> Plan:
 
 @pytest.mark.parametrize("name", ["osf", "tdeosf"])
 def test_near_a_singularity_nothing_is_hidden(name: str) -> None:
-    """The undamped laws demand finite torques of thousands of times the limit; the damped ones stay below
-    it."""
+    """The undamped laws demand finite torques of thousands of times the limit; those of the damped laws are
+    below the limit."""
     limit = load_robot("planar3").tau_limit
     assert np.abs(straight(name).tau / limit).max() > 1e3
     damped = straight(f"{name}_damped").tau
@@ -42,8 +42,7 @@ def test_near_a_singularity_nothing_is_hidden(name: str) -> None:
 
 
 def test_a_direction_that_is_gone_is_named() -> None:
-    """With the exactly straight arm OSF leaves the lost direction out, and the status of the level names
-    it."""
+    """If the arm is exactly straight, OSF omits the lost direction, and the status of the level names it."""
     loaded = torque_scene("planar3-singular")
     controller = make_controller("osf", loaded.robot, loaded.settings.for_controller())
     references = loaded.references(loaded.robot, loaded.settings.levels)
@@ -54,7 +53,7 @@ def test_a_direction_that_is_gone_is_named() -> None:
 
 
 def test_hqp_passes_the_singularity_inside_its_bounds() -> None:
-    """R > 0 keeps the Hessian positive definite: every level is solved, and the torque bounds hold."""
+    """R > 0 keeps the Hessian positive definite, so that every level is solved and the torque bounds hold."""
     for R in (10.0, 1e-6):
         levels = tuple(replace(level, R=R) for level in torque_scene("planar3-singular").settings.levels)
         plan = straight("hqp", stack=levels)

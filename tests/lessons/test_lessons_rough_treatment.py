@@ -1,4 +1,5 @@
-"""After jumps and pushes the robot stays inside its bounds and comes to rest; replays are bitwise equal."""
+"""After jumps and pushes the robot stays within its bounds and comes to rest, and replays are bitwise
+equal."""
 
 from __future__ import annotations
 
@@ -30,8 +31,8 @@ JUMPS = {
 
 @lru_cache(maxsize=len(JUMPS))
 def after_jump(case: str) -> tuple[TorqueSession, Array]:
-    """Returns the session and the rows of 2.5 s after a sudden jump of the target by 1 m, reachable or
-    not. The arm touches nothing: an impact changes velocities whatever the controller does."""
+    """Returns the session and the rows of 2.5 s after a sudden jump of the target by 1 m, reachable or not.
+    The arm has no contact, because an impact changes velocities independently of the controller."""
     name, jump = JUMPS[case]
     scene = torque_scene(name)
     plant = replace(scene.settings.plant, contacts=False, joint_stops=False)
@@ -45,7 +46,7 @@ def after_jump(case: str) -> tuple[TorqueSession, Array]:
 
 @pytest.mark.parametrize("case", JUMPS)
 def test_a_jump_of_the_gizmo_keeps_the_torque_in_its_bounds(case: str) -> None:
-    """After a gizmo jump of 1 m all numbers stay finite, and no demanded torque exceeds its bound."""
+    """After a jump of the gizmo by 1 m all numbers stay finite, and no demanded torque exceeds its bound."""
     session, rows = after_jump(case)
     assert np.isfinite(field(session, rows, "q")).all()
     assert np.isfinite(field(session, rows, "tau")).all()
@@ -75,7 +76,7 @@ SUBSETS = [names for size in range(4) for names in combinations(("position", "or
 
 @pytest.mark.parametrize("enabled", SUBSETS, ids=lambda names: "+".join(names) or "none")
 def test_a_push_dies_out_under_every_subset_of_levels(enabled: tuple[str, ...], scene: TorqueScene) -> None:
-    """After 5 N·m for 0.1 s on a middle link all joints are slow 3 s later, for every subset of enabled
+    """After 5 N·m for 0.1 s on a middle link, all joints are slow 3 s later, for every subset of enabled
     levels."""
     session = TorqueSession(scene)
     for name in ("position", "orientation", "posture"):

@@ -1,4 +1,4 @@
-"""RunSpec describes a run as data, with one type for the command line, lessons, jobs, codes and the page."""
+"""RunSpec describes a run as data; command line, lessons, jobs, codes and page use the same type."""
 
 from __future__ import annotations
 

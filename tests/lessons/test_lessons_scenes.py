@@ -1,4 +1,4 @@
-"""The scenes keep what the project promises: the numbers of 'Done when' 2, 3, 4 and 6."""
+"""The scenes have the numbers that the project promises, those of 'Done when' 2, 3, 4 and 6."""
 
 from __future__ import annotations
 
@@ -32,8 +32,7 @@ def record(
 
 
 def assert_sound(result: dict[str, Any]) -> None:
-    """Assert that a run is sound by the contract of the command line: finite, every QP solved, no
-    fallback."""
+    """Asserts that a run is sound as defined for the command line: finite, every QP solved, no fallback."""
     assert result["diverged"] is False
     assert result["finite"] is True
     assert result["solver"]["unsolved"] == 0
@@ -50,7 +49,7 @@ def circle() -> dict[str, Any]:
 
 
 def test_the_circle_is_sound(circle: dict[str, Any]) -> None:
-    """RT4 for 4 s from rest keeps the promised bounds, residuals and leak, without a fallback."""
+    """For 4 s from rest, RT4 keeps the promised bounds, residuals and leak, without a fallback."""
     assert_sound(circle)
     assert circle["limits"]["velocity"]["max_ratio"] <= 1.10
     assert circle["duration_s"] == pytest.approx(4.0)
@@ -68,7 +67,8 @@ def test_the_circle_is_accurate(circle: dict[str, Any]) -> None:
 
 
 def test_the_circle_presses_on_its_bounds(circle: dict[str, Any]) -> None:
-    """Level 3 demands more than joint 1 can do; bounds are active in the scene, and they are counted."""
+    """Level 3 demands more than joint 1 can do; therefore bounds are active in the scene, and they are
+    counted."""
     assert circle["bound_active_share"] > 0.1
     assert circle["limits"]["velocity"]["max_ratio"] > 0.95
     assert circle["dynamic_leak_max"] > circle["priority_leak_max"]
@@ -108,7 +108,7 @@ PAYLOAD = pytest.mark.xfail(
 
 @pytest.mark.parametrize("assignment", [VARIANTS[0], pytest.param(VARIANTS[1], marks=PAYLOAD), VARIANTS[2]])
 def test_the_circle_stays_fast_and_accurate_when(assignment: str) -> None:
-    """With the same changes the speeds and the accuracy of level 1 stay within the limits of the nominal
+    """With the same changes, the speeds and the accuracy of level 1 stay within the limits of the nominal
     run."""
     result = circle_with(assignment)
     assert result["limits"]["velocity"]["max_ratio"] <= 1.10
@@ -117,7 +117,7 @@ def test_the_circle_stays_fast_and_accurate_when(assignment: str) -> None:
 
 @pytest.mark.parametrize("name", ["panda-hold", "planar3-hold", "iiwa14-hold"])
 def test_hold_scenes_are_sound(name: str) -> None:
-    """A robot at rest on its targets stays there."""
+    """A robot that is at rest on its targets stays there."""
     result = summary(record(name, duration=4.0))
     assert_sound(result)
     assert result["limits"]["velocity"]["max_ratio"] <= 0.05
@@ -126,7 +126,7 @@ def test_hold_scenes_are_sound(name: str) -> None:
 
 @pytest.mark.parametrize("file", ["ur_description/urdf/ur10_robot.urdf", "xarm_description/urdf/xarm7.urdf"])
 def test_hold_is_sound_on_robots_of_others(example_urdf: Callable[[str], str], file: str) -> None:
-    """`run hold --urdf` is sound with a UR10 and an xArm 7 of example-robot-data."""
+    """`run hold --urdf` is sound for a UR10 and an xArm 7 of example-robot-data."""
     result = summary(record("hold", duration=4.0, urdf=example_urdf(file)))
     assert_sound(result)
     assert result["limits"]["velocity"]["max_ratio"] <= 0.05
@@ -134,8 +134,8 @@ def test_hold_is_sound_on_robots_of_others(example_urdf: Callable[[str], str], f
 
 
 def test_printed_position_rows_fail_honestly() -> None:
-    """With (32d) as printed and twice the speed QPs fail: the run ends, its numbers are finite, and every
-    fallback is counted."""
+    """With (32d) as printed and twice the speed, QPs fail. The run still ends, its numbers are finite, and
+    every fallback is counted."""
     recording = record("iiwa14-circle", "limits.position=paper", "limits.velocity_scale=2", duration=4.0)
     result = summary(recording)
     solver = result["solver"]
@@ -156,7 +156,7 @@ def test_printed_position_rows_fail_honestly() -> None:
     ids=["encoder", "encoder and friction"],
 )
 def test_sensor_resolution_and_friction_cause_no_limit_cycle(assignments: tuple[str, ...]) -> None:
-    """In 8 s of iiwa14-hold with a move and a push, the tip moves less than 0.2 mm peak to peak after it
+    """In 8 s of iiwa14-hold with a move and a push, the tip moves less than 0.2 mm peak to peak after it has
     settled."""
     events = (
         (0.2, MoveTarget("position", (0.506, 0.05, 0.428))),

@@ -1,4 +1,4 @@
-"""The session without a page: each tick returns a row of telemetry that agrees with plant and plan."""
+"""Without a page, each tick of a session returns a row of telemetry that agrees with plant and plan."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ from lessons.settings.assignments import with_assignments
 
 
 def test_rows_tell_the_filtered_target(session: TorqueSession) -> None:
-    """x_d and its derivatives in the row belong to the dragged target, and are consistent over the ticks."""
+    """x_d and its derivatives in the row are those of the dragged target, and are consistent from tick to
+    tick."""
     session.tick()
     start = value(session, session.tick(), "x_d/position").copy()
     goal = start + np.array([0.1, 0.05, -0.05])
@@ -54,7 +55,7 @@ def test_a_row_tells_the_truth(session: TorqueSession) -> None:
 
 
 def test_the_gauge_follows_M_bar(session: TorqueSession) -> None:
-    """The norm ‖I − M⁻¹M̄‖ in the row, which is 1 for M̄ = 0, increases with a ten times larger M̄."""
+    """The norm ‖I − M⁻¹M̄‖ in the row, which is 1 for M̄ = 0, increases if M̄ is ten times larger."""
     before = session.tick().copy()
     session.post(Set("M_bar_scale", 10))
     for _ in range(24):
@@ -64,7 +65,7 @@ def test_the_gauge_follows_M_bar(session: TorqueSession) -> None:
 
 
 def test_losing_control_is_said(scene: TorqueScene) -> None:
-    """A hopeless setting ends the run with `diverged`, a notice, and a finite summary."""
+    """A setting that cannot work ends the run with `diverged`, a notice, and a finite summary."""
     unlimited = ["limits.velocity=false", "limits.torque=false", "plant.saturate=false"]
     assignments = ["M_bar_scale=20", "R=0.01", *unlimited]
     push = Push(scene.robot.joint_names[3], force=(0.0, 20.0, 0.0))

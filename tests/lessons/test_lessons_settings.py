@@ -1,4 +1,5 @@
-"""Settings by their paths: a learner can change each of them; a wrong type or path is one clear sentence."""
+"""Settings have paths, and a learner can change each of them; a wrong type or path is answered by one clear
+sentence."""
 
 from __future__ import annotations
 
@@ -59,7 +60,8 @@ def test_a_path_reaches_its_field_and_nothing_else(start: TorqueSettings) -> Non
 
 @pytest.mark.parametrize("scene", ["iiwa14-circle", "ridgeback-ur10-delivery"])
 def test_one_table_of_paths_serves_all_values(scene: str) -> None:
-    """Changed values share one table of paths; other levels have another table."""
+    """Settings with changed values share one table of paths; settings with other levels have another
+    table."""
     settings = load_scene(scene).settings
     changed = with_assignments(settings, ["horizon=7", "levels.1.Q=3"])
     assert changed.places() is settings.places()
@@ -67,7 +69,7 @@ def test_one_table_of_paths_serves_all_values(scene: str) -> None:
 
 
 def test_one_joint_of_many(start: TorqueSettings) -> None:
-    """A path with a joint number changes this joint alone; a single number is first extended to all
+    """A path with a joint number changes only this joint; before this, a single number is extended to all
     joints."""
     scaled = start.changed("plant.inertia_scale.2", 0.5)
     assert scaled.plant.inertia_scale == (1.0, 0.5, 1.0, 1.0, 1.0, 1.0, 1.0)
@@ -97,8 +99,8 @@ def test_every_listed_path_is_taken(start: TorqueSettings) -> None:
 
 
 def test_weights_of_all_levels_at_once(start: TorqueSettings) -> None:
-    """Q and R accept one number, or one per level; the weight of a level may have one entry per
-    coordinate."""
+    """Q and R accept one number for all levels, or one per level; the weight of a level may have one entry
+    per coordinate."""
     assert [level.Q for level in start.changed("Q", 5).levels] == [5.0, 5.0, 5.0]
     assert [level.R for level in start.changed("R", [1, 2, 3]).levels] == [1.0, 2.0, 3.0]
     assert start.changed("levels.1.Q", [1, 2, 3]).levels[0].Q == (1.0, 2.0, 3.0)
@@ -198,7 +200,7 @@ def test_assignments_are_json_or_words() -> None:
     "text", ["horizon", "=3", "Q=NaN", "Q=nan", "Q=Infinity", "Q=-inf", "Q=", "R=[1, NaN]"]
 )
 def test_assignments_that_are_none(text: str) -> None:
-    """An assignment without "=" or with a value that is not a number is refused, and the sentence repeats
+    """An assignment without "=", or with a value that is not a number, is refused in a sentence that repeats
     it."""
     with pytest.raises(InputError, match="--set"):
         parse_assignment(text)
@@ -212,7 +214,7 @@ def test_later_assignments_build_on_earlier_ones(start: TorqueSettings) -> None:
 
 
 def test_the_order_is_a_setting_of_its_own(start: TorqueSettings) -> None:
-    """The order names every level, in one word or a list; the error of any other value names the valid
+    """The order names every level, in one word or a list; for any other value, the error names the valid
     form."""
     names = [level.name for level in start.levels]
     turned = start.changed("order", ",".join(reversed(names)))

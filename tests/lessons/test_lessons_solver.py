@@ -1,5 +1,5 @@
-"""`solver` is used by the controllers that have it, reported as it ran, and refused where it has no
-effect."""
+"""Controllers that have a QP solver use `solver` and report the solver that ran; controllers without one
+refuse it."""
 
 from __future__ import annotations
 

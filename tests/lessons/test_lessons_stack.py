@@ -1,4 +1,4 @@
-"""The stack is a setting: it is read, exported, changed in part, and changed while the robot moves."""
+"""The stack is a setting: it can be read, exported, changed in part, and changed while the robot moves."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def test_a_stack_is_read_as_it_is_written() -> None:
     assert isinstance(levels[0].tasks[0], FramePosition)
     assert levels[0].tasks[0].axes == "xy"
     assert isinstance(levels[6].tasks[0], Posture)
-    # Missing gains are computed for the robot; a task that existed before keeps its own.
+    # Missing gains are computed for the robot; a task that existed before keeps its own gains.
     assert levels[5].tasks[0].K_p == START.levels[0].tasks[0].K_p
     assert levels[3].tasks[0].K_p == 30.0
 
@@ -71,7 +71,7 @@ def test_every_kind_can_be_added_and_told(kind: str) -> None:
 
 
 def test_a_told_stack_is_the_same_to_the_last_bit() -> None:
-    """An exported stack is equal as assignments and as a state code, together with the other changed
+    """An exported stack is equal as assignments and as a state code, also together with other changed
     settings."""
     settings = START.changed("stack", EVERY_KIND).changed("tasks.turn.K_p", 0.1 + 0.2)
     settings = settings.changed("levels.posture.Q", [1, 2, 3, 4, 5, 6, 7]).changed(
@@ -127,7 +127,7 @@ def test_a_wrong_stack_is_one_sentence(value: Any, words: str) -> None:
     ],
 )
 def test_what_the_robot_does_not_have_is_one_sentence_and_changes_nothing(task: dict, words: str) -> None:
-    """A task that the robot cannot have is refused in a scene that is prepared and in a session that runs."""
+    """A task that the robot cannot have is refused in a prepared scene and in a running session."""
     wrong = START.changed("stack.add", task)
     with pytest.raises(InputError, match=words):
         TorqueSession(replace(SCENE, settings=wrong))
@@ -232,8 +232,8 @@ def test_the_stack_changes_without_a_bump(controller: str) -> None:
 
 
 def test_a_target_stays_where_the_hand_put_it() -> None:
-    """The target keeps its coordinates along the axes that remain; a new axis starts at the robot's position;
-    a renamed task keeps its target."""
+    """The target keeps its coordinates along the axes that remain. Along a new axis it starts at the position
+    of the robot. A renamed task keeps its target."""
     session = TorqueSession(SCENE)
     session.post(MoveTarget("position", (0.6, 0.1, 0.5)))
     for _ in range(50):
@@ -254,8 +254,8 @@ def test_a_target_stays_where_the_hand_put_it() -> None:
 
 
 def test_a_scene_s_motion_is_for_the_coordinates_it_was_made_for() -> None:
-    """The task of the circle on fewer axes has a target instead of the motion; on the same axes the motion
-    continues."""
+    """If the task of the circle has fewer axes, it has a target instead of the motion; with the same axes the
+    motion continues."""
     circle = torque_scene("iiwa14-circle")
     session = TorqueSession(circle)
     session.post(Set("stack.add", {"task": "com", "level": 3}))
@@ -271,7 +271,7 @@ def test_a_scene_s_motion_is_for_the_coordinates_it_was_made_for() -> None:
 
 
 def test_ranks_tell_which_level_gets_what() -> None:
-    """With seven joints and 3 + 3 + 3 + 7 rows, the elbow receives the one remaining direction."""
+    """With seven joints and 3 + 3 + 3 + 7 rows, the elbow has rank 1, the only direction that remains."""
     settings = START.changed("stack.add", {"task": "position", "name": "elbow", "frame": "link_4"})
     found = summary(run(replace(SCENE, settings=settings), 0.01))["levels"]
     assert [(each["name"], each["rank"], each["rows"]) for each in found] == [

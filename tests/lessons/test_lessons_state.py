@@ -1,5 +1,5 @@
-"""State codes: all settings as a line of text, bitwise equal after decoding, and safe from untrusted
-senders."""
+"""State codes contain all settings in a line of text. They are bitwise equal after decoding, and safe if the
+sender is not trusted."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def events(draw: st.DrawFn, scene: Scene) -> Event:
 @given(data=st.data())
 @settings(max_examples=60)
 def test_any_setting_survives_its_code(name: str, data: st.DataObject) -> None:
-    """Settings after random events are equal after encoding and decoding, also by the words of the command
+    """Settings after random events are equal after encoding and decoding, also when written for the command
     line."""
     scene = find(name)
     reached = scene.settings
@@ -96,7 +96,7 @@ def test_any_setting_survives_its_code(name: str, data: st.DataObject) -> None:
 
 
 def test_a_code_says_only_what_differs() -> None:
-    """The code of an unchanged scene has a few characters; the rate that a controller brings with it is not
+    """The code of an unchanged scene has a few characters; a rate that the controller itself sets is not
     stored."""
     plain = state_of(RunSpec("iiwa14-hold"), find("iiwa14-hold").settings)
     assert plain.run.set == ()
@@ -212,7 +212,7 @@ def test_bad_codes_are_refused_in_one_sentence(case: str) -> None:
     ],
 )
 def test_settings_of_a_stranger_are_refused_when_prepared(assignment: str) -> None:
-    """Names and numbers of a code are checked like those of --set: every wrong one is answered by one
+    """Names and numbers of a code are checked like those of --set, and each wrong one is answered by one
     sentence."""
     with pytest.raises(InputError) as caught:
         decode(packed({"s": "planar3-hold", "a": [assignment]})).run.prepared()
@@ -236,7 +236,7 @@ def test_a_mission_of_a_stranger_cannot_fill_the_memory(assignment: str) -> None
 
 @dataclass(frozen=True, kw_only=True)
 class OwnKind(FramePosition):
-    """A kind of task without a name in the catalog."""
+    """A kind of task that has no name in the catalog."""
 
 
 def test_what_a_code_cannot_carry_is_said() -> None:

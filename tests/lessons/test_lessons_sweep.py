@@ -1,4 +1,4 @@
-"""A sweep runs the requested cells, and a stopped sweep that is resumed has the same result as one without a
+"""A sweep runs the requested cells. If it is stopped and resumed, its result is that of a sweep without a
 stop."""
 
 from __future__ import annotations
@@ -47,8 +47,8 @@ OVER = ("M_bar_scale=0.5:2:2", "horizon=1:3:3")
     ],
 )
 def test_a_range_becomes_values(over: str, values: tuple[float, ...], log: bool) -> None:
-    """Values have equal ratios over a decade or more, equal steps below, and are integers where the setting
-    requires it."""
+    """Values have equal ratios over a decade or more and equal steps over a smaller range; they are integers
+    if the setting requires it."""
     (axis,) = make_sweep(SHORT, [over]).axes
     assert axis.values == pytest.approx(values)
     assert axis.log is log
@@ -79,14 +79,15 @@ def test_a_wrong_range_is_one_sentence(over: tuple[str, ...], says: str) -> None
 
 
 def test_cells_run_what_their_place_says() -> None:
-    """The last axis changes fastest, and the job of each cell adds its values to those of the base."""
+    """The values of the last axis change fastest, and the job of each cell adds the values of the cell to
+    those of the base."""
     sweep = make_sweep(RunSpec("planar3-circle", set=("Q=100",)), OVER)
     assert sweep.points == [(m, n) for m in (0.5, 2.0) for n in (1, 2, 3)]
     assert sweep.run(4).set == ("Q=100", "M_bar_scale=2.0", "horizon=2")
 
 
 class Stop(Exception):
-    """An exception that stands for Ctrl-C of a user."""
+    """An exception that represents Ctrl-C of a user."""
 
 
 def stopping_after(count: int) -> Callable[..., Generator[tuple[int, Any], None, None]]:
@@ -104,8 +105,8 @@ def stopping_after(count: int) -> Callable[..., Generator[tuple[int, Any], None,
 
 
 def test_a_stopped_sweep_goes_on_to_the_same_result(tmp_path: Path) -> None:
-    """A sweep that was stopped half-way, with an incomplete last line, and resumed has a bitwise equal
-    results.json."""
+    """A sweep is stopped half-way, with an incomplete last line, and resumed; its results.json is bitwise
+    equal to that of a sweep without a stop."""
     sweep = make_sweep(SHORT, OVER)
     carry_on(sweep, tmp_path / "whole", one_by_one)
     part = tmp_path / "part"
@@ -130,7 +131,7 @@ def test_a_stopped_sweep_goes_on_to_the_same_result(tmp_path: Path) -> None:
 
 
 def test_all_cores_give_the_same_result_as_one(tmp_path: Path) -> None:
-    """Spawned processes and this process write the same file, in whatever order the cells finish."""
+    """Spawned processes and this process write the same file, in whatever order the cells are completed."""
     sweep = make_sweep(SHORT, ("M_bar_scale=0.5:2:3",))
     for name, spread in (("one", one_by_one), ("all", on_cores)):
         carry_on(sweep, tmp_path / name, spread)
@@ -166,7 +167,8 @@ def dies_at_one(value: int) -> int:
 
 
 def test_a_sweep_notices_that_a_file_of_ones_own_was_changed(tmp_path: Path) -> None:
-    """A file that changes between two calls, or during one, is detected: cells of two versions are no map."""
+    """A file that changes between two calls, or during one, is detected, because a map must not mix cells of
+    two versions."""
     file, out = tmp_path / "mine.py", tmp_path / "out"
     file.write_text("def torque(now):\n    return now.bias\n")
     base = RunSpec("planar3-circle", controller=str(file), duration=0.02)
@@ -208,8 +210,8 @@ def dies_once(item: tuple[Path, int]) -> tuple[int, int]:
 
 
 def test_a_process_that_dies_once_costs_a_retry(tmp_path: Path) -> None:
-    """Every item has its result, and only the items in progress at that moment run again in separate
-    processes."""
+    """Every item has its result, and only the items that were running at that moment are repeated, in
+    separate processes."""
     outcomes = dict(on_cores(dies_once, [(tmp_path / "died", value) for value in range(12)]))
     done = {place: outcome for place, outcome in outcomes.items() if not isinstance(outcome, FailedJob)}
     assert {place: value for place, (value, _) in done.items()} == {value: value for value in range(12)}
@@ -217,7 +219,7 @@ def test_a_process_that_dies_once_costs_a_retry(tmp_path: Path) -> None:
 
 
 def test_a_run_that_fails_or_loses_control_is_a_cell(tmp_path: Path) -> None:
-    """A run with a far too large M̄ loses control, and a failing run has its reason; both are in the file,
+    """A run with a much too large M̄ loses control, and another run fails for a reason. Both are in the file,
     without a value."""
     unbounded = ("plant.saturate=false", "limits.torque=false", "limits.velocity=false")
     sweep = make_sweep(RunSpec("planar3-circle", set=unbounded, duration=0.3), ("M_bar_scale=1:200:2",))
@@ -239,7 +241,8 @@ def test_a_run_that_fails_or_loses_control_is_a_cell(tmp_path: Path) -> None:
 
 
 def test_metrics_are_the_numbers_of_a_run() -> None:
-    """Level 1 is the default; coordinates are combined; an unknown metric suggests the nearest name."""
+    """Level 1 is the default, coordinates are combined, and for an unknown metric the nearest name is
+    suggested."""
     names = metrics(make_sweep(SHORT, OVER))
     assert names[0] == "tasks.position.rmse"
     assert metrics(make_sweep(RunSpec("planar3-circle"), OVER))[0] == "tasks.position.rmse_after_1s"
@@ -265,7 +268,7 @@ def test_three_paths_make_none(tmp_path: Path) -> None:
 
 
 def test_a_map_without_a_single_value_can_be_drawn(tmp_path: Path) -> None:
-    """A map in which every run lost control is hatched and has no colour scale."""
+    """If every run of a map lost control, the map is hatched and has no colour scale."""
     nothing = np.full((2, 2), np.nan)
     lost = np.array([[True, True], [False, True]])
     path = tmp_path / "map.png"

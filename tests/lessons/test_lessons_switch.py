@@ -32,7 +32,7 @@ def at_rest(controller: str, scene: TorqueScene = SCENE) -> TorqueSession:
 
 
 def switch(session: TorqueSession, name: str, start: Array) -> None:
-    """Switch the controller; no tick changes a torque by 5 % of its limit, or moves the tip by 1 mm from
+    """Switches the controller; no tick changes a torque by 5 % of its limit, or moves the tip by 1 mm from
     `start`."""
     session.post(Set("controller", name))
     before = session.plant.tau
@@ -48,7 +48,7 @@ def switch(session: TorqueSession, name: str, start: Array) -> None:
 
 @pytest.mark.parametrize("old", list(CONTROLLERS)[:-1])
 def test_a_switch_at_rest_is_bumpless(old: str) -> None:
-    """A switch from this controller to each later one in the table and back is bumpless; thus every ordered
+    """The controller is switched to each later one in the table and back, without a bump. Thus every ordered
     pair is tested."""
     session = at_rest(old)
     start = tip(session)
@@ -59,8 +59,8 @@ def test_a_switch_at_rest_is_bumpless(old: str) -> None:
 
 @pytest.mark.parametrize("new", CONTROLLERS)
 def test_control_goes_on_after_a_switch(new: str) -> None:
-    """The new controller follows a target. The posture is off, as the weighted controller would otherwise
-    stop half-way."""
+    """The new controller follows a target. The posture is disabled, because it would stop the weighted
+    controller half-way."""
     session = at_rest("hqp" if new == "himpc" else "himpc")
     start = tip(session)
     switch(session, new, start)
@@ -95,7 +95,7 @@ def test_a_switch_in_motion_is_smooth(old: str, new: str) -> None:
 
 
 def test_the_new_controller_ends_up_alone() -> None:
-    """After the hand-over the session runs the requested controller itself."""
+    """After the transition, the session runs only the requested controller."""
     session = at_rest("himpc")
     session.post(Set("controller", "hqp"))
     session.tick()
@@ -109,7 +109,7 @@ def test_the_torque_goes_from_one_controller_to_the_other() -> None:
     """The blended torque starts at the old torque, ends at the new one and lies between them at every
     tick."""
     session = at_rest("himpc")
-    session.post(Set("plant.payload_kg", 3.0))  # unknown to the nominal model: torques differ
+    session.post(Set("plant.payload_kg", 3.0))  # not in the nominal model, so the torques differ
     for _ in range(300):
         session.tick()
     session.post(Set("controller", "hqp"))
@@ -125,7 +125,7 @@ def test_the_torque_goes_from_one_controller_to_the_other() -> None:
 
 
 def test_settings_reach_both_controllers_during_a_hand_over() -> None:
-    """A longer horizon, another period or a disabled level during the hand-over causes no notice and no
+    """During the transition, a longer horizon, another period or a disabled level causes no notice and no
     motion."""
     session = at_rest("himpc")
     start = tip(session)
@@ -144,7 +144,7 @@ def test_settings_reach_both_controllers_during_a_hand_over() -> None:
 
 
 def test_changes_of_mind_and_a_reset() -> None:
-    """Three switches within a hand-over remain smooth; a reset ends the hand-over at once."""
+    """Three switches during a transition remain smooth; a reset ends the transition at once."""
     session = at_rest("himpc")
     start, before = tip(session), session.plant.tau
     for name in ("hqp", "hiqp", "himpc"):
@@ -170,8 +170,8 @@ def test_an_unknown_controller_changes_nothing() -> None:
 
 
 def test_a_payload_is_picked_up_and_put_down_without_a_jump() -> None:
-    """The state does not jump when the payload changes, and the controller, which does not know of it, keeps
-    its target."""
+    """When the payload changes, the state does not jump. The controller, which has no information about it,
+    keeps its target."""
     session = at_rest("himpc")
     start = tip(session)
     for kilograms in (2.0, 0.0):

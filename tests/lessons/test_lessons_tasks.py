@@ -1,4 +1,4 @@
-"""Tasks of every kind in sessions: the compiled and the explicit route agree."""
+"""For tasks of every kind in sessions, the compiled and the explicit route agree."""
 
 from __future__ import annotations
 
@@ -55,9 +55,9 @@ GIVEN = {
 )
 @pytest.mark.parametrize("kind", GIVEN)
 def test_torques_with_any_kind_are_those_of_the_printed_route(kind: str, place: int, controller: str) -> None:
-    """Closed loops of both routes agree while the target moves; the kernel receives the rows of the task. It
-    computes orientations on one or two axes itself; their targets start 100° away, mostly about a free
-    axis."""
+    """The closed loops of both routes agree while the target moves; the kernel receives the rows of the task.
+    Orientations on one or two axes are computed by the kernel itself; their targets start 100° away, mostly
+    about a free axis."""
     scene = torque_scene("iiwa14-hold")
     levels = list(scene.settings.levels)
     levels.insert(place, Level((GIVEN[kind](),)))
@@ -94,7 +94,7 @@ def test_torques_with_any_kind_are_those_of_the_printed_route(kind: str, place: 
 
 @dataclass(frozen=True, kw_only=True)
 class OwnTurn(FrameTask):
-    """A user's own task whose value is a rotation and which controls some axes of it."""
+    """A user's own task; its value is a rotation, and it controls some axes of it."""
 
     first_row: ClassVar[int] = 3
     unit: ClassVar[Literal["m", "rad"]] = "rad"
@@ -110,8 +110,8 @@ class OwnTurn(FrameTask):
     ("controller", "route"), [("himpc", "compiled"), ("himpc", "explicit"), ("hqp", "compiled")]
 )
 def test_an_own_rotation_on_some_axes_is_told_of_these(controller: str, route: str) -> None:
-    """The target of the task turns about all axes; its previewed derivatives have as many columns as the task
-    has rows."""
+    """The target of the task rotates about all axes; its previewed derivatives have as many columns as the
+    task has rows."""
     scene = torque_scene("iiwa14-hold")
     levels = (scene.settings.levels[0], Level((OwnTurn(name="x", axes="xy"),)), scene.settings.levels[2])
     taken = replace(scene.settings, levels=levels, controller=controller, route=route)

@@ -1,4 +1,4 @@
-"""The compiled tick in sessions, compared with the route as printed."""
+"""In sessions, the compiled tick agrees with the printed route."""
 
 from __future__ import annotations
 
@@ -34,7 +34,8 @@ from lessons.session.torque import TorqueSession
 def test_torques_are_those_of_the_printed_route(
     name: str, horizon: int, position: str, controller: str
 ) -> None:
-    """Two closed loops, one by the kernel and one by the rows as printed, agree while targets are dragged."""
+    """Two closed loops, one with the kernel and one with the printed rows, agree while targets are
+    dragged."""
     scene = torque_scene(name)
     taken = replace(scene.settings, horizon=horizon, controller=controller)
     taken = taken.changed("limits.position", position)
@@ -57,16 +58,16 @@ def test_torques_are_those_of_the_printed_route(
             assert one.leak <= 1e-6 or controller == "weighted"
             assert one.kkt_residual <= 1e-6
             assert one.cost == pytest.approx(other.cost, rel=1e-6, abs=1e-6)
-    # One QP with all tasks in its cost is worse conditioned: there the printed route itself is less exact.
-    # The same holds at the paper's start, where J₁…J₃ have rank 6, if no bound limits the directions that
-    # rounding alone decides.
+    # One QP with all tasks in its cost has a larger condition number, and there the printed route itself is
+    # less exact. The same holds at the start of the paper, where J₁…J₃ have rank 6, if no bound limits the
+    # directions that only rounding decides.
     loose = controller == "weighted" or (name, position) == ("iiwa14-circle-paper", "paper")
     assert worst <= (1e-7 if loose else 1e-8)
 
 
 @pytest.mark.parametrize("route", ["compiled", "explicit"])
 def test_a_wild_torque_reading_does_not_raise_the_limit(route: Route) -> None:
-    """After a sensor reading of many times the robot's limit the next torques stay within the limit."""
+    """After a sensor reading of many times the limit of the robot, the next torques stay within the limit."""
     scene = torque_scene("planar3-hold")
     session = TorqueSession(replace(scene, settings=replace(scene.settings, route=route)))
     session.tick()
@@ -78,8 +79,8 @@ def test_a_wild_torque_reading_does_not_raise_the_limit(route: Route) -> None:
 
 
 def test_a_plan_that_is_kept_stays_as_it_is() -> None:
-    """A frozen plan keeps the evidence of its own tick. The evidence of a plan that was not frozen raises an
-    error later, and the message names `freeze`."""
+    """A frozen plan keeps the evidence of its own tick. If a plan is not frozen, access to its evidence
+    raises an error later, and the message names `freeze`."""
     session = TorqueSession(torque_scene("iiwa14-circle"))
     session.tick()
     shown, other = session.plan, TorqueSession(torque_scene("iiwa14-circle"))
@@ -100,11 +101,11 @@ def test_a_plan_that_is_kept_stays_as_it_is() -> None:
 @pytest.mark.parametrize("controller", ["himpc", "nhimpc", "weighted"])
 @pytest.mark.parametrize("name", ["iiwa14-circle", "iiwa14-circle-paper", "iiwa14-hold", "planar3-conflict"])
 def test_a_row_gathered_at_once_is_the_row_written_field_by_field(name: str, controller: str) -> None:
-    """The row of telemetry that the kernel collects equals the one that is written from the evidence of the
-    plan."""
+    """The row of telemetry that the kernel writes at once equals the row that is written from the evidence of
+    the plan."""
     scene = torque_scene(name)
     session = TorqueSession(replace(scene, settings=replace(scene.settings, controller=controller)))
-    session.post(Set("limits.velocity_scale", 0.3))  # so that bounds are active
+    session.post(Set("limits.velocity_scale", 0.3))  # with this setting, bounds are active
     session.post(Set("limits.position", "viability"))
     target = session.target("orientation")
     if target is not None:
@@ -126,7 +127,7 @@ def test_a_row_gathered_at_once_is_the_row_written_field_by_field(name: str, con
 
 
 def test_nothing_is_compiled_while_a_robot_moves() -> None:
-    """One compiled form of the entry serves every layout."""
+    """One compiled version of the entry function serves every layout."""
     for name in ("iiwa14-circle", "planar3-hold"):
         TorqueSession(torque_scene(name)).tick()
     assert len(control_period.signatures) == 1

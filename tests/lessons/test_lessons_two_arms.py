@@ -1,4 +1,4 @@
-"""The robot with two arms: its hands keep their relative pose, whatever the tasks of lower levels are."""
+"""The hands of the robot with two arms keep their relative pose for all tasks of lower levels."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from lessons.session.torque import TorqueSession
 
 
 def test_the_hands_move_along_a_square_as_if_they_carried_a_tray() -> None:
-    """The hands keep their relative pose within 0.5 mm and 0.2°; the middle reaches every corner and stays
-    level."""
+    """The relative pose of the hands changes by less than 0.5 mm and 0.2°. The middle reaches every corner
+    and stays level."""
     recording = run(torque_scene("baxter-tray"))
     assert np.abs(recording["error/grip"]).max() < 0.5e-3
     assert np.degrees(np.linalg.norm(recording["error/grip_turn"], axis=1).max()) < 0.2
@@ -32,8 +32,8 @@ def test_the_hands_move_along_a_square_as_if_they_carried_a_tray() -> None:
 
 
 def test_nothing_but_level_1_keeps_the_hands_together() -> None:
-    """The scene has no tray: the plant has no additional mass, and without the task `grip` the hands move
-    apart."""
+    """The scene has no tray: the plant has no additional mass, and without the task `grip` the hands
+    separate."""
     session = TorqueSession(torque_scene("baxter-tray"))
     M = pin.crba(session.robot.model, session.robot.model.createData(), session.plant.q)
     M = np.triu(M) + np.triu(M, 1).T + 0.1 * np.eye(14)
@@ -60,8 +60,8 @@ def test_both_hands_are_dragged_apart_from_each_other() -> None:
 
 @pytest.mark.parametrize("swapped", [False, True])
 def test_who_ranks_higher_gets_its_hand(swapped: bool) -> None:
-    """The grip is on level 1, and the targets of the two hands are 15 cm too far apart: the hand on the
-    higher of the two other levels reaches its target, and the other hand follows; swapped levels swap the
+    """The grip is on level 1, and the targets of the two hands are 15 cm too far apart. Of the two hands, the
+    one on the higher level reaches its target and the other follows; if the levels are swapped, so are the
     hands."""
     session = TorqueSession(torque_scene("baxter-conflict"))
     if swapped:

@@ -1,4 +1,5 @@
-"""Velocity-level scenes: the numbers of the HTMPC paper that the project promises, and live changes."""
+"""The velocity-level scenes have the numbers of the HTMPC paper that the project promises, and accept live
+changes."""
 
 from __future__ import annotations
 
@@ -39,7 +40,7 @@ def result(
 
 
 def assert_sound(summary: dict[str, Any]) -> None:
-    """Assert that a run is finite, inside its velocity and acceleration limits, and that every QP was
+    """Asserts that a run is finite and within its velocity and acceleration limits, and that every QP was
     solved."""
     assert summary["finite"] is True
     assert summary["diverged"] is False
@@ -70,8 +71,8 @@ def test_the_hand_stays_while_the_base_goes_as_far_as_it_can(peak: str) -> None:
 
 
 def test_preview_and_prediction_each_bring_the_base_home_sooner() -> None:
-    """Part 2: HTMPC has smaller errors than HTMPC_WPT (without preview of steps), which has smaller ones than
-    HTIDKC (without prediction)."""
+    """In part 2, the errors of HTMPC are smaller than those of HTMPC_WPT (without preview of steps), which
+    are smaller than those of HTIDKC (without prediction)."""
     errors = {
         controller: result("ridgeback-ur10-square", controller=controller)["parts"][1][
             "normalised_base_error"
@@ -83,7 +84,7 @@ def test_preview_and_prediction_each_bring_the_base_home_sooner() -> None:
 
 
 def test_a_single_task_controller_leaves_the_base_where_it_is() -> None:
-    """STMPC considers the first task of the window only."""
+    """STMPC considers only the first task of the window."""
     summary = result("ridgeback-ur10-square", controller="stmpc", duration=4.0)
     assert summary["parts"][0]["normalised_base_error"] > 0.95
 
@@ -101,8 +102,8 @@ def test_the_same_run_gives_the_same_numbers_and_another_seed_other_noise() -> N
 
 
 def test_delay_compensation_holds_the_hand_stiller() -> None:
-    """With 50 ms of servo lag and 1 mm of noise the mean EE error is below 5 mm with compensation, and larger
-    without."""
+    """With 50 ms of servo lag and 1 mm of noise, the mean EE error is below 5 mm with compensation, and
+    larger without."""
     laggy = ("plant.lag_ms=50", "plant.position_noise=0.001")
 
     def mean(*more: str) -> float:
@@ -118,8 +119,8 @@ def test_delay_compensation_holds_the_hand_stiller() -> None:
 
 
 def test_two_tasks_at_a_time_deliver_faster_and_on_a_shorter_way() -> None:
-    """In one round of the delivery, with one rule, the single-task architecture needs at least 1.5 times as
-    long."""
+    """For one round of the delivery, with the same rule, the single-task architecture needs at least 1.5
+    times as long."""
     both = [
         result("ridgeback-ur10-delivery", "rounds=1", f"architecture={architecture}")
         for architecture in ("hierarchical", "single_task")
@@ -132,7 +133,7 @@ def test_two_tasks_at_a_time_deliver_faster_and_on_a_shorter_way() -> None:
 
 
 def test_the_hand_waits_for_a_person_and_the_base_does_not_leave_it() -> None:
-    """The hold ends with the release and not before; meanwhile the base moves on and the hand stays."""
+    """The hold ends with the release and not before. Meanwhile the base moves on and the hand stays."""
     recording = run(scene("ridgeback-ur10-handover"))
     told = summary(recording)
     assert_sound(told)
@@ -144,12 +145,12 @@ def test_the_hand_waits_for_a_person_and_the_base_does_not_leave_it() -> None:
     assert np.linalg.norm(recording["error/ee"][waiting], axis=1).max() <= 0.01
     base = recording["x/base"][waiting]
     assert np.linalg.norm(base[-1] - base[0]) > 0.2, "the base moved on while the hand waited"
-    # The hand follows the person's shift of the running task.
+    # The hand follows when the person shifts the running task.
     np.testing.assert_allclose(recording["x/ee"][-1], [-1.9, -0.4, 1.0], atol=0.02)
 
 
 def test_a_running_task_that_is_moved_is_taken_up_at_the_next_step() -> None:
-    """The reference of the next step is the new one."""
+    """The reference of the next step is that of the moved task."""
     session = VelocitySession(scene("ridgeback-ur10-drag"))
     session.tick()
     session.post(MoveTarget("base", (-0.5, 0.3)))
@@ -165,8 +166,8 @@ def test_a_running_task_that_is_moved_is_taken_up_at_the_next_step() -> None:
 
 
 def test_swapping_the_priorities_lets_the_base_go() -> None:
-    """With a target out of reach the base stops and the hand stays; with swapped priorities the base moves to
-    the target and pulls the hand along."""
+    """If a target is out of reach, the base stops and the hand stays. After the priorities are swapped, the
+    base moves to the target and pulls the hand with it."""
     target = np.array([-1.5, 0.0])
     session = VelocitySession(scene("ridgeback-ur10-drag"))
     fields = session.layout.fields
@@ -249,8 +250,8 @@ def test_arms_settle_on_a_target_that_jumps(robot: str) -> None:
 
 
 def test_the_same_robot_under_the_torque_controller_holds_its_hand_too() -> None:
-    """With HIMPC and a base target dragged by 0.5 m, the EE RMSE is within 2 mm, and torques and speeds are
-    in bounds."""
+    """With HIMPC and a base target that is dragged by 0.5 m, the EE RMSE is within 2 mm, and torques and
+    speeds are within their bounds."""
     found = load_scene("ridgeback-ur10-hold")
     told = summary(run(replace(found, events=((0.2, MoveTarget("base", (-0.3, 0.4))),)), 1.5))
     assert told["diverged"] is False

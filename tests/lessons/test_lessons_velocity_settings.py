@@ -1,4 +1,5 @@
-"""Velocity-level scenes: settings, events as data, the output of a run, and the items of the paper."""
+"""The settings of the velocity-level scenes, events as data, the output of a run, and the items of the paper
+are tested."""
 
 from __future__ import annotations
 
@@ -34,7 +35,7 @@ from robots import InputError
 
 
 def test_every_setting_can_be_set_and_a_typo_names_the_nearest() -> None:
-    """Numbers, words, lists and null are assigned by the same paths as on the command line."""
+    """Numbers, words, lists and null are assigned with the same paths as on the command line."""
     settings = scene("ridgeback-ur10-delivery").settings
     for path, value, found in (
         ("horizon", 12, lambda s: s.htmpc.horizon),
@@ -65,7 +66,7 @@ def test_every_setting_can_be_set_and_a_typo_names_the_nearest() -> None:
 
 
 def test_a_formulation_and_a_controller_bring_what_they_were_tuned_with() -> None:
-    """Formulation A has stage weight 1, the default formulation has 10; HTIDKC runs at 50 Hz."""
+    """Formulation A has stage weight 1, and the default formulation has 10; HTIDKC runs at 50 Hz."""
     settings = scene("ridgeback-ur10-square").settings
     paper = settings.changed("formulation", "paper")
     assert [level.Q for level in settings.htmpc.stack] == [10.0, 10.0]
@@ -159,7 +160,7 @@ def test_random_peaks_are_out_of_reach_and_near_enough() -> None:
 
 
 def test_collinear_waves_are_those_on_the_line_through_hand_and_home() -> None:
-    """A wave straight behind the base or beyond the hand is collinear, and one to the side is not."""
+    """A wave straight behind the base or beyond the hand is collinear, but one to the side is not."""
     behind, side = HOME - 2.2 * HOME / np.linalg.norm(HOME), HOME + np.array([0.0, 2.2])
     assert collinear(square("htmpc", tuple(behind.tolist())))
     assert collinear(square("htmpc", tuple((HOME + 2.2 * HOME / np.linalg.norm(HOME)).tolist())))
@@ -167,7 +168,7 @@ def test_collinear_waves_are_those_on_the_line_through_hand_and_home() -> None:
 
 
 def test_priorities_can_be_a_setting() -> None:
-    """`order` takes effect when a run starts; a wrong value is refused with the valid form."""
+    """`order` takes effect when a run starts; a wrong value is refused in a sentence with the valid form."""
     drag = scene("ridgeback-ur10-drag", "order=base,ee")
     session = VelocitySession(drag)
     session.tick()

@@ -1,4 +1,4 @@
-"""A velocity-level session in single commands, and the fields that its telemetry adds for the page."""
+"""A velocity-level session runs in single commands, and its telemetry has additional fields for the page."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ def timeless(made: VelocitySession, row: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("mode", ["ideal", "servo"])
 def test_command_by_command_is_the_same_run_to_the_last_bit(mode: str) -> None:
-    """Single commands and whole ticks give bitwise equal runs, also if the page reads predictions in between.
-    Events in the middle of a period take effect at the next control step."""
+    """Runs by single commands and by whole ticks are bitwise equal, also if the page reads predictions in
+    between. Events in the middle of a period take effect at the next control step."""
     how = (f"plant.mode={mode}", "plant.position_noise=0.001", "plant.lag_ms=30")
     whole, parts = session("ridgeback-ur10-drag", *how), session("ridgeback-ur10-drag", *how)
     for k in range(25):
@@ -67,7 +67,7 @@ def test_command_by_command_is_the_same_run_to_the_last_bit(mode: str) -> None:
 
 
 def test_every_step_says_how_long_it_is() -> None:
-    """The step length is right also for the first step after a change of the rate."""
+    """The step length in the row is right also for the first step after a change of the rate."""
     made = session("ridgeback-ur10-drag")
     for rate in (10.0, 50.0, 12.0):
         made.post(Set("rate_hz", rate))
@@ -112,7 +112,7 @@ def test_the_bound_of_the_first_level_holds_and_the_last_level_has_none() -> Non
 
 
 def test_joints_at_their_bounds_are_marked() -> None:
-    """The base drives at its maximum speed and stops in the end; joints are marked only at their bounds."""
+    """The base drives at its maximum speed and finally stops; joints are marked only at their bounds."""
     made = session("ridgeback-ur10-drag")
     fields = made.layout.fields
     made.post(MoveLevel("base", 0))
@@ -128,7 +128,8 @@ def test_joints_at_their_bounds_are_marked() -> None:
 
 
 def test_manipulability_is_the_arms_and_falls_when_it_is_stretched() -> None:
-    """The manipulability agrees with a Jacobian by differences, without the joints of the base."""
+    """The manipulability agrees with a Jacobian that is computed by differences, without the joints of the
+    base."""
     made = session("ridgeback-ur10-drag")
     robot, data = made.robot, made.robot.model.createData()
 
@@ -162,8 +163,8 @@ def test_the_reach_circle_is_as_wide_as_the_arm_is_long() -> None:
 
 
 def test_the_robot_feels_the_time_of_planning_if_asked_to(monkeypatch: pytest.MonkeyPatch) -> None:
-    """With `delay_measured` the commands of a plan are delayed by its computing time, and the controller
-    expects the computing time of the previous plan; without it the plant has its own settings again."""
+    """With `delay_measured`, the commands of a plan are delayed by its computing time, and the controller
+    expects the computing time of the previous plan. Without it, the plant has its own settings again."""
     made = session("ridgeback-ur10-square", "delay_measured=true", "plant.delay_ms=10")
     solve = HTMPC.step
     taken = iter((20_000.0, 60_000.0, 5e9, 20_000.0))
