@@ -1,5 +1,5 @@
-"""Fixtures that start simulations, and one fork server that all tests of other things share, because its
-start takes a second of a core."""
+"""Fixtures that start simulations, and one fork server. All tests whose subject is something else share this
+server, because its start takes a second of a core."""
 
 from __future__ import annotations
 

@@ -63,8 +63,8 @@ def serving(own: Path | None, **more: Any) -> Iterator[PageServer]:
 
 
 def built(page: Wire, times: int = 1) -> bool:
-    """Whether the Robot tab was built this many times: its last folder is created after all fields for
-    files."""
+    """Returns whether the Robot tab was built this many times. The last folder of the tab is created after
+    all fields for files."""
     return eventually(lambda: page.folders("Import report") >= times, LONG)
 
 
