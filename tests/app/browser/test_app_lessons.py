@@ -76,7 +76,7 @@ def test_a_lesson_of_ones_own_is_walked_through(browser: Browser, tmp_path: Path
 
 
 def walk(page: Page, school: PageServer, lesson: Lesson) -> None:
-    """Does every part of the open lesson with a learner's actions; all claims must hold."""
+    """Does every part of the open lesson with the actions of a learner. All claims must hold."""
     for part in parts_of(lesson):
         expect_part(page, lesson, part)
         if isinstance(part, Challenge):
