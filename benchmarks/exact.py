@@ -196,7 +196,7 @@ class _System:
         self._L = rows.L
 
     def _kept_at(self, knot: int, above: list[Array]) -> Array:
-        """The independent rows of (33) at a knot, as printed."""
+        """Returns the independent rows of (33) at a knot, as printed."""
         chosen = np.empty((0, self._n))
         basis = np.empty((self._n, 0))
         for B in above:

@@ -66,7 +66,7 @@ def watched(bench: Bench, wire: Wire) -> None:
 
 @pytest.fixture
 def page(bench: Bench, fork_server: ForkServer | None) -> Iterator[SimulationClient]:
-    """The page's client of an arm; the arm waits for Run."""
+    """Yields the page's client of an arm. The arm waits for *Run*."""
     arm = Process(partial(forked_here, partial(watched, bench)))
     spares = Spares(WORKER, fork_server)
     made = SimulationClient("", CHOICE, spares, arm)

@@ -35,7 +35,7 @@ def circling() -> Iterator[PageServer]:
 
 @pytest.fixture
 def alone(circling: PageServer) -> PageServer:
-    """The server after the client of the previous test has disconnected."""
+    """Returns the server after the client of the previous test has disconnected."""
     assert wait_until(lambda: not circling.sessions.learners, LONG)
     return circling
 

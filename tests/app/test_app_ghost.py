@@ -57,8 +57,8 @@ def untimed(body: SimulationRunner) -> np.ndarray:
 
 
 def test_a_ghost_has_the_rows_of_its_leader(body: SimulationRunner) -> None:
-    """From the start of leading, the ghost's rows equal the leader's, although settings were changed
-    before."""
+    """From the moment at which the leader begins to lead, the ghost's rows equal the leader's rows, although
+    settings were changed before."""
     body.tick(20)
     for event in (Set("horizon", 3), Set("controller", "hqp"), Set("controller", "himpc")):
         body.handle(Post(event))

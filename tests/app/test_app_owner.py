@@ -39,13 +39,13 @@ def torque(now):
 
 @pytest.fixture
 def mark(tmp_path: Path) -> Path:
-    """A file that exists after the code was run."""
+    """Returns the path of a file that exists after the code was run."""
     return tmp_path / "was-run"
 
 
 @pytest.fixture
 def own(tmp_path: Path) -> Path:
-    """The folder of the server's files."""
+    """Returns the folder of the server's files."""
     folder = tmp_path / "secret-place" / "own"
     folder.mkdir(parents=True)
     return folder

@@ -35,7 +35,7 @@ HERE = Path(__file__).parent
 
 @pytest.fixture(scope="module")
 def lent(lent: dict[str, ForkServer | None]) -> Iterator[dict[str, ForkServer | None]]:
-    """The fork servers of other tests, and one for the worker `stubborn`."""
+    """Returns the fork servers of other tests, and one for the worker `stubborn`."""
     if lent[WORKER] is None:
         yield lent
         return

@@ -32,7 +32,7 @@ BRAKE, HOLD = 5, 6
 
 @pytest.fixture(scope="module")
 def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """Every scene's controller for this machine, with 1,000 recorded ticks."""
+    """Returns every scene's controller for this machine, with 1,000 recorded ticks."""
     needed("cc")
     where = tmp_path_factory.mktemp("export")
     return {scene: exported(scene, "x86_64-linux", where / scene) for scene in SCENES}

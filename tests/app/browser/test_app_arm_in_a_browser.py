@@ -35,7 +35,7 @@ def said(program: subprocess.Popen[str], words: str) -> str:
 
 def test_an_arm_and_its_simulation_on_a_page(browser: Browser, program: subprocess.Popen[str]) -> None:
     """*Run* starts the control of the arm. The ghost is drawn, and both robots have errors. A moved target
-    moves both. The status line shows the missed periods. Leaks are drawn of the simulation alone. When the
+    moves both. The status line shows the missed periods. Only the leaks of the simulation are drawn. When the
     page is closed, the arm is stopped gently and the program ends."""
     page = open_page(browser, said(program, "ready at").split()[-1])
     expect(page.get_by_text("at rest: Run takes it over")).to_be_visible()

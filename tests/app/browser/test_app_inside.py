@@ -26,7 +26,7 @@ from lessons.scenes.run_spec import RunSpec
 pytestmark = pytest.mark.usefixtures("one_fork_server")
 
 ARM = 0.08
-"""m, distance from the arm at which the gizmo of this small arm is grasped."""
+"""Distance from the arm at which the gizmo of this small arm is grasped, m."""
 
 
 @pytest.fixture(scope="module")
@@ -45,8 +45,8 @@ def shared(browser: Browser, drawing: PageServer) -> Iterator[Page]:
 
 @pytest.fixture
 def sheet(shared: Page, drawing: PageServer) -> Page:
-    """The page in its initial state, with the picture of the new run drawn. The picture of the run before is
-    still there when the new one begins."""
+    """Returns the page in its initial state, after the picture of the new run was drawn. The picture of the
+    run before is still there when the new one begins."""
     learner = learner_of(drawing)
     assert eventually(shared, lambda: learner.status is not None)
     before = 0 if learner.status is None else learner.status.resets

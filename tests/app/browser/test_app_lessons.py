@@ -105,7 +105,7 @@ def kept(page: Page) -> dict[str, Any]:
 
 
 def take_challenge(page: Page, school: PageServer, challenge: Challenge) -> None:
-    """The challenge fails with its initial settings, and passes with a known solution."""
+    """Checks that the challenge fails with its initial settings, and passes with a known solution."""
     hurry(page)
     run(page, "Start the run")
     expect(page.get_by_text("NOT YET", exact=True)).to_be_visible()

@@ -63,7 +63,7 @@ def page(shared_page: Page) -> Page:
 
 @pytest.fixture
 def learner(server: PageServer, page: Page) -> SimulationClient:
-    """The simulation of `page`, which was reset before."""
+    """Returns the simulation of `page`, which was reset before."""
     assert eventually(page, lambda: bool(server.sessions.learners))
     found = server.sessions.learners[0]
     assert eventually(page, lambda: found.status is not None and found.status.ticks > 0)

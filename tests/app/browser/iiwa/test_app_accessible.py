@@ -14,7 +14,7 @@ from browsing.browser_actions import key, press, row, tab
 RIGHT = ("Start", "Tasks", "Control", "Plant", "Lessons", "Compare", "Export", "Robot", "Help")
 LEFT = ("Errors", "Joints", "Inside", "Who binds")
 VISERS_OWN: dict[str, str] = {}
-"""The parts of viser that do not meet a rule and that the page cannot mend: selector → rule."""
+"""The parts of viser that do not meet a rule and that the page cannot repair: selector → rule."""
 _RUN = """(own) => axe.run(
   { include: [["body"]], exclude: own.map((each) => [each]) },
   { runOnly: ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa"], resultTypes: ["violations"] })"""

@@ -45,7 +45,7 @@ from robots import CATALOG
 
 @pytest.fixture
 def learner(server: PageServer, page: Page) -> SimulationClient:
-    """The simulation of `page`."""
+    """Returns the simulation of `page`."""
     assert eventually(page, lambda: bool(server.sessions.learners) and server.sessions.learners[0].attached)
     return server.sessions.learners[0]
 
