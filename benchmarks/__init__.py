@@ -1,1 +1,1 @@
-"""Measurements, as opposed to tests: run `python -m benchmarks.NAME` in a checkout."""
+"""Measurements, which are no part of the tests. `python -m benchmarks.NAME` runs one in a checkout."""

@@ -1,9 +1,9 @@
-"""How many periods of 1 ms the loop of an arm misses on this machine, without a real-time kernel.
+"""Counts the periods of 1 ms that the loop of an arm misses on this machine, without a real-time kernel.
 
     python -m benchmarks.arm [--seconds 60]
 
-The loop of `himpc-lab arm` holds the simulated panda, in step with the clock, first without and then with
-real-time priority (as under `chrt -f 50`), if that is allowed here.
+The loop of `himpc-lab arm` holds the simulated panda in step with the clock, first without and then with
+real-time priority (as under `chrt -f 50`), if that is allowed on this machine.
 """
 
 from __future__ import annotations
@@ -41,13 +41,13 @@ def main() -> None:
         try:
             os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(50))
         except OSError as error:
-            print(f"real-time priority is not allowed here: {error}")
+            print(f"real-time priority is not allowed on this machine: {error}")
             return
         measure("with", library, seconds)
 
 
 def measure(priority: str, library: Path, seconds: float) -> None:
-    """Runs the loop, and prints what it missed."""
+    """Runs the loop, and prints the number of missed periods and the times of the controller."""
     scene = torque_scene("panda-hold")
     arm = SimulatedArm(Plant(scene.robot))
     ready = prepared(scene, scene.q_0, arm.limits, ())

@@ -1,18 +1,21 @@
-"""Random drags into what is around a robot and into itself, with distances kept and without.
+"""Random drags of a robot into its surroundings and into itself, with rows that keep distances and without.
 
     python -m benchmarks.avoidance [--chains 25] [--robots iiwa14 panda baxter generated] [--off] [--balls]
                                    [--seed 1] [--controller himpc] [--set PATH=VALUE …]
 
-Every chain drags the hands of a robot four times, once a second, in position alone or in pose, from where the
-targets are 0.1 to 0.6 m in a random direction, so many targets end in the floor, in the robot or out of
-reach. Then the robot has three seconds to come to rest. `--balls` drags a ball through the arm four times
-instead, from 0.6 m before a moving link to as far behind it, with 0.15 to 0.5 m/s, and not through its
-first three joints, which cannot make way. Any controller can run. Prints a line of a Markdown table for each
-robot: drags, the deepest penetration between bodies whose distance is kept, by MuJoCo's geometry, the chains
-in which it exceeds 1 mm, the largest share of the velocity limits, lost runs, unsolved QPs, the chains whose
-joints are slower than 0.05 rad/s at the end, and the median and the longest processor time of a step; on the
-error stream one line after every chain. Exit code 1 if a penetration exceeds 1 mm, a run is lost, or more
-than 5 % of the chains do not come to rest.
+Every chain drags the hands of a robot four times, once a second, in position alone or in pose. Each new
+target is 0.1 to 0.6 m from the present one in a random direction, so that many targets lie in the floor, in
+the robot or out of reach. Then the robot has three seconds to come to rest. With `--balls`, a ball is dragged
+through the arm four times instead, with 0.15 to 0.5 m/s, from 0.6 m before a moving link to 0.6 m behind it.
+The ball does not pass through the first three joints, which cannot move out of its way. Any controller can
+run.
+
+The program prints a line of a Markdown table for each robot: the drags; the deepest penetration between
+bodies whose distance is kept, by MuJoCo's geometry; the chains in which it exceeds 1 mm; the largest share of
+the velocity limits; lost runs; unsolved QPs; the chains whose joints are slower than 0.05 rad/s at the end;
+and the median and the longest processor time of a step. It prints one line on the error stream after every
+chain. The exit code is 1 if a penetration exceeds 1 mm, a run is lost, or more than 5 % of the chains do not
+come to rest.
 """
 
 from __future__ import annotations
@@ -45,14 +48,15 @@ Array = NDArray[np.float64]
 
 DRAGS, APART_S, REST_S = 4, 1.0, 3.0
 FAR_M, TURN_RAD = (0.1, 0.6), 1.0
-"""How far a drag goes, at least and at most, and how far it turns at most."""
+"""The shortest and the longest distance of a drag, and its largest rotation."""
 DEEP_M, AT_REST = 1e-3, 0.05
 BALL_M, BESIDE_M, BALL_SPEED = 0.08, 0.6, (0.15, 0.5)
-"""Radius of a dragged ball, how far it goes before and behind a link, and its speed, m/s."""
+"""Radius of a dragged ball, the length of its path before and behind a link, and its range of speeds, m/s."""
 PAST_M, CLEAR_M = 0.25, 0.35
-"""How far from the first three joints of an arm it passes, and from all of the arm it begins, at least."""
+"""The smallest distance of its path from the first three joints of an arm, and of its start from the whole
+arm."""
 AWAY = np.array([0.0, 0.0, 10.0])
-"""m, where the ball waits."""
+"""The position at which the ball waits, m."""
 SCENES = {"iiwa14": "iiwa14-hold", "panda": "panda-hold", "baxter": "baxter-hold"}
 ROBOTS = (*SCENES, "generated")
 
@@ -73,7 +77,7 @@ class Total:
 
 
 def generated(seed: int) -> str:
-    """The URDF of a random arm with six joints, whose links are cylinders."""
+    """Returns the URDF of a random arm with six joints, whose links are cylinders."""
     rng = np.random.default_rng(seed)
     parts = ['<robot name="generated"><link name="base"/>']
     parent, length = "base", 0.3
@@ -95,13 +99,13 @@ def generated(seed: int) -> str:
 
 
 def scene_of(robot: str, seed: int) -> TorqueScene:
-    """The hold scene of a robot of this benchmark."""
+    """Returns the hold scene of a robot of this benchmark."""
     return torque_scene(SCENES[robot]) if robot in SCENES else hold(None, None, generated(seed))
 
 
 def drags(session: TorqueSession, rng: np.random.Generator) -> list[MoveTarget]:
-    """One drag: every target of a position moves, and in half of the drags every target of an orientation on
-    three axes turns with it."""
+    """Returns the targets of one drag: every position target moves, and in half of the drags every
+    orientation target on three axes turns as well."""
     found, turns = [], rng.random() < 0.5
     for level in session.settings.levels:
         for task in level.tasks:
@@ -121,8 +125,8 @@ def drags(session: TorqueSession, rng: np.random.Generator) -> list[MoveTarget]:
 
 
 class Crossing(NamedTuple):
-    """A ball that is dragged through an arm: where it is at the start, m, its velocity, m/s, and until when,
-    s."""
+    """A ball that is dragged through an arm: its position at the start, m, its velocity, m/s, and the
+    duration, s."""
 
     start: Array
     velocity: Array
@@ -130,7 +134,8 @@ class Crossing(NamedTuple):
 
 
 def crossing(session: TorqueSession, rng: np.random.Generator) -> Crossing:
-    """A path through the origin of a random joint that moves, and past the first three of its arm."""
+    """Returns a path through the origin of a random joint that moves. The path does not come near the first
+    three joints of the arm."""
     robot, data = session.robot, session.robot.model.createData()
     pin.forwardKinematics(robot.model, data, session.plant.q)
     origins = np.array([each.translation for each in data.oMi])
@@ -149,7 +154,7 @@ def crossing(session: TorqueSession, rng: np.random.Generator) -> Crossing:
 
 
 class Timed:
-    """A controller whose steps are timed: `times` are ms of processor time."""
+    """A controller whose steps are timed. times: the processor time of each step, ms."""
 
     def __init__(self, controller: Controller, times: list[float]) -> None:
         self._controller, self.times = controller, times
@@ -165,7 +170,8 @@ class Timed:
 
 
 def covered_depth(session: TorqueSession, left_out: set[tuple[int, int]]) -> tuple[float, str]:
-    """The deepest penetration between bodies whose distance is kept, m, and its name."""
+    """Returns the deepest penetration between bodies whose distance is kept, m, and the names of the two
+    bodies."""
     robot, found = session.robot, (0.0, "")
     for each in session.plant.contacts:
         joints = [joint_of(robot, name) for name in each.between]
@@ -176,7 +182,7 @@ def covered_depth(session: TorqueSession, left_out: set[tuple[int, int]]) -> tup
 
 
 def joint_of(robot: Robot, name: str) -> int:
-    """The joint that carries a link; 0 for an object of the world."""
+    """Returns the joint that carries a link, and 0 for an object of the world."""
     return robot.model.frames[robot.frame_id(name)].parentJoint if name in robot.frames else 0
 
 
@@ -189,8 +195,8 @@ def run(
     balls: bool = False,
     tell: Callable[[Total, list[float]], None] = lambda *_: None,
 ) -> tuple[Total, list[float]]:
-    """Runs all chains of a robot: of dragged targets or, with `balls`, of a ball dragged through the arm.
-    `tell` is called with the results after each."""
+    """Runs all chains of a robot. The chains drag targets or, with `balls`, a ball through the arm. `tell` is
+    called with the results after each chain."""
     rng, total, times = np.random.default_rng(seed), Total(), []
     scene = scene_of(robot, seed)
     settings = with_assignments(replace(scene.settings, controller=controller), changes)
@@ -237,7 +243,7 @@ def run(
 
 
 def line(robot: str, total: Total, times: Sequence[float]) -> str:
-    """A line of the table."""
+    """Returns a line of the table."""
     return (
         f"| {robot} | {total.drags} | {1e3 * total.deepest:.2f} {total.where} | {total.deep} | "
         f"{total.speed:.2f} | {total.lost} | {total.unsolved} | {total.resting} of {total.chains} | "

@@ -1,14 +1,15 @@
-"""Both routes with many active bounds: long horizons, low velocity and torque limits, dragged targets.
+"""Runs both routes with many active bounds: long horizons, low velocity and torque limits, dragged targets.
 
     python -m benchmarks.bounds [--quick] [--seconds 0.3] [--scenes NAME …] [--horizons N …]
                                 [--velocity SCALE …] [--torque SCALE …] [--still | --dragged] [--alone]
 
-Runs every torque scene with every horizon and every scale of its velocity and torque limits: once unchanged
-and, if it has a target, once with a target that jumps every 50 ms. Prints a line of a Markdown table for
-each: how many QPs had no verified optimum, the largest joint velocity as a share of its limit, the processor
-time of the longest step, and the largest share of its budget that a tick of the compiled route used. --quick
-runs only the hardest few; --alone leaves out the explicit route. Exit code 1 if the compiled route leaves
-more QPs unsolved than the explicit one, a joint is more than 2 % faster, or a step takes more than 20 ms.
+Every torque scene runs with every horizon and every scale of its velocity and torque limits: once unchanged
+and, if it has a target, once with a target that jumps every 50 ms. For each run the program prints a line of
+a Markdown table: the number of QPs without a verified optimum, the largest joint velocity as a share of its
+limit, the processor time of the longest step, and the largest share of its budget that a tick of the compiled
+route used. --quick runs only the few hardest cases; --alone leaves out the explicit route. The exit code is 1
+if the compiled route leaves more QPs unsolved than the explicit one, if a joint is more than 2 % faster, or
+if a step takes more than 20 ms.
 """
 
 from __future__ import annotations
@@ -51,9 +52,9 @@ class Found(NamedTuple):
 
     Attributes:
         unsolved, of: QPs without a verified optimum, and all QPs.
-        speed: the fastest joint's share of its limit.
+        speed: the largest joint velocity as a share of its limit.
         longest_ms: processor time of the longest step, without the first.
-        spent: the most of its budget that a tick of the compiled route used.
+        spent: the largest share of its budget that a tick of the compiled route used.
     """
 
     unsolved: int
@@ -107,7 +108,7 @@ def run(cell: Cell, route: Route, ticks: int) -> Found:
 
 
 def target_of(session: TorqueSession) -> str | None:
-    """The first position target that can be moved."""
+    """Returns the first position target that can be moved."""
     for name in session.references:
         target = session.target(name)
         if target is not None and target.raw.ndim == 1:
@@ -116,7 +117,7 @@ def target_of(session: TorqueSession) -> str | None:
 
 
 def cells(given: argparse.Namespace) -> Iterator[Cell]:
-    """The cells that the command line selects."""
+    """Returns the cells that the command line selects."""
     if given.quick:
         yield from QUICK
         return
@@ -131,7 +132,7 @@ def cells(given: argparse.Namespace) -> Iterator[Cell]:
 
 
 def faults(found: Found, reference: Found | None) -> list[str]:
-    """Sentences about limits that the compiled route exceeded."""
+    """Returns a word for each limit that the compiled route exceeded."""
     said = ["slow"] if found.longest_ms > LONGEST_MS else []
     if reference is not None:
         said += ["unsolved"] if found.unsolved * reference.of > reference.unsolved * found.of else []
@@ -148,9 +149,9 @@ def main() -> int:
     parser.add_argument("--horizons", nargs="+", type=int, default=HORIZONS)
     parser.add_argument("--velocity", nargs="+", type=float, default=VELOCITY)
     parser.add_argument("--torque", nargs="+", type=float, default=TORQUE)
-    parser.add_argument("--still", action="store_true", help="nothing is dragged")
-    parser.add_argument("--dragged", action="store_true", help="only runs in which something is")
-    parser.add_argument("--alone", action="store_true", help="without the explicit route")
+    parser.add_argument("--still", action="store_true", help="only runs in which nothing is dragged")
+    parser.add_argument("--dragged", action="store_true", help="only runs in which a target is dragged")
+    parser.add_argument("--alone", action="store_true", help="leaves out the explicit route")
     given = parser.parse_args()
     print(
         "| scene | N | velocity | torque | dragged | unsolved | explicit | speed | explicit | ms | budget | |"
@@ -171,7 +172,7 @@ def main() -> int:
             f"| {found.longest_ms:.1f} | {100 * found.spent:.0f} % | {', '.join(said)} |",
             flush=True,
         )
-    print(f"\n{ran} cells, {wrong} at fault")
+    print(f"\n{ran} cells, {wrong} with faults")
     return 1 if wrong else 0
 
 

@@ -3,10 +3,10 @@
     python -m benchmarks.client URL [--clients K] [--tab TAB] [--delay SECONDS]
 
 Each client answers the page's requests (camera, local storage) and reports that it shows the plots of one
-tab. Prints a line of JSON per second and client: messages, megabytes, and how often the busiest plot and the
-busiest node of the scene were updated. --delay: waits this long before each packet, as a slow line would. A
-number on stdin lets the first client reload its page that many times, each time until it sees its robot, and
-print a line.
+tab. The program prints a line of JSON per second and client: the messages, the megabytes, and how often the
+busiest plot and the busiest node of the scene were updated. With --delay, a client waits this long before
+each packet, as on a slow connection. A number on stdin lets the first client reload its page that many times.
+Each time, the client waits until it sees its robot; after the last reload it prints a line.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Second:
     links: Counter[str] = field(default_factory=Counter)
 
     def rates(self, seconds: float) -> dict[str, float]:
-        """The rates per second."""
+        """Returns the rates per second."""
         return {
             "megabytes_per_s": 1e-6 * self.bytes / seconds,
             "messages_hz": self.messages / seconds,
@@ -57,7 +57,7 @@ class Second:
 
 
 class Viewer:
-    """One browser. Its storage outlives its connections."""
+    """One browser. Its storage is kept when a connection ends."""
 
     def __init__(self, url: str, tab: str | None = _TAB, delay: float = 0.0) -> None:
         self._url = url.replace("http", "ws", 1)
@@ -141,7 +141,7 @@ class Viewer:
 
     @property
     def drawn(self) -> set[str]:
-        """Titles of the charts that were updated in the present `second`."""
+        """Returns the titles of the charts that were updated in the present `second`."""
         return {self._charts[uuid] for uuid in self.second.plots if uuid in self._charts}
 
     def show(self, tab: str | None) -> None:
@@ -207,7 +207,7 @@ class Viewer:
 
 
 def _tell(line: dict[str, float]) -> None:
-    # Written in one call, since other clients print as well.
+    # The line is written in one call, because other clients print as well.
     sys.stdout.write(json.dumps(line) + "\n")
     sys.stdout.flush()
 

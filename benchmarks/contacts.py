@@ -1,14 +1,14 @@
-"""What contacts cost, and how deep and how quietly a robot rests on its floor.
+"""Measures the computing time of contacts, and how deep and how still a robot rests on its floor.
 
     python benchmarks/contacts.py cost [TICKS]
     python benchmarks/contacts.py press [SECONDS]
 
-`cost` runs each scene without contacts, with contacts and nothing touched, and pressing on the floor, tick
-by tick in turn, and prints the medians of a whole tick (control and plant) and of the plant alone in
-microseconds, and the ratio of the ticks. A tick of a robot that presses contains what its limits cost the
-controller as well. `press` lets each arm fall on its floor without torque and prints, for time constants of
-the contact and steps of the plant, the deepest penetration in the fall and at rest, mm, and the largest
-joint speed at rest, rad/s.
+`cost` runs each scene in three sessions, tick by tick in turn: without contacts, with contacts while nothing
+is touched, and with a robot that presses on the floor. It prints the medians of a whole tick (control and
+plant) and of the plant alone in microseconds, and the ratio of the ticks. A tick of a robot that presses also
+contains the time that the controller needs for its active limits. `press` lets each arm fall on its floor
+without torque. For several time constants of the contact and steps of the plant, it prints the deepest
+penetration in the fall and at rest, mm, and the largest joint speed at rest, rad/s.
 """
 
 from __future__ import annotations
@@ -30,15 +30,16 @@ from robots.mechanics import model
 LOW = {
     "iiwa14-hold": ("position", (0.6, 0.1, -0.3)),
     "panda-hold": ("position", (0.55, 0.1, -0.15)),
-    "baxter-hold": ("right", (0.1, -0.3, 0.8)),  # into its own chest: the floor is out of reach
+    "baxter-hold": ("right", (0.1, -0.3, 0.8)),  # in its own chest, because the floor is out of reach
 }
-"""Targets that lie inside something."""
+"""Targets that lie inside the floor or the robot."""
 BENT = {"iiwa14": (0, 60, 0, -30, 0, 30, 0), "panda": (0, 60, 0, -60, 0, 90, 45)}
-"""Postures, degrees, from which the arms fall on the floor."""
+"""Postures from which the arms fall on the floor, degrees."""
 
 
 def cost(ticks: int) -> dict[str, dict[str, float]]:
-    """Medians over the ticks of three sessions side by side, the pressing one after it has touched."""
+    """Returns medians over the ticks of three sessions that run side by side. The pressing session counts
+    only while it touches something."""
     found = {}
     for name, (task, place) in LOW.items():
         scene = torque_scene(name)
@@ -72,7 +73,7 @@ def cost(ticks: int) -> dict[str, dict[str, float]]:
 
 
 def timed(plant: Plant) -> list[float]:
-    """The list to which the plant will append the time, µs, of each of its steps."""
+    """Returns the list to which the plant will append the time of each of its steps, µs."""
     times: list[float] = []
     step = plant.step
 
@@ -87,7 +88,8 @@ def timed(plant: Plant) -> list[float]:
 
 
 def press(seconds: float) -> list[dict[str, object]]:
-    """Falls of each arm on its floor, in viscous friction, for several contacts and steps."""
+    """Lets each arm fall on its floor, with viscous friction, for several contacts and steps; returns the
+    results."""
     found: list[dict[str, object]] = []
     for name in BENT:
         robot = load_robot(name)
@@ -100,7 +102,7 @@ def press(seconds: float) -> list[dict[str, object]]:
 
 
 def fall(robot: Robot, start: np.ndarray, timestep: float, seconds: float) -> dict[str, object]:
-    """One fall."""
+    """Returns the results of one fall."""
     plant = Plant(
         robot, PlantSettings(contacts=True, joint_stops=True, damping=2.0), timestep, standing_floor(robot)
     )

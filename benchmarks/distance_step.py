@@ -19,13 +19,13 @@ from lessons.session.torque import TorqueSession
 from lessons.settings.assignments import with_assignments
 
 TICKS, FIRST = 5000, 300
-"""Number of ticks, and how many of the first ones do not count."""
+"""The number of ticks, and the number of first ticks that are not counted."""
 DOWN = 0.7
-"""m."""
+"""The distance by which the target is dragged down, m."""
 
 
 def sessions(scene: TorqueScene, dragged: bool) -> list[TorqueSession]:
-    """The scene with and without rows of distances."""
+    """Returns two sessions of the scene, with and without rows of distances."""
     found = []
     for on in ("true", "false"):
         settings = with_assignments(scene.settings, [f"avoidance.on={on}"])

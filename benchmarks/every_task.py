@@ -3,7 +3,7 @@ then dragged to the value that it has in another posture, so that it can be reac
 
     python -m benchmarks.every_task [--seconds 3] [--json -]
 
-Prints a row per robot and kind: the error after holding and after dragging (mm or degrees).
+The program prints a row per robot and kind: the error after holding and after dragging (mm or degrees).
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from robots.truth import joint_axis
 CONTROLLERS = ("himpc", "hqp")
 HELD_FOR = 0.1  # s
 SETTLED = {"m": 1e-3, "rad": np.deg2rad(0.1)}
-"""Per unit of a coordinate: errors below this count as settled."""
+"""For each unit of a coordinate, the error below which the coordinate counts as settled."""
 
 
 @dataclass(frozen=True)
@@ -59,13 +59,13 @@ class Found:
 
 @cache
 def scene_of(robot: str) -> TorqueScene:
-    """The scene in which a robot of the catalog holds its posture."""
+    """Returns the scene in which a robot of the catalog holds its posture."""
     own = f"{robot}-hold"
     return torque_scene(own) if own in SCENES else torque_scene("hold", robot)
 
 
 def entry(kind: str, scene: TorqueScene) -> dict[str, Any]:
-    """A task of the given kind that the robot of a scene can influence."""
+    """Returns a task of the given kind that the robot of a scene can influence."""
     robot = scene.robot
     tasks = [task for level in scene.settings.levels for task in level.tasks]
     fields = {name for of in KINDS[kind].makes for name in of.__dataclass_fields__}
@@ -85,7 +85,7 @@ def entry(kind: str, scene: TorqueScene) -> dict[str, Any]:
 
 
 def measured(robot: str, kind: str, controller: str, seconds: float) -> Found:
-    """Results of a run: the task is held, then dragged for some seconds."""
+    """Returns the results of a run in which the task is held, then dragged for some seconds."""
     scene = scene_of(robot)
     stack = [entry(kind, scene), {"task": "posture", "name": "rest"}]
     session = TorqueSession(prepared(scene, controller, [assignment("stack", stack)]))
@@ -116,7 +116,7 @@ def run(session: TorqueSession, seconds: float) -> None:
 
 
 def off(session: TorqueSession, tasks: tuple[Task, ...]) -> float:
-    """The largest error in units of `SETTLED`; infinite after control was lost."""
+    """Returns the largest error in units of `SETTLED`, and infinity after control was lost."""
     plan = session.plan
     if plan is None or session.diverged_at is not None:
         return float("inf")
@@ -126,7 +126,7 @@ def off(session: TorqueSession, tasks: tuple[Task, ...]) -> float:
 
 
 def settled_within(task: Task, robot: Robot) -> NDArray[np.float64]:
-    """The value of `SETTLED` for each coordinate, (m,)."""
+    """Returns the value of `SETTLED` for each coordinate, (m,)."""
     names, joints = task.coordinates(robot), {}
     if isinstance(task, (Joints, Posture, Damping)):
         joints = {name: joint_axis(robot.model, at)[0] for at, name in enumerate(robot.joint_names, start=1)}

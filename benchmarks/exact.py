@@ -1,5 +1,5 @@
-"""The optimum of every level of a hierarchy to far more digits than a double has: the reference for both
-routes.
+"""Computes the optimum of every level of a hierarchy to far more digits than a double has. It is the
+reference for both routes.
 
 Only the problem's data come from `himpc`. Under a set of active rows the optimality conditions of (32) or
 (34), with (33) as printed, are linear: they are solved in doubles, and corrected until their residuals,
@@ -45,7 +45,7 @@ class Exact:
     Attributes:
         U: (N, n) N·m, rounded.
         fixed: the same, not rounded.
-        active: how many bounds hold it.
+        active: the number of bounds that hold it.
     """
 
     U: Array
@@ -64,7 +64,7 @@ def rounded(x: Fixed) -> Array:
 
 
 def times(a: Fixed, b: Fixed) -> Fixed:
-    """The matrix product of two fixed-point arrays."""
+    """Returns the matrix product of two fixed-point arrays."""
     return (a @ b) >> _BITS
 
 
@@ -128,7 +128,7 @@ def _dual_method(system: _System, point: _Point, side: Array) -> Exact | None:
 def _first_to_vanish(
     side: Array, new: tuple[Any, ...], multipliers: Array, change: Array
 ) -> tuple[float, tuple[Any, ...] | None]:
-    """The step at which the first multiplier of a row that is held vanishes, and that row."""
+    """Returns the step at which the first multiplier of a held row vanishes, and this row."""
     shrinks = (side != 0.0) & (side * change < 0.0)
     shrinks[new] = False
     if not shrinks.any():
@@ -158,7 +158,7 @@ class _Corrector:
         self._F = np.linalg.qr(np.vstack([A @ self._free, np.eye(self._free.shape[1])]), mode="r")
 
     def solve(self, right: Array) -> Array:
-        """The solution (v, e, λ) for the right-hand sides (r₁, r₂, r₃)."""
+        """Returns the solution (v, e, λ) for the right-hand sides (r₁, r₂, r₃)."""
         d, k = self._A.shape[1], len(self._A)
         r1, r2, r3 = right[:d], right[d : d + k], right[d + k :]
         v = self._held @ solve_triangular(self._R, r3, trans=1) if self._count else np.zeros(d)
@@ -196,7 +196,7 @@ class _System:
         self._L = rows.L
 
     def _kept_at(self, knot: int, above: list[Array]) -> Array:
-        """The independent rows of (33) at a knot, as printed."""
+        """Returns the independent rows of (33) at a knot, as printed."""
         chosen = np.empty((0, self._n))
         basis = np.empty((self._n, 0))
         for B in above:
@@ -255,7 +255,7 @@ class _System:
     def _missing(
         self, U: Fixed, e: Fixed, pull: Fixed, row: NDArray[Any], joint: NDArray[Any], bound: Fixed
     ) -> list[Array]:
-        """The residuals of the conditions, rounded only at the end: stationarity, e, and rows held."""
+        """Returns the residuals of the conditions, rounded at the end: stationarity, e, and held rows."""
         K = self._K
         pushed = np.array([times(self._B[j], U[j]) for j in range(self._N)])
         error = np.array(
@@ -284,14 +284,14 @@ class _System:
         return [rounded(part) for part in parts]
 
     def _effects(self) -> Array:
-        """√Q C B R^−½, (K·m, K·n)."""
+        """Returns √Q C B R^−½, (K·m, K·n)."""
         p, K = self._problem, self._K
         G = p.C[:K, :, :K, None] * p.B[:K].transpose(1, 0, 2)[None]
         weighted = p.root_Q[None, :, None, None] * G / self._root_R
         return weighted.reshape(K * p.B.shape[1], K * self._n)
 
     def _scaled_rows(self, row: NDArray[Any], joint: NDArray[Any]) -> Array:
-        """Rows of bounds, then of (33), times R^−½, (c, K·n)."""
+        """Returns the rows of bounds, then of (33), times R^−½, (c, K·n)."""
         K, n = self._K, self._n
         kept = sum(map(len, self._kept))
         rows = np.zeros((len(row) + kept, K, n))
@@ -303,7 +303,7 @@ class _System:
         return rows.reshape(len(rows), K * n)
 
     def independent(self, side: Array) -> NDArray[np.bool_]:
-        """A largest set of the given rows that depend neither on (33) nor on one another."""
+        """Returns a largest set of the given rows that depend neither on (33) nor on one another."""
         row, joint = np.nonzero(side)
         held = np.zeros(side.shape, bool)
         if not len(row):

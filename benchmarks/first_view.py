@@ -1,12 +1,12 @@
-"""What the first view of *Try it* costs.
+"""Measures the size and the time of the first view of *Try it*.
 
     python -m benchmarks.first_view SITE [SITE ...] [--runs N]
 
-Opens try.html of sites that `python -m docs.build` wrote, in turns and each time in a new Chromium, until
-the robot moves. Prints the medians of: size of the scripts (MB, and compressed by gzip -9), time from the
-opening of the page to its first picture and to the robot's first motion, and the processor time until then of
-the page's thread, of the simulation's thread, of the threads that compile WebAssembly, and of the whole
-browser, in s. Chromium draws with the processor here (SwiftShader).
+The program opens try.html of sites that `python -m docs.build` wrote, in turns and each time in a new
+Chromium, until the robot moves. It prints medians of the size of the scripts (MB, and compressed by gzip -9),
+of the time from the opening of the page to its first picture and to the robot's first motion, and of the
+processor time until then of the page's thread, of the simulation's thread, of the threads that compile
+WebAssembly, and of the whole browser, in s. Chromium draws with the processor here (SwiftShader).
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def main() -> None:
 
 
 def _opened(playwright: Playwright, page: Path) -> dict[str, float]:
-    """Times until the robot is drawn and moves, and the processor time that it took, s."""
+    """Returns the times until the robot is drawn and until it moves, and the processor time until then, s."""
     browser = playwright.chromium.launch(executable_path=find_chromium(), args=CHROMIUM_ARGS)
     tab = browser.new_page(viewport={"width": 1440, "height": 900})
     tab.add_init_script(WATCH)
@@ -77,7 +77,7 @@ def _opened(playwright: Playwright, page: Path) -> dict[str, float]:
 
 
 def _spent() -> dict[str, float]:
-    """Processor time so far of the browser's threads, s."""
+    """Returns the processor time that the browser's threads have used so far, s."""
     found: dict[str, float] = defaultdict(float)
     for process in psutil.Process().children(recursive=True):
         try:

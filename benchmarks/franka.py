@@ -1,14 +1,14 @@
-"""`himpc-lab arm` against franka-sim, which speaks the network protocol of a Franka arm.
+"""Runs `himpc-lab arm` with franka-sim, which uses the network protocol of a Franka arm.
 
     python3 -m venv SIM && SIM/bin/pip install numpy==1.26.4 "mujoco<3.3" "trimesh>=4"
     SIM/bin/pip install --no-deps franka-sim==1.1.7
     python -m benchmarks.franka --simulator SIM/bin/python
 
-franka-sim has an environment of its own, because it needs an older MuJoCo and NumPy than we do; without
-its package robot_descriptions it can fetch nothing. Both sides run in a network namespace of their own
-with nothing but a loopback (`unshare`, `ip`). The robot is our own panda, without friction; franka-sim
-enforces its limits on communication and motion. The drive on a page needs Chromium; `--picture FILE` stores
-a picture of that page.
+franka-sim has an environment of its own, because it needs an older MuJoCo and NumPy than himpc-lab;
+without its package robot_descriptions it cannot download anything. Both sides run in a network namespace of
+their own that has only a loopback interface (`unshare`, `ip`). The robot is our own panda, without friction;
+franka-sim enforces its limits on communication and motion. The drive on a page needs Chromium; `--picture
+FILE` stores a picture of that page.
 """
 
 from __future__ import annotations
@@ -51,11 +51,11 @@ from robots.truth import inertial, joint_axis, pose, true_model
 PORT = 1337
 INSIDE = "HIMPC_LAB_FRANKA_BENCHMARK"
 _PRIORITY = 40
-"""Real-time priority of franka-sim, where that is allowed: below the loop's."""
+"""Real-time priority of franka-sim, if it is allowed. It is lower than the loop's."""
 
 
 def model_of(robot: Robot) -> str:
-    """The robot for MuJoCo as XML, with the names that franka-sim looks for; without friction."""
+    """Returns the robot for MuJoCo as XML, without friction and with the names that franka-sim looks for."""
     truth = true_model(robot, PlantSettings())
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
@@ -74,7 +74,7 @@ def model_of(robot: Robot) -> str:
 
 
 def urdf_of(robot: Robot) -> str:
-    """Its URDF with the elements that libfranka asks for."""
+    """Returns the robot's URDF with the elements that libfranka requires."""
     root = ET.fromstring(robot.urdf_text)
     for joint in root.iter("joint"):
         if joint.get("type") == "revolute":
@@ -85,7 +85,7 @@ def urdf_of(robot: Robot) -> str:
 
 @contextmanager
 def arm(python: str, clock: str, folder: Path) -> Iterator[subprocess.Popen[bytes]]:
-    """A franka-sim that answers."""
+    """Runs franka-sim, and yields it as soon as it accepts connections."""
     robot = load_robot("panda")
     (folder / "panda.xml").write_text(model_of(robot))
     (folder / "panda.urdf").write_text(urdf_of(robot))
@@ -99,7 +99,7 @@ def arm(python: str, clock: str, folder: Path) -> Iterator[subprocess.Popen[byte
                 if probe.connect_ex(("127.0.0.1", PORT)) == 0:
                     break
             time.sleep(0.1)
-        time.sleep(1.0)  # it still takes the probe for an arm's client
+        time.sleep(1.0)  # franka-sim still treats the probe as a client
         yield server
     finally:
         server.kill()
@@ -109,7 +109,7 @@ def arm(python: str, clock: str, folder: Path) -> Iterator[subprocess.Popen[byte
 def drive(
     name: str, folder: Path, more: list[str], meanwhile: Callable[[subprocess.Popen[bytes]], None]
 ) -> None:
-    """Runs the command, and tells what its rows say."""
+    """Runs the command, and prints a summary of its rows."""
     path = folder / f"{name}.npz"
     command = [sys.executable, "-m", "app", "arm", "panda-hold", "--robot", "127.0.0.1", "--npz", path]
     print(f"\n== {name}: {' '.join(more)}", flush=True)
@@ -119,7 +119,7 @@ def drive(
 
 
 def tell(name: str, path: Path, code: int) -> None:
-    """Prints what the rows of a drive say."""
+    """Prints a summary of the rows of a drive."""
     if not path.exists():
         print(f"{name}: exit code {code}, no rows")
         return
@@ -148,7 +148,7 @@ def children(client: subprocess.Popen[bytes]) -> list[psutil.Process]:
 
 
 def nothing(client: subprocess.Popen[bytes]) -> None:
-    """Lets the command end by itself."""
+    """Does nothing: the command ends by itself."""
 
 
 def wait_for_loop(client: subprocess.Popen[bytes]) -> None:
@@ -172,7 +172,7 @@ def kill_watcher(client: subprocess.Popen[bytes]) -> None:
 
 
 def drive_on_a_page(folder: Path, picture: str | None) -> None:
-    """Drives the arm from a page in Chromium: Run, a target that moves by 8 cm, and the page is closed."""
+    """Drives the arm from a page in Chromium: presses Run, moves a target by 8 cm, and closes the page."""
     path = folder / "page.npz"
     command = [sys.executable, "-m", "app", "arm", "panda-hold", "--robot", "127.0.0.1", "--missed", "20"]
     command += ["--page", "--no-browser", "--port", "0", "--npz", str(path)]
@@ -202,12 +202,12 @@ def drive_on_a_page(folder: Path, picture: str | None) -> None:
 
 
 def sides(page: Page) -> tuple[float, float]:
-    """y of the hand and of its ghost as the page draws them, m."""
+    """Returns y of the hand and of its ghost as the page draws them, m."""
     return position(page, "/actual")[1], position(page, "/ghost/7")[1]
 
 
 def inside(python: str, picture: str | None) -> None:
-    """All runs, in the namespace."""
+    """Does all runs, inside the namespace."""
     subprocess.run(["ip", "link", "set", "lo", "up"], check=True)
     hold = ["--missed", "20", "--duration", "10"]
     drag = [*hold, "--drag", "2:position=0.05,0,0.05"]
@@ -240,7 +240,7 @@ def main() -> None:
     parser.add_argument("--picture", help="file for a picture of the page")
     given = parser.parse_args()
     if os.environ.get(INSIDE) != "1":
-        # Root stays root, who may use real-time priorities; others become root of their namespace alone.
+        # Root stays root and may use real-time priorities; others become root of their namespace only.
         alone = ["unshare", "-n" if os.geteuid() == 0 else "-rn"]
         command = [*alone, sys.executable, "-m", "benchmarks.franka", *sys.argv[1:]]
         sys.exit(subprocess.run(command, env={**os.environ, INSIDE: "1"}).returncode)

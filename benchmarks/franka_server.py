@@ -2,10 +2,11 @@
 
     python franka_server.py ROBOT.xml ROBOT.urdf M_BAR Q_0 CLOCK
 
-A script for another Python environment than ours: franka-sim needs an older MuJoCo and NumPy. M_BAR and Q_0
-are numbers separated by commas: gains of the arm's own hold, and where it starts. CLOCK: "step", the arm
-moves by one period with each state that it sends, after the answer to the state before has arrived, as if its
-drives and its network shared a clock; "own", franka-sim's own way: the simulation runs beside the network.
+This script runs in another Python environment, because franka-sim needs an older MuJoCo and NumPy. M_BAR and
+Q_0 are numbers separated by commas: the gains with which the arm itself holds its posture, and its initial
+posture. If CLOCK is "step", the arm moves by one period with each state that it sends, after the answer to
+the state before has arrived, as if its drives and its network shared a clock. If CLOCK is "own", franka-sim
+works as usual: the simulation runs beside the network.
 """
 
 import logging
@@ -21,7 +22,7 @@ FrankaSimServer: Any = import_module("franka_sim").FrankaSimServer
 
 
 class Stepped(simulation.MujocoFrankaSim):
-    """Moves only when it is told to."""
+    """A simulation that moves only when it is told to move."""
 
     def run_simulation(self):
         self._read_and_publish_state()

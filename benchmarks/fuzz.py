@@ -1,12 +1,13 @@
-"""Torque-level runs with hostile states, settings and events: none may raise, give NaN or take long.
+"""Runs torque-level scenes with hostile states, settings and events; none may raise, give NaN or take long.
 
     python -m benchmarks.fuzz [--ticks 1000000] [--seed 0] [--minutes 60] [--episode SEED]
 
 Every episode is a random scene and controller with some hundred ticks. Between the ticks the robot is put
-into impossible states, the torque sensor returns invalid values, and settings and targets change. Counts
-exceptions, numbers that are not finite, torques above the robot's own limit, and ticks that used more than 20
-ms of processor time. Each fault is printed in a line with the episode's seed, with which `--episode` repeats
-it, and a summary in JSON at the end or after an interruption. Exit code 1 if there was any fault.
+into impossible states, the torque sensor returns invalid values, and settings and targets change. The program
+counts exceptions, numbers that are not finite, torques above the robot's own limit, and ticks that used more
+than 20 ms of processor time. It prints a line for each fault with the episode's seed, with which `--episode`
+repeats the episode, and a summary in JSON at the end or after an interruption. The exit code is 1 if there
+was any fault.
 """
 
 from __future__ import annotations
@@ -49,12 +50,12 @@ BOUNDED = ("himpc", "hiqp", "nhimpc", "weighted", "hqp")
 """Controllers that impose the torque bounds."""
 LONGEST_S = 0.020
 _KNOTS = 150
-"""Largest product of joints and knots: an undisturbed step must take much less than LONGEST_S."""
+"""Largest product of joints and knots. With it, an undisturbed step must take much less than LONGEST_S."""
 
 
 @dataclass
 class Tally:
-    """The counts and faults."""
+    """The counts, and the faults that were found."""
 
     ticks: int = 0
     episodes: int = 0
@@ -73,7 +74,7 @@ class Tally:
 
 
 def state(rng: np.random.Generator, session: TorqueSession) -> tuple[Array, Array]:
-    """A measured state with an error of any size, or with invalid values."""
+    """Returns a measured state with an error of any size, or with invalid values."""
     q, v = session.plant.q, session.plant.v
     n, robot = q.size, session.robot
     match int(rng.integers(8)):
@@ -98,7 +99,7 @@ def state(rng: np.random.Generator, session: TorqueSession) -> tuple[Array, Arra
 
 
 def event(rng: np.random.Generator, session: TorqueSession) -> Event:
-    """An event that a learner may cause, with values of any size."""
+    """Returns an event that a learner may cause, with values of any size."""
     settings, robot = session.settings, session.robot
     level = settings.levels[int(rng.integers(len(settings.levels)))].name
     size = float(10.0 ** rng.uniform(-3, 3))
@@ -207,7 +208,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--minutes", type=float, default=1e9)
     parser.add_argument("--length", type=int, default=400, help="ticks of an episode")
-    parser.add_argument("--episode", type=int, help="walk only this one")
+    parser.add_argument("--episode", type=int, help="the seed of the only episode to run")
     given = parser.parse_args()
     tally, began = Tally(), monotonic()
     seeds = np.random.SeedSequence(given.seed)

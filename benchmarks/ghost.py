@@ -1,11 +1,12 @@
-"""Two robots on one page: whether the simulation keeps up with real time, and how often the plots are
-updated.
+"""Measures two robots on one page: whether the simulation keeps up with real time, and how often the plots
+are updated.
 
     python -m benchmarks.ghost [--scene S] [--set PATH=VALUE]… [--seconds S] [--alone]
 
-Starts the real server and, in a process of its own, a client that uses the page's protocol and draws nothing
-(benchmarks/client.py); starts a ghost, waits until everything runs, and measures. Prints JSON; exit code 0 if
-the simulation lost less than 1 % of real time and the plots were updated at least 10 times per second.
+The program starts the real server and, in a process of its own, a client that uses the page's protocol and
+draws nothing (benchmarks/client.py). It then starts a ghost, waits until everything runs, and measures. It
+prints JSON. The exit code is 0 if the simulation lost less than 1 % of real time and the plots were updated
+at least 10 times per second.
 """
 
 from __future__ import annotations
@@ -39,9 +40,9 @@ def main() -> int:
     """Measures as the command line says."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--scene", default="iiwa14-circle")
-    parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", help="of the ghost")
+    parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", help="a ghost's setting")
     parser.add_argument("--seconds", type=float, default=20.0)
-    parser.add_argument("--alone", action="store_true", help="without a ghost, for comparison")
+    parser.add_argument("--alone", action="store_true", help="runs without a ghost, for comparison")
     options = parser.parse_args()
     own = () if options.alone else tuple(options.set or ["controller=tdeosf"])
     server = PageServer(SceneChoice(RunSpec(options.scene)), port=0, max_sessions=1)
@@ -55,8 +56,8 @@ def main() -> int:
 
 
 def measure(server: PageServer, own: tuple[str, ...], seconds: float) -> dict[str, float]:
-    """Simulated over real time while a client watches, the data that it received, and the load of each
-    process."""
+    """Returns the ratio of simulated to real time while a client watches, the data that the client received,
+    and the load of each process."""
     client = subprocess.Popen(
         [sys.executable, "-m", "benchmarks.client", server.link],
         stdout=subprocess.PIPE,
@@ -108,19 +109,19 @@ def measured(learner: SimulationClient, lines: list[str], seconds: float) -> dic
 
 
 def simulated(learner: Simulation) -> float:
-    """Simulated time, s, in the memory that is shared with the simulation."""
+    """Returns the simulated time, s, from the memory that is shared with the simulation."""
     found = learner.read(lambda block, _: block.moment()[0])
     return 0.0 if found is None else found
 
 
 def follows(learner: SimulationClient) -> bool:
-    """Whether the ghost has kept up for a while."""
+    """Returns whether the ghost has kept up for a while."""
     ghost = learner.ghost
     return ghost is not None and simulated(ghost) > 1.0
 
 
 def pids(learner: SimulationClient) -> dict[str, int]:
-    """The ids of the processes that are running."""
+    """Returns the ids of the processes that are running."""
     found = {"page": psutil.Process().pid, "robot": learner.pid}
     if learner.ghost is not None:
         found["ghost"] = learner.ghost.pid

@@ -1,4 +1,4 @@
-"""A user who sends messages that no browser would send, at the wrong moments. It uses the page's protocol."""
+"""A user who sends messages that no browser would send, at the wrong moments, by the page's protocol."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class HostileUser:
 
     @property
     def once_all(self) -> bool:
-        """Whether every action was done at least once."""
+        """Returns whether every action was done at least once."""
         return sum(self.actions.values()) >= len(self._actions())
 
     def act(self) -> None:
@@ -44,7 +44,7 @@ class HostileUser:
         self.actions[chosen.__name__.strip("_")] += 1
 
     def _actions(self) -> Sequence[tuple[Callable[[], None], float]]:
-        """The actions and their weights."""
+        """Returns the actions and their weights."""
         return (
             (self._look, 3.0),
             (self._write_odd, 4.0),
@@ -161,7 +161,7 @@ class HostileUser:
             return
         uuid = self._random.choice(inputs)[0]
         if self._random.random() < 0.2:
-            uuid = self._random.choice(list(self.page.made))["uuid"]  # the control may be gone
+            uuid = self._random.choice(list(self.page.made))["uuid"]  # the control may have been removed
         name = self._random.choice(
             ("value",) * 8 + ("label", "min", "options", "removed", "__class__", "order")
         )

@@ -1,10 +1,11 @@
-"""The time of a step of HTMPC, here and in another checkout, measured alternately.
+"""Measures the time of a step of HTMPC, alternately in this checkout and in another one.
 
     python benchmarks/htmpc.py [SCENE…] [--before CHECKOUT] [--runs R]
 
-Each checkout has a process of its own that runs the scene. They take turns of a second of simulated time, so
-that both are disturbed equally, and processor time is measured, so that other programs do not count. Prints
-JSON: median and 99th percentile of the time from state to motion command, and their ratios.
+Each checkout has a process of its own that runs the scene. The processes run in turns of one second of
+simulated time, so that both are disturbed equally. Processor time is measured, so that other programs do not
+count. The program prints JSON: the median and the 99th percentile of the time from state to motion command,
+and their ratios.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ import numpy as np
 SCENES = ("ridgeback-ur10-square", "ridgeback-ur10-cluttered")
 HERE = Path(__file__).parents[1]
 TURN = 10
-"""Number of control steps."""
+"""The number of control steps of a turn."""
 PLACES = (
     ("lessons.session.velocity", "VelocitySession", "lessons.scenes.missions", "velocity_scene"),
     ("lessons.mobile.session", "MobileSession", "lessons.scenes.mobile", "mobile_scene"),
@@ -56,7 +57,7 @@ def child(scene: str) -> None:
 
 
 def measure(scene: str, checkouts: dict[str, Path], seconds: float) -> dict[str, list[float]]:
-    """The step times of every checkout, µs."""
+    """Returns the step times of every checkout, µs."""
     started = {}
     for name, place in checkouts.items():
         environment = os.environ | {"PYTHONPATH": str(place), "OPENBLAS_NUM_THREADS": "1"}
@@ -108,7 +109,7 @@ def main() -> None:
 
 
 def spread(times: list[float]) -> dict[str, float]:
-    """µs"""
+    """Returns the median and the 99th percentile, µs."""
     return {"median": float(np.median(times)), "p99": float(np.percentile(times, 99))}
 
 

@@ -1,11 +1,11 @@
-"""A JupyterHub with two users: both press the icon of himpc-lab, run a step of a lesson, and hand in.
+"""Runs a JupyterHub with two users: both press the icon of himpc-lab, run a step of a lesson, and hand in.
 
     PATH=FOLDER/node_modules/.bin:$PATH python -m benchmarks.hub [--pictures FOLDER]
 
-Needs the hub's own proxy (`npm install configurable-http-proxy`) and a Chromium. Exit code 0 if both texts
-are signed and name the account of the hub, the step and nothing else, and if a request that does not come
-through the user's own Jupyter server is refused: over the port itself, over Jupyter's path of any port, and
-without a login. Prints the times that the two users waited.
+The program needs the hub's own proxy (`npm install configurable-http-proxy`) and a Chromium. The exit code is
+0 if both texts are signed and name the account of the hub, the step and nothing else, and if every request
+that does not come through the user's own Jupyter server is refused: over the port itself, over Jupyter's path
+of any port, and without a login. The program prints the times that the two users waited.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ USERS = ("zoe", "ben")
 
 
 def main() -> int:
-    """Runs the hub and prints what the users met."""
+    """Runs the hub, and prints the waiting times of the users and what went wrong."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--pictures", type=Path, default=None)
     pictures: Path | None = parser.parse_args().pictures
     proxy, chromium = find_proxy(), find_chromium()
     if proxy is None or chromium is None:
-        print("needs Chromium, and configurable-http-proxy of npm in PATH", file=sys.stderr)
+        print("This benchmark needs Chromium, and configurable-http-proxy of npm in PATH.", file=sys.stderr)
         return 2
     with (
         tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder,
@@ -71,7 +71,7 @@ def main() -> int:
 
 
 def judged(text: str, user: str) -> list[str]:
-    """What is wrong with the text that a user hands in."""
+    """Returns what is wrong with the text that a user hands in."""
     handed, proof = read_handed_in(text, KEY.encode())
     wrong = [] if proof == "signed" else [f"{user}: {proof}"]
     if (handed.account, handed.progress.seen) != (user, {LESSON: frozenset({0})}):
@@ -80,7 +80,7 @@ def judged(text: str, user: str) -> list[str]:
 
 
 def let_in(page: Page, url: str, user: str, port: int) -> list[str]:
-    """The ways past the user's Jupyter server that a user's lab leaves open: none."""
+    """Returns the ways past the user's Jupyter server that a user's lab leaves open. There should be none."""
     forged = {USER_HEADER: "somebody", HEADER: "somebody's-token"}
     ways = {
         "the port": (f"http://127.0.0.1:{port}/", {}),
@@ -89,13 +89,13 @@ def let_in(page: Page, url: str, user: str, port: int) -> list[str]:
         "another user's path without a login": (f"{url}/user/{user}/himpc-lab/page", {}),
     }
     open_ways = [f"{user}: {name} is open" for name, way in ways.items() if status(*way) == 200]
-    # The user's own browser, over Jupyter's path for any port, which sends no token.
+    # A request of the user's own browser over Jupyter's path for any port, which sends no token.
     answer = page.request.get(f"{url}/user/{user}/proxy/{port}/", headers=forged)
     return [*open_ways, *([f"{user}: /proxy/PORT is open"] if answer.status != 403 else [])]
 
 
 def status(url: str, headers: dict[str, str]) -> int:
-    """The status of the answer; redirects are not followed."""
+    """Returns the status of the answer. Redirects are not followed."""
     parts = urlsplit(url)
     connection = HTTPConnection(parts.hostname or "", parts.port or 80, timeout=30.0)
     connection.request("GET", f"{parts.path}?{parts.query}", headers=headers)

@@ -1,12 +1,13 @@
-"""The cost of a learner: the server's share of a core, bytes, the memory of its simulation, and its frame
-rates.
+"""Measures the cost of a learner: the server's share of a core, bytes, the memory of its simulation, and its
+frame rates.
 
     python -m benchmarks.learners [--clients K] [--scene S] [--horizon N] [--tab TAB] [--seconds S] [--json -]
 
-Starts the real server and, in a process of their own, K clients that use the page's protocol and draw nothing
-(benchmarks/client.py), each with the plots of one tab visible. Exit code 0 if every learner costs the server
-at most 8 % of a core and 300 kB/s and gets poses at 30 Hz (27 are accepted, as packets come in bunches) and
-plots at 10 Hz. The real-time factor of the simulations depends on the machine's cores; it is not judged.
+The program starts the real server and, in a process of their own, K clients that use the page's protocol and
+draw nothing (benchmarks/client.py). Each client has the plots of one tab visible. The exit code is 0 if every
+learner costs the server at most 8 % of a core and 300 kB/s and gets poses at 30 Hz (27 are accepted, as
+packets come in bunches) and plots at 10 Hz. The real-time factor of the simulations depends on the machine's
+cores; it is not judged.
 """
 
 from __future__ import annotations
@@ -75,7 +76,7 @@ class Viewers:
             self.said.append(json.loads(line))
 
     def reload(self, times: int) -> int:
-        """Lets the first client reload its page; returns how often it saw its robot."""
+        """Lets the first client reload its page. Returns how often it saw its robot."""
         assert self._process.stdin is not None
         heard = len(self.said)
         self._process.stdin.write(f"{times}\n")
@@ -96,7 +97,7 @@ def _came(said: list[dict[str, Any]]) -> list[int]:
 
 
 def measured(server: PageServer, clients: int, tab: str, seconds: float) -> dict[str, Any]:
-    """The server's load and bytes per learner, and the figures of each learner."""
+    """Returns the server's load and bytes per learner, and the figures of each learner."""
     with Viewers(server.link, "--clients", str(clients), "--tab", tab) as viewers:
         assert wait_until(lambda: len(server.sessions.learners) == clients, LONG), "not all were let in"
         learners = server.sessions.learners
@@ -120,7 +121,8 @@ def measured(server: PageServer, clients: int, tab: str, seconds: float) -> dict
 
 
 def found(learner: SimulationClient, before: tuple[float, int, int], seconds: float) -> dict[str, float]:
-    """The speed and memory of a simulation. uss: bytes that it shares with no other process."""
+    """Returns the speed and the memory of a simulation. uss: the bytes that it shares with no other
+    process."""
     ticks, over = (now - then for now, then in zip(counts(learner), before[1:], strict=True))
     own = psutil.Process(learner.pid).memory_full_info().uss
     return {
@@ -131,8 +133,8 @@ def found(learner: SimulationClient, before: tuple[float, int, int], seconds: fl
 
 
 def of_client(said: list[dict[str, Any]], client: int) -> dict[str, float]:
-    """Medians over the seconds of a client. Learners and clients are not matched: all are in the same
-    scene."""
+    """Returns medians over the seconds of a client. Learners and clients are not matched, because all are in
+    the same scene."""
     own = [line for line in said if line["client"] == client]
     rates = {name: median(line[name] for line in own) for name in ("megabytes_per_s", "plots_hz", "poses_hz")}
     return {
@@ -143,19 +145,19 @@ def of_client(said: list[dict[str, Any]], client: int) -> dict[str, float]:
 
 
 def simulated(learner: SimulationClient) -> float:
-    """Simulated time, s, in the memory that is shared with the simulation."""
+    """Returns the simulated time, s, from the memory that is shared with the simulation."""
     found = learner.read(lambda block, _: block.moment()[0])
     return 0.0 if found is None else found
 
 
 def counts(learner: SimulationClient) -> tuple[int, int]:
-    """(control ticks, ticks over budget) of the last report."""
+    """Returns (control ticks, ticks over budget) of the last report."""
     status = learner.status
     return (0, 0) if status is None else (status.ticks, status.over_budget)
 
 
 def holds(found: dict[str, Any]) -> bool:
-    """Whether every figure is within its limit."""
+    """Returns whether every figure is within its limit."""
     return found["server_share_per_learner"] <= SHARE and all(
         row["kilobytes_per_s"] <= KILOBYTES and row["poses_hz"] >= POSES_HZ and row["plots_hz"] >= PLOTS_HZ
         for row in found["learners"]
@@ -163,7 +165,7 @@ def holds(found: dict[str, Any]) -> bool:
 
 
 def table(found: dict[str, Any]) -> str:
-    """The results as a table."""
+    """Returns the results as a table."""
     head = (
         f"{found['scene']}, {found['clients']} learners, tab {found['tab']}, {found['cores']} cores\n"
         f"server: {found['server_share_per_learner']:.1%} of a core per learner (at most {SHARE:.0%})\n"

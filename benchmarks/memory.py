@@ -1,11 +1,11 @@
-"""Memory over many changes of lesson, in a real browser and in the server.
+"""Measures memory over many changes of lesson, in a real browser and in the server.
 
     python -m benchmarks.memory [--switches 50]
 
-Opens one lesson after another by its card and runs its first step for a moment. When every lesson has been
-open twice (until then the browser compiles frequent code and keeps it in its heap), measures the page's heap
-(after a garbage collection) and the server's memory; and again after the given number of further changes.
-Prints JSON; exit code 0 if both grew by less than 10 %.
+The program opens one lesson after another by its card, and runs its first step for a moment. It measures the
+page's heap (after a garbage collection) and the server's memory when every lesson has been open twice,
+because until then the browser compiles frequent code and keeps it in its heap. It measures both again after
+the given number of further changes. It prints JSON. The exit code is 0 if both grew by less than 10 %.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ def switch(page: Page, count: int) -> None:
 
 
 def memory(page: Page) -> dict[str, float]:
-    """MB of the page's heap and of the server, after a moment without activity."""
+    """Returns the MB of the page's heap and of the server, after a moment without activity."""
     # The visible lesson adds to the heap, so the measurement always uses the same lesson.
     open_lesson(page, load_lesson(COURSE[0]))
     page.wait_for_timeout(4000)

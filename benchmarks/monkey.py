@@ -1,9 +1,11 @@
-"""A user who tries everything at random: the page must survive, and the robot must stay within its bounds.
+"""A user who tries everything at random. The page must keep working, and the robot must stay within its
+bounds.
 
     python -m benchmarks.monkey [--minutes M] [--seed N] [--scene S] [--hostile]
 
-Uses a browser; with --hostile it uses the page's protocol instead and sends messages that no browser would
-send, see benchmarks/hostile.py. Prints all actions as JSON; exit code 1 if there was a fault.
+The user has a browser. With --hostile the user has only the page's protocol instead, and sends messages that
+no browser would send, see benchmarks/hostile.py. The program prints all actions as JSON. The exit code is 1
+if there was a fault.
 """
 
 from __future__ import annotations
@@ -34,12 +36,12 @@ from lessons.scenes.run_spec import RunSpec
 from lessons.settings.torque import TorqueSettings
 
 STRICT = ("himpc", "hiqp", "nhimpc")
-"""Controllers that keep priorities to rounding."""
+"""Controllers that keep priorities up to rounding errors."""
 UNBOUNDED = ("osf", "osf_damped", "tdeosf", "tdeosf_damped")
 LEAK = 1e-6
-"""m/s² or rad/s²."""
+"""Leak into a higher level that is still allowed, m/s² or rad/s²."""
 BOUND = 1e-9
-"""N·m above a torque bound that count as rounding."""
+"""Excess over a torque bound, N·m, that counts as a rounding error."""
 ANSWER = 60.0
 """Time, s, after which a page counts as dead if it shows nothing new although its robot should move."""
 _PATIENCE = 1_500
@@ -238,9 +240,9 @@ class Monkey:
 def walk(
     browser: Browser, server: PageServer, minutes: float, seed: int, complaints: Callable[[], str]
 ) -> Findings:
-    """A random walk of a number of minutes; it ends early after a fault."""
-    # In a smaller window, viser's statistics panel has no canvas to draw on, which a random user finds in the
-    # end.
+    """Does random actions for a number of minutes. It ends early after a fault."""
+    # In a smaller window, viser's statistics panel has no canvas to draw on, which a random user
+    # finds after some time.
     page = open_page(browser, server.link, scale=0.5, rest=SELDOM)
     page.set_default_timeout(_PATIENCE)
     page.set_default_navigation_timeout(SLOW)

@@ -35,14 +35,14 @@ LOOKS: tuple[dict[str, Any], ...] = (
 
 @final
 class Odd(Random):
-    """A stream of random numbers and messages, of which some are odd."""
+    """A stream of random numbers and messages, some of which are invalid."""
 
     def number(self) -> float:
         """Returns a random number; every second one is taken from `NUMBERS`."""
         return self.choice(NUMBERS) if self.random() < 0.5 else self.gauss(0.0, 1.0)
 
     def numbers(self, count: int) -> tuple[Any, ...]:
-        """A number of values, usually the right number."""
+        """Returns several values, usually the right number of them."""
         chance = self.random()
         if chance < 0.05:
             return tuple(self.number() for _ in range(self.randrange(7)))
@@ -51,15 +51,15 @@ class Odd(Random):
         return tuple(self.number() for _ in range(count))
 
     def place(self) -> tuple[float, ...]:
-        """A position that a user may drag to, m."""
+        """Returns a position that a user may drag to, m."""
         return tuple(self.uniform(-1.2, 1.2) for _ in range(3))
 
     def turn(self) -> tuple[float, ...]:
-        """A quaternion that is not normalised."""
+        """Returns a quaternion that is not normalised."""
         return tuple(self.gauss(0.0, 1.0) for _ in range(4))
 
     def babble(self) -> bytes:
-        """Bytes, or a message that nobody would send."""
+        """Returns bytes, or a message that nobody would send."""
         match self.randrange(4):
             case 0:
                 return self.randbytes(self.choice((0, 1, 30, 3000)))

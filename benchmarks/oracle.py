@@ -1,11 +1,12 @@
-"""Compares both routes with the optimum to many digits: random stacks on every robot of the catalog.
+"""Compares both routes with the optimum to many digits, for random stacks on every robot of the catalog.
 
     python -m benchmarks.oracle [--stacks 200] [--seed 0] [--longest 30] [--json -]
 
 A stack has one to four levels with random tasks, weights (Q over five decades, R on the torque or on the
 acceleration), horizons and limits, in a random state and with random targets. Each route solves the problem
-of the controller at that tick, and `benchmarks.exact` computes the optimum. Prints a row per robot: how often
-a route gave no point although there is an optimum, and the distance of its points from the optimum, N·m.
+of the controller at that tick, and `benchmarks.exact` computes the optimum. The program prints a row per
+robot: how often a route gave no point although there is an optimum, and the distance of its points from the
+optimum, N·m.
 """
 
 from __future__ import annotations
@@ -74,7 +75,7 @@ class Found:
 
 
 def random_stack(robot: str, seed: int, longest: int) -> Stack | None:
-    """A random stack that has a solution; None if no torque satisfies all limits in this state."""
+    """Returns a random stack that has a solution; None if no torque satisfies all limits in this state."""
     rng = np.random.default_rng(seed)
     scene = scene_of(robot)
     kinds = [kind for kind in KINDS if kind != "damping"]
@@ -114,7 +115,7 @@ def random_stack(robot: str, seed: int, longest: int) -> Stack | None:
 
 
 def judged(stack: Stack) -> list[Found] | None:
-    """One row per level; None where the exact optimum was not found."""
+    """Returns one row per level; None if the exact optimum was not found."""
     solutions = {route: stack.solve(route) for route in ROUTES}
     above: list[tuple[LevelProblem, Exact]] = []
     found = []
@@ -137,7 +138,7 @@ def judged(stack: Stack) -> list[Found] | None:
 
 
 def stacks(count: int, seed: int, longest: int, robots: tuple[str, ...]) -> Iterator[Stack]:
-    """Random stacks, for each robot in turn."""
+    """Yields random stacks, for each robot in turn."""
     done = 0
     while done < count:
         stack = random_stack(robots[done % len(robots)], seed, longest)
@@ -148,7 +149,7 @@ def stacks(count: int, seed: int, longest: int, robots: tuple[str, ...]) -> Iter
 
 
 def table(found: list[Found]) -> str:
-    """One row per robot, in Markdown."""
+    """Returns one row per robot, in Markdown."""
     lines = [
         "| robot | levels, held by bounds | compiled: none, worst error | explicit: none, worst error |",
         "|---|--:|--:|--:|",
@@ -178,14 +179,14 @@ def main() -> int:
         rows = judged(stack)
         if rows is None:
             unknown += 1
-            print(f"{stack.robot} --seed {stack.seed}: no optimum found out", file=sys.stderr)
+            print(f"{stack.robot} --seed {stack.seed}: the optimum was not found", file=sys.stderr)
             continue
         found += rows
         for each in rows:
             if any(error is None or error > 1e-6 for error in (each.compiled, each.explicit)):
                 print(each, file=sys.stderr, flush=True)
     print(table(found))
-    print(f"{given.stacks} stacks, of {unknown} the optimum was not found out", file=sys.stderr)
+    print(f"{given.stacks} stacks, for {unknown} of them the optimum was not found", file=sys.stderr)
     if given.json is not None:
         text = json.dumps([asdict(each) for each in found], indent=1)
         sys.stdout.write(text) if given.json == "-" else Path(given.json).write_text(text)

@@ -1,11 +1,11 @@
-"""The cost of a lecture hall: phones that vote and watch the teacher's robot.
+"""Measures the cost of a lecture hall: phones vote and watch the teacher's robot.
 
     python -m benchmarks.phones [--phones 200] [--scene S] [--seconds S] [--json -]
 
-Starts a server with a class and, in a process of their own, phones that use the page's protocol and draw
-nothing. The teacher's robot moves all the time, so that each phone gets five pictures a second; then all
-phones vote at once, twice. Exit code 0 if the server, without the robot's own process, needs at most one core
-and every vote was counted.
+The program starts a server with a class and, in a process of their own, phones that use the page's protocol
+and draw nothing. The teacher's robot moves all the time, so that each phone gets five pictures a second. Then
+all phones vote at once, twice. The exit code is 0 if the server, without the robot's own process, needs at
+most one core and every vote was counted.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def main() -> int:
     parser.add_argument("--scene", default="iiwa14-circle")
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--json", choices=["-"], default=None)
-    parser.add_argument("--at", default=None, help="be the phones of the class at this address")
+    parser.add_argument("--at", default=None, help="runs only the phones, of the class at this address")
     options = parser.parse_args()
     if options.at is not None:
         asyncio.run(be_phones(options.at, options.phones))
@@ -60,8 +60,8 @@ def main() -> int:
 
 
 async def be_phones(address: str, count: int) -> None:
-    """Connects all phones. A line on stdin begins to count pictures; the next one ends that; each further one
-    is a vote, after which a line tells what was measured."""
+    """Connects all phones. The first line on stdin begins the counting of pictures, and the second ends it.
+    Each further line lets all phones vote, after which a line with the measured times is printed."""
     phones = await asyncio.gather(*(Phone.open(address, k) for k in range(count)))
     _tell(phones=len(phones))
     await _line()
@@ -92,7 +92,7 @@ class Phone:
 
     @classmethod
     async def open(cls, address: str, number: int) -> Phone:
-        """A phone that said hello."""
+        """Returns a phone that has sent its first message."""
         await asyncio.sleep(0.01 * number)
         line = await connect(address, max_size=None, open_timeout=LONG, ping_interval=None)
         await line.send('{"do":"hello"}')
@@ -109,7 +109,7 @@ class Phone:
                 self._answer.set_result(None)
 
     async def vote(self) -> float:
-        """Votes; returns the time until the answer, s."""
+        """Votes. Returns the time until the answer, s."""
         self._answer = asyncio.get_running_loop().create_future()
         began = time.monotonic()
         options, scale = self._asked.get("options"), self._asked.get("scale")
@@ -144,13 +144,13 @@ class Crowd:
         self.pid = self._process.pid
 
     def go_on(self) -> None:
-        """Begins the next thing that the phones do, see `be_phones`."""
+        """Starts the next action of the phones, see `be_phones`."""
         assert self._process.stdin is not None
         self._process.stdin.write("go on\n")
         self._process.stdin.flush()
 
     def hear(self) -> dict[str, float]:
-        """What the phones tell next."""
+        """Returns the next line that the phones print."""
         assert self._process.stdout is not None
         return json.loads(self._process.stdout.readline())
 
@@ -163,7 +163,8 @@ class Crowd:
 
 
 def measured(server: PageServer, count: int, seconds: float) -> dict[str, Any]:
-    """The server's share of a core while all phones watch, and how long they wait for their votes."""
+    """Returns the server's share of a core while all phones watch, and the time for which they wait for their
+    votes."""
     hall = server.hall
     assert hall is not None
     address = f"{server.url.replace('http', 'ws')}/v/{hall.code}"
@@ -183,7 +184,7 @@ def measured(server: PageServer, count: int, seconds: float) -> dict[str, Any]:
         counted, waits = [], []
         for _ in range(2):
             hall.open_vote()
-            time.sleep(1.0)  # until all phones have heard of it
+            time.sleep(1.0)  # wait until all phones have received this
             phones.go_on()
             waits.append(phones.hear())
             hall.close_vote()
@@ -202,7 +203,7 @@ def measured(server: PageServer, count: int, seconds: float) -> dict[str, Any]:
 
 
 def table(found: dict[str, Any]) -> str:
-    """The results as text."""
+    """Returns the results as text."""
     votes = "; ".join(
         f"median {each['median_ms']} ms, longest {each['longest_ms']} ms" for each in found["votes"]
     )

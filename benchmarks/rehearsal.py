@@ -1,12 +1,13 @@
-"""A rehearsal of a class: learners with robots of their own on two servers, and phones, go through a lesson.
+"""Rehearses a class: learners with robots of their own on two servers, and phones, go through a lesson.
 
     python -m benchmarks.rehearsal [--learners 20] [--phones 200] [--lesson L] [--json -]
 
-Starts two servers, each with half of the learners; the first has the teacher's page and the phones, and the
-second follows its class. For each step of the lesson the class goes there, votes, votes again, and runs it on
-all robots. Then every learner hands in and all texts are graded. Learners and phones use the protocol of
-their pages and draw nothing. Exit code 0 if no vote, step or text was lost. Waiting times and real-time
-factors depend on the cores and on what else they do; they are printed and not judged.
+The program starts two servers, each with half of the learners. The first server has the teacher's page and
+the phones, and the second follows its class. The class goes to each step of the lesson, votes, votes again,
+and runs the step on all robots. Then every learner hands in, and all texts are graded. Learners and phones
+use the protocol of their pages and draw nothing. The exit code is 0 if no vote, step or text was lost.
+Waiting times and real-time factors depend on the cores and on their other load; they are printed and not
+judged.
 """
 
 from __future__ import annotations
@@ -55,7 +56,7 @@ def main() -> int:
 
 
 def rehearsed(learners: int, phones: int, lesson: str) -> dict[str, Any]:
-    """Everything that was measured. learners: on each server."""
+    """Returns everything that was measured. learners: their number on each server."""
     hosts = [Host(learners, lesson)]
     try:
         hosts += [Host(learners, lesson, hosts[0].links["server"]) for _ in range(SERVERS - 1)]
@@ -81,8 +82,8 @@ def _people(
         crowd = Crowd("--phones", str(phones), "--at", hosts[0].links["phones"])
         all_leave.enter_context(crowd)
         crowd.hear()
-        crowd.go_on()  # begins to count pictures,
-        crowd.go_on()  # and ends that; from now on, each line is a vote
+        crowd.go_on()  # begins the counting of pictures
+        crowd.go_on()  # ends the counting; from now on, each line is a vote
         crowd.hear()
         yield pages, crowd, teacher
 
@@ -155,13 +156,13 @@ def _lecture(
 
 
 def _ready(page: Learner) -> bool:
-    """Whether the step on the page can be run, or asks for a prediction first."""
+    """Returns whether the step on the page can be run, or asks for a prediction first."""
     labels = ("Run this step", "Run (first say what you expect)")
     return any(page.find(label) for label in labels) and not page.shows("DONE")
 
 
 def _all(waits: Waits, name: str, pages: Sequence[Learner], shows: Callable[[Learner], object]) -> None:
-    """Notes how long each page takes until it shows something."""
+    """Measures the time that each page needs until it shows something."""
     times: list[float] = []
 
     def wait(page: Learner) -> None:
@@ -172,7 +173,7 @@ def _all(waits: Waits, name: str, pages: Sequence[Learner], shows: Callable[[Lea
         thread.start()
     for thread in threads:
         thread.join()
-    assert len(times) == len(pages), f"{name}: {len(pages) - len(times)} learners waited in vain"
+    assert len(times) == len(pages), f"{name}: {len(pages) - len(times)} learners waited too long"
     waits.setdefault(name, []).extend(times)
     print(f"{name}: {max(times):.1f} s", file=sys.stderr, flush=True)
 
@@ -181,7 +182,7 @@ def _vote(page: Learner, asked: object, number: int) -> None:
     if isinstance(asked, Choice):
         page.use("I expect", "ABCDEFG"[number % len(asked.options)])
     elif isinstance(asked, Value):
-        page.use("My guess", STEPS // 2 + 1 + number % 7)  # the middle is where the slider begins
+        page.use("My guess", STEPS // 2 + 1 + number % 7)  # the slider begins in the middle
 
 
 def _rows(teacher: Teacher, steps: int) -> list[dict[str, Any]]:
@@ -230,7 +231,7 @@ def _figures(values: Sequence[float]) -> dict[str, float]:
 
 
 def table(found: dict[str, Any]) -> str:
-    """The results as text."""
+    """Returns the results as text."""
     waits = "\n".join(
         f"  {name:18} median {each['median']:7.2f}   longest {each['most']:7.2f}"
         for name, each in found["waits"].items()

@@ -23,8 +23,9 @@ KEY, CLASS_KEY = "a key of a rehearsal", "the-class-of-a-rehearsal"
 
 
 def be_a_server(learners: int, lesson: str, follows: str | None) -> None:
-    """Serves a class, or follows the one at an address; tells its own addresses, and for each line on stdin
-    how long the run of each learner took and the processor time that server and robots used so far, s."""
+    """Serves a class, or follows the class at an address. The process prints its own addresses. For each line
+    on stdin it prints the real-time factor of each learner's run, and the processor time that the server and
+    the robots have used so far, s."""
     with tempfile.TemporaryDirectory() as folder:
         key = Path(folder) / "key.txt"
         key.write_text(KEY)
@@ -60,7 +61,7 @@ def be_a_server(learners: int, lesson: str, follows: str | None) -> None:
 
 
 def _processor_time(server: PageServer) -> float:
-    """The processor time that the learners' robots have used, s."""
+    """Returns the processor time that the learners' robots have used, s."""
     times = [psutil.Process(each.pid).cpu_times() for each in server.sessions.learners if each.pid]
     return sum(each.user + each.system for each in times)
 
@@ -68,7 +69,7 @@ def _processor_time(server: PageServer) -> float:
 def _follow(
     server: PageServer, runs: dict[tuple[str, LessonPlace], list[float]], over: threading.Event
 ) -> None:
-    """Notes when the run of each learner begins and ends, to 0.02 s, and how long it is in simulated time."""
+    """Records when the run of each learner begins and ends, to 0.02 s, and its duration in simulated time."""
     while not over.wait(0.02):
         for learner in server.sessions.learners:
             lecture = learner.lecture
@@ -76,7 +77,7 @@ def _follow(
                 continue
             times = runs.setdefault((learner.token, lecture.exercise), [])
             if lecture.phase == "running" and not times:
-                # A report is up to 0.1 s old, and tells how far the run was then.
+                # A report is up to 0.1 s old, and contains the time of the run at that moment.
                 times.append(time.monotonic() - lecture.t)
             elif lecture.phase == "done" and len(times) == 1:
                 times += [time.monotonic(), lecture.t]
@@ -106,7 +107,7 @@ class Host:
         return json.loads(self._process.stdout.readline())
 
     def report(self) -> dict[str, Any]:
-        """What the server tells now, see `be_a_server`."""
+        """Returns the present report of the server, see `be_a_server`."""
         assert self._process.stdin is not None
         self._process.stdin.write("now\n")
         self._process.stdin.flush()

@@ -25,10 +25,10 @@ class Learner(Wire):
             self.controls.clear()
         super()._take(message)
         if message["type"] == "GuiTextMessage" and message["props"]["label"] == LABEL:
-            self.write(message["uuid"], value=AWAKE)  # a browser shows the curves of the step, and no other
+            self.write(message["uuid"], value=AWAKE)  # a browser shows only the curves of the step
 
     def waits_for(self, condition: Callable[[], object]) -> float:
-        """The time until a condition holds, s."""
+        """Returns the time until a condition holds, s."""
         began = time.monotonic()
         while True:
             with contextlib.suppress(RuntimeError):  # the page changes while it is read
@@ -39,7 +39,7 @@ class Learner(Wire):
             time.sleep(0.02)
 
     def use(self, label: str, value: object) -> None:
-        """Uses a control by its label, once the page has it."""
+        """Uses the control with this label, as soon as the page has it."""
         self.waits_for(lambda: self.find(label))
         found = self.find(label)
         assert found is not None
@@ -47,7 +47,7 @@ class Learner(Wire):
 
 
 class Teacher:
-    """A teacher's page. told: the latest of each part of what it shows."""
+    """A teacher's page. told: the latest value of each part that the page shows."""
 
     def __init__(self, link: str) -> None:
         self._line = connect(link.replace("http", "ws", 1), max_size=None, ping_interval=None)

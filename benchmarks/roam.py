@@ -51,7 +51,7 @@ def _look(server: PageServer, page: Wire, found: Findings, complaints: Callable[
 
 
 def _answers(server: PageServer, user: HostileUser) -> bool:
-    """Whether a new page shows the session and accepts a command."""
+    """Returns whether a new page shows the session and accepts a command."""
     user.reload()
     if not eventually(lambda: user.page.find("Playback") is not None and bool(server.sessions.learners)):
         return False

@@ -1,11 +1,11 @@
-"""The page under disturbances: killed, stopped and hanging simulations, large uploads, little memory.
+"""Disturbs the page: simulations are killed, stopped or hang, uploads are large, and memory is small.
 
     python -m benchmarks.rough [--kills 100] [--stops 20] [--shm 8]
 
-Two pages without a browser share a server and are disturbed; a third page only watches. Run as root with
-`--shm` MB of shared memory (a mount of its own). Prints JSON: how often a page recovered with its button, the
-longest time in which the watching page received nothing, the longest response time of a GET, and what was
-left behind. Exit code 0 if every page recovered and nothing was left behind.
+Two pages without a browser share a server and are disturbed; a third page only watches. If root runs the
+program, it has `--shm` MB of shared memory (a mount of its own). It prints JSON: how often a page recovered
+with its button, the longest time in which the watching page received nothing, the longest response time of a
+GET, and what was left behind. The exit code is 0 if every page recovered and nothing was left behind.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def main() -> int:
 
 
 def treat(kills: int, stops: int, scene: str = "iiwa14-hold") -> dict[str, object]:
-    """All disturbances in sequence; see the module. scene: the scene that the pages show."""
+    """Does all disturbances in sequence, see the module. scene: the scene that the pages show."""
     shared = shutil.disk_usage("/dev/shm").total if os.path.exists("/dev/shm") else 0
     before, there = _memory_left(), set(psutil.Process().children(recursive=True))
     server = PageServer(SceneChoice(RunSpec(scene)), port=0, max_sessions=3)
@@ -143,7 +143,7 @@ def _hang(learner: SimulationClient) -> None:
 def _recovers(
     learner: SimulationClient, page: Wire, harm: Callable[[SimulationClient], None], by_reset: bool
 ) -> bool:
-    """Whether the page says what is wrong, and whether its button starts a running robot again."""
+    """Returns whether the page says what is wrong, and whether its button starts a running robot again."""
 
     def says() -> bool:
         return any(page.shows(badge) for badge in ("STOPPED", "SILENT", "LOADING"))
@@ -189,7 +189,7 @@ def _upload(page: Wire, answers: list[str]) -> None:
 
 @contextlib.contextmanager
 def _watch(url: str, witness: Wire) -> Iterator[list[float]]:
-    """(longest silence of a page, longest response time of a GET), s, during the disturbance."""
+    """Yields (longest silence of a page, longest response time of a GET), s, during the disturbance."""
     worst, over = [0.0, 0.0], threading.Event()
     seen: dict[str, object] = {}
 
@@ -224,7 +224,8 @@ def _watch(url: str, witness: Wire) -> Iterator[list[float]]:
 
 
 def _memory_left() -> set[str]:
-    """Named shared memory that belongs to no other living program, and rings that this process still maps."""
+    """Returns the named shared memory that belongs to no other living program, and the rings that this
+    process still maps."""
     found = {f"/dev/shm/{path.name}" for path in Path("/dev/shm").glob("*")}
     others = {line.split()[-1] for each in psutil.pids() if each != os.getpid() for line in _maps(each)}
     # Its owner may have removed a name meanwhile.

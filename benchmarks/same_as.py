@@ -67,7 +67,7 @@ def main() -> int:
 
 
 def _names() -> list[str]:
-    """SCENE/CONTROLLER for all combinations that fit."""
+    """Returns SCENE/CONTROLLER for all combinations that fit."""
     from himpc.catalog import CONTROLLERS, VELOCITY_CONTROLLERS
     from lessons.scenes.names import SCENES, VELOCITY_SCENES
 
@@ -92,7 +92,7 @@ def _differs(name: str, then: Path, now: Path, tolerance: float) -> bool:
 
 
 def _same(before: Any, after: Any, tolerance: float) -> bool:
-    """Whether two parts of a JSON object are equal, numbers up to the tolerance."""
+    """Returns whether two parts of a JSON object are equal, with numbers equal up to the tolerance."""
     if isinstance(before, dict) and isinstance(after, dict):
         keys = before.keys() - (_HOW if tolerance > 0 else set())
         return before.keys() == after.keys() and all(_same(before[k], after[k], tolerance) for k in keys)

@@ -1,11 +1,13 @@
-"""Three servers of two sessions each behind a real nginx, as docs/serving.md prints it.
+"""Runs three servers of two sessions each behind a real nginx, with the configuration that docs/serving.md
+prints.
 
     python -m benchmarks.several [--picture FILE]
 
-Six learners come in, one of them in a browser, and the seventh is asked to wait. Two learners leave; then the
-server of the browser is killed: its two learners go on elsewhere, at the step of the lesson where they were,
-and the benchmark says after how many seconds. Last, a server gets SIGTERM: it lets nobody in, and its page is
-told and goes on elsewhere. Exit code 0 if all of this happened, each move after the kill within 10 s.
+Six learners come in, one of them in a browser, and the seventh is asked to wait. Two learners leave. Then the
+server of the browser is killed, and its two learners continue on another server, at the step of the lesson
+where they were; the program prints after how many seconds. At the end, a server gets SIGTERM: it admits
+nobody, and its page is informed and continues on another server. The exit code is 0 if all of this happened,
+each move after the kill within 10 s.
 """
 
 from __future__ import annotations
@@ -38,21 +40,21 @@ from browsing.wire import eventually
 ROOT = Path(__file__).parents[1]
 SERVERS, SESSIONS, DRAIN = 3, 2, 5
 MOVE = 10.0
-"""Time, s, within which a learner goes on elsewhere."""
+"""Time, s, within which a learner continues on another server."""
 _LONG = 180.0  # s
 _TOKEN = "one-token-for-all-three-servers"
 _HERE = "lab-{}.example.org:8080"
 
 
 def main() -> int:
-    """Runs the servers and prints what the learners met."""
+    """Runs the servers, and prints what happened to the learners."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--picture", type=Path, default=None)
     picture: Path | None = parser.parse_args().picture
     nginx = shutil.which("nginx") or shutil.which("nginx", path="/usr/sbin:/usr/local/sbin")
     chromium = find_chromium()
     if nginx is None or chromium is None:
-        print("needs nginx and Chromium", file=sys.stderr)
+        print("This benchmark needs nginx and Chromium.", file=sys.stderr)
         return 2
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
@@ -65,7 +67,7 @@ def main() -> int:
         failures = _learn(stack, link, new_page(browser, 1300, 700), ports, servers, picture)
         browser.close()
     for each in failures:
-        print(f"not true: {each}")
+        print(f"this was not the case: {each}")
     return 1 if failures else 0
 
 
@@ -77,7 +79,7 @@ def _learn(
     servers: list[subprocess.Popen[bytes]],
     picture: Path | None,
 ) -> list[str]:
-    """Everything that happens; returns what went wrong."""
+    """Does everything in sequence, and returns what went wrong."""
     wrong: list[str] = []
 
     def check(right: bool, words: str) -> None:
@@ -118,13 +120,13 @@ def _learn(
     began = time.monotonic()
     moved, there = _again(stack, tabs[companion], link)
     check(there, "the learner is at the second step")
-    print(f"killed: the learner of a protocol client goes on after {time.monotonic() - began:.1f} s")
+    print(f"killed: the learner of a protocol client continues after {time.monotonic() - began:.1f} s")
     check(time.monotonic() - began < MOVE, "the protocol client changes servers in time")
     in_browser = _until(lambda: [_sessions(each) for each in rest] == [2, 2], page)
     shown = _until(lambda: page.get_by_text("You go on where you were").count() > 0, page)
     check(in_browser and shown, "the learner in the browser continues on another server")
     page.get_by_text("2 of").first.wait_for()
-    print(f"killed: the page in the browser goes on after {time.monotonic() - began:.1f} s")
+    print(f"killed: the page in the browser continues after {time.monotonic() - began:.1f} s")
     check(time.monotonic() - began < MOVE, "the browser changes servers in time")
     if picture is not None:
         page.screenshot(path=picture)
@@ -145,7 +147,7 @@ def _drained(
     ports: list[int],
     servers: list[subprocess.Popen[bytes]],
 ) -> list[str]:
-    """SIGTERM for the server of one learner, whose place is at the other one."""
+    """Sends SIGTERM to the server that has one learner. This learner must continue on the other server."""
     (alone,) = (port for port in rest if _sessions(port) == 1)
     server = servers[ports.index(alone)]
     (tab,) = (each for each in tabs if _place_of(each, ports) == ports.index(alone))
@@ -155,19 +157,19 @@ def _drained(
     began = time.monotonic()
     left = eventually(lambda: server.poll() is not None, DRAIN + 10.0)
     seconds = time.monotonic() - began
-    print(f"drained: told {told}, newcomers refused {closed}, ended {left} after {seconds:.1f} s")
+    print(f"drained: informed {told}, newcomers refused {closed}, ended {left} after {seconds:.1f} s")
     # The other server is full, so one of its learners makes room.
     other = next(port for port in rest if port != alone)
     next(each for each in tabs if each is not tab and _place_of(each, ports) == ports.index(other)).__exit__()
     _, there = _again(stack, tab, link)
-    print(f"drained: the learner goes on elsewhere at the same step: {there}")
+    print(f"drained: the learner continues on another server at the same step: {there}")
     right = {"told": told, "newcomers are refused": closed, "ended": left, "goes on": there}
     return [f"drained: {name}" for name, is_so in right.items() if not is_so]
 
 
 def _again(stack: ExitStack, tab: Tab, link: str) -> tuple[Tab, bool]:
-    """The tab after its server has gone, as soon as it shows the second step of the lesson, and whether it
-    does."""
+    """Returns the tab after its server has ended, as soon as it shows the second step of the lesson, and
+    whether it shows this step."""
     assert eventually(lambda: not tab.is_open, _LONG)
     until = time.monotonic() + _LONG
     while time.monotonic() < until:
@@ -179,7 +181,7 @@ def _again(stack: ExitStack, tab: Tab, link: str) -> tuple[Tab, bool]:
 
 
 def _until(condition: Callable[[], bool], page: Page) -> bool:
-    """Waits for a condition while the browser goes on."""
+    """Waits for a condition while the browser keeps running."""
     until = time.monotonic() + _LONG
     while not condition():
         if time.monotonic() > until:
@@ -203,7 +205,8 @@ def _step_of(page: Page) -> int:
 
 
 def _place_of(tab: Tab, ports: list[int]) -> int:
-    """The number of the server with which a tab is connected: nginx says it in a header of the handshake."""
+    """Returns the number of the server with which a tab is connected. nginx gives it in a header of the
+    handshake."""
     return ports.index(int(tab.answered("X-Server").rpartition(":")[2]))
 
 
@@ -231,7 +234,7 @@ def _health(port: int) -> dict[str, str]:
 
 @contextmanager
 def _server(port: int, address: int) -> Iterator[subprocess.Popen[bytes]]:
-    """A server, which is ended in the end if it still runs."""
+    """Runs a server, and ends it at the end if it still runs."""
     options = f"--no-browser --port {port} --max-sessions {SESSIONS} --one-of-several --drain {DRAIN}"
     more = ["--no-own-files", "--lesson", "one-task", "--trusted-origin", f"http://127.0.0.1:{address}"]
     process = subprocess.Popen(
@@ -251,7 +254,7 @@ def _server(port: int, address: int) -> Iterator[subprocess.Popen[bytes]]:
 
 @contextmanager
 def _balancer(nginx: str, folder: Path, port: int, ports: list[int]) -> Iterator[None]:
-    """nginx with the printed configuration; it also says which server answered."""
+    """Runs nginx with the printed configuration. It also says which server answered."""
     text = (ROOT / "docs" / "serving.md").read_text()
     (site,) = re.findall(r"```text\n(upstream .*?)```", text, re.DOTALL)
     lines = "".join(f"    server 127.0.0.1:{each} max_fails=0;\n" for each in ports)

@@ -1,17 +1,17 @@
-"""Whether the server's memory, threads and handles stay constant, over time and over reconnections.
+"""Measures whether the server's memory, threads and handles stay constant, over time and over reconnections.
 
     python -m benchmarks.soak [--minutes M] [--clients K] [--reconnects N] [--scene S] [--json -]
 
-Runs a server and, in a process of their own, K clients that use the page's protocol (benchmarks/client.py).
-Measures for M minutes. The first ten of them (or the first half of a shorter run) fill the histories for
-looking back and for export, at twice the speed, and last until every robot has run for two minutes of its own
-time. Then one of the clients reloads its page N times. Prints a table; exit code 0 if the memory of the
-server and of its children grew by at most 5 % since the histories were full, the numbers of threads and
-handles are the same as before, and 100 reloads cost at most 5 MB.
+The program runs a server and, in a process of their own, K clients that use the page's protocol
+(benchmarks/client.py). It measures for M minutes. The first ten of them (or the first half of a shorter run)
+fill the histories for looking back and for export, at twice the speed, and last until every robot has run for
+two minutes of its own time. Then one of the clients reloads its page N times. The program prints a table. The
+exit code is 0 if the memory of the server and of its children grew by at most 5 % since the histories were
+full, the numbers of threads and handles are the same as before, and 100 reloads cost at most 5 MB.
 
-Memory is what a process has written and shares with no other process, after free memory was returned to the
-system. The free memory that an allocator keeps varies by more than a leak would, and so do the pages of
-libraries, which are shared as long as another program on the machine uses them.
+The measured memory is what a process has written and shares with no other process, after free memory was
+returned to the system. The free memory that an allocator keeps varies by more than a leak would, and so do
+the pages of libraries, which are shared as long as another program on the machine uses them.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ from lessons.scenes.run_spec import RunSpec
 
 FILL = 10.0  # minutes
 EVERY = 5.0  # s
-NEAR = 5  # samples over which a median is taken, at least
+NEAR = 5  # the smallest number of samples over which a median is taken
 BATCHES = 5  # of reloads
 REST = 5.0  # s
 GROWTH = 1.05
@@ -111,8 +111,8 @@ def go(learners: Sequence[SimulationClient], speed: float) -> None:
 
 
 def reconnected(viewers: Viewers, times: int) -> float | None:
-    """MB that the server keeps per hundred reloads of a page, after some reloads to warm up: the median slope
-    between any two of several batches, since a single reading varies."""
+    """Returns the MB that the server keeps per hundred reloads of a page, after some reloads to warm up. This
+    is the median slope between any two of several batches, because a single reading varies."""
     if not times:
         return None
     visit(viewers, max(20, times // 5))
@@ -131,7 +131,7 @@ def visit(viewers: Viewers, times: int) -> None:
 
 
 def rested(client: int) -> float:
-    """MB of the server after a moment without activity."""
+    """Returns the MB of the server after a moment without activity."""
     time.sleep(REST)
     found: list[float] = []
     for _ in range(NEAR):
@@ -141,19 +141,20 @@ def rested(client: int) -> float:
 
 
 def watched(minutes: float, client: int, after: float = 0.0) -> list[Sample]:
-    """Samples over a number of minutes, and enough of them for a verdict; after: the minute of the first
-    one."""
+    """Returns samples over a number of minutes, and enough of them for a verdict. after: the minute of the
+    first sample."""
     began, found = time.monotonic(), list[Sample]()
     while (minute := (time.monotonic() - began) / 60) < minutes or len(found) < 2 * NEAR:
         found.append(sample(after + minute, client))
-        if len(found) % 12 == 1:  # printed from time to time: a run takes an hour and may fail at its end
+        if len(found) % 12 == 1:  # because a run takes an hour and may fail at its end
             print(json.dumps(asdict(found[-1])), file=sys.stderr, flush=True)
         time.sleep(EVERY)
     return found
 
 
 def sample(minute: float, client: int) -> Sample:
-    """What the server and its children use now. client: id of the process that is not part of the server."""
+    """Returns what the server and its children use now. client: id of the process that is not part of the
+    server."""
     server = psutil.Process()
     tidy()
     memory = written(server)
@@ -178,7 +179,7 @@ def sample(minute: float, client: int) -> Sample:
 
 
 def written(process: psutil.Process) -> float:
-    """Bytes that a process has written and shares with no other process."""
+    """Returns the bytes that a process has written and shares with no other process."""
     if sys.platform != "linux":
         return process.memory_full_info().uss
     try:
@@ -196,7 +197,7 @@ def tidy() -> None:
 
 
 def judged(later: list[Sample], cost: float | None) -> list[str]:
-    """Sentences about exceeded limits; later: samples after the histories were full."""
+    """Returns sentences about exceeded limits. later: the samples after the histories were full."""
     if len(later) < 2 * NEAR:
         return [f"Too short: {len(later)} samples since everything was filled."]
     some = max(NEAR, len(later) // 10)  # data on the way to a client vary within minutes
@@ -216,7 +217,7 @@ def judged(later: list[Sample], cost: float | None) -> list[str]:
 
 
 def table(samples: list[Sample], cost: float | None, faults: list[str]) -> str:
-    """A table of about thirty lines."""
+    """Returns a table of about thirty lines."""
     names = list(asdict(samples[0]))
     lines = ["  ".join(name.rjust(9) for name in names)]
     lines += [

@@ -1,9 +1,10 @@
-"""The cost of a start: CPU and wall time until the page listens, and CPU time of lists, help and compiling.
+"""Measures the cost of a start: CPU and wall time until the page listens, and CPU time of lists, help and
+compiling.
 
     python benchmarks/start.py [--runs 5] [--cold]
 
-CPU time is user and system time: of the server's process alone, or of a command and its children. Medians of
-several runs are printed; `--cold` also compiles once, into a folder of its own.
+CPU time is user and system time: of the server's process alone, or of a command and its children. The program
+prints medians of several runs. With `--cold` it also compiles once, into a folder of its own.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ COMPILE = "from himpc.compilation.compiling import compile_all; compile_all(lamb
 
 
 def cost(command: list[str], **environment: str) -> float:
-    """CPU time of a command and its children, s."""
+    """Returns the CPU time of a command and its children, s."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     subprocess.run(command, env={**os.environ, **environment}, capture_output=True, check=True)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -33,7 +34,7 @@ def cost(command: list[str], **environment: str) -> float:
 
 
 def listening(arguments: list[str]) -> tuple[float, float]:
-    """(CPU time of the server, wall time), s, until it prints that it is ready."""
+    """Returns (CPU time of the server, wall time), s, until the server prints that it is ready."""
     began = time.perf_counter()
     command = [sys.executable, "-m", "app", "--no-browser", "--port", "0", *arguments]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as server:

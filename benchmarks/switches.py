@@ -1,17 +1,18 @@
-"""Whether the server's memory stays constant while learners change scenes, with and without ghosts.
+"""Measures whether the server's memory stays constant while learners change scenes, with and without ghosts.
 
     python -m benchmarks.switches [--clients K] [--minutes M] [--every S] [--speed X] [--seed N]
 
-Starts the real server and, in a process of their own, K clients that draw nothing (benchmarks/client.py).
-Every S seconds each learner opens another scene, starts a ghost or ends it, at random. The simulations run at
-X times real time, so that a small machine can run all of them. Memory is measured every five seconds, without
-garbage collection before it. Prints a line of JSON for every five minutes (in a shorter run for every sixth
-part): the median and the maximum of the server's memory in that time, MB. At the end all learners return to
-the first scene, and the server's memory is compared with that after the warm-up.
+The program starts the real server and, in a process of their own, K clients that draw nothing
+(benchmarks/client.py). Every S seconds each learner opens another scene, starts a ghost or ends it, at
+random. The simulations run at X times real time, so that a small machine can run all of them. Memory is
+measured every five seconds, without garbage collection before it. A line of JSON is printed for every five
+minutes (in a shorter run for every sixth part): the median and the maximum of the server's memory in that
+time, MB. At the end all learners return to the first scene, and the server's memory is compared with that
+after the warm-up.
 
-Exit code 0 if memory was never more than BASE + K · EACH, nothing was left behind, and memory in the last
-third of the time was at most 10 % more than in the first. Thirds are compared if each is at least five
-minutes long: shorter ones differ by the scenes that happen to be open.
+The exit code is 0 if memory was never more than BASE + K · EACH, nothing was left behind, and memory in the
+last third of the time was at most 10 % more than in the first. Thirds are compared only if each is at least
+five minutes long, because shorter ones differ by the scenes that happen to be open.
 """
 
 from __future__ import annotations
@@ -52,7 +53,7 @@ PERIOD = 5.0  # minutes
 LOOK = 5.0  # s
 GROWTH = 1.1
 BASE, EACH = 300.0, 50.0
-"""MB for a server with its libraries and the meshes of all scenes, and for a learner with a ghost."""
+"""Memory of a server with its libraries and the meshes of all scenes, and of a learner with a ghost, MB."""
 
 
 @dataclass
@@ -63,7 +64,7 @@ class Period:
     megabytes: list[float] = field(default_factory=list)
 
     def told(self) -> dict[str, float]:
-        """The period as a line for the terminal."""
+        """Returns the period as a line for the terminal."""
         return {"minute": round(self.began, 1), "median": median(self.megabytes), "most": max(self.megabytes)}
 
 
@@ -139,23 +140,23 @@ def everybody(learners: tuple[SimulationClient, ...], scene: str, speed: float) 
 
 
 def shows(learner: SimulationClient, scene: str) -> bool:
-    """Whether a scene is running."""
+    """Returns whether a scene is running."""
     return learner.choice.run.scene == scene and runs(learner)
 
 
 def runs(learner: Simulation) -> bool:
-    """Whether the scene has run some ticks."""
+    """Returns whether the scene has run some ticks."""
     found = learner.read(lambda block, _: block.moment()[0])
     return found is not None and found > 0.01
 
 
 def megabytes() -> float:
-    """MB of the server, without any collection before the measurement."""
+    """Returns the MB of the server, without any garbage collection before the measurement."""
     return round(1e-6 * psutil.Process().memory_info().rss, 1)
 
 
 def state(server: PageServer) -> dict[str, float]:
-    """The state of the server after all pages were built and a moment passed without activity."""
+    """Returns the state of the server after all pages were built and a moment passed without activity."""
     viewers = server._viser.get_clients().values()
     assert wait_until(
         lambda: all("/robot/1" in viewer.scene._handle_from_node_name for viewer in viewers), LONG
@@ -175,7 +176,7 @@ def state(server: PageServer) -> dict[str, float]:
 def judged(
     periods: list[Period], before: dict[str, float], after: dict[str, float], most: float
 ) -> list[str]:
-    """Sentences about exceeded limits."""
+    """Returns sentences about exceeded limits."""
     faults = [
         f"There were {before[name]:g} {name}, then {after[name]:g}."
         for name in ("processes", "blocks", "nodes", "controls")

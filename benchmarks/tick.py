@@ -1,8 +1,9 @@
-"""The computing time of the parts of a control tick: reference, control step, telemetry, plant.
+"""Measures the computing time of the parts of a control tick: reference, control step, telemetry, plant.
 
     python benchmarks/tick.py [SCENE] [TICKS]
 
-Prints JSON: medians and 99th percentiles in microseconds, and how many simulated seconds pass per second.
+The program prints JSON: medians and 99th percentiles in microseconds, and how many simulated seconds pass per
+second.
 """
 
 from __future__ import annotations

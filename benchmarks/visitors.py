@@ -2,12 +2,12 @@
 
     python -m benchmarks.visitors [--silent 200] [--seconds 5] [--no-browser]
 
-Starts the real server in a process of its own and tries to connect as other sites do: with a foreign origin,
-`null`, another port's origin, a rebinding name, and with 40 sockets from a page of another site in Chromium.
-Then, while a page is open, many silent connections are opened (half without a request, half web sockets
-without a message) and one that sends as fast as it can, and a new visitor arrives. Prints JSON; exit code 0
-if the foreign sites read, started and closed nothing, the new visitor was served within 2 s and the page kept
-at least half its rate.
+The program starts the real server in a process of its own and tries to connect as other sites do: with a
+foreign origin, `null`, another port's origin, a rebinding name, and with 40 sockets from a page of another
+site in Chromium. Then, while a page is open, it opens many silent connections (half without a request, half
+web sockets without a message) and one that sends as fast as it can, and a new visitor arrives. It prints
+JSON. The exit code is 0 if the foreign sites read, started and closed nothing, the new visitor was served
+within 2 s, and the page kept at least half its rate.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ _FOREIGN = """async ([url, protocol]) => {
 
 
 def serve(pipe: Any) -> None:
-    """The server's process: answers questions about its state until it is told to end."""
+    """Runs the server's process, which answers questions about its state until it is told to end."""
     server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=3, grace=600.0)
     pipe.send(server.link)
     while pipe.recv() == "seen":
@@ -91,7 +91,7 @@ class Watched:
                             self._socket.send(pack(nothing_kept(message["request_uuid"])))
 
     def rate(self, seconds: float) -> float:
-        """Packets per second from now on."""
+        """Returns the number of packets per second from now on."""
         before, began = self.packets, time.monotonic()
         time.sleep(seconds)
         return (self.packets - before) / (time.monotonic() - began)
@@ -122,7 +122,7 @@ def shake(url: str, host: str, origin: str) -> int:
 
 
 def strangers(url: str) -> dict[str, int]:
-    """The status that each kind of foreign site gets, five times each."""
+    """Returns the status that each kind of foreign site gets, five times each."""
     ours = urlsplit(url).netloc
     kinds = {
         "foreign origin": (ours, "https://evil.example"),
@@ -204,8 +204,8 @@ def _drain(connection: Any) -> None:
 
 
 def newcomer(url: str) -> float:
-    """Time, s, until a new page is served: the document, the socket, and the first packet after its first
-    message."""
+    """Returns the time, s, until a new page is served: the document, the socket, and the first packet after
+    its first message."""
     parts, cookie = urlsplit(url), let_in(url)
     began = time.monotonic()
     with socket.create_connection((parts.hostname or "", parts.port or 0), timeout=LONG) as plain:
@@ -227,8 +227,8 @@ def newcomer(url: str) -> float:
 def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--silent", type=int, default=200, metavar="K")
-    parser.add_argument("--seconds", type=float, default=5.0, help="of each measurement of the page's rate")
-    parser.add_argument("--no-browser", action="store_true", help="leave Chromium out")
+    parser.add_argument("--seconds", type=float, default=5.0, help="length of each measurement of the rate")
+    parser.add_argument("--no-browser", action="store_true", help="runs without Chromium")
     parser.add_argument("--flood", metavar="URL", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.flood:

@@ -66,7 +66,7 @@ class Bench:
     def __init__(self, folder: Path) -> None:
         needed("cc")
         self.scene = torque_scene("panda-hold")
-        self.settings = PlantSettings()  # without contacts: faster
+        self.settings = PlantSettings()  # a simulation without contacts is faster
         self.ready = self.prepared(self.scene)
         self.make = maker(build(folder), self.ready.image)
 
@@ -88,8 +88,8 @@ class Bench:
         shown: Callable[[Reading], Reading] | None = None,
         delay: int = 0,
     ) -> tuple[Ended, np.ndarray, Columns, Scripted]:
-        """Runs the loop in this process, one period per read. drags: by the number of the period; periods:
-        after so many the loop is asked to end."""
+        """Runs the loop in this process, one period per read. drags: the orders, by the number of their
+        period; periods: the number of periods after which the loop is asked to end."""
         controller = self.make()
         orders, at = Orders(4), Columns.of(7, controller.view("error").size)
         block = Block(at.width, 8)
@@ -120,7 +120,7 @@ class Bench:
         tolerances: Tolerances = PATIENT,
         elsewhere: float = 0.0,
     ) -> Driven:
-        """Runs a drive with the loop in a process of its own; elsewhere: offset of the model's joint 2,
+        """Runs a drive with the loop in a process of its own. elsewhere: offset of joint 2 of the model,
         rad."""
         beside = self.plant()
         beside.reset(self.scene.q_0 + elsewhere * np.eye(7)[1])
@@ -135,16 +135,16 @@ class Bench:
         tolerances: Tolerances = PATIENT,
         stuck: float = STUCK,
     ) -> Drive:
-        """A drive of this scene with an arm of the test's own."""
+        """Returns a drive of this scene with an arm that the test supplies."""
         q_0 = self.scene.q_0
         return Drive(arm, self.make, self.ready.limits, q_0, T_S, duration, drags, tolerances, stuck=stuck)
 
     def model(self) -> Model:
-        """The model of the arm beside it."""
+        """Returns the model that is simulated beside the arm."""
         return Model(self.plant(), self.make(), self.ready.limits, T_S)
 
     def order(self, *moved: float) -> Order:
-        """The hand's target moves, m."""
+        """Returns an order that moves the hand's target by `moved`, m."""
         (task,) = (each for each in self.ready.image.manifest["tasks"] if each["name"] == "position")
         _, position = self.plant().frame_pose(self.scene.robot.tip)
         return Order(task["index"], position + np.array(moved))

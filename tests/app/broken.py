@@ -1,4 +1,4 @@
-"""A worker whose fork server fails to start. Its own children work."""
+"""A worker whose fork server fails to start. Simulations that the worker starts itself run normally."""
 
 from __future__ import annotations
 

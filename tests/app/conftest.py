@@ -1,5 +1,5 @@
-"""Fixtures that start simulations, and one fork server that all tests of other things share, because its
-start takes a second of a core."""
+"""Fixtures that start simulations, and one fork server. All tests whose subject is something else share this
+server, because its start takes a second of a core."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @pytest.fixture(scope="session")
 def fork_server() -> Iterator[ForkServer | None]:
-    """The fork server; None on systems that cannot fork."""
+    """Yields the fork server, and None on systems that cannot fork."""
     try:
         made = ForkServer(WORKER)
     except OSError:
@@ -44,7 +44,7 @@ def one_fork_server(fork_server: ForkServer | None) -> Iterator[None]:
 
 @pytest.fixture(scope="module")
 def lent(fork_server: ForkServer | None) -> dict[str, ForkServer | None]:
-    """The fork servers that tests may use but must not change, by worker."""
+    """Returns, by worker, the fork servers that tests may use but must not change."""
     return {WORKER: fork_server}
 
 
@@ -70,7 +70,7 @@ def start(lent: dict[str, ForkServer | None]) -> Iterator[Start]:
 
 @pytest.fixture(scope="session")
 def bench(tmp_path_factory: pytest.TempPathFactory) -> Bench:
-    """A scene prepared for drives of an arm; its controller is compiled once."""
+    """Returns a scene prepared for drives of an arm. Its controller is compiled once."""
     from arm_bench import Bench
 
     return Bench(tmp_path_factory.mktemp("arm"))

@@ -1,4 +1,4 @@
-"""The command that drives an arm, and the one module that speaks to a Franka arm."""
+"""The command that drives an arm, and the one module that communicates with a Franka arm."""
 
 from __future__ import annotations
 
@@ -62,7 +62,8 @@ def test_what_cannot_be_driven_is_told_in_one_sentence(
 
 
 def test_an_arm_that_does_not_fit_the_scene_is_refused(bench: Bench) -> None:
-    """A scene's robot with another number of joints is refused, and an arm with a joint outside its range."""
+    """A scene whose robot has another number of joints is refused, and so is an arm with a joint outside its
+    range."""
     limits = SimulatedArm(bench.plant()).limits
     with pytest.raises(InputError, match="has 7 joints and the scene's robot 'planar3' has 3"):
         limits.with_robot(torque_scene("planar3-hold").robot)
@@ -73,7 +74,7 @@ def test_an_arm_that_does_not_fit_the_scene_is_refused(bench: Bench) -> None:
 
 
 def test_a_motion_that_begins_elsewhere_is_refused(bench: Bench, tmp_path: Path) -> None:
-    """A circle that begins far from the hand would pull the arm there at once."""
+    """A circle that begins far from the hand is refused, because it would pull the arm there at once."""
     scene = load_scene("iiwa14-circle")
     assert isinstance(scene, TorqueScene)
     arm = SimulatedArm(Plant(scene.robot))
@@ -84,7 +85,8 @@ def test_a_motion_that_begins_elsewhere_is_refused(bench: Bench, tmp_path: Path)
 
 
 class FakeLibrary:
-    """Replaces pylibfranka: the names that `robots.arms.franka` uses, and one arm with given answers."""
+    """Replaces pylibfranka. It has the names that `robots.arms.franka` uses, and one arm with given
+    answers."""
 
     class FrankaException(Exception):
         pass
@@ -176,7 +178,7 @@ def test_the_arm_must_be_the_scene_s_robot(library: FakeLibrary, bench: Bench) -
 
 
 def test_nobody_answers_at_this_machine() -> None:
-    """No arm listens at this address: the message of the real library is part of the error."""
+    """No arm listens at this address, and the error contains the message of the real library."""
     pytest.importorskip("pylibfranka")
     with pytest.raises(InputError, match="is this the address of the arm"):
         door.Franka("127.0.0.1")

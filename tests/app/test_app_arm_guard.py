@@ -67,8 +67,8 @@ def reading(v: float = 0.0, q: float = 0.0) -> Reading:
 def test_the_guard_finds_every_reason_to_end(
     bench: Bench, each: dict[str, Any], periods: int, words: str
 ) -> None:
-    """Each reason is found when it has lasted long enough, and not earlier. If there is no reason, nothing is
-    found."""
+    """The guard reports each reason when it has lasted long enough, and not earlier. Without a reason it
+    reports nothing."""
     calm = {"reading": reading(), "missed": 0, "hurried": False, "fallback": 0}
     guard, found = ArmGuard(bench.ready.limits, Tolerances(), T_S), None
     for k in range(periods):
@@ -103,7 +103,7 @@ def test_a_killed_loop_is_told_and_its_rows_stay(bench: Bench) -> None:
 
 
 def test_a_library_that_hangs_ends_the_loop_s_process(bench: Bench) -> None:
-    """The process of the loop does not wait for ever for an answer of the arm."""
+    """The loop's process ends if the arm's library does not answer for too long."""
 
     def hang(k: int, arm: Scripted) -> None:
         if k == 20:

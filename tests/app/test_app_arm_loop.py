@@ -1,4 +1,4 @@
-"""A real arm's loop, with an arm in MuJoCo behind the interface of a real one."""
+"""The control loop of a real arm. In these tests an arm in MuJoCo has the interface of the real one."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ def test_without_gravity_nothing_has_to_be_commanded(bench: Bench) -> None:
 
 
 def test_a_torque_with_gravity_in_it_moves_the_arm(bench: Bench) -> None:
-    """If the arm reported the measured torque, in which gravity is contained, increments would start from
-    there and gravity would act twice."""
+    """If the arm reported the measured torque, which contains gravity, the increments would start from this
+    torque and gravity would act twice."""
     gravity = bench.plant().holding_torque()
     _, rows, at, _ = bench.run(shown=lambda reading: reading._replace(tau=reading.tau + gravity))
     assert np.abs(rows[:, at.q] - bench.scene.q_0).max() > 0.05
@@ -50,14 +50,15 @@ def test_an_arm_that_compensates_gravity_moves_as_the_lab_does(bench: Bench) -> 
 
 
 def test_a_load_that_the_arm_was_not_told_of_is_carried(bench: Bench) -> None:
-    """Time-delay estimation finds the weight that the arm does not compensate."""
+    """Time-delay estimation compensates the weight of a load that the arm itself does not compensate."""
     _, rows, at, _ = bench.run(plant=bench.plant(payload_kg=1.0), periods=1500)
     assert np.abs(rows[1400:1500, at.error][:, :3]).max() < 2e-3
     assert np.abs(rows[1400:1500, at.tau]).max() > 2.0
 
 
 def test_no_torque_changes_faster_than_the_arm_accepts(bench: Bench) -> None:
-    """This holds while the arm is pushed hard and while it is stopped. At the end the torque is small."""
+    """The limit holds while the arm is pushed hard and while it is stopped. At the end the torque is
+    small."""
 
     def push(k: int, arm: Scripted) -> None:
         if k in (100, 150):
@@ -92,8 +93,8 @@ def test_accelerations_are_over_the_time_that_has_passed(bench: Bench) -> None:
 
 
 def test_the_torque_that_acted_counts(bench: Bench) -> None:
-    """An arm whose torques act two periods late, and that tells what was commanded, is controlled if the
-    delay is known; else it goes on shaking after a drag."""
+    """The torques of this arm act two periods late, and the arm reports the commanded torque. If the loop
+    knows the delay, it controls the arm; if not, the arm continues to shake after a drag."""
     speeds = []
     for delay in (0, 2):
         last = [np.zeros(7)]
@@ -127,7 +128,7 @@ def test_a_drive_holds_drags_and_ends(bench: Bench) -> None:
 
 
 def test_orders_are_whole_or_not_there() -> None:
-    """The last place of each task counts; an order that is being written is not seen."""
+    """If a task has several orders, the last one counts. An order that is still being written is not read."""
     orders = Orders(3)
     assert orders.news() == []
     orders.drag(Order(2, np.array([1.0, 2.0, 3.0])))

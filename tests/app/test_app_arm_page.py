@@ -57,7 +57,7 @@ def plan_of(
 
 
 def watched(bench: Bench, wire: Wire) -> None:
-    """Runs what the process that watches an arm runs."""
+    """Does the work of the process that watches an arm."""
     plan, model = plan_of(bench)
     shown = Shown(wire, CHOICE, bench.prepared(bench.scene), T_S)
     if shown.wait_for_start():
@@ -66,7 +66,7 @@ def watched(bench: Bench, wire: Wire) -> None:
 
 @pytest.fixture
 def page(bench: Bench, fork_server: ForkServer | None) -> Iterator[SimulationClient]:
-    """The page's client of an arm; the arm waits for Run."""
+    """Yields the page's client of an arm. The arm waits for *Run*."""
     arm = Process(partial(forked_here, partial(watched, bench)))
     spares = Spares(WORKER, fork_server)
     made = SimulationClient("", CHOICE, spares, arm)
@@ -90,7 +90,7 @@ def arm_of(page: SimulationClient) -> ArmView:
 
 def test_the_simulation_is_the_ghost_of_the_arm(page: SimulationClient, bench: Bench) -> None:
     """A dragged target moves the measured robot and its simulation; both have errors to draw, at the same
-    time. Stop gently stops the arm, and the page says why."""
+    time. *Stop gently* stops the arm, and the page gives the reason."""
     assert wait_until(lambda: page.status is not None, LONG)
     assert not told(page).running
     ghost = page.ghost
@@ -128,8 +128,8 @@ def test_the_simulation_is_the_ghost_of_the_arm(page: SimulationClient, bench: B
 
 
 def test_only_targets_of_an_arm_can_be_changed(page: SimulationClient) -> None:
-    """Settings, resets, scenes and other ghosts are refused in a sentence; no simulation takes the arm's
-    place."""
+    """Settings, resets, scenes and other ghosts are refused in one sentence each, and no simulation replaces
+    the arm."""
     assert wait_until(lambda: page.status is not None, LONG)
     pid, notices = page.pid, list[str]()
 
@@ -168,8 +168,8 @@ def test_an_arm_stops_when_its_page_is_closed(page: SimulationClient) -> None:
 
 
 def blocked_counts(k: int, arm: Scripted, last: list[float], periods: int | None) -> None:
-    """Counts a period as missed if the loop waited for long, and not for a core: it waited for another
-    process."""
+    """Counts a period as missed if the loop waited for a long time for another process. The time in which the
+    loop waited for a core is not counted."""
     now = time.monotonic() - waited(os.getpid())
     if last and now - last[0] > 0.05:
         arm.skipped += T_S
@@ -179,18 +179,19 @@ def blocked_counts(k: int, arm: Scripted, last: list[float], periods: int | None
 
 
 def published(driven: Driven, at: Columns) -> tuple[int, int]:
-    """Returns the number of cycles that the loop has published until its end, and of missed periods."""
+    """Returns the number of cycles that the loop published before its end, and the number of missed
+    periods."""
     rows = driven.rows[driven.rows[:, at.ending] == 0]
     return len(rows), int(rows[:, at.missed].sum())
 
 
 def test_a_page_that_hangs_delays_nothing(bench: Bench) -> None:
-    """A page reads nothing, and its queue is soon full. The loop misses hardly more periods than without
-    a page, and after some seconds the arm is stopped gently."""
+    """The page reads nothing, and its queue is soon full. The loop misses hardly more periods than without a
+    page, and after some seconds the arm is stopped gently."""
     at = Columns.of(7, bench.make().view("error").size)
     tolerances = replace(PATIENT, silent=DEAF - 1.0)
     ours, theirs = socket.socketpair()
-    theirs.settimeout(10.0)  # a watcher that waits for the page would else hang here
+    theirs.settimeout(10.0)  # otherwise a watcher that waits for the page would hang here
     theirs.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 8192)
     plan, model = plan_of(bench, partial(blocked_counts, last=[], periods=None), tolerances, 4 * T_S)
     shown = Shown(Wire(theirs), CHOICE, bench.prepared(bench.scene), T_S)
@@ -204,7 +205,7 @@ def test_a_page_that_hangs_delays_nothing(bench: Bench) -> None:
     plan, model = plan_of(bench, partial(blocked_counts, last=[], periods=cycles - 1), tolerances, 4 * T_S)
     cycles_alone, missed_alone = published(drive(plan, model, lambda text: None), at)
     assert cycles == cycles_alone
-    assert missed <= missed_alone + 3  # a slow disk may stop either loop now and then
+    assert missed <= missed_alone + 3  # a slow disk may sometimes stop either loop
     ours.close()
     theirs.close()
 

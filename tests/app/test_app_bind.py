@@ -75,7 +75,7 @@ def panel(viser_server: viser.ViserServer, monkeypatch: pytest.MonkeyPatch) -> P
 
 
 def test_an_edit_is_not_lost_to_a_refresh_at_the_same_moment(panel: Panel, settings: TorqueSettings) -> None:
-    """A new value arrives while the page shows the earlier settings: the new value is posted."""
+    """A value that arrives while the page shows the earlier settings is posted."""
     panel.browser_sets(12, meanwhile=lambda: panel.bindings.refresh(settings))
     assert panel.posted == [Set("horizon", 12)]
     panel.refresh(settings)

@@ -68,14 +68,14 @@ def test_pause_step_speed(body: SimulationRunner) -> None:
     body.handle(Play(True))
     body.handle(Post(Reset()))
     body.handle(StepTicks())
-    assert body.take_steps() == 1  # one press is one tick
+    assert body.take_steps() == 1  # one press gives one tick
     body.handle(Speed(0.5))
     assert body.status().speed == 0.5
 
 
 def test_paused_edits_take_effect_though_no_time_passes(body: SimulationRunner) -> None:
-    """While paused, status reports the settings, the order, the gauge and the refusals after the edits; time
-    and robot do not change."""
+    """While the simulation is paused, the status reports the settings, the order, the gauge and the refusals
+    that the edits cause. Time and robot do not change."""
     body.tick(3)
     assert body.status().gauge is None  # while the simulation runs, the rows contain the gauge
     body.handle(Play(False))
@@ -156,7 +156,7 @@ def test_history_keeps_spikes_and_counts_bounds(body: SimulationRunner) -> None:
     assert np.nanmax(window.columns(layout.fields["step_us"])) == 7.0
     assert history.bound_ticks[2].tolist() == [1, 0, 1, 1, 0] and history.bound_ticks.sum() == 4
     assert history.bound_ticks[3].tolist() == [0, 1, 0, 0, 0]
-    assert window.at_bound(0)[:, 2].sum() == 2  # one bucket, two points
+    assert window.at_bound(0)[:, 2].sum() == 2  # one bucket is drawn as two points
     assert len(window.ages()) == 2 * BUCKETS
     history.forget()
     assert np.isnan(history.window().columns(layout.fields["t"])).all()

@@ -42,7 +42,7 @@ def test_the_next_lesson_is_built_once_so_that_no_answer_is_lost(monkeypatch: py
             eventually(lambda: learner.lecture is not None and learner.lecture.exercise == NEXT)
         write(stage, moment)
         if late:
-            # the browser shows the lesson already
+            # the browser already shows the next lesson
             eventually(lambda: any(answers(page) for page in pages), 3.0)
 
     monkeypatch.setattr(Stage, "_write", slow)
@@ -82,7 +82,7 @@ def test_what_is_pressed_on_a_page_that_is_gone_is_said(monkeypatch: pytest.Monk
             assert eventually(lambda: page.find("Playback") not in (None, before))
             said = len(page.notices)
             told = next(each["uuid"] for each in page.made if each["props"].get("label") == LABEL)
-            # this message comes from the page itself and not from a press
+            # the page itself sends this message, without a press
             page.write(told, value=f"{AWAKE}\nErrors")
             page.write(before, value="Pause")
             assert eventually(lambda: any("was rebuilt" in body for _, body in page.notices))

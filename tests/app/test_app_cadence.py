@@ -6,7 +6,7 @@ from app.page.cadence import CALM, LEAST, PLOTS, POSES, STILL, TEXTS, Cadence
 
 
 def looks(cadence: Cadence, begin: float, end: float, moves: bool, pace: float) -> tuple[float, float, float]:
-    """Looks, plots and texts per second."""
+    """Returns the numbers of looks, plots and texts per second."""
     now, seen = begin, [0, 0, 0]
     while now < end:
         seen[0] += 1

@@ -38,7 +38,7 @@ def server() -> Iterator[PageServer]:
 
 
 class Line:
-    """A page of the class. told: the latest of what the server sent."""
+    """A connection of a page of the class. told: the latest values that the server sent, by name."""
 
     def __init__(self, address: str, **headers: str) -> None:
         self.socket: ClientConnection = connect(
@@ -64,7 +64,7 @@ class Line:
                 return told
 
     def until(self, name: str, key: str, value: object) -> dict[str, Any]:
-        """Waits until a part of what is told has a value."""
+        """Waits until this key of the part `name` has this value, and returns the part."""
         while self.told.get(name, {}).get(key) != value:
             self.hear(name)
         return self.told[name]
@@ -85,8 +85,8 @@ def teacher(server: PageServer) -> Line:
 
 
 def test_the_address_decides_who_is_the_teacher(server: PageServer) -> None:
-    """The owner's secret opens the teacher's page and becomes a cookie; the token of guests and the code of
-    the class do not; the code opens the phones' page and nothing else."""
+    """The owner's secret opens the teacher's page and is then stored in a cookie; the guests' token and the
+    code of the class do not open this page. The code opens only the phones' page."""
     assert server.hall is not None
     code = server.hall.code
     status, headers, text = get(f"{server.url}/v/{code}")
@@ -115,7 +115,7 @@ def test_the_address_decides_who_is_the_teacher(server: PageServer) -> None:
 
 
 def cookie_of(link: str, **headers: str) -> str:
-    """The cookie that a link sets before it leads to its page without the secret."""
+    """Returns the cookie that a link sets before it redirects to its page without the secret."""
     import http.client
 
     parts = urlsplit(link)
@@ -240,7 +240,7 @@ def test_learners_stay_or_go_ahead_as_the_teacher_sets(server: PageServer) -> No
 
 
 def test_what_a_stranger_sends_ends_their_page_alone(server: PageServer) -> None:
-    """Megabytes, floods and nonsense: one answer, and another phone is answered as before."""
+    """Megabytes close the connection, nonsense gets one answer, and a flood does not stop another phone."""
     with phone(server) as good:
         with phone(server) as bad:
             bad.socket.send("x" * 1_000_000)

@@ -47,7 +47,7 @@ def by_proxy(account: str = "") -> dict[str, str]:
 
 
 def test_only_the_proxy_opens_the_pages_of_the_class(server: PageServer) -> None:
-    """Neither the code of the class nor the teacher's secret opens anything without it."""
+    """Without the proxy, neither the code of the class nor the teacher's secret opens a page."""
     assert server.hall is not None
     phones, secret = f"{server.url}/v/{server.hall.code}", f"?{QUERY}={server.passes.owner}"
     for path in ("/v/xxxxxx", "/class", f"/class{secret}", "/class.csv", "/", f"/v/{server.hall.code}"):
@@ -66,7 +66,8 @@ def test_only_the_proxy_opens_the_pages_of_the_class(server: PageServer) -> None
 
 
 def test_the_account_is_the_name_of_the_row(server: PageServer) -> None:
-    """It is not asked for, cannot be changed, and its robot is given to nobody else."""
+    """The page does not ask for a name, the name cannot be changed, and the learner's robot is given to
+    nobody else."""
     hall = server.hall
     assert hall is not None
     lead = Line(f"{server.url}/class?{QUERY}={server.passes.owner}", **by_proxy("prof"))
@@ -88,8 +89,8 @@ def test_the_account_is_the_name_of_the_row(server: PageServer) -> None:
 
 
 def test_where_the_proxy_asks_for_no_password_nobody_gets_a_robot(server: PageServer) -> None:
-    """It takes these addresses for one below /v/, and passes on an account that it did not check; the last
-    ones reach a server without a class."""
+    """The proxy treats these addresses as addresses below /v/, and passes on an account that it did not
+    check. The last addresses go to a server without a class."""
     assert server.hall is not None
     alone = PageServer(START, port=0, max_sessions=1, token=TOKEN, proxy_only=True, trusted_origins=[ORIGIN])
     try:
@@ -107,7 +108,8 @@ def test_where_the_proxy_asks_for_no_password_nobody_gets_a_robot(server: PageSe
 
 
 def upgraded(url: str, path: str, **headers: str) -> int:
-    """The status of the response to an upgrade of an address that is sent as it is written."""
+    """Returns the status of the response to an upgrade request; the address is sent exactly as it is
+    written."""
     where = urlsplit(url)
     asking = {"Host": where.netloc, "Connection": "Upgrade", "Upgrade": "websocket", **headers}
     asking |= {"Sec-WebSocket-Version": "13", "Sec-WebSocket-Key": "x" * 22 + "=="}
@@ -119,7 +121,8 @@ def upgraded(url: str, path: str, **headers: str) -> int:
 
 
 def test_an_account_keeps_its_row_and_names_may_be_left_out() -> None:
-    """Another browser with the account goes on in the same row; a class without names stores no account."""
+    """Another browser with the same account continues in the same row. A class without names stores no
+    account."""
     place = LessonPlace("a-redundant-arm")
     begun = Gathering().entered("one", "robot", 0.0, "zoe").entered("two", "robot", 0.0, "max")
     left = begun.going_to(place).opened().voted("one", 0, 1.0).left("one")

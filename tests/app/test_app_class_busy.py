@@ -1,4 +1,5 @@
-"""A class on a machine that is too slow for all its robots: pages are answered, robots come one by one."""
+"""A class on a machine that is too slow for all its robots: pages are answered, and robots are built a few at
+a time."""
 
 from __future__ import annotations
 
@@ -36,11 +37,11 @@ def server() -> Iterator[PageServer]:
 
 
 def test_pages_do_not_wait_for_robots(server: PageServer, monkeypatch: pytest.MonkeyPatch) -> None:
-    """In a class the robots have a lower priority than the pages, and a text to hand in and a learner's state
-    come also while the robot gets no time at all."""
+    """In a class, robots have a lower priority than pages. A page shows the text to hand in, and the server
+    knows a learner's state, also while the robot gets no processor time."""
     hall = server.hall
     assert hall is not None
-    given: list[tuple[int, int]] = []  # not read back: others may change priorities on this machine
+    given: list[tuple[int, int]] = []  # others may change the priorities themselves on this machine
     monkeypatch.setattr(os, "getpriority", lambda *_: 3)
     monkeypatch.setattr(os, "setpriority", lambda _, pid, priority: given.append((pid, priority)))
     with Wire(server.guest_link) as page:

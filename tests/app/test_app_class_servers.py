@@ -1,4 +1,4 @@
-"""One class over two servers: the second one's learners take part in the class of the first."""
+"""One class on two servers: the learners of the second server take part in the class of the first one."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ def lead_rows(server: PageServer) -> list[dict[str, Any]]:
 
 
 def test_another_server_that_sends_rubbish_is_sent_away_alone(first: PageServer, second: PageServer) -> None:
-    """It gets one answer; a server without the key gets none, and the right one stays connected."""
+    """It gets one answer, a server without the key is refused, and the valid server stays connected."""
     for key in ("", f"{KEY}x"):
         with pytest.raises(InvalidStatus) as refused:
             other_server(first, key)
@@ -146,7 +146,7 @@ def test_another_server_that_sends_rubbish_is_sent_away_alone(first: PageServer,
 
 
 def test_steps_that_the_class_does_not_have_are_left_out(first: PageServer) -> None:
-    """A lesson of another server's own is not opened here, and the other learners of that server arrive."""
+    """A lesson that only another server has is not opened; the other learners of that server are added."""
     hall = first.hall
     assert hall is not None
     own, done = (
@@ -187,8 +187,8 @@ def test_a_server_with_another_key_says_what_to_do(
 
 
 def test_learners_go_on_without_the_class_and_nothing_is_lost_when_it_is_back() -> None:
-    """The class's server ends; the learner is told, is kept no longer and runs a step; the next server at the
-    same address, which knows nothing, hears all of it."""
+    """When the server of the class ends, the learner is informed, may leave the step and runs it. The next
+    server at the same address, which has no data yet, receives all of this."""
     lead = leading()
     follower = PageServer(START, port=0, max_sessions=1, class_key=KEY, class_of=lead.url)
     try:
@@ -220,13 +220,13 @@ def test_learners_go_on_without_the_class_and_nothing_is_lost_when_it_is_back() 
 
 
 class NoLearners:
-    """The sessions of a server on which nobody is."""
+    """The sessions of a server without learners."""
 
     learners = ()
 
 
 class OneLearner:
-    """The sessions of a server with a learner whose page is open at a step, without a robot."""
+    """The sessions of a server with one learner, whose page is open at a step and who has no robot."""
 
     def __init__(self, at: LessonPlace | None = None) -> None:
         self.loaded: list[LessonPlace] = []
@@ -266,8 +266,8 @@ def following(branch: Branch, at_class: str) -> Iterator[None]:
 def test_what_a_browser_stores_and_an_unforeseen_error_end_no_link_for_good(
     first: PageServer, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    """A learner's browser brings text that cannot be sent, then telling fails once: the learner arrives all
-    the same."""
+    """A learner's browser brings text that cannot be sent, and then one report fails. The learner is added to
+    the class nevertheless."""
     hall, sessions, failures = first.hall, OneLearner(), [RuntimeError()]
     assert hall is not None
 
@@ -285,8 +285,8 @@ def test_what_a_browser_stores_and_an_unforeseen_error_end_no_link_for_good(
 
 
 def test_a_second_step_does_not_wait_until_the_first_is_built() -> None:
-    """The teacher goes on, and back at once: the robot is brought to each step, also to the one that its page
-    still shows, and on the learner's wish."""
+    """The teacher opens other steps and returns at once. The robot loads each step, also the one that its
+    page still shows, and loads the step again when the learner asks for it."""
     there, sessions = LessonPlace(STEP.lesson, 1), OneLearner(STEP)
     branch = Branch(sessions)
     branch.start(lambda: None)
@@ -303,7 +303,7 @@ def test_a_second_step_does_not_wait_until_the_first_is_built() -> None:
 
 
 def test_the_class_travels_as_numbers_and_is_shown_the_same() -> None:
-    """No text of another server is shown, and votes that are still open are not told."""
+    """Texts of another server are not shown, and the votes of an open round are not sent."""
     state = Gathering().entered("zoe", "robot", 0.0).going_to(STEP).opened().voted("zoe", 1, 0.0)
     assert class_now(state).rounds == [[]] and "zoe" not in str(class_now(state))
     for each in (state, state.closed(), state.closed().opened().started().measured(0.3)):
@@ -348,7 +348,7 @@ def test_a_message_about_learners_has_bounds() -> None:
 
 
 def test_another_server_changes_its_own_learners_alone(first: PageServer) -> None:
-    """A late answer to an earlier question is no vote, and no other server's learner is touched."""
+    """A late answer to an earlier question does not count, and learners of other servers are not changed."""
     hall = first.hall
     assert hall is not None
     seat = hall.enter("")
@@ -374,7 +374,7 @@ def test_another_server_changes_its_own_learners_alone(first: PageServer) -> Non
 
 
 def test_a_learner_who_moves_to_another_server_keeps_one_row(first: PageServer) -> None:
-    """The server that they left still tells of them; coming back, they have the row again."""
+    """The first server still reports the learner. When the learner returns, they have the same row."""
     hall = first.hall
     assert hall is not None
     old, new, here, there = new_token(), new_token(), "one server of two", "the other one of two"
@@ -404,8 +404,8 @@ def told_by(branch: Branch) -> list[LearnerNow]:
 
 
 def test_a_server_tells_of_its_learners_once_it_has_heard_the_class() -> None:
-    """Then once, and again when something has changed; a learner who has left is not told again because the
-    class goes on, and one who comes back under another identity has their name."""
+    """It reports each learner once, and again after a change. A learner who has left is not reported again
+    when the class goes on; one who returns under another identity keeps their name."""
     sessions = OneLearner()
     branch, old = Branch(sessions), sessions.one.token
     branch.start(lambda: None)
@@ -454,7 +454,7 @@ def test_the_reason_for_which_a_class_ends_a_connection_is_shown(
 
 
 def test_another_server_may_know_the_first_one_by_any_name(first: PageServer) -> None:
-    """Its key decides; a short host name does not equal the one in the example of the docs."""
+    """The key decides. A short host name differs from the one in the example of the documentation."""
     for key, status in ((KEY, 101), (f"{KEY}x", 403)):
         asking = {"Host": "lab-1.example.org:8080", CLASS_KEY: key}
         assert upgraded(first.url, f"/{BRANCH}", **asking) == status

@@ -61,7 +61,7 @@ def press(wire: Wire, label: str) -> None:
 
 
 def test_a_task_is_added_moved_reduced_merged_split_and_removed(server: PageServer) -> None:
-    """The panel follows every change, the stack's code gives the same stack elsewhere, and the robot keeps
+    """The panel shows every change, the code of the stack gives the same stack elsewhere, and the robot keeps
     running."""
     with Wire(server.link) as wire:
         assert wait_until(lambda: bool(server.sessions.learners), LONG)
@@ -78,7 +78,7 @@ def test_a_task_is_added_moved_reduced_merged_split_and_removed(server: PageServ
         shown(wire, "Remove elbow")
         assert wait_until(lambda: wire.shows("gets 2 of 3 directions"), LONG)
 
-        wire.press_key("4")  # a key that belonged to no level before
+        wire.press_key("4")  # before, this key belonged to no level
         assert wait_until(lambda: not settings(learner).levels[3].enabled, LONG)
         wire.press_key("9")
         wire.press_key("4")

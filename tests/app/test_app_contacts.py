@@ -24,8 +24,8 @@ from robots.world import Thing
 
 
 def test_the_simulation_reports_what_the_robot_touches() -> None:
-    """The floor pushes the hand of a robot that is dragged into it upwards; a moment later the rows say so,
-    too."""
+    """A hand is dragged into the floor, and the floor pushes it upwards. The rows report the contact a moment
+    later, too."""
     body = SimulationRunner(SceneChoice(RunSpec("panda-hold")))
     try:
         assert [thing.shape.name for thing in body.ready().world] == ["floor"]
@@ -44,7 +44,7 @@ def test_the_simulation_reports_what_the_robot_touches() -> None:
 
 
 class Scene:
-    """Takes note of what is added to the 3D view."""
+    """Records what is added to the 3D view."""
 
     def __init__(self) -> None:
         self.added: dict[str, Any] = {}
@@ -101,8 +101,8 @@ def test_the_plot_of_errors_marks_the_time_in_contact() -> None:
 
 
 def test_the_cover_is_drawn_on_request() -> None:
-    """Nothing is created before; each mesh is below the frame of its body, and contains the body's drawn
-    shapes."""
+    """The meshes are created at the first request. Each mesh is a child of the frame of its body, and
+    contains the body's drawn shapes."""
     scene: Any = Scene()
     robot = load_robot("panda")
     view = CoverView(scene, robot)

@@ -35,7 +35,7 @@ def circling() -> Iterator[PageServer]:
 
 @pytest.fixture
 def alone(circling: PageServer) -> PageServer:
-    """The server after the client of the previous test has disconnected."""
+    """Returns the server after the client of the previous test has disconnected."""
     assert wait_until(lambda: not circling.sessions.learners, LONG)
     return circling
 
@@ -54,7 +54,7 @@ def test_only_charts_in_view_are_sent(alone: PageServer) -> None:
         for tab, seen, unseen in (("Errors", STEP, TORQUE), ("Joints", TORQUE, STEP)):
             viewer.show(tab)
             viewer.second = Second()
-            # until data that were sent earlier have arrived
+            # wait until data that were sent earlier have arrived
             hear_until(viewer, page, lambda seen=seen: seen in viewer.drawn)
             viewer.second = Second()
             hear_until(viewer, page, lambda: max(viewer.second.plots.values(), default=0) >= 5)
@@ -115,7 +115,7 @@ def test_a_slow_line_queues_one_scene_at_most(alone: PageServer) -> None:
 
 
 def simulates(learner: SimulationClient, scene: str) -> bool:
-    """Whether a scene has run for half a second."""
+    """Returns whether a scene has run for half a second."""
     status = learner.status
     return learner.choice.run.scene == scene and status is not None and status.t > 0.5
 

@@ -36,7 +36,7 @@ PROXIED = Door(trusted=frozenset({"https://lab.example.org"}))
 
 
 def asked(path: str = "/", **headers: str | list[str]) -> Request:
-    """Returns a request; keywords are headers, with _ for -."""
+    """Returns a request. The keywords are headers, with _ in place of -."""
     given = Headers()
     for name, values in {"Host": OURS, **headers}.items():
         for value in values if isinstance(values, list) else [values]:
@@ -210,7 +210,7 @@ def test_origins_are_written_as_browsers_do() -> None:
 
 
 def test_a_proxy_may_send_the_token_in_its_header() -> None:
-    """The owner's secret does not count there, and pages of other sites are refused as before."""
+    """The owner's secret is not accepted in this header, and pages of other sites are refused as before."""
     own = {"Origin": f"http://{OURS}", "Upgrade": "websocket"}
     assert judged(TOKENED, X_Himpc_Lab_Token=TOKEN, **own) is None
     assert judged(TOKENED, X_Himpc_Lab_Token=TOKEN) is None
@@ -221,8 +221,8 @@ def test_a_proxy_may_send_the_token_in_its_header() -> None:
 
 
 def test_a_door_for_one_proxy_lets_in_nobody_else() -> None:
-    """Only the header opens it, under any name of the server; the proxy's own pages may open web sockets, and
-    only its word about the account counts."""
+    """Only the header opens the server, under any host name. The proxy's own pages may open web sockets, and
+    the account is accepted only from the proxy."""
     door = Door(passes=shared(TOKEN, OWNER), proxy_only=True)
     by_proxy = {"Host": "hub.example.org", HEADER.replace("-", "_"): TOKEN}
     account = {USER_HEADER.replace("-", "_"): "zo%C3%AB%0A"}
@@ -253,8 +253,8 @@ def test_a_door_for_one_proxy_lets_in_nobody_else() -> None:
 
 
 def test_a_door_for_one_proxy_takes_only_plain_addresses() -> None:
-    """nginx takes the first four for /v/x, where it may ask for no password, and passes them on as they
-    are."""
+    """nginx treats the first four addresses as /v/x, for which it may ask for no password, and passes them on
+    unchanged."""
     door = Door(passes=shared(TOKEN, OWNER), proxy_only=True)
     by_proxy = {HEADER.replace("-", "_"): TOKEN}
     for path in ("//v/x", "/%76/x", "/x/../v/x", "/./v/x", "/v/x#y", "http://lab/v/x", "/v\\x", "/é", "/x//"):
@@ -269,7 +269,7 @@ def test_a_door_for_one_proxy_takes_only_plain_addresses() -> None:
 
 
 def test_servers_with_one_token_take_each_others_cookies_but_no_owner_is_made_of_it() -> None:
-    """Who has the token can compute the key, but the owner's cookie also needs the owner's secret."""
+    """Whoever has the token can compute the key, but the owner's cookie also needs the owner's secret."""
     first, second = shared(TOKEN, OWNER), shared(TOKEN, new_token())
     cookie = first.keep("guest", "")
     assert judged(Door(passes=second), Cookie=cookie) is None
@@ -297,7 +297,7 @@ def test_a_token_of_ones_own_comes_from_a_file_or_the_environment(tmp_path: Path
 
 
 def test_only_the_embedders_may_show_the_page_in_a_frame() -> None:
-    """Without one, nobody may. The browser compares the origins; other ways to embed the page stay closed."""
+    """Without an embedder, nobody may. The browser compares the origins; other ways to embed are refused."""
     for origins, policy in (
         (frozenset[str](), "frame-ancestors 'none'"),
         (
@@ -317,7 +317,7 @@ def test_only_the_embedders_may_show_the_page_in_a_frame() -> None:
 
 @pytest.mark.parametrize("given", ["websocket=wss://evil.example", "playbackPath=https://evil.example/x"])
 def test_a_server_in_the_address_of_the_page_below_a_path_is_taken_out(given: str) -> None:
-    """viser's page adds its own there, which a reload sends; another one has no effect either."""
+    """viser's page adds its own server there, and a reload sends it. Another server has no effect either."""
     request = asked(f"/page?{given}&fixedDpr=1", X_Forwarded_Prefix="/user/zoe/lab")
     assert LOCAL.judge(request) is None
     moved = under_its_name(request)

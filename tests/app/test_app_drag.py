@@ -182,7 +182,8 @@ def test_targets_from_before_the_axes_were_changed_are_not_drawn(held: Callable[
 
 
 def test_keys_move_and_turn_the_target_as_a_drag_does(held: Callable[[bool], Held]) -> None:
-    """By an amount along an axis and about one."""
+    """A key moves the target along an axis by a given distance, or turns it about an axis by a given
+    angle."""
     one = held(False)
     (target,) = one.hand.movables()
     at = target.place()

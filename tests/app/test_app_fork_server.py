@@ -23,8 +23,8 @@ def server_of(learner: SimulationClient) -> ForkServer:
 
 
 def test_children_are_forked_where_one_thread_lives(start: Start) -> None:
-    """The fork server has one thread: a lock that a second thread holds during a fork would stay locked in
-    the child for ever."""
+    """The fork server has one thread, because a lock that a second thread holds during a fork would stay
+    locked in the child for ever."""
     learner = start("iiwa14-hold", own_server=True)
     assert wait_until(lambda: running(learner), LONG)
     server = psutil.Process(server_of(learner).pid)
@@ -59,7 +59,7 @@ def test_a_dead_fork_server_takes_nobody_along(start: Start) -> None:
 
 def test_a_fork_server_that_is_stopped_is_replaced(start: Start) -> None:
     """A simulation that waits for the stopped server is started from a new one automatically. The stopped
-    server is ended, its children keep running."""
+    server is ended, and its children keep running."""
     learner = start("planar3-hold", own_server=True)
     assert wait_until(lambda: running(learner), LONG)
     before = server_of(learner)

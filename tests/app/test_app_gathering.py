@@ -1,4 +1,4 @@
-"""A class as data: steps, votes, members, the table."""
+"""The data of a class: steps, votes, members and the table."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ CHOICE, VALUE, SKETCH, NOTHING = STEPS[Choice], STEPS[Value], STEPS[Sketch], STE
 
 
 def of(place: LessonPlace = CHOICE) -> Gathering:
-    """A class of a learner and a phone at a step."""
+    """Returns a class with a learner and a phone at a step."""
     return Gathering().entered("zoe", "robot", 0.0).entered("max", "phone", 0.0).going_to(place)
 
 

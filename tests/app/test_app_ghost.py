@@ -57,8 +57,8 @@ def untimed(body: SimulationRunner) -> np.ndarray:
 
 
 def test_a_ghost_has_the_rows_of_its_leader(body: SimulationRunner) -> None:
-    """The ghost's rows equal the leader's from the moment of leading on, although settings were changed
-    before."""
+    """From the moment at which the leader begins to lead, the ghost's rows equal the leader's rows, although
+    settings were changed before."""
     body.tick(20)
     for event in (Set("horizon", 3), Set("controller", "hqp"), Set("controller", "himpc")):
         body.handle(Post(event))
@@ -125,7 +125,7 @@ def start(fork_server: ForkServer | None) -> Iterator[Callable[[str], Simulation
 
 
 def together(learner: SimulationClient) -> bool:
-    """Whether both are paused at the same time t > 0.1 s."""
+    """Returns whether both are paused at the same time t > 0.1 s."""
     status, ghost = learner.status, learner.ghost
     if status is None or ghost is None or ghost.status is None or status.running:
         return False

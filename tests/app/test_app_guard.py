@@ -137,7 +137,7 @@ def test_every_answer_forbids_frames_and_guesses(plain: PageServer) -> None:
 
 
 def test_a_place_is_kept_for_who_reloads(plain: PageServer) -> None:
-    """A visitor without the learner's token does not get its place, even after several attempts."""
+    """A visitor without the learner's token does not get the learner's place, even after several attempts."""
     pages = [dial(plain), dial(plain)]
     for page in pages:
         page.send(pack(camera()))
@@ -186,7 +186,7 @@ def test_without_the_token_nothing_opens(kind: str, request: pytest.FixtureReque
 
 
 def test_no_token_lets_everybody_in() -> None:
-    """No visitor counts as the owner then."""
+    """If no token is needed, no visitor counts as the owner."""
     server = PageServer(
         SceneChoice(RunSpec("planar3-hold")), port=0, ask_token=False, own_files=Folder.at(".")
     )
@@ -355,7 +355,7 @@ def test_a_seam_that_is_gone_is_a_sentence_and_nothing_is_served(monkeypatch: py
         return changed(*given, **keywords)
 
     with monkeypatch.context() as patch:
-        patch.setattr(web, "serve", without)  # this version no longer asks our process
+        patch.setattr(web, "serve", without)  # a version that does not call our function for a request
         with pytest.raises(InputError, match=r"viser .*how it serves"):
             private.self_test(ConnectionGuard(Door()))
     for gone in ("FileTransferPart", "GuiUpdateMessage"):

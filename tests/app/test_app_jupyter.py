@@ -30,7 +30,7 @@ FORGED = {USER_HEADER: "ben", HEADER: "x" * 20}
 
 @pytest.fixture(scope="module")
 def jupyter(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Path]]:
-    """The address of zoe's Jupyter server, and its log."""
+    """Yields the address of zoe's Jupyter server, and its log."""
     folder = tmp_path_factory.mktemp("jupyter")
     (folder / "key.txt").write_text("the key of the instructor")
     log = folder / "log"
@@ -81,7 +81,7 @@ def answers(port: int) -> bool:
 
 
 def ask(url: str, headers: Mapping[str, str]) -> tuple[int, str]:
-    """Status and address of the page after redirects."""
+    """Returns the status and the address of the page after redirects."""
     request = urllib.request.Request(url, headers=dict(headers))
     try:
         with urllib.request.urlopen(request, timeout=LONG) as found:
@@ -91,9 +91,9 @@ def ask(url: str, headers: Mapping[str, str]) -> tuple[int, str]:
 
 
 def test_only_the_user_of_the_jupyter_server_gets_in(jupyter: tuple[str, Path]) -> None:
-    """Through Jupyter's path the page opens at its name, from which its web socket finds the way back; the
-    account is Jupyter's, whatever the browser says. Nothing else opens: not the port, not the path of any
-    port, not a token or an account of one's own."""
+    """Through Jupyter's path the page opens under its name, and from this address its web socket finds the
+    same path. The account is the one that Jupyter sends, whatever the browser sends. All other requests are
+    refused: to the port itself, by the path of any port, and with a token or an account of one's own."""
     url, log = jupyter
     status, page = ask(f"{url}himpc-lab/", {**MINE, **FORGED})
     assert (status, page) == (HTTPStatus.OK, f"{url}himpc-lab/page")
@@ -116,8 +116,8 @@ def test_only_the_user_of_the_jupyter_server_gets_in(jupyter: tuple[str, Path]) 
 
 
 def test_the_launcher_says_what_it_starts(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The token is new each time and on no command line; braces of an option are not replaced; the name of
-    the account can be sent in a header."""
+    """The token is new at each start and is on no command line. Braces in an option are not replaced. The
+    name of the account can be sent in a header."""
     monkeypatch.setenv(OPTIONS, "--lesson 'my {lesson}.py'")
     monkeypatch.setenv("JUPYTERHUB_USER", "zoë {port}")
     first, second = launcher(), launcher()

@@ -1,5 +1,5 @@
-"""Ticks of a simulation and scenes that a learner has left keep no memory, neither that of Python's objects
-nor that of the libraries."""
+"""Ticks of a simulation, and scenes that a learner has left, keep no memory, neither in Python's objects nor
+in the libraries."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def test_ticks_keep_nothing(scene: str) -> None:
             packed(body.status())
 
     try:
-        for _ in range(2):  # what is remembered of the last seconds is full then
+        for _ in range(2):  # after this, the memory for the last seconds is full
             run()
         before = allocated()
         run()
@@ -67,8 +67,8 @@ def test_ticks_keep_nothing(scene: str) -> None:
 
 
 def test_scenes_that_were_left_keep_nothing() -> None:
-    """Four visits of a scene keep less than 100 kB each. What is loaded once may fall into a round; a leak
-    grows in every round."""
+    """Four visits of a scene keep less than 100 kB each. Memory for something that is loaded only once may be
+    counted in one round; a leak grows in every round."""
     server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
     try:
         with Viewers(server.link, "--clients", "1"):
@@ -100,6 +100,6 @@ def show(server: PageServer, scene: str) -> None:
 
 
 def simulates(learner: SimulationClient) -> bool:
-    """Whether the simulation has run for a moment."""
+    """Returns whether the simulation has run for a moment."""
     status = learner.status
     return status is not None and status.t > 0.1

@@ -1,4 +1,4 @@
-"""Keys: no two commands share one, none of them moves the camera, and the help names them all."""
+"""Keys: each command has a key of its own, no such key moves the camera, and the help names all keys."""
 
 from __future__ import annotations
 

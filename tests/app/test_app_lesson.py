@@ -71,8 +71,8 @@ Start = Callable[..., Learner]
 
 
 def test_a_run_in_the_page_measures_what_the_headless_one_does(learn: Start) -> None:
-    """The values are bitwise equal to those of a headless run, ghost included, and the report can be
-    pickled."""
+    """The values are bitwise equal to those of a headless run, including those of the ghost, and the report
+    can be pickled."""
     learner = learn("your-robot", 2)
     lesson = load_lesson("your-robot")
     step = lesson.steps[2]
@@ -249,7 +249,7 @@ def test_every_control_reads_what_it_sets(name: str) -> None:
 
 
 def test_what_a_script_changes_is_undone_before_the_next_run(learn: Start) -> None:
-    """Without this, a challenge whose script adds a load would start its second run with the load."""
+    """Otherwise a challenge whose script adds a load would start its second run with this load."""
     challenge = load_lesson("no-model-needed").challenge
     assert challenge is not None and any(isinstance(event, Set) for _, event in challenge.events)
     learner = learn("no-model-needed", len(load_lesson("no-model-needed").steps))

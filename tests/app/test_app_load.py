@@ -34,7 +34,7 @@ def load(attached: int = 0, maximum: int = 2, stopping: bool = False) -> Load:
         (load(1), "open", 200),
         (load(2), "full", 503),
         (load(0, stopping=True), "stopping", 503),
-        (load(1, maximum=0), "open", 200),  # a classroom turns nobody away
+        (load(1, maximum=0), "open", 200),  # a classroom admits everybody
     ],
 )
 def test_health_is_good_while_a_newcomer_gets_a_place(now: Load, state: str, status: int) -> None:
@@ -98,7 +98,8 @@ def test_a_full_server_sends_newcomers_away_and_takes_them_again(one_fork_server
 
 
 def test_a_server_of_its_own_shows_a_full_house_on_the_page(one_fork_server: None) -> None:
-    """Without a proxy that could try another one, a newcomer's page opens and says why it must wait."""
+    """Without a proxy that could try another server, a newcomer's page opens and explains why it must
+    wait."""
     server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
     try:
         with Wire(server.link) as first:

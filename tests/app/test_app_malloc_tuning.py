@@ -1,5 +1,5 @@
-"""The server's threads share few arenas of the memory allocator. Tested in a process of its own, because the
-option cannot be reset."""
+"""The server's threads share few arenas of the memory allocator. The tests use a process of its own, because
+the option cannot be reset."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ libc.fclose(stream)
 
 
 def arenas(few: bool, report: Path) -> int:
-    """Returns the number of arenas of a process with six threads that hold memory."""
+    """Returns the number of arenas of a process in which six threads hold memory."""
     environment = {key: value for key, value in os.environ.items() if key != "MALLOC_ARENA_MAX"}
     subprocess.run(
         [sys.executable, "-c", COUNT.format(few=few), str(report)],
@@ -90,4 +90,4 @@ def test_what_a_scene_recorded_is_given_back_when_it_goes() -> None:
         capture_output=True,
         text=True,
     )
-    assert float(done.stdout) < 25.0  # MB; 8 of them small objects. Without the options, glibc keeps 85 MB.
+    assert float(done.stdout) < 25.0  # MB, 8 of them for small objects; glibc alone keeps 85 MB

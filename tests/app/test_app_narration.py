@@ -1,5 +1,5 @@
 """The line that says what happens, the fields that move targets without a mouse, and the pause in which a
-page begins for those who asked for less motion."""
+page begins for users who asked for less motion."""
 
 from __future__ import annotations
 
@@ -100,13 +100,14 @@ class Reader(Wire):
 
 
 def says(page: Reader, word: str) -> bool:
-    """Whether the line has said a word."""
+    """Returns whether the line has contained a word."""
     return any("textContent =" in each and word in each.lower() for each in page.scripts)
 
 
 def test_a_page_without_a_mouse(one_fork_server: None) -> None:
-    """It begins paused, because its browser asks for less motion; a field moves the target by a centimetre, a
-    button turns it by 5°; and a sentence says that the simulation runs, unless that is switched off."""
+    """The page begins paused, because its browser asks for less motion. A field moves the target by a
+    centimetre, and a button turns it by 5°. A sentence says that the simulation runs, unless these sentences
+    are switched off."""
     server = PageServer(SceneChoice(RunSpec("iiwa14-hold")), port=0, max_sessions=1)
     try:
         with Reader(server.link) as page:

@@ -38,7 +38,7 @@ time.sleep(60)
 
 @pytest.fixture
 def browser(tmp_path: Path) -> Path:
-    """A program that writes its arguments to a file and keeps running."""
+    """Returns a program that writes its arguments to a file and keeps running."""
     path = tmp_path / "browser"
     path.write_text(BROWSER.format(python=sys.executable, said=str(tmp_path / "said")))
     path.chmod(0o755)

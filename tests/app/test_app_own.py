@@ -46,7 +46,7 @@ def body(file: Path) -> Iterator[SimulationRunner]:
 
 
 def after(body: SimulationRunner, condition: Callable[[], bool]) -> bool:
-    """Whether a condition becomes true while the simulation runs."""
+    """Returns whether a condition becomes true while the simulation runs."""
 
     def looked() -> bool:
         body.tick(5)
@@ -103,7 +103,8 @@ def test_own_code_that_fails_can_be_reset(body: SimulationRunner, file: Path) ->
 
 
 def test_own_code_has_a_ghost_beside_it(body: SimulationRunner, file: Path) -> None:
-    """The ghost of a user's controller may be one of ours, and the other way round."""
+    """The ghost of a user's controller may be a built-in controller, and the ghost of a built-in controller
+    may be a user's."""
     body.handle(Lead(True))
     begin = body.leader.script(body.session)
     assert begin is not None and begin.begin is not None
@@ -193,8 +194,8 @@ def test_own_scene_and_lesson_open(tmp_path: Path) -> None:
 
 
 def test_a_task_that_a_robot_cannot_have_is_left_out_there(tmp_path: Path) -> None:
-    """One sentence gives the reason, and the scene opens. On a robot that has the frame, the task is there
-    again. A stack that names the task is refused for the same reason."""
+    """One sentence gives the reason, and the scene opens. On a robot that has the frame, the task is
+    available again. A stack that names the task is refused for the same reason."""
     path = tmp_path / "reach.py"
     path.write_text(text_of("task", None, "reach.py").replace('name="reach"', 'name="reach", frame="link_4"'))
     choice = SceneChoice.starting("iiwa14-hold", tasks=(str(path),))

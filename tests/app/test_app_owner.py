@@ -39,13 +39,13 @@ def torque(now):
 
 @pytest.fixture
 def mark(tmp_path: Path) -> Path:
-    """A file that exists after the code was run."""
+    """Returns the path of a file that exists after the code was run."""
     return tmp_path / "was-run"
 
 
 @pytest.fixture
 def own(tmp_path: Path) -> Path:
-    """The folder of the server's files."""
+    """Returns the folder of the server's files."""
     folder = tmp_path / "secret-place" / "own"
     folder.mkdir(parents=True)
     return folder
@@ -63,8 +63,8 @@ def serving(own: Path | None, **more: Any) -> Iterator[PageServer]:
 
 
 def built(page: Wire, times: int = 1) -> bool:
-    """Whether the Robot tab was built this many times: its last folder is created after all fields for
-    files."""
+    """Returns whether the Robot tab was built this many times. The last folder of the tab is created after
+    all fields for files."""
     return eventually(lambda: page.folders("Import report") >= times, LONG)
 
 

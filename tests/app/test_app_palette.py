@@ -56,7 +56,7 @@ def seen(colour: RGB, sight: str) -> Color:
 
 
 def least(colours: Sequence[RGB], method: str = "2000") -> tuple[float, str, RGB, RGB]:
-    """The smallest difference of all pairs, and the sight and the pair that have it."""
+    """Returns the smallest difference of all pairs, with the kind of sight and the pair."""
     return min(
         (seen(one, sight).delta_e(seen(other, sight), method=method), sight, one, other)
         for sight in SIGHTS
@@ -71,7 +71,8 @@ def test_each_pair_of_colours_differs_by_ten_for_each_sight(colours: tuple[RGB, 
 
 
 def test_the_check_finds_the_pairs_that_looked_alike() -> None:
-    """Levels 2 and 4 differed by a ΔE*ab of 1.9 and a CIEDE2000 of 0.9 under deuteranopia."""
+    """In the earlier palette, levels 2 and 4 differed by a ΔE*ab of 1.9 and a CIEDE2000 of 0.9 under
+    deuteranopia."""
     blue, violet = (seen(BEFORE[k], "deutan") for k in (1, 3))
     assert blue.delta_e(violet, method="76") == pytest.approx(1.95, abs=0.01)
     assert least(BEFORE)[:2] == (pytest.approx(0.896, abs=0.001), "deutan")
@@ -112,7 +113,7 @@ def test_joints_that_share_a_colour_have_other_dashes() -> None:
 
 
 def test_simulation_is_that_of_machado() -> None:
-    """Pure red under deuteranopia: the first column of the published matrix for severity 1.0."""
+    """Pure red under deuteranopia gives the first column of the published matrix for severity 1.0."""
     red = Color("srgb-linear", [1, 0, 0]).filter("deutan", 1.0, method="machado")
     expected = [0.367322, 0.280085, -0.011820]
     assert np.allclose(red.convert("srgb-linear").coords(), expected, atol=1e-5)

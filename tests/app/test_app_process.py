@@ -82,8 +82,8 @@ def _factor(learner: SimulationClient) -> float:
 def test_a_page_that_shows_the_scene_before_keeps_its_settings(
     start: Callable[[str], SimulationClient],
 ) -> None:
-    """A page has the settings of the scene that it shows until it has built the next one, whose settings may
-    be of another type."""
+    """Until a page has built the next scene, it has the settings of the scene that it shows. The settings of
+    the next scene may be of another type."""
     learner = start("planar3-hold")
     learner.send(Post(Set("horizon", 8)))
     before = learner.ready

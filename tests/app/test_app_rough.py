@@ -35,7 +35,7 @@ HERE = Path(__file__).parent
 
 @pytest.fixture(scope="module")
 def lent(lent: dict[str, ForkServer | None]) -> Iterator[dict[str, ForkServer | None]]:
-    """The fork servers of other tests, and one for the worker `stubborn`."""
+    """Returns the fork servers of other tests, and one for the worker `stubborn`."""
     if lent[WORKER] is None:
         yield lent
         return
@@ -104,7 +104,7 @@ def test_a_load_that_hangs_can_be_cancelled(start: Start, monkeypatch: pytest.Mo
 
 @pytest.mark.parametrize("scene", [None, "panda-hold"])
 def test_what_is_pressed_before_a_death_is_known_is_done(start: Start, scene: str | None) -> None:
-    """*Reset all*, or another scene, is requested between a child's death and the detection of this death."""
+    """*Reset all*, or another scene, is requested after a child's death and before this death is detected."""
     learner = start("planar3-hold")
     assert wait_until(lambda: running(learner), LONG)
     pid, ready = born(learner), learner.ready
@@ -213,8 +213,8 @@ def test_a_child_takes_sigterm(start: Start, scene: str) -> None:
 
 
 def test_a_ring_is_as_large_as_there_is_memory() -> None:
-    """On a machine with little memory the ring is smaller; with less memory one sentence is shown. No run
-    crashes later."""
+    """On a machine with little memory the ring is smaller, and with too little memory one sentence is shown.
+    No run crashes later."""
     width = 180
     assert measured(width, None) == f"{min(MAX_ROWS, 12_000_000 // (8 * width))}"
     assert int(measured(width, 4_000_000)) in range(MIN_ROWS, 2800)

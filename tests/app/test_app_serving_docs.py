@@ -64,7 +64,7 @@ def nginx() -> str:
 
 @pytest.fixture(scope="module")
 def proxied(nginx: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[PageServer, int, Path]]:
-    """The page, nginx's port for it, and the certificate."""
+    """Yields the page, nginx's port for it, and the certificate."""
     folder, port = tmp_path_factory.mktemp("nginx"), free_port()
     certificate, key = folder / "lab.pem", folder / "lab.key"
     subprocess.run(
@@ -243,8 +243,8 @@ server {
 
 
 def test_the_page_works_below_any_path(nginx: str, tmp_path: Path) -> None:
-    """Behind a proxy that removes a prefix: the token leaves the address without leaving the prefix, the
-    cookie belongs to it, the question for the token leads back to it, and a page gets a robot at its name."""
+    """The proxy removes a prefix. The token, but not the prefix, is removed from the address; the cookie
+    belongs to the prefix; the question for the token leads back to it; a page gets a robot at its name."""
     port, prefix = free_port(), "/user/zoe/lab/"
     server = PageServer(
         SceneChoice(RunSpec("planar3-hold")),
@@ -272,7 +272,7 @@ def test_the_page_works_below_any_path(nginx: str, tmp_path: Path) -> None:
             status, headers, _ = ask(f"{prefix}?{token}")
             assert status == 303 and urljoin(prefix, headers["Location"]) == prefix
             cookie, *attributes = headers["Set-Cookie"].split("; ")
-            assert not any(each.startswith("Path") for each in attributes)  # a browser takes the prefix
+            assert not any(each.startswith("Path") for each in attributes)  # the browser uses the prefix
             status, headers, _ = ask(f"{prefix}?fixedDpr=1", cookie)
             assert status == 303 and urljoin(prefix, headers["Location"]) == f"{prefix}page?fixedDpr=1"
             status, _, page = ask(f"{prefix}page", cookie)
@@ -288,8 +288,8 @@ def test_the_page_works_below_any_path(nginx: str, tmp_path: Path) -> None:
 
 
 def test_phones_need_no_password_and_get_no_account(nginx: str, tmp_path: Path) -> None:
-    """The printed locations of a class: only a right password opens a robot's page, however an address is
-    written."""
+    """With the printed locations of a class, only a correct password opens a robot's page, even if an address
+    is written in an unusual way."""
     port, token = free_port(), "the-token-of-the-proxy"
     origin = f"http://127.0.0.1:{port}"
     with tempfile.NamedTemporaryFile("w", delete=False) as users:  # nginx may run as another user
@@ -343,7 +343,7 @@ def test_phones_need_no_password_and_get_no_account(nginx: str, tmp_path: Path) 
 
 @contextmanager
 def balanced(nginx: str, folder: Path, servers: int) -> Iterator[tuple[str, list[PageServer]]]:
-    """Servers of one session each with one token, behind the printed balancer; yields the link of all."""
+    """Runs servers of one session each, with one token, behind the printed balancer; yields their link."""
     port, token = free_port(), "one-token-for-all-servers"
     origin = f"http://127.0.0.1:{port}"
     running = [
@@ -379,8 +379,8 @@ def learners(servers: Sequence[PageServer]) -> list[SimulationClient]:
 
 
 def test_a_full_server_behind_the_printed_balancer_is_passed_over(nginx: str, tmp_path: Path) -> None:
-    """Two servers of one session each, with one token: the second learner gets the second robot, the third is
-    asked to wait, and gets the place that becomes free."""
+    """There are two servers of one session each, with one token. The second learner gets the second robot;
+    the third is asked to wait, and gets the place that becomes free."""
     with balanced(nginx, tmp_path, 2) as (link, servers):
         origin, _, token = link.partition(f"/?{QUERY}=")
         with Wire(link):
@@ -400,8 +400,8 @@ def test_a_full_server_behind_the_printed_balancer_is_passed_over(nginx: str, tm
 
 
 def test_a_page_goes_on_with_another_server_where_it_was(nginx: str, tmp_path: Path) -> None:
-    """A server that is to stop lets nobody in and tells its page; once it is gone, the page's browser brings
-    the step of its lesson, or the settings of its scene, to the other server."""
+    """A server that is going to stop admits nobody and informs its page. After it has ended, the page's
+    browser brings the step of its lesson, or the settings of its scene, to the other server."""
     lesson = SceneChoice.of_lesson(LessonPlace.at("one-task", 2))
     with balanced(nginx, tmp_path, 2) as (link, servers):
         storage = Storage()
@@ -459,8 +459,8 @@ def test_a_page_goes_on_with_another_server_where_it_was(nginx: str, tmp_path: P
     ],
 )
 def test_a_place_that_cannot_be_read_is_none(text: str) -> None:
-    """Anybody may have written it: nothing is opened but a step of the course or a state code, and only for a
-    server that was started with the same scene."""
+    """The place may have been written by anybody. Therefore only a step of the course or a state code is
+    opened, and only for a server that was started with the same scene."""
     start = SceneChoice(RunSpec("planar3-hold"))
     step = SceneChoice.of_lesson(LessonPlace.at("one-task", 2))
     right = place.written(step, step.scene().settings, start)
@@ -470,7 +470,7 @@ def test_a_place_that_cannot_be_read_is_none(text: str) -> None:
 
 
 def test_the_command_takes_what_the_page_shows(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Several proxies are accepted as well."""
+    """The command also accepts several proxies."""
     from app.server import serving
 
     asked: dict[str, Any] = {}

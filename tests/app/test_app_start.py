@@ -100,7 +100,7 @@ def test_a_lesson_opens_with_what_its_file_says() -> None:
 
 
 class Unborn(Process):
-    """A process that waits for the compiler."""
+    """A process that waits until the compilation has finished."""
 
     def __init__(self) -> None:
         pass

@@ -12,8 +12,8 @@ from app.adapter.thread_safe_event import ThreadSafeEvent
 
 
 class Meeting(deque[Any]):
-    """An event's list of waiters. Another thread sets the event just before the first waiter starts to
-    wait."""
+    """Replaces an event's list of waiters. Another thread sets the event just before the first waiter starts
+    to wait."""
 
     def __init__(self, event: asyncio.Event) -> None:
         super().__init__()
@@ -30,8 +30,8 @@ class Meeting(deque[Any]):
 
 
 async def wakes(event: asyncio.Event) -> bool:
-    """Whether a waiter wakes up if another thread sets the event at that moment, by this call or by a later
-    one."""
+    """Returns whether a waiter wakes up if another thread sets the event at that moment, by this call or by a
+    later one."""
     event._waiters = Meeting(event)  # pyright: ignore[reportAttributeAccessIssue]
     waiter = asyncio.ensure_future(event.wait())
     await asyncio.sleep(0.1)

@@ -49,7 +49,7 @@ def refusals(page: Wire) -> int:
 
 
 def taken(page: Wire) -> bool:
-    """Whether a later file is read: the page shows the fault of its content."""
+    """Returns whether a later file is read; the page then shows the fault of its content."""
     upload(page, "small", b"\xff")
     return eventually(lambda: page.shows("is not text"), LONG)
 

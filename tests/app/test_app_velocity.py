@@ -183,7 +183,8 @@ def test_what_a_kind_does_not_know_is_a_sentence(body: SimulationRunner) -> None
 
 
 def test_an_arm_turns_its_hand_as_it_is_told() -> None:
-    """After all tasks of that role are removed, the role has no target."""
+    """An orientation target turns the hand. After all tasks of this role are removed, the role has no
+    target."""
     for arm in opened("iiwa14-htmpc"):
         arm.tick()
         wanted = exp3(np.array([0.0, 0.0, 0.5])) @ arm.status().targets["orientation"]

@@ -28,7 +28,7 @@ def test_a_message_brings_open_files_along() -> None:
 
 
 def test_a_message_with_files_does_not_wait_for_who_does_not_read() -> None:
-    """Otherwise a page would block while its fork server is stopped."""
+    """If the message waited, a page would block while its fork server is stopped."""
     ours, theirs = map(Wire, socket.socketpair())
     request = packed(Handle(theirs.fileno()))
 

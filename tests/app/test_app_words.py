@@ -291,8 +291,8 @@ def test_a_camera_that_looks_at_where_it_will_be_is_turned(position: tuple[float
 
 
 def test_poses_of_another_scene_are_none_of_this_page() -> None:
-    """A page is still built for one scene while the next scene arrives, whose robot has other joints; it gets
-    no poses of that robot."""
+    """The next scene, whose robot has other joints, arrives while the page is still the one of the scene
+    before. This page gets no poses of the new robot."""
     robot, now = load_robot("iiwa14"), object()
     block = SimpleNamespace(poses=lambda: np.ones((4, 7)))
     learner = SimpleNamespace(ready=now, read=lambda look: look(block, None))
@@ -332,7 +332,7 @@ def test_a_control_that_goes_before_it_is_written_is_no_news() -> None:
 
 
 def test_the_newest_row_does_not_keep_all_that_came_with_it() -> None:
-    """A view would keep all rows in memory until the next call, up to 12 MB per robot."""
+    """As a view, the row would keep all rows in memory until the next call, up to 12 MB per robot."""
     body = SimulationRunner(SceneChoice(RunSpec("planar3-hold")))
     history = History(body.block, body.session.layout)
     body.tick(50)

@@ -1,4 +1,5 @@
-"""Exported controllers for tests: builds what `himpc-lab export` wrote, and calls it from Python."""
+"""Functions for tests of exported controllers: they build what `himpc-lab export` wrote, and call it from
+Python."""
 
 from __future__ import annotations
 
@@ -17,7 +18,7 @@ from himpc.export.native import NativeController, link
 
 
 def needed(*programs: str) -> None:
-    """Skips the test if a program is missing here; in CI that is a failure."""
+    """Skips the test if a program is missing here. In CI the test fails instead."""
     missing = [each for each in programs if shutil.which(each) is None]
     if missing:
         if os.environ.get("CI") == "true":
@@ -26,14 +27,14 @@ def needed(*programs: str) -> None:
 
 
 def exported(scene: str, target: str, out: Path, *more: str) -> Path:
-    """Runs the command; returns the folder."""
+    """Runs `himpc-lab export` and returns the folder."""
     assert main(["export", scene, "--target", target, "--out", str(out), *more]) == 0
     return out
 
 
 def replayed(folder: Path, *more: str) -> tuple[int, float, str]:
-    """Builds and runs the replay by the two lines of the folder's README; returns how many ticks, the largest
-    difference (N·m), and the whole answer."""
+    """Builds and runs the replay by the two lines of the folder's README. Returns the number of ticks, the
+    largest difference (N·m), and the whole answer."""
     build, run = (
         line.strip() for line in (folder / "README.md").read_text().splitlines() if line[:4] == "    "
     )
@@ -43,13 +44,13 @@ def replayed(folder: Path, *more: str) -> tuple[int, float, str]:
 
 
 def told(answer: str) -> tuple[int, float, str]:
-    """Ticks and largest difference of a replay's answer."""
+    """Returns the number of ticks and the largest difference in a replay's answer, and the answer."""
     words = answer.split()
     return int(words[0]), float(words[words.index("difference") + 1]), answer
 
 
 def controller_in(folder: Path) -> NativeController:
-    """The controller of an exported folder, called through its C interface."""
+    """Returns the controller of an exported folder, called through its C interface."""
     library = folder / "himpc.so"
     if not library.exists():
         link(folder / "himpc.o", library)
@@ -58,7 +59,7 @@ def controller_in(folder: Path) -> NativeController:
 
 
 def rows_of(folder: Path, n: int) -> np.ndarray:
-    """The recorded run: q, v, τ applied, τ of every tick, (ticks, 4, n)."""
+    """Returns the recorded run: q, v, τ applied, τ of every tick, (ticks, 4, n)."""
     data = (folder / "vector.bin").read_bytes()
     ticks, moves = np.frombuffer(data[:16], np.int64)
     return np.frombuffer(data[16 + 88 * int(moves) :], float).reshape(int(ticks), 4, n)

@@ -86,7 +86,7 @@ def test_a_broken_urdf_gets_one_sentence(broken_urdf: str, capfd: pytest.Capture
 
 
 def test_as_a_program_it_says_the_same() -> None:
-    """`python -m app` exits with the same code and writes no traceback."""
+    """`python -m app` exits with the same code, and writes no traceback."""
     command = [sys.executable, "-m", "app", "run", "iiwa14-hodl"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 2

@@ -1,9 +1,10 @@
-"""Grades as other systems read them, against the published descriptions, and the folder of an autograder.
+"""Grades in the formats of other systems, compared with the published descriptions; and the folder of an
+autograder.
 
 Sources, read on 2026-11-24:
 
 - Gradescope: https://gradescope-autograders.readthedocs.io/en/latest/specs/ ("Autograder Specifications"),
-  also github.com/gradescope/autograder_samples, docs/specs.md. Quoted below are its lines.
+  also github.com/gradescope/autograder_samples, docs/specs.md. Its lines are quoted below.
 - GitHub Classroom: github.com/github-education-resources/autograding-grading-reporter, src/main.js,
   src/console-results.js, src/aggregate-results.js and src/notify-classroom.js: what the reporter reads.
 """
@@ -83,7 +84,7 @@ GITHUB: dict[str, Any] = {
         "max_score": {"type": "number"},
         "tests": {
             "type": "array",
-            "minItems": 1,  # the reporter divides by their number
+            "minItems": 1,  # the reporter divides by the number of tests
             "items": {
                 "type": "object",
                 "required": ["name", "status", "score"],
@@ -127,7 +128,7 @@ def test_a_grade_is_what_gradescope_reads(name: str) -> None:
 
 @pytest.mark.parametrize("name", GRADES)
 def test_a_grade_is_what_the_reporter_of_github_classroom_reads(name: str) -> None:
-    """The sums are those that the reporter computes from what it decodes."""
+    """The sums are those that the reporter computes from the data that it decodes."""
     result = base64.b64encode(json.dumps(github(GRADES[name]), allow_nan=False).encode())
     found = json.loads(base64.b64decode(result))
     jsonschema.validate(found, GITHUB)
@@ -148,9 +149,9 @@ def test_the_schemas_refuse_what_the_descriptions_do_not_have() -> None:
 def test_the_folder_of_an_autograder_grades_a_submission(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """As in the container: the folder is /autograder/source, and `run_autograder` gets a submission. Only the
-    installation is left out: this environment stands for that of requirements.txt, and its himpc-lab, which
-    is compiled already, for the equal copy in the folder."""
+    """The test does what the container does: the folder is /autograder/source, and `run_autograder` gets a
+    submission. Only the installation is left out. This environment replaces that of requirements.txt, and its
+    himpc-lab, which is compiled already, replaces the equal copy in the folder."""
     source = tmp_path / "source"
     assert main(["grade", "--autograder", "joint-pd", "--out", str(source)]) == 0
     assert "zip" in capsys.readouterr().out

@@ -1,4 +1,4 @@
-"""Exported controllers give the torques of Python, whatever state they are given."""
+"""Exported controllers give the torques that Python gives, for every state."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ BRAKE, HOLD = 5, 6
 
 @pytest.fixture(scope="module")
 def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """Every scene's controller for this machine, with 1,000 recorded ticks."""
+    """Returns every scene's controller for this machine, with 1,000 recorded ticks."""
     needed("cc")
     where = tmp_path_factory.mktemp("export")
     return {scene: exported(scene, "x86_64-linux", where / scene) for scene in SCENES}
@@ -52,9 +52,9 @@ def test_two_controllers_in_turns_replay_what_python_did(folders: dict[str, Path
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_hostile_states_give_torques_within_the_limits(folders: dict[str, Path], scene: str) -> None:
-    """States that are not finite or far outside all limits, and such torques: every torque is within its
-    limits."""
-    replayed(folders[scene])  # builds it
+    """The states, and the applied torques, are not finite or far outside all limits. Every computed torque is
+    within its limits."""
+    replayed(folders[scene])  # builds the library
     answer = subprocess.run(["./replay", "hostile"], cwd=folders[scene], capture_output=True, text=True)
     assert answer.returncode == 0, answer.stdout
     assert "hostile states: 0 torques outside" in answer.stdout
@@ -64,7 +64,8 @@ def test_hostile_states_give_torques_within_the_limits(folders: dict[str, Path],
 
 
 def test_controllers_of_two_robots_do_not_notice_each_other(folders: dict[str, Path]) -> None:
-    """Two kernels, three controllers, in turns: the torques are those of each alone, to the bit."""
+    """Two kernels with three controllers run in turns, and each controller gives the torques that it gives
+    alone, bit by bit."""
     names = ("planar3-conflict", "iiwa14-circle", "iiwa14-circle")
     alone = []
     for name in names[:2]:
@@ -80,8 +81,8 @@ def test_controllers_of_two_robots_do_not_notice_each_other(folders: dict[str, P
 
 
 def test_without_optima_the_joints_brake_inside_the_rows(folders: dict[str, Path]) -> None:
-    """With no budget no level has an optimum. The increments still meet all rows of torque and velocity
-    whenever any increments do, and brake the joints."""
+    """With a budget of zero no level has an optimum. The increments still satisfy all rows of torque and
+    velocity whenever any increments can satisfy them, and they brake the joints."""
     one = controller_in(folders["iiwa14-hold"])
     scene = torque_scene("iiwa14-hold")
     settings = scene.settings.for_controller()
@@ -116,8 +117,8 @@ def test_without_optima_the_joints_brake_inside_the_rows(folders: dict[str, Path
 
 
 def test_settings_do_what_they_do_in_python(folders: dict[str, Path]) -> None:
-    """M̄, gains, weights, limits, the order of the levels, and levels that are switched off and on: the
-    torques stay those of a Python controller with the same settings."""
+    """M̄, gains, weights, limits and the order of the levels are changed, and levels are switched off and on.
+    The torques stay those of a Python controller with the same settings."""
     scene = torque_scene("iiwa14-hold")
     settings = replace(scene.settings.for_controller())
     python, one = HIMPC(scene.robot, settings), controller_in(folders["iiwa14-hold"])
@@ -167,7 +168,7 @@ def test_settings_do_what_they_do_in_python(folders: dict[str, Path]) -> None:
 
 
 def test_settings_that_do_not_fit_change_nothing(folders: dict[str, Path]) -> None:
-    """Wrong numbers, wrong names and fixed motions are refused, and the memory stays as it was."""
+    """Wrong numbers, wrong names and fixed motions are refused, and the memory is unchanged."""
     one, fixed = controller_in(folders["iiwa14-hold"]), controller_in(folders["iiwa14-circle"])
     before = one.memory.copy()
     nan, inf = float("nan"), float("inf")
@@ -191,7 +192,7 @@ def test_settings_that_do_not_fit_change_nothing(folders: dict[str, Path]) -> No
 
 
 def test_the_exported_functions_are_those_that_python_runs() -> None:
-    """The control period of an exported controller is Python's, not a copy of it."""
+    """An exported controller runs the same function for the control period as Python, not a copy of it."""
     assert fallbacks.perform_parts is control_period.perform_parts
     assert "perform_parts" in control_period.control_period.py_func.__code__.co_names
     assert fallbacks.solve_level is control_period.solve_level
@@ -218,8 +219,8 @@ def test_the_exported_functions_are_those_that_python_runs() -> None:
 def test_what_cannot_be_exported_is_told_in_one_sentence(
     arguments: list[str], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Unknown targets, Python of one's own, velocity-level scenes and what is computed in Python are refused
-    before anything is compiled or written."""
+    """Unknown targets, a user's Python code, velocity-level scenes and controllers that are computed in
+    Python are refused before anything is compiled or written."""
     out = tmp_path / "made"
     assert main(["export", *arguments, "--out", str(out)]) == 2
     told = capsys.readouterr().err

@@ -108,8 +108,8 @@ def test_ctrl_c_ends_it(phase: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("again", [0.05, 1e-6])
 def test_what_swallows_an_interrupt_is_interrupted_again(again: float) -> None:
-    """A callback that a library calls loses the exception; a library that continues nevertheless is
-    interrupted again, also if the alarm comes before Python's hook for lost exceptions has returned."""
+    """A callback that a library calls loses the exception, and the library continues. It is interrupted
+    again, also if the alarm comes before Python's hook for lost exceptions has returned."""
     code = f"""
 import ctypes, time
 from app.commands import interrupts
@@ -155,8 +155,8 @@ sys.meta_path.insert(0, Interrupted())
 
 
 def python(*arguments: str, before: Callable[[], None] | None = None) -> subprocess.CompletedProcess[str]:
-    """Runs Python with these arguments and returns the result; `before`: a function that is called first in
-    the new process."""
+    """Runs Python with these arguments and returns the result. before: a function that is called first in the
+    new process."""
     command = [sys.executable, *arguments]
     return subprocess.run(
         command, cwd=ROOT, capture_output=True, text=True, timeout=LONG, check=False, preexec_fn=before

@@ -52,8 +52,8 @@ def test_lists_load_no_numerics(command: str) -> None:
 
 
 def test_the_plant_looks_for_no_window() -> None:
-    """By default MuJoCo's import would start processes that look for a window library, and Ctrl-C would reach
-    them."""
+    """By default the import of MuJoCo would start processes that look for a window library, and Ctrl-C would
+    also reach these processes."""
     code = """
 import sys
 import app.commands.early, robots.plant

@@ -47,8 +47,8 @@ def test_new_file_of_ones_own_runs(capsys: pytest.CaptureFixture[str]) -> None:
 
 @pytest.mark.parametrize("word", TASKS)
 def test_a_new_task_may_begin_with_a_kind_of_the_lab(word: str, capsys: pytest.CaptureFixture[str]) -> None:
-    """A task file that starts from a built-in kind is a kind of its own, and moves the arm like the built-in
-    one."""
+    """A task file that starts from a built-in kind defines a new kind, and this kind moves the arm like the
+    built-in one."""
     assert main(["new", "task", "mine.py", "--from", word]) == 0
     line = ["--duration", "0.02", "--set", "plant.payload_kg=1", "--json", "a.json"]
     errors = {}

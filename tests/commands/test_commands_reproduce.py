@@ -55,7 +55,7 @@ def test_wrong_input_gets_one_sentence_and_exit_2(case: str, capfd: pytest.Captu
 
 
 def test_reproduce_writes_a_report(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    """Two items without runs give report.md and results.json, which is also printed."""
+    """Two items without runs write report.md and results.json, and the JSON is also printed."""
     arguments = ["reproduce", "himpc-table-1", "himpc-table-4", "--out", str(tmp_path), "--json", "-"]
     assert main(arguments) == 0
     printed = json.loads(capfd.readouterr().out)
@@ -67,7 +67,7 @@ def test_reproduce_writes_a_report(tmp_path: Path, capfd: pytest.CaptureFixture[
 def test_a_check_that_fails_is_exit_1(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The command runs, but a claim does not hold: it names this claim."""
+    """The command runs, but a claim does not hold, and the command names this claim."""
     from lessons import papers
     from lessons.papers.item import Item, PaperCheck, Section
 
@@ -85,7 +85,7 @@ def cells(folder: Path) -> list[dict[str, Any]]:
 
 
 def gone(group: int, within: float) -> bool:
-    """Whether no process of a group is left within this number of seconds."""
+    """Returns whether all processes of a group have ended within this number of seconds."""
     give_up = time.monotonic() + within
     while time.monotonic() < give_up:
         try:
@@ -102,7 +102,7 @@ SWEEP = ["planar3-circle", "--over", "Q=100:200:6", "--duration", "0.4"]
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    """The results of the sweep without an interruption."""
+    """Returns the results of the sweep without an interruption."""
     out = tmp_path_factory.mktemp("whole")
     assert main(["sweep", *SWEEP, "--out", str(out)]) == 0
     return (out / "results.json").read_bytes()
@@ -124,8 +124,8 @@ def test_a_sweep_without_a_folder_has_one_of_its_own(
 
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
 def test_a_sweep_that_is_stopped_carries_on(tmp_path: Path, stop: signal.Signals, whole: bytes) -> None:
-    """A sweep that is interrupted by SIGINT or SIGTERM says how many cells are finished and leaves no
-    process; the same command then ends with the same results as without an interruption."""
+    """A sweep that is interrupted by SIGINT or SIGTERM prints how many cells are finished and leaves no
+    process. The same command then ends with the same results as without an interruption."""
     command = [sys.executable, "-m", "app", "sweep", *SWEEP, "--out"]
     part = tmp_path / "part"
     process = subprocess.Popen(

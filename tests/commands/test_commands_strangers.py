@@ -25,7 +25,7 @@ def test_brackets_in_names_are_text(tmp_path: Path, capsys: pytest.CaptureFixtur
 def test_a_robot_with_too_many_joints_is_refused_before_it_takes_minutes(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The check and the run refuse it with the same words."""
+    """The check and the run refuse the robot with the same message."""
     links = "".join(f'<link name="l{k}"/>' for k in range(61))
     joints = "".join(
         f'<joint name="j{k}" type="continuous"><parent link="l{k}"/><child link="l{k + 1}"/></joint>'

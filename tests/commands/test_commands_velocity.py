@@ -14,7 +14,7 @@ SQUARE = "ridgeback-ur10-square"
 
 
 def test_run_prints_the_contract_of_a_velocity_level_scene(tmp_path: Path) -> None:
-    """The result has the keys of parts, line search, base path and mission in addition; the npz file has one
+    """In addition, the result has the keys of parts, line search, base path and mission. The npz file has one
     row per tick."""
     out, rows = tmp_path / "out.json", tmp_path / "rows.npz"
     assert main(["run", SQUARE, "--duration", "1", "--json", str(out), "--npz", str(rows)]) == 0

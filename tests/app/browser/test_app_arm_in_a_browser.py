@@ -1,4 +1,4 @@
-"""`himpc-lab arm --page`, once, in a real browser."""
+"""`himpc-lab arm --page` is run once, in a real browser."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ def program() -> Iterator[subprocess.Popen[str]]:
 
 
 def said(program: subprocess.Popen[str], words: str) -> str:
-    """The next line of the program that contains the words."""
+    """Returns the next line of the program that contains the words."""
     assert program.stdout is not None
     return next(line for line in program.stdout if words in line)
 
 
 def test_an_arm_and_its_simulation_on_a_page(browser: Browser, program: subprocess.Popen[str]) -> None:
-    """Run takes the arm over; the ghost is drawn, both have errors; a moved target moves both; the status
-    line tells the missed periods; leaks are drawn of the simulation alone; closing the page stops the arm
-    gently and ends the program."""
+    """*Run* starts the control of the arm. The ghost is drawn, and both robots have errors. A moved target
+    moves both. The status line shows the missed periods. Only the leaks of the simulation are drawn. When the
+    page is closed, the arm is stopped gently and the program ends."""
     page = open_page(browser, said(program, "ready at").split()[-1])
     expect(page.get_by_text("at rest: Run takes it over")).to_be_visible()
     expect(page.get_by_text("Start lesson 1")).to_have_count(0)
@@ -57,7 +57,7 @@ def test_an_arm_and_its_simulation_on_a_page(browser: Browser, program: subproce
     leaks.scroll_into_view_if_needed()
     expect(page.get_by_text("priority (own model), ghost")).to_be_visible()
     expect(page.get_by_text("priority (own model)", exact=True)).to_have_count(0)
-    page.wait_for_timeout(3000)  # more than after which an empty chart is explained
+    page.wait_for_timeout(3000)  # longer than the time after which an empty chart is explained
     expect(page.get_by_text("No tick has run yet").locator("visible=true")).to_have_count(0)
     page.context.close()
     assert said(program, "ended: ") == "ended: the page was closed; it came to rest under control\n"

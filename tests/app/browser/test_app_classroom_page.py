@@ -1,5 +1,5 @@
-"""A classroom: one robot for all pages, and only pages with the token can control it. It is a class as well:
-phones vote, and the teacher's page shows it."""
+"""A classroom: all pages show one robot, and only pages with the token can control it. It is a class as well:
+phones vote, and the teacher's page shows the votes."""
 
 from __future__ import annotations
 
@@ -53,13 +53,14 @@ _RULES = """() => axe.run(document, {
 
 
 def violations(page: Page) -> list[str]:
-    """What axe-core finds against WCAG 2.1 A and AA."""
+    """Returns what axe-core finds against WCAG 2.1 A and AA."""
     found: Any = page.evaluate(_RULES)
     return [f"{each['id']}: {node['html'][:150]}" for each in found["violations"] for node in each["nodes"]]
 
 
 def page_of(browser: Browser, address: str, width: int, height: int, faults: list[str]) -> Page:
-    """A page of the class. faults: gets the errors of its script and what its policy refuses."""
+    """Opens a page of the class. faults: gets the errors of the page's script, and what the page's policy
+    refuses."""
     page = browser.new_context(viewport={"width": width, "height": height}).new_page()
     page.on("pageerror", lambda error: faults.append(str(error)))
     page.on("console", lambda said: faults.append(said.text) if said.type == "error" else None)
@@ -69,7 +70,8 @@ def page_of(browser: Browser, address: str, width: int, height: int, faults: lis
 
 
 def test_a_phone_votes_and_the_projector_shows_who_was_right(browser: Browser, classroom: PageServer) -> None:
-    """A step with two votes and its run, by clicks; both pages fit their screens, and axe finds nothing."""
+    """A step with two votes and its run is done by clicks. Both pages fit their screens, and axe finds no
+    violation."""
     faults: list[str] = []
     assert classroom.hall is not None
     lead = page_of(browser, classroom.first_link, 1920, 1080, faults)

@@ -26,7 +26,7 @@ from lessons.scenes.run_spec import RunSpec
 pytestmark = pytest.mark.usefixtures("one_fork_server")
 
 ARM = 0.08
-"""m, distance from the arm at which the gizmo of this small arm is grasped."""
+"""Distance from the arm at which the gizmo of this small arm is grasped, m."""
 
 
 @pytest.fixture(scope="module")
@@ -45,8 +45,8 @@ def shared(browser: Browser, drawing: PageServer) -> Iterator[Page]:
 
 @pytest.fixture
 def sheet(shared: Page, drawing: PageServer) -> Page:
-    """The page in its initial state, with the picture of the new run drawn. The picture of the run before is
-    still there when the new one begins."""
+    """Returns the page in its initial state, after the picture of the new run was drawn. The picture of the
+    run before is still there when the new one begins."""
     learner = learner_of(drawing)
     assert eventually(shared, lambda: learner.status is not None)
     before = 0 if learner.status is None else learner.status.resets
@@ -92,7 +92,7 @@ def stand_still(page: Page, server: PageServer) -> None:
 
 
 def agrees(page: Page, server: PageServer) -> bool:
-    """Whether the picture shows both optima at the solver's points."""
+    """Returns whether the picture shows both optima at the solver's points."""
     found = [point(page, f"optimum-{place}") for place in (1, 2)]
     levels = plane(server).levels
     return all(
@@ -123,8 +123,8 @@ def watched(page: Page, names: Sequence[str]) -> Iterator[None]:
 
 
 def test_dragging_the_target_moves_both_optima(sheet: Page, drawing: PageServer) -> None:
-    """Recorded from before the drag on, because in a slow browser everything is at rest again when the drag
-    ends."""
+    """The points are recorded from a time before the drag, because in a slow browser everything is at rest
+    again when the drag ends."""
     names = ("optimum-1", "optimum-2")
 
     def moved() -> bool:
@@ -134,7 +134,7 @@ def test_dragging_the_target_moves_both_optima(sheet: Page, drawing: PageServer)
     with watched(sheet, names):
         drag_target(sheet, axis=0, along=0.12, arm=ARM)
         assert eventually(sheet, moved)
-    # At rest, level 2 has another optimum than it would have alone, and the picture agrees with the solver.
+    # At rest, level 2 has an optimum that differs from its optimum alone; the picture agrees with the solver.
     assert eventually(sheet, lambda: point(sheet, "wish-2") is not None)
     stand_still(sheet, drawing)
     assert plane(drawing).apart < 1e-6
@@ -151,8 +151,8 @@ def test_swapping_levels_swaps_their_roles(sheet: Page, drawing: PageServer) -> 
     assert eventually(sheet, lambda: plane(drawing).levels[0].name == "pose")
     stand_still(sheet, drawing)
     after = plane(drawing)
-    assert before.levels[0].leaves.span.shape == (2, 1)  # a line
-    assert after.levels[0].leaves.span.shape == (2, 0)  # a point
+    assert before.levels[0].leaves.span.shape == (2, 1)  # the dimension is that of a line
+    assert after.levels[0].leaves.span.shape == (2, 0)  # the dimension is that of a point
     assert after.apart < 1e-6
 
 

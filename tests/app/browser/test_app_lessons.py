@@ -76,7 +76,7 @@ def test_a_lesson_of_ones_own_is_walked_through(browser: Browser, tmp_path: Path
 
 
 def walk(page: Page, school: PageServer, lesson: Lesson) -> None:
-    """Does every part of the open lesson with a learner's actions; all claims must hold."""
+    """Does every part of the open lesson with the actions of a learner. All claims must hold."""
     for part in parts_of(lesson):
         expect_part(page, lesson, part)
         if isinstance(part, Challenge):
@@ -105,7 +105,7 @@ def kept(page: Page) -> dict[str, Any]:
 
 
 def take_challenge(page: Page, school: PageServer, challenge: Challenge) -> None:
-    """The challenge fails with its initial settings, and passes with a known solution."""
+    """Checks that the challenge fails with its initial settings, and passes with a known solution."""
     hurry(page)
     run(page, "Start the run")
     expect(page.get_by_text("NOT YET", exact=True)).to_be_visible()

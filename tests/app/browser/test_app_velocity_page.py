@@ -53,7 +53,7 @@ def shared_page(browser: Browser, server: PageServer) -> Iterator[Page]:
 
 @pytest.fixture
 def page(shared_page: Page) -> Page:
-    """The page after a reset, the same for each test."""
+    """Returns the page after a reset, in the same state for each test."""
     tab(shared_page, "Start")
     press(shared_page, "Reset all")
     expect(shared_page.get_by_text("RUNNING", exact=True).first).to_be_visible()
@@ -63,7 +63,7 @@ def page(shared_page: Page) -> Page:
 
 @pytest.fixture
 def learner(server: PageServer, page: Page) -> SimulationClient:
-    """The simulation of `page`, which was reset before."""
+    """Returns the simulation of `page`, which was reset before."""
     assert eventually(page, lambda: bool(server.sessions.learners))
     found = server.sessions.learners[0]
     assert eventually(page, lambda: found.status is not None and found.status.ticks > 0)
@@ -175,8 +175,8 @@ def test_a_mission_runs_to_its_end_though_a_task_is_moved_meanwhile(
     drag_target(page, axis=1, along=-0.5, node="/goal/base", arm=0.5)
 
     def arrived() -> bool:
-        """Whether all moves of the drag have been applied: the task's goal is at the position of the disc. A
-        drag consists of many moves, and a tick takes a second here."""
+        """Returns whether all moves of the drag have been applied, that is, whether the task's goal is at the
+        position of the disc. A drag consists of many moves, and a tick takes a second here."""
         left = target_position(page, "/goal/base/disc")[:2]
         return left[1] < before[1] - 0.2 and np.allclose(goal(learner, 1), left, atol=1e-3)
 

@@ -1,5 +1,5 @@
-"""One server and one page for all tests that can share them, because a page takes ten seconds of both cores
-to open without a graphics card."""
+"""One server and one page for all tests that can share them, because without a graphics card a page needs ten
+seconds of both cores to open."""
 
 from __future__ import annotations
 
@@ -39,7 +39,8 @@ def shared_page(browser: Browser, server: PageServer) -> Iterator[Page]:
 
 @pytest.fixture
 def page(shared_page: Page, server: PageServer) -> Page:
-    """The page in its initial state, independent of the tests before, and the only page on the server."""
+    """Returns the page in its initial state, independent of the tests before. It is the only page on the
+    server."""
     assert eventually(shared_page, lambda: len(server.sessions.learners) == 1)
     show_scene(shared_page, server.sessions.learners[0], CHOICE)
     tab(shared_page, "Errors")

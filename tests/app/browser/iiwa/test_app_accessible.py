@@ -14,7 +14,7 @@ from browsing.browser_actions import key, press, row, tab
 RIGHT = ("Start", "Tasks", "Control", "Plant", "Lessons", "Compare", "Export", "Robot", "Help")
 LEFT = ("Errors", "Joints", "Inside", "Who binds")
 VISERS_OWN: dict[str, str] = {}
-"""The parts of viser that do not meet a rule and that the page cannot mend: selector → rule."""
+"""The parts of viser that do not meet a rule and that the page cannot repair: selector → rule."""
 _RUN = """(own) => axe.run(
   { include: [["body"]], exclude: own.map((each) => [each]) },
   { runOnly: ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa"], resultTypes: ["violations"] })"""
@@ -38,10 +38,10 @@ def violations(page: Page, where: str) -> list[str]:
 
 def test_axe_finds_no_violation_of_wcag_on_any_tab(page: Page, checked: Page) -> None:
     found: list[str] = []
-    press(page, "Pause")  # axe needs the cores
+    press(page, "Pause")  # axe needs the processor
 
     def look(left: str, right: str, theme: str) -> None:
-        """Both panels at once: a run of axe takes seconds."""
+        """Checks a tab of each panel together, because a run of axe takes seconds."""
         tab(page, left)
         tab(page, right)
         found.extend(violations(page, f"{left}, {right}, {theme}"))
@@ -60,7 +60,7 @@ def test_axe_finds_no_violation_of_wcag_on_any_tab(page: Page, checked: Page) ->
 
 
 def test_axe_would_find_what_is_wrong(page: Page, checked: Page) -> None:
-    """A control without a name and pale words: the check can fail."""
+    """The check can fail: it finds a control without a name, and text of low contrast."""
     page.evaluate(
         """() => { const bad = document.createElement("div"); bad.id = "bad";
              bad.style.cssText = "position:fixed;top:0;left:45%;z-index:9999;background:#fff";

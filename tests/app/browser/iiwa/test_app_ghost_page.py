@@ -28,7 +28,7 @@ def test_a_ghost_a_look_back_and_a_file(page: Page, server: PageServer) -> None:
     expect(page.get_by_text("position [mm], ghost")).to_be_visible()
     expect(page.get_by_text("99 % below")).to_be_visible()
 
-    # Both robots follow the target aside; then the simulation pauses, and the view goes back to the time
+    # Both robots follow the target to the side; then the simulation pauses, and the view returns to the time
     # before.
     assert learner.status is not None
     x, y, z = learner.status.targets["position"]

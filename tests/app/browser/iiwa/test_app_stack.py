@@ -62,8 +62,8 @@ def frame_clicked(page: Page) -> str:
 def test_a_task_is_added_dragged_moved_reduced_merged_passed_on_and_removed(
     page: Page, server: PageServer
 ) -> None:
-    """A user adds an elbow task below the hand: errors, ranks and gizmo follow every change, no level loses
-    its target, and the stack's code gives the same stack elsewhere."""
+    """A user adds an elbow task below the hand. Errors, ranks and gizmo show every change, no level loses its
+    target, and the code of the stack gives the same stack elsewhere."""
     learner = server.sessions.learners[0]
     tab(page, "Tasks")
     unfold(page, "Add a task")
@@ -78,7 +78,7 @@ def test_a_task_is_added_dragged_moved_reduced_merged_passed_on_and_removed(
     assert eventually(page, lambda: is_drawn(page, "/targets/elbow/control"))
     expect(page.get_by_text("gets 2 of 3 directions", exact=False).first).to_be_visible()
     assert error(learner, "position") < 1e-3
-    expect(page.get_by_text("elbow [mm]", exact=True).first).to_be_visible()  # its curve
+    expect(page.get_by_text("elbow [mm]", exact=True).first).to_be_visible()  # the curve of the new task
 
     before = target_position(page, ELBOW)
     drag_target(page, axis=0, along=0.08, node="/targets/elbow/control", arm=0.13)

@@ -45,7 +45,7 @@ from robots import CATALOG
 
 @pytest.fixture
 def learner(server: PageServer, page: Page) -> SimulationClient:
-    """The simulation of `page`."""
+    """Returns the simulation of `page`."""
     assert eventually(page, lambda: bool(server.sessions.learners) and server.sessions.learners[0].attached)
     return server.sessions.learners[0]
 
@@ -222,7 +222,7 @@ def test_no_thread_can_hold_up_what_is_sent(page: Page, server: PageServer) -> N
 def test_the_browser_tells_which_charts_it_shows(
     page: Page, server: PageServer, learner: SimulationClient
 ) -> None:
-    """The server sends the data of these charts only."""
+    """The server sends data only for these charts."""
     pages = [each._page for each in server._visits.values() if each._page is not None]
     (shown,) = (each for each in pages if each.learner is learner)
 
