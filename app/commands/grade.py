@@ -51,7 +51,7 @@ def grade(
         exercise: name of the exercise; by default the name that the file assigns to EXERCISE.
         hints: number of hints of the exercise to show.
         seed: seed of the disturbances.
-        out: file for the table of a folder, grades.csv by default, an unfinished table is continued; with
+        out: file for the table of a folder, grades.csv by default; an unfinished table is continued. With
             --autograder the new folder, autograder by default.
         scheduler: address of a Dask scheduler, e.g. tcp://10.0.0.1:8786, for a folder, instead of this
             machine's cores.

@@ -129,8 +129,9 @@ class Lecture:
         grade: the grade of the prediction, after the run.
         curves: one per signal of the step; ghosts: the same for the second robot, if it was computed.
         sketched: the curve that a sketch predicts.
-        result, points_for: of a challenge, after the run: the result and the value that decides its points.
-        lost_at: s, when the robot went out of control, which ends the run.
+        result, points_for: the result of a challenge and the value that decides its points; both are
+            known after the run.
+        lost_at: time at which the robot went out of control, s; the run ends there.
     """
 
     exercise: LessonPlace

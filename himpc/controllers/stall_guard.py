@@ -45,7 +45,7 @@ class StallGuard:
         for joints that accelerate or have little torque left.
 
         Args:
-            limits: without that.
+            limits: the limits without these reductions.
             tau: torque that acts, (n,) N·m.
             v: measured, (n,) rad/s.
             distances: the pairs of the last tick.

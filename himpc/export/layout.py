@@ -13,7 +13,7 @@ from himpc.tick.kernel.arrays import NUMBERS, WHOLES
 
 @cache
 def layout_number() -> int:
-    """Returns a number that changes with every source of the kernel: memory that another kernel laid out is
-    refused."""
+    """Returns a number that is different for every version of the kernel's sources. A kernel refuses memory
+    whose number is not its own."""
     tables = repr((NUMBERS, WHOLES, SHAPES)).encode()
     return int.from_bytes(sha256(tables + digest_of(control.py_func)).digest()[:7], "little")

@@ -46,8 +46,8 @@ class Challenge:
         goals: claims that must all hold at the end of the run.
         knobs: the settings that may be changed; any other change disqualifies the attempt.
         score: the points for the quality of a solution.
-        solutions: at least two different sets of assignments "PATH=VALUE" to knobs that pass. The run with
-            none of them, the start, does not pass.
+        solutions: at least two different sets of assignments "PATH=VALUE" to knobs that pass. The
+            challenge does not pass before any of them is made.
         set: assignments on top of the lesson's before the learner begins.
         duration: s.
         events: the script of the run.

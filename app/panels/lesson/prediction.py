@@ -147,7 +147,10 @@ class Asking:
             self._picture.content = html
 
     def _pictured(self, lecture: Lecture | None) -> str:
-        """lecture: given after the run was graded; it does not contain an input that came too late."""
+        """Returns the picture of the prediction.
+
+        lecture: the graded run; None before it is graded. An answer that came too late is not in it.
+        """
         truth, mine = (math.nan, self._mine) if lecture is None else (lecture.truth, lecture.answer)
         match self._prediction:
             case Choice() as choice:

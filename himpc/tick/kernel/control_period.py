@@ -23,7 +23,7 @@ from himpc.tick.kernel.linearize import linearize
 from himpc.tick.kernel.solve_level import solve_level
 
 LINEARIZE, LEVELS, ONE_LEVEL, FINISH, REMEMBER = 1, 2, 4, 8, 16
-"""Parts of a period; `parts` is their sum."""
+"""The parts of a period. The argument `parts` is the sum of the parts to perform."""
 ALL_PARTS = LINEARIZE + LEVELS + FINISH + REMEMBER
 """All parts of a period whose levels are solved once."""
 ITERATION = LINEARIZE + LEVELS + FINISH

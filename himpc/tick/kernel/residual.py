@@ -106,7 +106,8 @@ def hessian(
         S: (m, N, N).
         projected_jacobian: b, the rows of B in the level's coordinates, (N, m, n).
         first, last: the level's rows.
-        start, offset: where its own coordinates of a knot begin among all of the knot, and among its own.
+        start: index of the level's first own coordinate of a knot among all coordinates of the knot, (N,).
+        offset: the same among the level's own coordinates of all knots, (N + 1,).
         rho: ρ, the weight R of the increments.
         H: the result.
     """
