@@ -46,7 +46,8 @@ pytestmark = [
 ]
 SECONDS = 2.0
 UNSTABLE = "no-model-needed/4"
-"""Its claim is that errors grow from step to step, and so does the difference in the last digit."""
+"""Errors grow from period to period in this step, as its claim says; so does a difference in the last
+digit."""
 STEPS = [
     f"{name}/{place + 1}"
     for name in COURSE

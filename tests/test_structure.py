@@ -352,7 +352,7 @@ COMPILED = {
         *("rotation", "qp"),
     ),
 }
-"""The same for the compiled parts and the parts that run them."""
+"""The order of the compiled parts and of the parts that run them."""
 HIMPC = THEORY | COMPILED
 
 

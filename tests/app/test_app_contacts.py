@@ -24,8 +24,8 @@ from robots.world import Thing
 
 
 def test_the_simulation_reports_what_the_robot_touches() -> None:
-    """A hand is dragged into the floor, and the floor pushes it upwards. The rows report the contact a moment
-    later, too."""
+    """A hand is dragged into the floor; the status reports the contact, with a force that pushes the hand
+    upwards."""
     body = SimulationRunner(SceneChoice(RunSpec("panda-hold")))
     try:
         assert [thing.shape.name for thing in body.ready().world] == ["floor"]

@@ -131,8 +131,8 @@ def test_rows_say_what_the_prediction_does(seed: int, n: int, N: int, position: 
 def test_a_velocity_row_tells_which_limit_it_stands_for(
     position: Any, q: float, upper: str, lower: str
 ) -> None:
-    """With `viability`, a velocity row near the end of a joint stands for the position limit at every
-    velocity."""
+    """With `viability`, a velocity row near the end of a joint stands for the position limit; the joint is
+    at rest here."""
     one = np.ones(1)
     force = LimitsInForce(-9 * one, 9 * one, 0.5 * one, -one, one, 10 * one)
     state = JointState(q * one, 0 * one, 0 * one)

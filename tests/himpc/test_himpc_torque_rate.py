@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 RATE = 5.0
 """N·m/s."""
 FASTEST = 0.02
-"""rad/s: what the sum of the first two velocities may be."""
+"""Largest sum of the first two velocities, rad/s."""
 
 
 def pulled(name: str, route: Route = "compiled", rate: float = 0.0, controller: str = "himpc") -> Loop:

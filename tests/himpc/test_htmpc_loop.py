@@ -359,7 +359,8 @@ def test_delay_compensation_pays(robot: Robot) -> None:
 
 @pytest.mark.parametrize("name", ["iiwa14", "panda"])
 def test_fixed_arms_position_then_orientation(name: str) -> None:
-    """A 0.3 m step of the target settles below 1 mm without leaving a bound."""
+    """A 0.3 m step of the target settles below 1 mm. Velocities, accelerations and positions stay within
+    their bounds."""
     arm = load_robot(name)
     stack = (
         Level((FramePosition(name="position"),), Q=10.0),

@@ -77,7 +77,7 @@ def test_workers_end_with_their_owner(tmp_path: Path, number: signal.Signals) ->
 
 
 def test_a_worker_takes_sigterm(tmp_path: Path) -> None:
-    """A worker that receives SIGTERM ends. Its work has an outcome, also after the second attempt."""
+    """A worker that receives SIGTERM ends."""
     script = tmp_path / "owner.py"
     script.write_text(OWNER.format(paths=[str(HERE), str(HERE.parents[1])], folder=str(tmp_path)))
     owner = subprocess.Popen([sys.executable, str(script)], stderr=subprocess.DEVNULL)

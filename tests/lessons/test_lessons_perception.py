@@ -25,7 +25,7 @@ ROOT = Path(__file__).parents[2]
 NAME = "ridgeback-ur10-perception"
 ON_THE_WAY = ("obstacles.crate=[1.9,0.3,0.25]", "report_offset=[0,1.1,0]")
 KEPT = 0.05 - 0.01
-"""m: the margin, of which a centimetre may be lost between two knots."""
+"""Distance that must be kept, m: the margin of 5 cm, of which 1 cm may be lost between two knots."""
 
 
 @cache

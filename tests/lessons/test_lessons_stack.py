@@ -206,8 +206,8 @@ CHANGES = (
 
 @pytest.mark.parametrize("controller", ["himpc", "hqp", "tdeosf", "weighted"])
 def test_the_stack_changes_without_a_bump(controller: str) -> None:
-    """With a change every 60 ms while the arm moves, all numbers stay finite, no torque jumps by more than it
-    does when only targets are dragged, and no joint exceeds its velocity limit."""
+    """With a change every 60 ms while the arm moves, all numbers stay finite, no torque jumps by 6 N·m or
+    more in one tick, and no joint is faster than 1.1 times its velocity limit."""
     scene = replace(SCENE, settings=START.changed("controller", controller))
     session = TorqueSession(scene)
     steps, worst = [], 0.0
