@@ -52,9 +52,11 @@ def badge(text: str, colour: RGB) -> str:
     )
 
 
-def block(inner: str, style: str = "") -> str:
-    """A paragraph in the font size of the panel."""
-    return f'<div style="font-size:0.85em;line-height:1.45;padding:0.15em 0.75em;{style}">{inner}</div>'
+def block(inner: str, style: str = "", lines: int = 0) -> str:
+    """A paragraph in the font size of the panel, with room for a number of lines. The controls below it stay
+    in place when the text changes, as long as the text needs no more lines."""
+    room = f"min-height:{1.45 * lines + 0.3:g}em;" if lines else ""
+    return f'<div style="font-size:0.85em;line-height:1.45;padding:0.15em 0.75em;{room}{style}">{inner}</div>'
 
 
 def in_trouble(state: str, sentence: str) -> str:

@@ -49,14 +49,14 @@ class RobotPanel:
         with gui.add_folder("Scene"):
             names, now = tuple(name for name in scenes if name != "hold"), ready.choice.run.scene
             scene = gui.add_dropdown("Scene", names, initial_value=now if now in names else names[0])
-            described = gui.add_html(block(esc(scenes[str(scene.value)])))
+            described = gui.add_html(block(esc(scenes[str(scene.value)]), lines=2))
             of_scene = _answer(gui)
             load_scene = gui.add_button("Load scene")
         with gui.add_folder("Robot of the catalog"):
             catalog = gui.add_dropdown(
                 "Robot", tuple(CATALOG), initial_value=robot.name if robot.name in CATALOG else None
             )
-            about = gui.add_html(block(esc(CATALOG[str(catalog.value)].title)))
+            about = gui.add_html(block(esc(CATALOG[str(catalog.value)].title), lines=2))
             of_robot = _answer(gui)
             load_robot = gui.add_button("Load robot")
         with gui.add_folder("Your own URDF"):
@@ -79,11 +79,11 @@ class RobotPanel:
 
         @scene.on_update
         async def _(_: object) -> None:
-            described.content = block(esc(scenes[str(scene.value)]))
+            described.content = block(esc(scenes[str(scene.value)]), lines=2)
 
         @catalog.on_update
         async def _(_: object) -> None:
-            about.content = block(esc(CATALOG[str(catalog.value)].title))
+            about.content = block(esc(CATALOG[str(catalog.value)].title), lines=2)
 
         on_click(load_scene, lambda: self._ask(of_scene, RunSpec(str(scene.value))))
 

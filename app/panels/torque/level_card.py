@@ -20,6 +20,8 @@ from lessons.settings.torque import TorqueSettings
 from robots import Robot
 
 UP, DOWN = "▲ Up", "▼ Down"
+LINES = 3
+"""Number of lines of the longest usual text about a level, in a panel of the usual width."""
 
 
 class LevelCard:
@@ -45,7 +47,7 @@ class LevelCard:
         self._colour = colours.get(name, BOUND)
         self._folder = gui.add_folder(_title(place, name), order=float(place))
         with self._folder:
-            self._live = gui.add_html("")
+            self._live = gui.add_html(block("", lines=LINES))
             on = gui.add_checkbox("Enabled", level.enabled, hint=f"Key {place + 1}")
             move = gui.add_button_group("Priority", (UP, DOWN))
             add_joint_targets(gui, moves, level, robot, targets)
@@ -90,6 +92,7 @@ class LevelCard:
         self._live.content = block(
             f"{swatch(self._colour)}{errors}{notes}{_rank(now.status.ranks.get(level.name))}",
             f"border-left:3px solid {css(self._colour)}",
+            LINES,
         )
 
 
