@@ -37,7 +37,7 @@ class ControllerPanel:
         controls = Controls(gui, bindings, settings)
         with gui.add_folder("Which controller"):
             controls.add("controller")
-            self._what = gui.add_html(block(esc(settings.controllers[settings.controller])))
+            self._what = gui.add_html(block(esc(settings.controllers[settings.controller]), lines=2))
         self._shown = settings.controller
         with gui.add_folder("Horizon"):
             controls.add("horizon", "T_s")
@@ -66,7 +66,7 @@ class ControllerPanel:
         self._deadline.update(now)
         if now.settings.controller != self._shown:
             self._shown = now.settings.controller
-            self._what.content = block(esc(now.settings.controllers[self._shown]))
+            self._what.content = block(esc(now.settings.controllers[self._shown]), lines=2)
         norm, radius = now.number("gauge_norm"), now.number("gauge_radius")
         self._gauge.content = block(
             f"spectral radius of I − M⁻¹M̄: <b>{radius:.3f}</b>{_verdict(radius)}"

@@ -40,7 +40,7 @@ class HtmpcPanel:
         self._settings = settings
         with gui.add_folder("Which controller"):
             controls.add("controller")
-            self._what = gui.add_html(block(esc(VELOCITY_CONTROLLERS[settings.controller])))
+            self._what = gui.add_html(block(esc(VELOCITY_CONTROLLERS[settings.controller]), lines=2))
         self._shown = settings.controller
         with gui.add_folder("Horizon"):
             self._ahead = gui.add_html("")
@@ -59,7 +59,7 @@ class HtmpcPanel:
         with gui.add_folder("Limits"):
             controls.add(*(f"limits.{name}" for name in _LIMITS), "margin_m", "self_collision")
         with gui.add_folder("Delay"):
-            self._lag = gui.add_html("")
+            self._lag = gui.add_html(block("", lines=3))
             controls.add("compensate_delay", "delay_measured")
 
     def _weights(self) -> None:
@@ -97,7 +97,7 @@ class HtmpcPanel:
         settings = now.settings
         if settings.controller != self._shown:
             self._shown = settings.controller
-            self._what.content = block(esc(VELOCITY_CONTROLLERS[self._shown]))
+            self._what.content = block(esc(VELOCITY_CONTROLLERS[self._shown]), lines=2)
         htmpc = settings.htmpc
         self._ahead.content = block(
             f"Looks <b>{htmpc.horizon * htmpc.dt:.2g} s</b> ahead, every {1e3 * htmpc.period:.3g} ms."
@@ -106,7 +106,8 @@ class HtmpcPanel:
         self._lag.content = block(
             f"Lag of the plant: <b>{lag:g} ms</b>{_compensated(settings)}. The last control step took "
             f"{step_ms:.1f} ms of {1e3 * htmpc.period:.3g} ms; "
-            + ("the robot has this delay, too." if settings.delay_measured else "simulated time waits.")
+            + ("the robot has this delay, too." if settings.delay_measured else "simulated time waits."),
+            lines=3,
         )
 
 

@@ -75,7 +75,7 @@ class _Card:
         self._colour = colour
         self._folder = gui.add_folder(_title(place, name), order=float(place + 1))
         with self._folder:
-            self._live = gui.add_html("")
+            self._live = gui.add_html(block("", lines=2))
             on = gui.add_checkbox("Enabled", level.enabled, hint=f"Key {place + 1}")
             Controls(gui, bindings, settings).add(f"levels.{name}.Q")
         bindings.bind(
@@ -99,7 +99,7 @@ class _Card:
         if fallback == fallback and fallback > 0:
             notes += " " + badge(FALLBACKS[int(fallback)], BAD)
         self._live.content = block(
-            f"{swatch(self._colour)}{text}{notes}", f"border-left:3px solid {css(self._colour)}"
+            f"{swatch(self._colour)}{text}{notes}", f"border-left:3px solid {css(self._colour)}", lines=2
         )
 
 
