@@ -1,4 +1,4 @@
-"""Loads another scene on an open page, which is quicker than opening a new page."""
+"""Loads another scene on an open page, or the present one anew, which is quicker than opening a new page."""
 
 from __future__ import annotations
 
@@ -7,7 +7,17 @@ from playwright.sync_api import Page, expect
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.messages import Load
-from browsing.browser_actions import eventually, tab, wait_for_scene
+from browsing.browser_actions import eventually, press, tab, wait_for_scene
+
+
+def reset_all(page: Page, learner: SimulationClient) -> None:
+    """Presses "Reset all", and waits until the simulation runs from the beginning. Before that, the page
+    shows the previous state, and a click on a control that is about to be replaced has no effect."""
+    before = None if learner.status is None else learner.status.resets
+    press(page, "Reset all")
+    assert eventually(page, lambda: learner.status is not None and learner.status.resets != before)
+    expect(page.get_by_text("RUNNING", exact=True).first).to_be_visible()
+    wait_for_scene(page)
 
 
 def show_scene(page: Page, learner: SimulationClient, choice: SceneChoice) -> None:

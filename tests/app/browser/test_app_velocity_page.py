@@ -29,7 +29,9 @@ from browsing.browser_actions import (
     target_position,
     wait_for_scene,
 )
+from browsing.scene_switch import reset_all
 from lessons.events import MoveTarget, Set
+from lessons.scenes.names import ALL_SCENES
 from lessons.scenes.run_spec import RunSpec
 from lessons.settings.velocity import VelocitySettings
 from robots.collision import Ball, Box, Floor
@@ -52,19 +54,17 @@ def shared_page(browser: Browser, server: PageServer) -> Iterator[Page]:
 
 
 @pytest.fixture
-def page(shared_page: Page) -> Page:
+def page(shared_page: Page, server: PageServer) -> Page:
     """Returns the page after a reset, in the same state for each test."""
+    assert eventually(shared_page, lambda: bool(server.sessions.learners))
     tab(shared_page, "Start")
-    press(shared_page, "Reset all")
-    expect(shared_page.get_by_text("RUNNING", exact=True).first).to_be_visible()
-    wait_for_scene(shared_page)
+    reset_all(shared_page, server.sessions.learners[0])
     return shared_page
 
 
 @pytest.fixture
 def learner(server: PageServer, page: Page) -> SimulationClient:
     """Returns the simulation of `page`, which was reset before."""
-    assert eventually(page, lambda: bool(server.sessions.learners))
     found = server.sessions.learners[0]
     assert eventually(page, lambda: found.status is not None and found.status.ticks > 0)
     return found
@@ -103,6 +103,7 @@ def load(page: Page, learner: SimulationClient, scene: str) -> None:
         return
     tab(page, "Robot")
     pick(page, "Scene", scene)
+    expect(page.get_by_text(ALL_SCENES[scene])).to_be_visible()
     press(page, "Load scene")
     assert eventually(page, lambda: learner.ready is not None and learner.ready.choice.run.scene == scene)
     assert eventually(page, lambda: learner.status is not None and learner.status.mission is not None)
@@ -249,7 +250,7 @@ def test_obstacles_are_moved_by_hand_and_put_in_the_way(page: Page, learner: Sim
     row(page, "Arrows of obstacles").locator("input").click()
     assert eventually(page, lambda: not is_drawn(page, f"/obstacle_arrows/{place}"))
     tab(page, "Start")
-    press(page, "Reset all")
+    reset_all(page, learner)
     assert eventually(page, lambda: obstacles() == before)
 
 

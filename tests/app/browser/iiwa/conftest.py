@@ -7,14 +7,14 @@ from collections.abc import Iterator
 from functools import partial
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, Page
 
 from app.link.choice import SceneChoice
 from app.link.forkserver import ForkServer
 from app.link.spares import Spares
 from app.server.server import PageServer
-from browsing.browser_actions import eventually, open_page, press, tab, wait_for_scene
-from browsing.scene_switch import show_scene
+from browsing.browser_actions import eventually, open_page, tab
+from browsing.scene_switch import reset_all, show_scene
 from lessons.own.folder import Folder
 from lessons.scenes.run_spec import RunSpec
 
@@ -42,10 +42,9 @@ def page(shared_page: Page, server: PageServer) -> Page:
     """Returns the page in its initial state, independent of the tests before. It is the only page on the
     server."""
     assert eventually(shared_page, lambda: len(server.sessions.learners) == 1)
-    show_scene(shared_page, server.sessions.learners[0], CHOICE)
+    learner = server.sessions.learners[0]
+    show_scene(shared_page, learner, CHOICE)
     tab(shared_page, "Errors")
     tab(shared_page, "Start")
-    press(shared_page, "Reset all")
-    expect(shared_page.get_by_text("RUNNING", exact=True).first).to_be_visible()
-    wait_for_scene(shared_page)
+    reset_all(shared_page, learner)
     return shared_page

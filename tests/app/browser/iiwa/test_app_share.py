@@ -9,6 +9,7 @@ from playwright.sync_api import Page, expect
 from app.client.simulation_client import SimulationClient
 from app.server.server import PageServer
 from browsing.browser_actions import eventually, press, row, set_number, tab, write
+from browsing.scene_switch import reset_all
 from lessons.replay.state import decode
 from lessons.settings.torque import TorqueSettings
 
@@ -39,7 +40,7 @@ def test_a_code_brings_the_setting_back_and_a_script_repeats_the_run(page: Page,
     assert f"Set('horizon', {before + 2})" in text
 
     tab(page, "Start")
-    press(page, "Reset all")
+    reset_all(page, learner)
     assert eventually(page, lambda: horizon(learner) == before)
     tab(page, "Export")
     write(page, "Somebody's code", given[:-3])

@@ -38,6 +38,7 @@ from browsing.browser_actions import (
     wait_for_scene,
     write,
 )
+from browsing.scene_switch import reset_all
 from lessons.scenes.run_spec import RunSpec
 from lessons.settings.torque import TorqueSettings
 from robots import CATALOG
@@ -136,7 +137,7 @@ def test_levels_move_and_gains_change(page: Page, learner: SimulationClient) -> 
         ),
     )
     expect(page.get_by_text("2 · posture")).to_be_visible()
-    press(page, "Reset all")
+    reset_all(page, learner)
     expect(page.get_by_text("2 · orientation")).to_be_visible()
     assert eventually(page, lambda: number(page, "Q") == 200)
 
