@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+import re
+
 from playwright.sync_api import Page, expect
 
 from app.client.simulation_client import SimulationClient
@@ -9,15 +12,25 @@ from app.link.choice import SceneChoice
 from app.link.messages import Load
 from browsing.browser_actions import eventually, press, tab, wait_for_scene
 
+_SOON = 2.0
+"""Simulated time, s; a run that was reset before this time is not told apart from a new one."""
+
 
 def reset_all(page: Page, learner: SimulationClient) -> None:
-    """Presses "Reset all", and waits until the simulation runs from the beginning. Before that, the page
-    shows the previous state, and a click on a control that is about to be replaced has no effect."""
-    before = None if learner.status is None else learner.status.resets
+    """Presses "Reset all", and waits until the simulation runs from the beginning and the page shows it.
+    Before that, a click on a control that is about to be replaced has no effect."""
+    before = learner.status
     press(page, "Reset all")
-    assert eventually(page, lambda: learner.status is not None and learner.status.resets != before)
+    if before is not None:
+        assert eventually(page, lambda: learner.status is not None and learner.status.resets != before.resets)
+        assert eventually(page, lambda: _time_shown(page) < max(before.t, _SOON))
     expect(page.get_by_text("RUNNING", exact=True).first).to_be_visible()
     wait_for_scene(page)
+
+
+def _time_shown(page: Page) -> float:
+    found = re.search(r"t = ([\d.]+) s", page.locator("body").inner_text())
+    return float(found[1]) if found else math.inf
 
 
 def show_scene(page: Page, learner: SimulationClient, choice: SceneChoice) -> None:

@@ -118,6 +118,32 @@ def test_controls_are_reminded_of_what_the_session_has(
     assert len(sent) == 2 and panel.slider.value == 5
 
 
+def test_the_browser_is_told_what_an_edit_became(
+    panel: Panel, settings: TorqueSettings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A value that was sent just before an edit arrives just after it and replaces it on the screen. The
+    edited value is sent again: that of a switch at once, so that the next click inverts it; that of a slider
+    when nobody has moved it for a while."""
+    sent: list[Any] = []
+    switch = panel.gui.add_checkbox("Damping", True)
+    switch._impl.sync_cb = None  # there is no other browser
+    panel.bindings.bind(switch, lambda s: s.damping, lambda on: Set("damping", bool(on)))
+    panel.refresh(settings)
+    monkeypatch.setattr(panel.gui._websock_interface, "queue_message", sent.append)
+    message = _messages.GuiUpdateMessage(switch._impl.uuid, {"value": False})
+    asyncio.run_coroutine_threadsafe(panel.gui._handle_gui_updates(0, message), panel.loop).result(10)  # pyright: ignore
+    assert [(each.uuid, each.updates) for each in sent] == [(switch._impl.uuid, {"value": False})]
+    sent.clear()
+    panel.browser_sets(12)
+    panel.refresh(settings)
+    assert sent == []  # the slider may still be moving
+    monkeypatch.setattr(bind, "HOLD", 0.0)
+    edited = replace(settings, horizon=12, damping=False)
+    panel.refresh(edited)
+    panel.refresh(edited)
+    assert [(each.uuid, each.updates) for each in sent] == [(panel.slider._impl.uuid, {"value": 12})]
+
+
 def test_a_wish_counts_until_the_answer_is_due(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two quick presses of a toggle restore its initial state, because an unconfirmed edit counts until HOLD
     s have passed."""

@@ -18,7 +18,9 @@ from lessons.events import Event
 REMIND = 2.0
 """Period, s, after which the values of all controls are sent again. viser sends at most one change per 50 ms
 and tab and drops all but the latest: if two controls change at once (or while the browser is busy), one
-change may be lost, and the control would go on showing a wrong value."""
+change may be lost, and the control would go on showing a wrong value. A value that is on its way to the
+browser at the moment of an edit replaces the edit on the screen; therefore a control sends its value again
+after each edit, too: a switch or a menu at once, a slider or a number when it has not changed for HOLD s."""
 
 S = TypeVar("S")
 
@@ -28,6 +30,7 @@ class _Mirror(Generic[S]):
     handle: viser.GuiInputHandle[Any]
     read: Callable[[S], Any]
     touched: float = -float("inf")
+    sent: float = 0.0  # time at which the value was sent last
 
 
 class Bindings(Generic[S]):
@@ -66,6 +69,9 @@ class Bindings(Generic[S]):
             if change.client is None:
                 return  # a value that `refresh` wrote
             mirror.touched = time.monotonic()
+            if isinstance(handle, (viser.GuiCheckboxHandle, viser.GuiDropdownHandle)):
+                send_again(handle)
+                mirror.sent = mirror.touched
             self.post(event(on_scale(handle)))
 
     def refresh(self, present: S) -> None:
@@ -92,8 +98,10 @@ class Bindings(Generic[S]):
                 value = mirror.read(present)
                 if value != mirror.handle.value:
                     mirror.handle.value = value
-                elif remind:
+                    mirror.sent = now
+                elif remind or mirror.sent < mirror.touched:
                     send_again(mirror.handle)
+                    mirror.sent = now
 
 
 def on_scale(handle: viser.GuiInputHandle[Any]) -> Any:
