@@ -35,7 +35,7 @@ def checked(answer: Any, levels: int, n: int, where: str) -> Array:
     if not usable(found.ravel()):
         worst = int(np.argmax(~np.isfinite(found[-1]))) if not np.isfinite(found[-1]).all() else None
         which = f" for joint {worst + 1}" if worst is not None else ""
-        raise OwnFault(f"{where}: it returned a torque that is no finite, usable number{which}")
+        raise OwnFault(f"{where}: it returned a torque that is not finite, or is too large{which}")
     return found
 
 

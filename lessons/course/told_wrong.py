@@ -111,7 +111,7 @@ THERE = Step(
     do="How late may the correction of the report come? Find the last time with which 5 cm are kept.",
     why=r"""
     The robot drives 40 cm into the crate; until 7 s its base is never more than 3 mm from its line. The
-    bound keeps a distance from the reported crate; the true crate is no part of it. The time of the
+    bound keeps a distance from the reported crate, not from the true one. The time of the
     correction is decisive. A correction at 5 s is early enough: 5 cm are kept and the hand stays on its
     line. A correction at 5.4 s is nearly too late: 2 cm are left. The hand swings out by 12 cm meanwhile:
     (7c) bounds level 1, too. A correction at 5.6 s is too late: the robot overlaps the crate by 7 cm. A

@@ -115,8 +115,8 @@ def exercise_of(source: Source) -> Exercise:
     """
     if not _makes_one(source):
         raise InputError(
-            f"{source.path}: is no file of an exercise: it must assign EXERCISE = own_exercise(…); begin "
-            "with himpc-lab new exercise FILE.py"
+            f"{source.path}: is not the file of an exercise: it must assign EXERCISE = own_exercise(…); "
+            "begin with himpc-lab new exercise FILE.py"
         )
     module = load(source)
     expected(module, "exercise")

@@ -21,7 +21,7 @@ class Folder:
         """The folder of a name. Raises InputError if there is none."""
         try:
             path = Path(os.path.realpath(name))
-        except (OSError, ValueError):  # "." is gone, or this is no path
+        except (OSError, ValueError):  # the folder "." was removed, or this is not a path
             path = None
         if path is None or not path.is_dir():
             raise InputError(f"--own-files {shortened(name, 100)} is not a folder: give one that exists")

@@ -102,14 +102,14 @@ def valid(asked: Choice | Value, answer: object) -> float:
         case Choice() if type(answer) is int and 0 <= answer < len(asked.options):
             return answer
         case Choice():
-            raise InputError(f"this is no answer: choose one of the {len(asked.options)} options")
+            raise InputError(f"this is not an option: choose one of the {len(asked.options)} options")
         case Value() as value:
             if isinstance(answer, (int, float)) and not isinstance(answer, bool):
                 slack = 1 + 1e-9  # a slider computes its ends with rounding
                 if value.low / slack <= answer <= value.high * slack:
                     return float(min(max(answer, value.low), value.high))
             raise InputError(
-                f"this is no answer: give a number from {value.low:g} to {value.high:g} {value.measure.unit}"
+                f"the answer must be a number from {value.low:g} to {value.high:g} {value.measure.unit}"
             )
 
 

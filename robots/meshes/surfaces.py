@@ -58,7 +58,7 @@ def read_meshes(paths: tuple[str, ...]) -> dict[str, tuple[Piece, ...]]:
 def read_mesh(path: Path) -> tuple[Piece, ...]:
     """Returns the pieces of a mesh file, one per colour. May raise any exception for a bad file."""
     if path.suffix.lower() not in _FORMATS or path.stat().st_size > MAX_BYTES:
-        raise ValueError(f"{path} is no mesh file of at most {MAX_BYTES} bytes")
+        raise ValueError(f"{path} is not a mesh file, or has more than {MAX_BYTES} bytes")
     scene = trimesh.load_scene(str(path))
     pieces: dict[Colour | None, list[tuple[np.ndarray, np.ndarray]]] = {}
     for solid in scene.dump():

@@ -92,8 +92,8 @@ def _surfaces(uris: list[str]) -> dict[str, np.ndarray]:
 
 
 def _scaled(shape: Element, meshes: Mapping[str, np.ndarray]) -> np.ndarray:
-    """The points (V, 3), m, of the mesh that an element names. Raises ValueError for a scale that is no
-    number."""
+    """The points (V, 3), m, of the mesh that an element names. Raises ValueError for a scale that is not
+    a number."""
     scale = np.broadcast_to([float(word) for word in shape.get("scale", "1 1 1").split()], 3)
     return meshes.get(shape.get("filename", ""), np.zeros((0, 3))) * scale
 
@@ -110,7 +110,7 @@ def _corners(solid: Solid) -> np.ndarray:
 
 
 def primitive(shape: Element, joint: int, link: str, source: Source, at: pin.SE3) -> Solid | None:
-    """A box, cylinder or sphere; None for a mesh. Raises ValueError for a size that is no number."""
+    """A box, cylinder or sphere; None for a mesh. Raises ValueError for a size that is not a number."""
     sizes = {
         name: [float(word) for word in shape.get(name, "").split()] for name in ("size", "radius", "length")
     }

@@ -95,7 +95,7 @@ def _visual(
 
 
 def _geometry(shape: Element, meshes: Mapping[str, tuple[Piece, ...]]) -> Iterator[Piece]:
-    """Yields the pieces of one geometry element. Raises ValueError for a size that is no number."""
+    """Yields the pieces of one geometry element. Raises ValueError for a size that is not a number."""
     if shape.tag == "mesh":
         scale = np.broadcast_to(_numbers(shape, "scale", "1 1 1"), 3)
         for colour, vertices, faces in meshes.get(shape.get("filename", ""), ()):

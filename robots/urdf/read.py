@@ -64,18 +64,19 @@ def parse(data: bytes, source: str) -> Element:
 def load_bytes(path: Path) -> bytes:
     """Returns the content of a URDF file, at most one byte more than the parser accepts.
 
-    Raises InputError if the path cannot be read or is no regular file: reading a pipe could block for ever.
+    Raises InputError if the path cannot be read, or is not a regular file: reading a pipe could block
+    for ever.
     """
     try:
         if path.is_dir():
             reason = "it is a folder"
         elif path.exists() and not path.is_file():
-            reason = "it is no plain file"
+            reason = "it is not a regular file"
         else:
             with path.open("rb") as file:
                 return file.read(MAX_BYTES + 1)
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "this is no path"
+        reason = getattr(error, "strerror", None) or "this is not a valid path"
     name = shortened(str(path), 100)
     raise InputError(f"Cannot read the URDF '{name}': {reason}; give the path of a URDF file.")
 

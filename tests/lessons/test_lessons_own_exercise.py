@@ -94,10 +94,10 @@ def test_a_submission_to_an_own_exercise_is_graded_in_a_process_that_cannot_read
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("EXERCISE = 'joint-pd'\nraise SystemExit\n", "is no file of an exercise"),
+        ("EXERCISE = 'joint-pd'\nraise SystemExit\n", "is not the file of an exercise"),
         ("def torque(now): return now.q\nEXERCISE = make()\n", "name 'make' is not defined"),
         ("EXERCISE = dict()\n", "must be made with own_exercise"),
-        ("EXERCISE = (\n", "is no file of an exercise"),
+        ("EXERCISE = (\n", "is not the file of an exercise"),
     ],
 )
 def test_another_file_is_no_exercise(text: str, words: str, tmp_path: Path) -> None:

@@ -125,11 +125,12 @@ def optimum(
 
     Args:
         level: prepared.
-        active: the k rows to begin with, from `warm_start`; holds the active rows and their multipliers
-            afterwards.
-        bounds: gives way by rounding where nothing else can.
+        active: the k rows to begin with, from `warm_start`. Afterwards it contains the active rows and their
+            multipliers.
+        bounds: the bounds. A bound that cannot be met because of rounding is widened by its violation.
         U: the increments found, (N, n).
-        budget: how many multiplications are left, one number: time, but the same on every machine.
+        budget: an array of one number, the number of multiplications that are left. It limits the time, and
+            is the same on every machine.
     """
     low, high, value = bounds.low, bounds.high, bounds.value
     N, d, D = len(level.start), level.cost.d, level.cost.D

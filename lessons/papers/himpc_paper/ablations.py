@@ -39,8 +39,8 @@ def _line(runs: Mapping[float, JobResult], label: str, colour: str) -> PlotCurve
 
 _N = 20
 _SHORTER = {False: (20, 10, 5, 2, 1), True: (20, 5, 1)}
-"""Numbers of knots of the lower levels; the key says whether it is the quick version, also in the tables
-below."""
+"""Numbers of knots of the lower levels. Here and in the tables below, the key True stands for the quick
+version."""
 
 
 def _shorter(knots: int, timed: bool) -> Job:
