@@ -35,7 +35,7 @@ Secret = Annotated[str, Meta(pattern=_SECRET)]
 Count = Annotated[int, Meta(ge=0, le=100_000)]
 Place = tuple[Short, Annotated[int, Meta(ge=0, le=1000)]]
 Ran = tuple[Short, Annotated[int, Meta(ge=0, le=1000)], Count, Count]
-"""Lesson and step, claims met and claims."""
+"""Lesson, step, number of claims that are met, and number of all claims."""
 Answered = int | Number
 Votes = Annotated[list[tuple[Answered, Count]], Meta(max_length=VOTERS)]
 

@@ -79,7 +79,7 @@ class Forked:
 
 
 class Spawned:
-    """A process of Python's own `multiprocessing`; methods as of `Forked`."""
+    """A process of Python's own `multiprocessing`; with the same methods as `Forked`."""
 
     doing = ""
 

@@ -9,8 +9,8 @@ import msgspec
 from msgspec import Meta
 
 LONGEST = 2_000_000
-"""Largest size, B, of a message without a part of a file; a text of the page has at most 200,000
-characters."""
+"""Largest size, B, of a message that contains no part of a file. A text that the page sends has at most
+200,000 characters."""
 _FILE = b"FileTransfer"  # in every message that begins or carries a file
 _CAMERA = b"ViewerCamera"  # in messages that pages send by themselves
 _LEAST = 1e-9  # m, or the norm of a quaternion: a shorter vector has no direction

@@ -195,8 +195,8 @@ class Hand:
         """Shows the filtered target of the last telemetry row, rings if an orientation can be dragged, and
         the verdict.
 
-        running: whether simulated time passes or a past instant is shown; otherwise the gizmo says how to
-            continue.
+        running: true if simulated time passes or a past instant is shown; if it is false, the gizmo says how
+            to continue.
         """
         gizmo = self._gizmo
         if gizmo is None:

@@ -64,9 +64,9 @@ class HTMPCSettings:
         formulation: "proximal" (the effort of upper levels is their deviation from the shifted previous plan;
             hard rows) or "paper" (every level has the absolute effort (10), states and inputs softened by
             relaxed log barriers).
-        lexicographic: constraint (12), "per_coordinate", or (11), "cost".
-        delta_m: δ of (13), by how much a level's error may exceed its best at a knot, m (or rad); for (11) it
-            becomes the cost of that error at every knot.
+        lexicographic: "per_coordinate" for constraint (12), "cost" for constraint (11).
+        delta_m: δ of (13), m (or rad): by how much the error of a level at a knot may exceed its best value
+            there. For (11), δ is converted to a cost: that of an error δ at every knot.
         max_iter: MAX_ITER, QPs per level.
         limits: bounds.
         obstacles: obstacles of the collision avoidance (7c).

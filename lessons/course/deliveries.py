@@ -179,7 +179,7 @@ WAIT = Step(
     ),
     claims=(
         Claim(
-            "While the hand waits, 5 s to 14 s, the base drives on by at least 45 cm.",
+            "While the hand waits, from 5 s to 14 s, the base drives on by at least 45 cm.",
             Measure(WAY, "range", after=5.0, until=14.0),
             "at least",
             0.45,

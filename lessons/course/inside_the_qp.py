@@ -93,7 +93,7 @@ SWAP = Step(
     the order has changed.
     """,
     prediction=Choice(
-        "The wrist is on its target when its level becomes the second. One second later the wrist is …",
+        "The wrist is on its target when its level becomes level 2. After 1 s the wrist is …",
         (
             Option("still there: nobody has moved the target", high=10.0),
             Option("half way back", 10.0, 80.0),

@@ -198,7 +198,7 @@ BEHIND = Step(
     alone 19 cm. An order of tasks does not hold if the bounds are applied after it.
     """,
     prediction=Choice(
-        "The rows are the same, but behind the levels. At the end the hand …",
+        "The rows are the same, but a filter after all levels imposes them. At the end the hand …",
         (
             Option("is at its target, as the ghost's", high=5.0),
             Option("is a few centimetres away", 5.0, 100.0),

@@ -130,7 +130,8 @@ LONGER = Step(
 VIABLE = Step(
     title="A speed from which the joint can stop",
     text=r"""
-    Instead of the position, bound the speed to values from which the joint can still stop, at any distance:
+    Instead of the position, bound the speed. At every distance from the limit, only speeds are allowed from
+    which the joint can still stop:
 
     $$\dot q \le a\left(-t + \sqrt{t^2 + 2\,(q_s - q)/a}\right)$$
 
@@ -138,9 +139,9 @@ VIABLE = Step(
     Such a state is called viable: a motion exists that keeps the limit. For an exact model $t = T_s$ and
     $q_s = q_{\max}$ would be enough. Two things are not exact. The rows on speed delay the braking: in a
     second the speed may change by at most 15 times its distance from its bound. So $t = T_s + 5/15$ s $=
-    0.33$ s. Our model is estimated, so that the joint brakes late and then harder than with $a$. To allow
-    for this delay, $q_s$ lies 0.4° before the limit; beyond $q_s$ the joint must come back, at a speed of
-    five times the excess per second. Again $N = 5$.
+    0.33$ s. Our model is estimated, so the joint brakes late, and then harder than with $a$. To allow for
+    this late braking, $q_s$ lies 0.4° before the limit. Beyond $q_s$ the joint must come back: its speed in
+    °/s is five times its distance from $q_s$ in degrees. Again $N = 5$.
     """,
     do="Let the speed bound close in faster, at 60 and 200 1/s. What improves, and how large is the torque?",
     why=r"""

@@ -29,7 +29,7 @@ class ObstacleDistances:
         self._true = self._told = CollisionModel(robot, settings.obstacles, settings.self_collision)
 
     def tell(self, obstacles: tuple[Obstacle, ...]) -> None:
-        """Takes over the obstacles that are reported from now on."""
+        """Sets the obstacles as they are reported, which may differ from the true ones."""
         if obstacles == self._reported:
             return
         self._reported = obstacles

@@ -47,7 +47,7 @@ SIXTH_ROWS = (
         measure=LATE_SPEED, there=(17.5, 18.5), without=("M_bar_scale=2",), gone=(17.5, 18.5), stays=True,
     ),
     VIABLE(
-        says="Our model is estimated, so that the joint brakes late and then harder than with $a$",
+        says="Our model is estimated, so the joint brakes late, and then harder than with $a$",
         measure=TORQUE, there=(76.5, 77.5), without=("M_bar_scale=2",), gone=(66.5, 67.5), of=NO_DELAY,
     ),
     VIABLE(

@@ -19,7 +19,7 @@ from lessons.settings.settings import SceneSettings
 
 
 class Course:
-    """The lessons of a page, built with every scene. The tab of a lesson comes first, since the learner
+    """The lessons of a page, built anew for every scene. The tab of a lesson comes first, since the learner
     opened the page for it."""
 
     def __init__(

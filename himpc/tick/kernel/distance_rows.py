@@ -96,8 +96,8 @@ def nearest(
     moving: Array,
     about: Array,
 ) -> int:
-    """Chooses, among `count` pairs, those that can come first to the smallest distance that they must keep,
-    see `soonest`. Chooses at most as many as `chosen` has room for, sorts them by distance, and returns their
+    """Chooses those of `count` pairs that can soonest reach the distance that they must keep, see `soonest`.
+    Chooses at most as many as `chosen` has room for, sorts them by distance, and returns their
     number. A near pair whose distance hardly changes is not chosen if farther pairs can approach faster.
 
     Args:
