@@ -9,7 +9,7 @@ from playwright.sync_api import Page, expect
 
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
-from app.link.messages import Load
+from app.link.messages import Load, Status
 from browsing.browser_actions import eventually, press, tab, wait_for_scene
 
 _SOON = 2.0
@@ -22,10 +22,16 @@ def reset_all(page: Page, learner: SimulationClient) -> None:
     before = learner.status
     press(page, "Reset all")
     if before is not None:
-        assert eventually(page, lambda: learner.status is not None and learner.status.resets != before.resets)
+        assert eventually(page, lambda: _began_after(learner.status, before))
         assert eventually(page, lambda: _time_shown(page) < max(before.t, _SOON))
     expect(page.get_by_text("RUNNING", exact=True).first).to_be_visible()
     wait_for_scene(page)
+
+
+def _began_after(status: Status | None, before: Status) -> bool:
+    """Whether the run began after a status. A new process, which replaces one in trouble, counts its resets
+    from 1."""
+    return status is not None and (status.resets != before.resets or status.t < before.t)
 
 
 def _time_shown(page: Page) -> float:

@@ -237,7 +237,7 @@ class Sockets:
     # ---------------------------------------------------------------- all pages
 
     def _tell(self) -> None:
-        """Called on the thread of the class after every look."""
+        """Called on the thread of the class each time after it has looked at the pages."""
         news = {name: json.dumps(each) for name, each in self._news().items() if each is not None}
         loop, now = self._loop, _packed(self._hall.news())
         if loop is not None and not loop.is_closed():

@@ -29,8 +29,8 @@ class Coming:
 
     @classmethod
     def at(cls, place: LessonPlace, settings: SceneSettings | None) -> Coming | None:
-        """The step before any command; None if its controls cannot be built from the present settings.
-        Raises InputError if there is no such step."""
+        """The step as it is before any command; None if its controls cannot be built from the present
+        settings. Raises InputError if there is no such step."""
         from lessons.teaching.lesson import Step
 
         part = place.part

@@ -47,7 +47,7 @@ def written(choice: SceneChoice, settings: SceneSettings, start: SceneChoice) ->
     try:
         return json.dumps({**place, "code": code_of(Told(choice, settings, (), 0.0))})
     except InputError:
-        return ""  # e.g. an uploaded robot: another server starts with its own scene
+        return ""  # e.g. an uploaded robot, which other servers do not have
 
 
 def read(text: str | None, start: SceneChoice) -> SceneChoice | None:

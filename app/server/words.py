@@ -45,7 +45,7 @@ class ViewerCameraMessage(msgspec.Struct, forbid_unknown_fields=True, tag=True, 
 
     def __post_init__(self) -> None:
         if math.dist(self.position, self.look_at) < _LEAST:
-            raise ValueError("it looks at where it is")
+            raise ValueError("the camera is at the point that it looks at")
         _has_direction(self.up_direction)
 
 

@@ -143,7 +143,7 @@ SUM = Step(
     $$\mathcal J_i(\bar x, \bar u) \le \mathcal J_i(\bar x^{i*}, \bar u^{i*}) \quad (11)$$
 
     the other bounds each error, (12). Every plan that keeps (12) keeps (11) as well: (12) is the stricter
-    one. This step uses (11), with a $\delta$ that allows the cost of 1 cm at every knot. The ghost has
+    one. This step uses (11), with a $\delta$ that allows the cost of 1 cm at every knot. The ghost uses
     (12).
     """,
     do="Raise the δ of (11) until the base is as fast as the ghost. How large is the error of the hand?",

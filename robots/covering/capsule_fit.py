@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 _ROUNDS = 12  # steps of the search for the middle of a circle
-_DIGITS = 4  # of a coordinate in m
-_FEW, _MANY = 48, 100  # directions in which the farthest points are fitted, quickly or tightly
-_FACTORS = np.array([1.0, 1.05, 1.1, 1.2, 1.3, 1.5])  # tried for the radius, times the smallest
-_AT_ONCE = 2_000_000  # numbers in an array
+_DIGITS = 4  # decimal places of a coordinate in m
+_FEW, _MANY = 48, 100  # numbers of directions, of a quick and of a tight fit to the farthest points
+_FACTORS = np.array([1.0, 1.05, 1.1, 1.2, 1.3, 1.5])  # radii that are tried, as multiples of the smallest
+_AT_ONCE = 2_000_000  # largest number of elements of an array
 
 
 class Fit(NamedTuple):
