@@ -228,8 +228,8 @@ class Visit:
         self._keep(_DARK, "1" if on else "0")
 
     def _greet(self, learner: SimulationClient, leads: bool, gui: viser.GuiApi) -> None:
-        """Adds the field for the instructor's token to a page that can only watch, and the card of a class to a
-        page of the class."""
+        """Adds the field for the instructor's token to a page that can only watch, and the card of a class to
+        a page of the class."""
         room = self._room
         if room is not None and not leads:
             watches = isinstance(learner, Watcher)
