@@ -27,8 +27,8 @@ CONTENDERS: tuple[tuple[Route, Solver], ...] = (
 _LONGEST_EXPLICIT = 20
 """The explicit route is left out beyond this horizon: one step takes seconds there."""
 _TURN = 10
-"""Number of timed ticks of a contender before the next contender runs. The contenders take turns, and the noise
-of the machine affects all of them equally. An untimed tick precedes each turn: at that tick the caches
+"""Number of timed ticks of a contender before the next contender runs. The contenders take turns, and the
+noise of the machine affects all of them equally. An untimed tick precedes each turn: at that tick the caches
 still hold the data of the previous contender, which does not happen on a robot.
 """
 _DRAG_TICKS = 100
