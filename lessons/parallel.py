@@ -84,7 +84,7 @@ def _until_one_dies(
     with _pool(workers) as pool, suppress(BrokenProcessPool):
         while not orphans and (waiting or under_way):
             with _born_deaf():
-                # Not more items than processes: a dying process ends no further items.
+                # One item per process at most: if a process dies, the items that wait are not lost.
                 while waiting and len(under_way) < workers:
                     future = pool.submit(guarded, function, items[waiting[0]])
                     under_way[future] = waiting.popleft()

@@ -24,7 +24,7 @@ Refuse = Callable[[str], object]
 GRACE = 10.0  # s that a session outlives its tab: enough for a reload
 _PERIOD = 0.5  # s between two checks which learners have left
 _TIDY = 10.0
-"""Time, s, between two times that free memory is returned to the system, if scenes were changed meanwhile."""
+"""Interval, s, at which free memory is returned to the system if scenes were changed since the last time."""
 
 
 class Sessions:

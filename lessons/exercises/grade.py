@@ -231,8 +231,8 @@ def _own(shown: Shown, diagnosis: Diagnosis, settings: TorqueSettings, robot: Ro
 
 
 def beside(scene: TorqueScene, shown: Shown, diagnosis: Diagnosis, duration: float) -> float:
-    """The largest difference in torque, N·m, between the scene's controller, which drives, and a submission
-    that is shown the same states. Raises InputError if the submission fails."""
+    """The largest difference, N·m, between the torque of the scene's controller, which moves the robot, and
+    the torque that a submission computes for the same states. Raises InputError if the submission fails."""
     session = TorqueSession(scene)
     other = _own(shown, diagnosis, scene.settings, session.robot)
     other.reset(session.plant.tau)

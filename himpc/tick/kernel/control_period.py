@@ -51,18 +51,18 @@ _clock = _monotonic_us if os.name == "posix" else _no_clock
 def perform_parts(
     data: Any, where: Whole, whole: Whole, whole_where: Whole, parts: int, i: int, room: float
 ) -> int:
-    """Performs parts of a control period, in the order of their names.
+    """Performs parts of a control period, in the order in which the constants above are defined.
 
     Args:
         data, where, whole, whole_where: the arena.
-        parts: what is to be done, a sum of LINEARIZE … REMEMBER. REMEMBER belongs to FINISH.
+        parts: what is to be done, a sum of LINEARIZE … REMEMBER. REMEMBER has an effect only with FINISH.
         i: LEVELS: the first level to solve; ONE_LEVEL: the level to solve.
         room: of ONE_LEVEL, N·m, see `solve_level`.
 
     Returns:
-        the number of levels if all went well; the level for which no optimum was found: the caller must then
-        apply its fallback and perform the remaining parts; NOT_FINITE if the problems or the torque are not
-        finite.
+        the number of levels if all went well; NOT_FINITE if the problems or the torque are not finite;
+        otherwise the level for which no optimum was found. The caller must then apply the level's fallback
+        and perform the remaining parts.
     """
     t = arrays_of(data, where, whole, whole_where)
     if parts & LINEARIZE and not linearize(data, where, whole, whole_where):

@@ -19,7 +19,8 @@ from robots import InputError
 
 MAX_CELLS = 100_000
 _DECADE = 10.0
-"""A range from `lo` to this many times `lo` or more is divided in equal ratios, not equal steps."""
+"""A range whose upper end is at least this many times its lower end is divided in equal ratios instead of
+equal steps."""
 
 
 @dataclass(frozen=True)
