@@ -184,6 +184,14 @@ def tab(page: Page, name: str) -> None:
     page.wait_for_timeout(BETWEEN)
 
 
+def unfold(page: Page, title: str, at: int = 0) -> None:
+    """Unfolds a folder and waits until it has its whole height. Before that, a control may move between the
+    press and the release of the mouse, and then gets no click."""
+    folder = page.get_by_text(title, exact=True).nth(at)
+    folder.click()
+    assert eventually(page, lambda: folder.evaluate("(title) => !title.nextElementSibling.style.height"))
+
+
 def key(page: Page, name: str) -> None:
     page.keyboard.press(name)
     page.wait_for_timeout(BETWEEN)

@@ -93,6 +93,7 @@ class PageServer:
         self.sessions = room or alone or Sessions(choice, max_sessions, grace)
         self._own_files, self._key, self._refers = own_files, key, refers
         self._visits: dict[int, Visit] = {}
+        self._closed = False  # once True, no visit is added to `_visits`
         self._lock = threading.Lock()
         self._sockets: Sockets | None = None
         self._link: Link | None = None
@@ -198,7 +199,11 @@ class PageServer:
             refers=self._refers,
         )
         with self._lock:
-            self._visits[client.client_id] = visit
+            closed = self._closed
+            if not closed:
+                self._visits[client.client_id] = visit
+        if closed:
+            visit.leave()
         await visit.arrive()
 
     async def _disconnect(self, client: viser.ClientHandle) -> None:
@@ -226,6 +231,7 @@ class PageServer:
             if each is not None:
                 each.close()
         with self._lock:
+            self._closed = True
             visits, self._visits = list(self._visits.values()), {}
         for visit in visits:
             visit.leave()

@@ -102,7 +102,8 @@ class Visit:
             )
 
     async def arrive(self) -> None:
-        """Starts the visit, on viser's loop. A browser that does not answer is treated as a new one."""
+        """Starts the visit, on viser's loop, unless it has ended already. A browser that does not answer is
+        treated as a new one."""
         private.run_script(self._client, ASK_MOTION)
         here = f"himpc-lab-place-{secrets.token_hex(8)}"
         size = f"{here}-window"
@@ -110,6 +111,8 @@ class Visit:
         private.run_script(self._client, ASK_WINDOW % (STORED, size))
         keys = (self._tokens_key, _DARK, self._progress_key, MOTION, here, size)
         self._asking = asyncio.ensure_future(private.read_storage(self._client, keys, STORAGE))
+        if self._left:  # `leave` may have found nothing to cancel
+            self._asking.cancel()
         try:
             found = await self._asking
         except asyncio.CancelledError:

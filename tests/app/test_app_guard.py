@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 import gc
 import http.client
 import os
 import socket
 import subprocess
 import sys
+import threading
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
@@ -32,6 +34,7 @@ from app.server.door import Door
 from app.server.guard import FIRST_WORD, ConnectionGuard, GuardedConnection
 from app.server.passes import QUERY
 from app.server.server import PageServer
+from app.server.visit import Visit
 from browsing.wire import camera, let_in, pack
 from lessons.own.folder import Folder
 from lessons.scenes.run_spec import RunSpec
@@ -403,6 +406,33 @@ def test_a_page_that_says_nothing_leaves_no_noise_at_the_end(caplog: pytest.LogC
     with dial(server) as page:
         page.send(pack(camera()))
         assert wait_until(lambda: server.guard.taken > 0, LONG)
+        server.close()
+    gc.collect()
+    assert not [record for record in caplog.records if record.name == "asyncio"]
+
+
+def test_a_page_that_comes_while_the_server_closes_leaves_no_noise(
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The visit of a page ends before it has asked the page anything."""
+    came, left, arrive, leave = threading.Event(), threading.Event(), Visit.arrive, Visit.leave
+
+    async def late(visit: Visit) -> None:
+        came.set()
+        while not left.is_set():
+            await asyncio.sleep(0.01)
+        await arrive(visit)
+
+    def leaves(visit: Visit) -> None:
+        leave(visit)
+        left.set()
+
+    monkeypatch.setattr(Visit, "arrive", late)
+    monkeypatch.setattr(Visit, "leave", leaves)
+    server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
+    with dial(server) as page:
+        page.send(pack(camera()))
+        assert came.wait(LONG)
         server.close()
     gc.collect()
     assert not [record for record in caplog.records if record.name == "asyncio"]

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, expect
 
-from browsing.browser_actions import eventually, is_drawn, open_page, position, press, set_number
+from browsing.browser_actions import eventually, is_drawn, open_page, position, press, set_number, unfold
 from tests.commands.exported import needed
 
 ROOT = Path(__file__).parents[3]
@@ -45,7 +45,7 @@ def test_an_arm_and_its_simulation_on_a_page(browser: Browser, program: subproce
     expect(page.get_by_text("periods missed")).to_be_visible()
     assert eventually(page, lambda: is_drawn(page, "/ghost/1"))
     expect(page.get_by_text("position [mm], ghost")).to_be_visible()
-    page.get_by_text("Move a target by keys").click()
+    unfold(page, "Move a target by keys")
     set_number(page, "Target y [m]", 0.08)
 
     def moved() -> bool:

@@ -27,6 +27,7 @@ from browsing.browser_actions import (
     set_number,
     tab,
     target_position,
+    unfold,
     wait_for_scene,
 )
 from browsing.scene_switch import reset_all
@@ -145,7 +146,7 @@ def test_the_camera_goes_along_with_the_base(page: Page, learner: SimulationClie
     its camera late."""
     load(page, learner, "ridgeback-ur10-drag")
     tab(page, "Start")
-    page.get_by_text("Show", exact=True).first.click()
+    unfold(page, "Show")
     along = row(page, "Camera follows the base").locator("input")
     along.click()
     expect(along).to_be_checked()
@@ -212,7 +213,7 @@ def test_tasks_are_added_released_and_settings_changed(page: Page, learner: Simu
     page.get_by_role("button", name="Release ee 1").click()
     assert eventually(page, lambda: mission(learner).rows[1].state == "done")
     assert eventually(page, lambda: mission(learner).people[0].balls == 1)
-    page.get_by_text("Add a task").click()
+    unfold(page, "Add a task")
     press(page, "Add")
     assert eventually(page, lambda: mission(learner).rows[-1].name == "ee added")
     assert learner.failure is None
@@ -246,7 +247,7 @@ def test_obstacles_are_moved_by_hand_and_put_in_the_way(page: Page, learner: Sim
     assert eventually(page, lambda: len(obstacles()) == len(before))
     press(page, "Put an obstacle in the way")
     assert eventually(page, lambda: len(obstacles()) == len(before) + 1)
-    page.get_by_text("Show", exact=True).click()
+    unfold(page, "Show")
     row(page, "Arrows of obstacles").locator("input").click()
     assert eventually(page, lambda: not is_drawn(page, f"/obstacle_arrows/{place}"))
     tab(page, "Start")

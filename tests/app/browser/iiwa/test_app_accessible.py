@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from app.page.comfort import LINE
-from browsing.browser_actions import key, press, row, tab
+from browsing.browser_actions import key, press, row, tab, unfold
 
 RIGHT = ("Start", "Tasks", "Control", "Plant", "Lessons", "Compare", "Export", "Robot", "Help")
 LEFT = ("Errors", "Joints", "Inside", "Who binds")
@@ -75,9 +75,7 @@ def test_axe_would_find_what_is_wrong(page: Page, checked: Page) -> None:
 
 
 def test_keys_move_the_target_and_a_line_says_what_happened(page: Page) -> None:
-    press(page, "Move a target by keys") if page.get_by_role(
-        "button", name="Move a target by keys", exact=True
-    ).count() else page.get_by_text("Move a target by keys", exact=True).first.click()
+    unfold(page, "Move a target by keys")
     field = page.get_by_label("Target y [m]", exact=True).first
     expect(field).to_be_visible()
     before = float(field.input_value())

@@ -18,6 +18,7 @@ from browsing.browser_actions import (
     row,
     tab,
     target_position,
+    unfold,
     write,
 )
 from browsing.wire import Wire
@@ -46,11 +47,6 @@ def now(learner: SimulationClient, field: str) -> float:
     assert found is not None
     layout, latest = found
     return float(np.linalg.norm(latest[layout.fields[field]]))
-
-
-def unfold(page: Page, title: str, at: int = 0) -> None:
-    page.get_by_text(title, exact=True).nth(at).click()
-    page.wait_for_timeout(300)
 
 
 def frame_clicked(page: Page) -> str:

@@ -8,31 +8,34 @@ from browsing.browser_actions import pick, row, tab
 from lessons.scenes.names import SCENES
 
 
-def top(page: Page, button: str, place: int = 0) -> float:
-    """The distance of a button from the top of the page, px."""
+def below(page: Page, button: str, first: str, place: int = 0) -> float:
+    """The distance of a button from the text with which its tab begins, px. It does not depend on how far the
+    tab is scrolled."""
     box = page.get_by_role("button", name=button, exact=True).nth(place).bounding_box()
-    assert box is not None
-    return box["y"]
+    start = page.get_by_text(first, exact=False).first.bounding_box()
+    assert box is not None and start is not None
+    return box["y"] - start["y"]
 
 
 def test_a_description_of_a_scene_moves_no_button(page: Page) -> None:
     """The descriptions have one and two lines."""
     tab(page, "Robot")
-    before = top(page, "Load scene")
+    before = below(page, "Load scene", "7 joints")
     for scene in ("panda-post", "baxter-conflict"):
         pick(page, "Scene", scene)
         expect(page.get_by_text(SCENES[scene])).to_be_visible()
-        assert top(page, "Load scene") == before
+        assert below(page, "Load scene", "7 joints") == before
 
 
 def test_a_level_that_is_off_moves_no_button(page: Page) -> None:
     """A level that is off has a text of one line; the lowest level has one of three."""
     tab(page, "Tasks")
     expect(page.get_by_text("gets 1 of 7 directions", exact=False)).to_be_visible()
-    before = [top(page, "▼ Down", place) for place in range(3)]
+    first = "The level with the highest priority is first."
+    before = [below(page, "▼ Down", first, place) for place in range(3)]
     box = row(page, "Enabled").get_by_role("checkbox")
     box.click()
     expect(page.get_by_text("OFF", exact=True)).to_be_visible()
-    assert [top(page, "▼ Down", place) for place in range(3)] == before
+    assert [below(page, "▼ Down", first, place) for place in range(3)] == before
     box.click()
     expect(page.get_by_text("OFF", exact=True)).to_be_hidden()

@@ -35,6 +35,7 @@ from browsing.browser_actions import (
     tab,
     target_position,
     turn_target,
+    unfold,
     wait_for_scene,
     write,
 )
@@ -125,7 +126,7 @@ def test_a_level_switched_off_lets_go_and_level_1_does_not(page: Page, learner: 
 
 def test_levels_move_and_gains_change(page: Page, learner: SimulationClient) -> None:
     tab(page, "Tasks")
-    page.get_by_text("Gains and weights").first.click()
+    unfold(page, "Gains and weights")
     set_number(page, "Q", 300)
     assert eventually(page, lambda: learner.settings is not None and learner.settings.levels[0].Q == 300)
     page.get_by_role("button", name="▼ Down").nth(1).click()
