@@ -8,7 +8,7 @@ from app.commands.output import print_table, write_json
 from robots import InputError
 
 TEXTS = (".txt", ".text", "")
-"""Name of a file that contains the text which the page wrote."""
+"""Endings of files that may contain the text which the page wrote."""
 
 
 def handed_in(file: Path, key: str | None, json: str | None) -> int:

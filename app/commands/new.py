@@ -17,9 +17,9 @@ def new(
     Args:
         kind: the kind of file.
         file: where to write it.
-        start: copy an existing one: an example controller (pd, osf, one_level_qp, himpc_one_page), or what
-            students begin with in an exercise (himpc-lab grade lists them; or the path of one of your own);
-            a scene, a lesson, or a kind of task (com, plane_distance, …).
+        start: copy an existing one: an example controller (pd, osf, one_level_qp, himpc_one_page), the file
+            with which students begin an exercise (its name, see himpc-lab grade, or the path of your own
+            exercise), a scene, a lesson, or a kind of task (com, plane_distance, …).
     """
     from lessons.authoring.new import write_new
     from lessons.exercises import EXERCISES

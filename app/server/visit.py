@@ -201,7 +201,8 @@ class Visit:
     # ---------------------------------------------------------------- where the page is
 
     def _watch(self) -> None:
-        """Lets the tab keep its place whenever scene or settings have changed. On viser's loop."""
+        """Checks every _PERIOD s, on viser's event loop, whether scene or settings have changed; if so, the
+        tab stores the page's new place (see `app.server.place`)."""
         if self._left or not isinstance(self._sessions, Sessions):
             return
         page = self._page

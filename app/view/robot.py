@@ -14,7 +14,9 @@ from app.view.camera import look, turn
 from robots import Robot
 from robots.shapes.link_shapes import link_shapes
 
-_STILL = 1e-4  # m, and about the same number of rad: a tenth of a pixel
+_STILL = 1e-4
+"""Smaller changes of a link's pose are not sent to the page; m, and the same number for each component of the
+quaternion. They move a link by about a tenth of a pixel."""
 _ARROW = 1.2
 """Length of an arrow with its head, as a multiple of the gizmo's size."""
 

@@ -72,8 +72,8 @@ class HTMPCSettings:
         obstacles: obstacles of the collision avoidance (7c).
         margin_m: δ_safe of (7c), m.
         self_collision: whether the arm avoids collisions with the base.
-        delay_s: s, delay of a command; the measured state is predicted forward by it. The references must be
-            sampled later by the same time.
+        delay_s: s, delay of a command; the measured state is predicted forward by it. The caller
+            samples the references at t + delay_s.
         hold: joints that stay at rest, by name.
         base: how the base moves; see `kinematics.G`.
         gains: of HTIDKC only, 1/s: ẋ = ṙ + gain · (r − x) at each enabled level; the last gain applies to all

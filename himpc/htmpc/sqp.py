@@ -171,7 +171,7 @@ def _line_search(problem: Problem, at: Iterate, found: _Direction) -> tuple[floa
     step 0 if none does."""
     tick = problem.tick
     merit = problem.merit(at)
-    # Outside its bounds the first level must return to them, whatever the merit is.
+    # If the bounds of the first level are violated, the step must lead back to them, whatever the merit is.
     returning = problem.forced and tick.table.outside(len(tick.rows.A)) > _FEASIBLE
     alpha = 1.0
     for attempt in range(BACKTRACKS + 1):

@@ -20,8 +20,8 @@ _NUDGES = 3
 
 
 class Seen(NamedTuple):
-    """Kinematics of the tasks at a state: J (m, n), J̇q̇ and x̃ (m,) of the solved tasks; x and x̃ of all
-    tasks by name."""
+    """Kinematics of the tasks at a state: J (m, n), J̇q̇ (m,) and the error x̃ (m,) of the solved tasks, and the
+    value x and the error x̃ of every task by its name."""
 
     J: Array
     drift: Array

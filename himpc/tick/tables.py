@@ -21,7 +21,7 @@ BUDGET = 50e6
 """Largest number of multiplications for changes of active rows in one tick: about ten milliseconds, less than
 twenty on a slower core. The limit is a count and not a time, so that the same seed gives the same run."""
 _ROUNDS = 12_000
-"""Largest number of changes of active rows in a tick; the longest run takes some milliseconds."""
+"""Largest number of changes of active rows in one tick; a tick that reaches it takes a few milliseconds."""
 ACCURACY = 1e-8
 """N·m: largest distance of a point from the optimum, since H ≥ ρ."""
 

@@ -161,7 +161,7 @@ REPAIR = Step(
             "at most",
             1.1,
             fails_with=("M_bar_scale=1",),
-            because="nothing compensates the lost half of the corrections",
+            because="with the old M̄ nothing compensates the lower rate of corrections",
         ),
     ),
     set=("deadline_ms=1", "horizon=11", "M_bar_scale=2"),

@@ -156,7 +156,8 @@ class Apart:
     # ---------------------------------------------------------------- one message and its answer
 
     def torque(self, now: View) -> Any:
-        """The torque of the control law for a tick. Raises OwnFault, one sentence."""
+        """The torque of the control law for a tick. Raises OwnFault, whose message is one sentence, if the
+        call fails, takes too long, or its process has ended."""
         if self._child is None:
             raise OwnFault(f"{self._source.path}: its process has ended")
         message, arrays = b"", numbers_of(now)

@@ -75,7 +75,7 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
 
 
 MISTAKES: tuple[Mistake, ...] = (
-    wrong("the levels are in reverse order: the first one comes first", osf, order=-1),
+    wrong("the levels are in reverse order: level 1 has the highest priority", osf, order=-1),
     wrong("the second level is left out", osf, levels=1),
     wrong("J̇q̇ is missing: ẍ = J q̈ + J̇q̇", osf, curvature=0.0),
     wrong("J̇q̇ has the wrong sign: it is taken off ẍ", osf, curvature=-1.0),

@@ -49,12 +49,14 @@ class Proof:
             if grade.error:
                 found.append(f"the mistake '{says}' cannot be run: {grade.error}")
             elif grade.passed:
-                found.append(f"the mistake '{says}' gets all points: add a check that it fails")
+                found.append(
+                    f"the mistake '{says}' gets all points: add a check that this mistake does not pass"
+                )
             elif not any(says in line.why for line in grade.lines):
                 found.append(f"the mistake '{says}' is not named: another mistake returns the same torques")
         missed = {place for _, grade in self.mistakes for place, line in enumerate(grade.lines) if line.why}
         found += [
-            f"the check '{check.text}' is passed by every mistake: add one that fails it"
+            f"the check '{check.text}' is passed by every mistake: add a mistake that does not pass it"
             for place, check in enumerate(self.exercise.checks(0))
             if place not in missed
         ]

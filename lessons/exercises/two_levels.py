@@ -65,9 +65,9 @@ MISTAKES: tuple[Mistake, ...] = (
     wrong("the equality (33) is missing: a weighted sum is not strict", hierarchy, equality="none"),
     wrong("the equality (33) has J₁ instead of J₁M̄⁻¹", hierarchy, equality="without M̄"),
     wrong("J₁M̄⁻¹Δτ₂ is set to zero: it must be equal to J₁M̄⁻¹Δτ₁", hierarchy, equality="zero"),
-    wrong("the levels are in reverse order: the first one comes first", hierarchy, order=-1),
+    wrong("the levels are in reverse order: level 1 has the highest priority", hierarchy, order=-1),
     wrong(
-        "the levels are in reverse order: the first one comes first",
+        "the levels are in reverse order: level 1 has the highest priority",
         hierarchy,
         order=-1,
         equality="about the first",

@@ -78,11 +78,11 @@ class Row:
         if self.says == "about":
             return "agrees" if abs(self.ours - turn) <= self.within * (abs(turn) or 1.0) else "differs"
         if abs(self.ours - turn) <= TIE * (abs(turn) or 1.0):
-            return "differs"  # the paper sees an effect where ours has none
+            return "differs"  # the paper reports an effect, and ours has none
         return "agrees" if (self.ours < turn) == (self.says == "below") else "opposite"
 
     def _turned(self) -> bool:
-        """Whether an effect has the opposite direction. If one of the two counts as no effect, it has not."""
+        """Whether our effect has the opposite direction; False if one of the two counts as no effect."""
         if self.turns_at is None or self.paper is None:
             return False
         theirs, own = self.paper - self.turns_at, self.ours - self.turns_at
@@ -90,7 +90,8 @@ class Row:
 
     @property
     def remark(self) -> str:
-        """`why`, unless ours and the paper's agree."""
+        """How well ours agrees with the paper's number; `why` if it does not agree, or if the paper states
+        only a direction."""
         if self.verdict == "agrees" and self.says is None:
             return (
                 f"agrees within {self.within:.4g}"

@@ -15,9 +15,9 @@ SCENES: dict[str, str] = {
     "hold": "any robot: the same three levels; levels without freedom stay empty (needs --urdf)",
     "planar3-plane": "the same arm, N = 1: the whole QP is drawn; the wrist's x comes before two joints",
     "planar3-circle": "planar 3-joint arm on RT1 of the HIMPC paper: a circle while joint 1 swings a little",
-    "planar3-conflict": "the same arm on RT2: joint 1 must swing so far that the circle is out of reach",
+    "planar3-conflict": "the same arm on RT2: joint 1 swings so far that the hand cannot keep to the circle",
     "planar3-singular": "the same arm on RT3: two circles through the straight, singular arm",
-    "iiwa14-circle": "KUKA iiwa 14 on RT4 of the HIMPC paper: a circle, upright, while joint 1 swings",
+    "iiwa14-circle": "KUKA iiwa 14 on RT4 of the HIMPC paper: the upright hand on a circle, joint 1 swings",
     "iiwa14-circle-paper": "the same circle as the paper most likely ran it: weightless, no velocity limits",
 }
 """The torque-level scenes."""

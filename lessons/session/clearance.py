@@ -21,11 +21,11 @@ EVERY = 5
 
 
 class Nearest(NamedTuple):
-    """The nearest pair: what counts is by how much it is farther apart than what is kept of it.
+    """The pair whose distance exceeds the distance that it must keep by the least.
 
     Attributes:
         distance: m, negative inside; NaN if no pair is near.
-        kept: m, d_safe with its margin, from which on it may come no closer; NaN unless distances are kept.
+        kept: the distance that the pair must keep, d_safe plus its margin, m; NaN unless distances are kept.
         pair: its names.
     """
 
@@ -52,7 +52,10 @@ class Clearance:
         self.found, self._due = NOTHING, 0
 
     def measure(self, q: Array, avoidance: Avoidance) -> tuple[float, float]:
-        """Distance of the nearest pair and what it keeps, m, held for EVERY ticks; q: (n,) true positions."""
+        """The distance of the nearest pair and the distance that it must keep, m, measured every EVERY ticks.
+
+        q: (n,) true positions.
+        """
         if not (avoidance.on or self._furnished):
             return math.nan, math.nan
         if self._due == 0:

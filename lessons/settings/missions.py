@@ -72,8 +72,8 @@ class MissionOptions(ABC):
 class ArchitectureOptions(MissionOptions):
     """Scenes that compare architectures.
 
-    All but the tasks in the window is the same for each: the HTMPC paper does not print when a task counts as
-    completed, so it is a choice, and one for all of them.
+    The architectures differ only in the tasks of the window. The HTMPC paper does not print when a task
+    counts as completed, so this is an option, whose value applies to all of them.
 
     Attributes:
         architecture: see `Architecture`.

@@ -29,7 +29,7 @@ REFERENCE = (
         ("himpc/references/square_wave.py", "s: a switch counts as reached this much earlier"),
         ("himpc/stack.py", "Generic: the largest rank over a few random configurations"),
         ("lessons/own/deadline.py", "The waiting time is read only after the first alarm"),
-        ("lessons/papers/himpc_paper/ablations.py", "All tasks in one cost, one step ahead"),
+        ("lessons/papers/himpc_paper/ablations.py", "All tasks are in one cost, one step ahead"),
         ("lessons/scenes/planar.py", "The plant applies any torque"),
         ("lessons/settings/assignments.py", "The controller comes first"),
         ("lessons/settings/missions.py", "Scenes whose tasks last for the whole run"),
@@ -149,7 +149,7 @@ REFERENCE = (
         ("lessons/session/deadline.py", "So one late tick costs one tick of holding"),
     )),
     Exempt("software", LESSONS + "architectures.py::test_all_architectures_have_one_mission", (
-        ("lessons/settings/missions.py", "All but the tasks in the window is the same"),
+        ("lessons/settings/missions.py", "The HTMPC paper does not print when a task"),
     )),
     Exempt("software", LESSONS + "deadline.py::test_the_clock_decides_only_if_asked_to", (
         ("lessons/settings/settings.py", "Whether measured computing times change the run"),

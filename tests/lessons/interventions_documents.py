@@ -33,26 +33,28 @@ DOCUMENT_ROWS = (
     ),
     # ---------------------------------------- a conflict reaches level 1
     RT2(
-        "disagreements", "Twice the M̄ halves level 1's error", HAND_RMS, (0.25, 0.5), ("M_bar_scale=2",),
+        "disagreements", "Twice the M̄ halves the error of level 1", HAND_RMS, (0.25, 0.5), ("M_bar_scale=2",),
         (0.1, 0.24),
     ),
     RT2(
-        "disagreements", "half the period nearly does", HAND_RMS, (0.25, 0.5), ("T_s=0.0005",), (0.1, 0.24),
+        "disagreements", "half the period nearly halves it",
+        HAND_RMS, (0.25, 0.5), ("T_s=0.0005",), (0.1, 0.24),
     ),
     RT2(
-        "disagreements", "half the bound on speed halves it",
+        "disagreements", "Half the velocity limit halves it",
         HAND_RMS, (0.25, 0.5), ("limits.velocity_scale=0.5",), (0.1, 0.24),
     ),
     RT2(
-        "disagreements", "without that bound joint 3 swings faster and level 1 errs three times as much",
+        "disagreements",
+        "without this limit joint 3 moves faster and the error of level 1 is three times as large",
         HAND_RMS, (0.25, 0.5), ("limits.velocity=false",), (0.8, 1.6),
     ),
     RT2(
-        "disagreements", "without that bound joint 3 swings faster",
+        "disagreements", "without this limit joint 3 moves faster",
         of("v", "deg/s", "largest", 2.0, column=2), (80, 100), ("limits.velocity=false",), (130, 250),
     ),
     RT2(
-        "disagreements", "Our friction is not the cause: without it level 1 errs as much.",
+        "disagreements", "Our friction is not the cause: without it the error of level 1 is the same.",
         HAND_RMS, (0.25, 0.5), ("plant.friction=0", "plant.damping=0"), (0.25, 0.5), stays=True,
     ),
     Intervention(
@@ -60,7 +62,7 @@ DOCUMENT_ROWS = (
         HAND_RMS, (0.35, 0.365), ("horizon=1",), (0.26, 0.29), on="planar3-conflict",
     ),
     RT2(
-        "disagreements", "RT1 has no such swing.", HAND_RMS, (0.25, 0.5), ("q1_amplitude_deg=20",),
+        "disagreements", "RT1 has no such oscillation.", HAND_RMS, (0.25, 0.5), ("q1_amplitude_deg=20",),
         (0, 0.06),
     ),
     # ---------------------------------------- RT4
@@ -73,7 +75,7 @@ DOCUMENT_ROWS = (
         of("error/orientation", "deg", "rms", column=2), (0.8, 1.4), FIVE, (0.15, 0.35),
     ),
     RT4(
-        "disagreements", "our errors are those of time-delay estimation and go with T_s·M/M̄",
+        "disagreements", "our errors are those of time-delay estimation and are proportional to T_s·M/M̄",
         of("error/position", "mm", "rms"), (0.55, 0.85), ("M_bar_scale=2",), (0.25, 0.43),
     ),
     # ---------------------------------------- RT1
@@ -87,32 +89,32 @@ DOCUMENT_ROWS = (
         HAND_RMS, (0.02, 0.045), ("plant.friction=0",), (0.003, 0.0125), seconds=4.0,
     ),
     RT1(
-        "disagreements", "A third of M̄ does the same",
+        "disagreements", "A third of M̄ has the same effect",
         HAND_RMS, (0.055, 0.1), ("M_bar_scale=1",), (0.01, 0.04), of=("M_bar_scale=0.3",),
     ),
     RT1(
-        "disagreements", "most of its error is friction's",
+        "disagreements", "most of OSF's error is due to friction",
         HAND_RMS, (1.0, 1.7), ("plant.friction=0", "plant.damping=0"), (0, 0.3), of=("controller=osf",),
     ),
     # ---------------------------------------- a disturbed inertia
     RT4(
         "disagreements",
-        "If M̄ is altered by the same factors as diag M(q), most of the change in orientation goes",
+        "If M̄ is altered by the same factors as diag M(q), most of the change in orientation disappears",
         O_Z, (1.0, 1.2), ("M_bar=[0.08,0.168,0.0396,0.0504,0.0008,0.0012,0.00036]",), (1.35, 1.55),
         of=(DIAGONAL,), seconds=1.0,
     ),
     RT4(
-        "disagreements", "HIMPC's errors are the same with a nominal inertia a fifth larger",
+        "disagreements", "HIMPC's errors are the same with a nominal inertia that is a fifth larger",
         X, (0.535, 0.545), ("nominal.mass_scale=1.2", "nominal.inertia_scale=1.2"), (0.535, 0.545),
         stays=True,
     ),
     RT4(
-        "disagreements", "hardly change with that of link 3 alone",
+        "disagreements", "hardly change if only the inertia of link 3 is disturbed",
         X, (0.535, 0.545), ("plant.inertia_scale=[1,1,1.2,1,1,1,1]",), (0.535, 0.545), stays=True,
     ),
     # ---------------------------------------- horizon
     RT4(
-        "disagreements", "ours only where joints meet their position limits",
+        "disagreements", "Ours decreases only where joints meet their position limits",
         X, (0.47, 0.475), ("horizon=15",), (0.47, 0.475), of=("horizon=5", "limits.position=off"),
         seconds=4.0, stays=True,
     ),
@@ -136,16 +138,16 @@ DOCUMENT_ROWS = (
     ),
     # ---------------------------------------- smoothness, chatter
     RT1(
-        "disagreements", "Controllers that remove nearly all of e in a tick answer noise alike",
+        "disagreements", "Controllers that remove nearly all of e in a tick react to noise in the same way",
         ROUGH, (0.85, 1.05), ("R_on=acceleration", "horizon=1"), (0.6, 0.8), of=(ENCODER,), seconds=1.5,
     ),
     RT1(
-        "disagreements", "Controllers that remove nearly all of e in a tick answer noise alike",
+        "disagreements", "Controllers that remove nearly all of e in a tick react to noise in the same way",
         ROUGH, (0.85, 1.05), ("controller=tdeosf",), (0.85, 1.05), of=(ENCODER,), seconds=1.5, stays=True,
     ),
     *(
         RT4(
-            "disagreements", "S goes with M̄ δ/T_s²",
+            "disagreements", "S is proportional to M̄ δ/T_s²",
             of("delta_tau", "N·m", "rms"), (13, 17), (without,), gone, of=CHATTER, seconds=1.0,
         )
         for without, gone in (
@@ -161,7 +163,7 @@ DOCUMENT_ROWS = (
             of=("controller=osf",), on="planar3-singular", seconds=0.15,
         )
         for at, says in (
-            ("disagreements", "ours tracks accelerations and inverts nothing, so there is nothing to fail"),
+            ("disagreements", "ours tracks accelerations and inverts nothing, so no inversion can fail"),
             ("results", "ours never inverts J M⁻¹Jᵀ"),
         )
     ),
@@ -189,11 +191,11 @@ DOCUMENT_ROWS = (
     ),
     # ---------------------------------------- formulation C
     SQUARE(
-        "disagreements", "upper levels are charged for leaving their shifted previous plan, not for effort",
+        "disagreements", "upper levels pay for deviations from their shifted previous plan, not for effort",
         of("error/ee", "mm", "mean"), (0, 0.1), ("formulation=paper",), (8, 15),
     ),
     SQUARE(
-        "disagreements", "with a thousandth of the charge for speed it errs less than half as much",
+        "disagreements", "with a thousandth of the weight of speed its error is less than half as large",
         of("error/ee", "mm", "mean"), (8, 15), ("velocity_effort=0.001",), (3, 5), of=("formulation=paper",),
     ),
     SQUARE(
@@ -207,7 +209,7 @@ DOCUMENT_ROWS = (
         of=("formulation=paper", "lexicographic=per_coordinate"),
     ),
     STRICT(
-        "disagreements", "the hand then errs about half as much with (12) as with (11)",
+        "disagreements", "the hand's error with (12) is then about half of that with (11)",
         of("error/ee", "mm", "mean"), (1.2, 2.8), ("lexicographic=cost",), (3.0, 5.0),
         of=("formulation=paper", "lexicographic=per_coordinate", "Q=100"),
     ),

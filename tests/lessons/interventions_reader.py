@@ -200,7 +200,7 @@ READER_ROWS = (
         on="planar3-conflict", seconds=4.0,
     ),
     Intervention(
-        "disagreements", "Against N = 1 our N = 30 errs more in x over the whole run",
+        "disagreements", "our error of x is larger with N = 30 than with N = 1",
         X, (0.528, 0.538), ("horizon=1",), (0.47, 0.476), of=LONG, on="iiwa14-circle-paper", seconds=4.0,
     ),
 )

@@ -158,7 +158,7 @@ def test_the_average_cost_of_a_noisy_run_is_noise() -> None:
 def test_TDEOSF_gets_through_without_leaving_out_singular_values(monkeypatch: pytest.MonkeyPatch) -> None:
     """The statement of the page of disagreements is correct: TDEOSF starts equally well if all singular
     values are kept."""
-    assert "with all of them kept it starts as well" in told("disagreements")
+    assert "TDEOSF starts equally well if all of them are kept" in told("disagreements")
 
     def largest() -> float:
         spec = RunSpec("iiwa14-circle-paper", controller="tdeosf", duration=0.3)

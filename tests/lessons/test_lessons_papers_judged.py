@@ -220,7 +220,7 @@ def test_a_measured_number_is_written_into_its_text() -> None:
     row = Row(
         "HIMPC: level-1 RMSE in RT2 over RT1", "1", None, 77.0, says="about", topic="conflict-reaches-level-1"
     )
-    assert "ours errs 77 times as much" in page([("himpc-fig-11", row)])
+    assert "the error of level 1 is 77 times as large" in page([("himpc-fig-11", row)])
 
 
 def test_what_needs_hardly_a_run_is_measured_again() -> None:

@@ -138,10 +138,10 @@ def _points(challenge: Challenge, lecture: Lecture, best: float | None) -> str:
             html = f"{badge('DOES NOT COUNT', BAD)} Reset this challenge and try again."
         else:
             html = (
-                f"{badge('PASSED', GOOD)} <b>{lecture.result.score:.0f} points</b> of 100. More with a "
-                f"better value: {esc(challenge.score.measure.words)}, now "
-                f"{figure(lecture.points_for, challenge.score.measure.unit)}, 100 points at "
-                f"{figure(challenge.score.best, challenge.score.measure.unit)}."
+                f"{badge('PASSED', GOOD)} <b>{lecture.result.score:.0f} points</b> of 100. The points depend "
+                f"on this value: {esc(challenge.score.measure.words)}. It is "
+                f"{figure(lecture.points_for, challenge.score.measure.unit)}; with "
+                f"{figure(challenge.score.best, challenge.score.measure.unit)} you get 100 points."
             )
     if best is not None:
         html += f"<div>Your best score: <b>{best:.0f}</b></div>"

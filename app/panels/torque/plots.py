@@ -99,7 +99,7 @@ class LevelPlots:
             near.show(window, lambda: _distances(window, windows))
 
     def _only_simulated(self, ghost: bool) -> bool:
-        """Whether the leaks are those of the simulation alone: a measured arm has none."""
+        """Whether the chart shows only the leaks of the simulation: those of a measured arm are unknown."""
         return self._measured and ghost
 
     def _errors_and_contacts(self, window: PlotWindow, windows: list[PlotWindow]) -> list[np.ndarray]:

@@ -100,8 +100,9 @@ def bounds(
 
 @inline_kernel
 def constraint_values(U: Array, bounds: LevelBounds) -> None:
-    """L U Dᵀ into `bounds.value`: torque rows are running sums of the increments, velocity rows of these, and
-    position rows, one knot later, of those. Rows with directions of their own follow."""
+    """Writes L U Dᵀ to `bounds.value`: torque rows are the running sums of the increments, velocity rows
+    those of the torque rows, and position rows those of the velocity rows, one knot later. The rows of
+    constraints with directions of their own follow."""
     N, n = U.shape
     value, plain = bounds.value, bounds.plain
     kinds = plain // N

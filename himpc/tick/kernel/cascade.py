@@ -29,7 +29,8 @@ def own_directions(
     count: Whole,
     start: Whole,
 ) -> None:
-    """Directions of a level at every knot: those of the levels above up to `start`, its own up to `count`."""
+    """Finds the directions Q[j] of a level at every knot j: the first start[j] are those of the levels
+    above, the next ones, up to count[j], are the level's own."""
     N, _, n = B.shape
     above = 0 if levels[index, ALONE] else index
     afresh = above == 0 or levels[index, AFRESH]

@@ -43,7 +43,7 @@ def approach(pair: int, other: int, normal: Array, velocity: Array) -> float:
 
     Args:
         pair: which one.
-        other: its shape; only the first ones are objects.
+        other: index of the pair's second shape; the first b shapes are objects, the others do not move.
         normal: of all pairs, see `near`.
         velocity: (b, 3) m/s, of the objects.
     """

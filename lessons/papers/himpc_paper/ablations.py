@@ -73,10 +73,10 @@ def _remark_8(results: Results, quick: bool) -> Section:
     columns = ("knots of levels 2 and 3", "median step (ms)", "level 1 (mm)", "o_Z (deg)", "q₁ (deg)", "")
     return Section(
         notes=(
-            f"**Remark 8, shorter horizons for lower levels.** Level 1 looks {_N} knots ahead, levels 2 and "
-            "3 fewer; R on Δτ as printed. With one knot a step takes "
-            f"{number(medians[-1] / medians[0])} of the time with all: here most of a step is kinematics and "
-            "null spaces, which every knot needs anyway.",
+            f"**Remark 8, shorter horizons for lower levels.** The horizon of level 1 has {_N} knots, those "
+            "of levels 2 and 3 have fewer; R weighs Δτ as printed. If they have one knot, a step takes "
+            f"{number(medians[-1] / medians[0])} of its time with all knots: most of a step is spent on "
+            "kinematics and null spaces, which level 1 needs at every knot.",
         ),
         tables=(Table("Remark 8: time against accuracy", columns, tuple(rows)),),
         pictures=(Picture("himpc-remark-8", "Shorter horizons for lower levels, RT4.", panels, 2),),
@@ -126,7 +126,7 @@ def _over(
 
 def _remark_6(results: Results, quick: bool) -> Section:
     runs = {scene: {ms: results[_period_job(scene, ms)] for ms in _PERIODS} for scene in _SCENES[quick]}
-    note = "**Remark 6, sampling period.** T_s is also the delay of time-delay estimation; M̄ stays."
+    note = "**Remark 6, sampling period.** T_s is also the delay of time-delay estimation; M̄ is the same."
     section = _over("Remark 6", "sampling period (ms)", _PERIODS, runs, note, log=True)
     ratio = _level_1(runs[RT1][4.0]) / _level_1(runs[RT1][0.5])
     row = Row(
@@ -144,9 +144,9 @@ def _remark_6(results: Results, quick: bool) -> Section:
 def _remark_5(results: Results, quick: bool) -> Section:
     runs = {scene: {ms: results[_lag_job(scene, ms)] for ms in _LAGS[quick]} for scene in _SCENES[quick]}
     note = (
-        "**Remark 5, actuators.** A first-order lag between the torque command and the torque; the "
-        "controller's τ₀ is the torque that acted. Estimation covers a lag that is short against the closed "
-        "loop, not a long one."
+        "**Remark 5, actuators.** The torque follows the commanded torque with a first-order lag; the "
+        "controller's τ₀ is the torque that acted. Time-delay estimation compensates a lag that is short "
+        "compared with the time constants of the closed loop, but not a long one."
     )
     return _over("Remark 5", "motor time constant (ms)", _LAGS[quick], runs, note, log=False)
 
@@ -210,10 +210,10 @@ def _section_4c(results: Results, quick: bool) -> Section:
     columns = ("R weighs", "reference", *(f"R = {R:g}" for R in _WEIGHTS[quick]))
     return Section(
         notes=(
-            "**Section IV-C, ‖τ‖² instead of ‖Δτ‖².** All tasks in one cost, one step ahead, so that nothing "
-            "but the regularisation differs. Holding a pose needs torque, and ‖τ‖² trades it against "
-            "accuracy: the more gravity, the smaller R must be; yet RT4 starts singular and a small R loses "
-            "it there. ‖Δτ‖² is zero at rest whatever the pose.",
+            "**Section IV-C, ‖τ‖² instead of ‖Δτ‖².** All tasks are in one cost, one step ahead, so that "
+            "only the regularisation differs. Holding a pose needs torque, and ‖τ‖² weighs this torque "
+            "against the accuracy: with more gravity, R must be smaller. But RT4 starts in a singular pose, "
+            "where control is lost with a small R. ‖Δτ‖² is zero at rest in every pose.",
         ),
         tables=(Table("Section IV-C: level-1 RMSE, worst axis (mm)", columns, tuple(rows)),),
         checks=(

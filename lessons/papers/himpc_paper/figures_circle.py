@@ -110,8 +110,8 @@ def _torques(results: Results, number: int, controllers: tuple[str, str]) -> Sec
     runs = _runs(results, encoder_runs(controllers))
     first, second = (name(controller) for controller in controllers)
     caption = (
-        f"Torques of {first} and {second} on RT1 with the paper's encoder: between which values in every "
-        "50 ms, where the two all but coincide; right: 50 ms of them."
+        f"Torques of {first} and {second} on RT1 with the paper's encoder: the least and the largest value "
+        "in every 50 ms, which are nearly the same for both; right: an excerpt of 50 ms."
     )
     whole = joint_panels(runs, "tau", r"\tau", "N·m")
     panels = tuple(each for panel in whole for each in (banded(panel), excerpt(panel, 2.5, 2.55)))

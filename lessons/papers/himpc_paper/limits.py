@@ -125,7 +125,8 @@ def _picture(results: Results, plants: list[str]) -> Picture:
         bars("level 1, worst axis (mm)", _level_1_mm),
     )
     caption = (
-        "Limits as printed, with a barrier on speed, and with position limits one can stop before. –: none."
+        "Limits as printed, with a barrier on speed, and with position limits before which the joint can "
+        "stop. –: none."
     )
     return Picture("himpc-limits", caption, panels, 2)
 

@@ -62,10 +62,10 @@ def _table(results: Results, quick: bool) -> Section:
         "share of zero steps",
     )
     notes = (
-        "EE error on one square wave. Formulation A takes the paper's weights literally; the default C "
-        "charges upper levels for leaving the shifted previous plan and keeps limits as hard rows.",
+        "EE error on one square wave. Formulation A takes the paper's weights literally. In the default C "
+        "upper levels pay for deviations from the shifted previous plan, and limits are hard constraints.",
     )
-    return Section(notes, tuple(rows), (Table("Beside it", columns, tuple(lines)),))
+    return Section(notes, tuple(rows), (Table("The base error and the line search", columns, tuple(lines)),))
 
 
 def _order(results: Results, f: str, d: str) -> Row:
