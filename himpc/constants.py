@@ -9,8 +9,8 @@ RETURN_RATE = 5.0
 WITHIN = 0.25
 """m: pairs of links or objects that are farther apart have no row."""
 FADE = 0.05
-"""m: over the last part of this length before WITHIN, a bound fades out. A pair that comes nearer than WITHIN
-has no bound at first."""
+"""m: width of the range of distances just below WITHIN in which a bound fades out with growing distance. The
+bound of a pair that comes nearer than WITHIN appears without a jump."""
 RETREAT = 0.2
 """m/s: the fastest retreat that a row of a distance asks for."""
 TURN_PULL = 5.0

@@ -96,7 +96,7 @@ def arm(
     beside = nominal(loaded, as_torque_scene(plain.prepared(), "an arm"))
     ready = prepared(beside, start, limits, drag)
     with tempfile.TemporaryDirectory() as folder:
-        print("compiling the controller: up to a minute at the first time …", flush=True)
+        print("compiling the controller: up to a minute the first time …", flush=True)
         make = maker(build(Path(folder)), ready.image)
         check_start(make(), start)
         period = loaded.settings.T_s

@@ -16,6 +16,7 @@ from app.link.choice import SceneChoice
 from app.link.process import Process
 from app.link.wire import Wire
 from app.server.classroom import Classroom
+from app.server.server import PageServer
 from app.server.serving import serve
 
 _PRIORITY = 10
@@ -61,7 +62,8 @@ def drive_on_a_page(
 
     room = Classroom(choice, all_steer=True, arm=Process(start))
     try:
-        serve(choice, port=port, open_browser=open_browser, room=room, over=lambda: room.deserted)
+        server = PageServer(choice, port=port, room=room)
+        serve(server, open_browser=open_browser, over=lambda: room.deserted)
     except BaseException:
         room.close()
         raise

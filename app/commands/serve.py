@@ -85,7 +85,7 @@ def serve(
     """
     from app.link.choice import SceneChoice
     from app.server.passes import CLASS_VARIABLE, given_token
-    from app.server.server import FIRST
+    from app.server.server import FIRST, PageServer
     from app.server.serving import serve as serve_page
     from lessons.own.folder import Folder
     from lessons.replay.progress import read_key
@@ -127,13 +127,12 @@ def serve(
         choice = SceneChoice.of_state(found).admitting(own)
     else:
         choice = own
-    return serve_page(
+    server = PageServer(
         choice,
         host=host,
         port=port,
         max_sessions=max_sessions,
         classroom=classroom,
-        open_browser=not no_browser,
         trusted_origins=trusted_origin,
         ask_token=not no_token,
         own_files=None if no_own_files else Folder.at(own_files or "."),
@@ -142,8 +141,8 @@ def serve(
         refers=one_of_several,
         class_names=not no_names if class_ else None,
         proxy_only=proxy_only,
-        drain=drain,
         embed_in=embed_in,
         class_key=of_class,
         class_of=class_of,
     )
+    return serve_page(server, open_browser=not no_browser, drain=drain)

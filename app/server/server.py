@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import errno
-import socket
 import threading
 import time
 import warnings
@@ -16,10 +14,10 @@ import viser
 from app.adapter import private
 from app.classes.words import TEACHER
 from app.link.choice import SceneChoice
+from app.server.address import LOOPBACK, address_in_use, check_address, local_url, seen_from_outside
 from app.server.classroom import Classroom
 from app.server.connection_limits import OF_A_CLASS, ConnectionLimits
 from app.server.door import SELF, Door, as_origin, names_of_this_machine
-from app.server.greeting import seen_from_outside
 from app.server.guard import ConnectionGuard
 from app.server.malloc_tuning import few_arenas, large_arrays_apart
 from app.server.passes import VARIABLE, Passes, new_token, shared
@@ -35,7 +33,6 @@ if TYPE_CHECKING:  # a class computes: the server listens before that is loaded
     from app.classes.room import Room
     from app.classes.sockets import Sockets
 
-_LOOPBACK = ("127.0.0.1", "localhost", "::1")
 FIRST = SceneChoice(RunSpec("iiwa14-hold"))
 """The scene that the page shows by default."""
 
@@ -65,8 +62,32 @@ class PageServer:
         class_key: str | None = None,
         class_of: str | None = None,
     ) -> None:
-        """Arguments as for `serving.serve`; grace: time, s, that a session outlives its tab; all_steer: every
-        page of a classroom controls the robot; room: whose robot all pages show, instead of one made here."""
+        """Starts the server.
+
+        Args:
+            choice: what the page shows first.
+            host, port: where it listens.
+            max_sessions: number of pages with a robot of their own.
+            grace: time, s, that a session outlives its tab.
+            classroom: all pages show one session, and pages on which the token was typed control it.
+            trusted_origins: addresses of proxies that may serve the page.
+            ask_token: whether the page asks for a token.
+            own_files: the page whose address contains the owner's secret may open and run files below this
+                folder by their paths; None: no page may.
+            key: signs the learners' progress.
+            token: replaces the random token.
+            refers: a full server answers 503, so that a proxy tries the next one.
+            class_names: whether a class is asked for names; None: there is no class.
+            proxy_only: only a proxy that sends the token in its header is let in.
+            embed_in: origins whose pages may show the page in a frame.
+            all_steer: every page of a classroom controls the robot.
+            room: all pages show the robot of this room.
+            class_key: the key that the servers of one class have in common.
+            class_of: address of the server whose class this one takes part in.
+
+        Raises:
+            InputError: a scene, robot, host, port, origin or combination that cannot be used.
+        """
         if max_sessions < 1:
             raise InputError(f"max-sessions is {max_sessions}: give 1 or more.")
         if proxy_only and (token is None or not ask_token):
@@ -74,18 +95,20 @@ class PageServer:
                 "--proxy-only needs the token that the proxy sends: give it with --token-file FILE or "
                 f"{VARIABLE}, and leave out --no-token"
             )
-        trusted = frozenset(map(as_origin, trusted_origins))
+        self.host = host
+        self.proxies = tuple(map(as_origin, trusted_origins))
+        """The addresses of the trusted proxies."""
         framing = frozenset(each if each == SELF else as_origin(each, "--embed-in") for each in embed_in)
         self.follows = "" if class_of is None else as_origin(class_of, "--class-of")
         """The address of the server whose class this one takes part in; "" if there is none."""
         _check_choice(choice)
-        _check_address(host, port)
+        check_address(host, port)
         few_arenas()
         large_arrays_apart()
         # A tab may close at any moment, which is not reported on the terminal.
         warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
-        local = host in _LOOPBACK
-        self.public = not local or bool(trusted)
+        local = host in LOOPBACK
+        self.public = not local or bool(self.proxies)
         """Whether other people than the users of this machine can reach the page."""
         self.proxy_only = proxy_only
         self.guard = ConnectionGuard(Door())
@@ -105,10 +128,9 @@ class PageServer:
         found = self._viser.get_port()
         if port and found != port:
             self.close()
-            raise _in_use(host, port)
-        shown = "127.0.0.1" if host == "0.0.0.0" else f"[{host}]" if ":" in host else host
-        self.url = f"http://{shown}:{found}"
-        self.outside = seen_from_outside(host, self.url, tuple(map(as_origin, trusted_origins)))
+            raise address_in_use(host, port)
+        self.url = local_url(host, found)
+        self.outside = seen_from_outside(host, self.url, self.proxies)
         """The address for other machines, as numbers: phones rarely find a machine by its name."""
         self._viser.gui.configure_theme(show_share_button=False, show_logo=False)
         self._viser.on_client_connect(self._connect)
@@ -122,7 +144,7 @@ class PageServer:
             self.passes = shared(token, owner)
         else:
             self.passes = Passes(new_token() if ask_token else None, owner, f"himpc-lab-{found}")
-        door = Door(local, trusted, self.passes, names_of_this_machine(), proxy_only, framing)
+        door = Door(local, frozenset(self.proxies), self.passes, names_of_this_machine(), proxy_only, framing)
         if self.hall is None:
             self.guard.open(door, self.sessions, refers)
         else:
@@ -265,25 +287,3 @@ def _load(choice: SceneChoice) -> None:
     from robots.shapes.link_shapes import link_shapes
 
     link_shapes(choice.scene().robot)
-
-
-def _check_address(host: str, port: int) -> None:
-    if not 0 <= port <= 65535:
-        raise InputError(f"Port {port} does not exist: give a port from 1024 to 65535.")
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    with socket.socket(family, socket.SOCK_STREAM) as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((host, port))
-        except OSError as error:
-            if error.errno == errno.EADDRINUSE:
-                raise _in_use(host, port) from None
-            reason = error.strerror or str(error)
-            raise InputError(
-                f"Cannot listen on {host}:{port} ({reason}): try --host 127.0.0.1 and another --port."
-            ) from None
-
-
-def _in_use(host: str, port: int) -> InputError:
-    other = port + 1 if port < 65535 else port - 1
-    return InputError(f"Port {port} on {host} is in use: choose another one, e.g. --port {other}.")

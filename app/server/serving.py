@@ -7,76 +7,32 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 
-from app.link.choice import SceneChoice
-from app.server.classroom import Classroom
-from app.server.door import as_origin
 from app.server.greeting import greeting
 from app.server.opening import opened_in_a_browser
-from app.server.server import FIRST, PageServer
-from lessons.own.folder import Folder
+from app.server.server import PageServer
 
 
 def serve(
-    choice: SceneChoice = FIRST,
+    server: PageServer,
     *,
-    host: str = "127.0.0.1",
-    port: int = 8080,
-    max_sessions: int = 4,
-    classroom: bool = False,
     open_browser: bool = True,
-    trusted_origins: Sequence[str] = (),
-    ask_token: bool = True,
-    own_files: Folder | None = None,
-    key: bytes | None = None,
-    token: str | None = None,
-    refers: bool = False,
-    class_names: bool | None = None,
-    proxy_only: bool = False,
     drain: float = 0.0,
-    embed_in: Sequence[str] = (),
-    class_key: str | None = None,
-    class_of: str | None = None,
-    room: Classroom | None = None,
     over: Callable[[], bool] = lambda: False,
 ) -> int:
-    """Serves the page until Ctrl-C, SIGTERM, or until `over` returns True. Raises InputError for a scene,
-    robot, host, port or origin that cannot be used.
+    """Serves the pages of a server until Ctrl-C, SIGTERM, or until `over` returns True; then closes it.
 
-    With `classroom` all pages show one session, and pages on which the printed token was typed control it.
-    The page asks for a token unless `ask_token` is False. The page whose address contains the owner's
-    secret may open and run files below `own_files` by path; with None no page may. `key` signs the
-    learners' progress. `token` replaces the random one; with `refers` a full server answers 503, so that a
-    proxy tries the next one. `class_names`: whether a class is asked for names; None: there is no class.
-    `class_of` is the server of a class that this one follows; both have the same `class_key`.
-    With `proxy_only` only a proxy that sends the token in its header is let in. After SIGTERM the pages that
-    are open have `drain` seconds. Pages of the origins `embed_in` may show the page in a frame. With `room`
-    all pages show the robot of that room.
+    Args:
+        server: just started.
+        open_browser: whether a browser opens its first page.
+        drain: time, s, that open pages have after SIGTERM.
+        over: called twice a second.
     """
-    server = PageServer(
-        choice,
-        host,
-        port,
-        max_sessions,
-        classroom=classroom,
-        trusted_origins=trusted_origins,
-        ask_token=ask_token,
-        own_files=own_files,
-        key=key,
-        token=token,
-        refers=refers,
-        class_names=class_names,
-        proxy_only=proxy_only,
-        embed_in=embed_in,
-        class_key=class_key,
-        class_of=class_of,
-        room=room,
-    )
     stop, now = threading.Event(), threading.Event()
     try:
         with _ended_by_signals(stop, now), contextlib.ExitStack() as until_the_end:
-            for line in greeting(server, host, tuple(map(as_origin, trusted_origins))):
+            for line in greeting(server):
                 print(line, flush=True)
             if open_browser:
                 until_the_end.enter_context(opened_in_a_browser(server.first_link))

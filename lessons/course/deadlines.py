@@ -133,7 +133,7 @@ SLOWER = Step(
 )
 
 REPAIR = Step(
-    title="Buy it back",
+    title="A larger M̄ for a late torque",
     text=r"""
     The torque is one tick late again. A small $\bar M$ and a late torque have the same effect: corrections
     are too slow. So let $\bar M$ be twice as large. The ghost is in time, with the old $\bar M$.
@@ -161,7 +161,7 @@ REPAIR = Step(
             "at most",
             1.1,
             fails_with=("M_bar_scale=1",),
-            because="with the old M̄ nothing compensates the lower rate of corrections",
+            because="with the old M̄ nothing compensates the slow corrections",
         ),
     ),
     set=("deadline_ms=1", "horizon=11", "M_bar_scale=2"),

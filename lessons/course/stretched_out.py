@@ -62,7 +62,7 @@ INVERSE = Step(
 )
 
 REGULAR = Step(
-    title="A softer question",
+    title="A cost instead of an inverse",
     text=r"""
     HIMPC minimises $Q \lVert e \rVert^2 + R \lVert \Delta\tau \rVert^2$ over $\Delta\tau$. Where $J$ loses
     a direction, the first term does not depend on the torque in this direction, and the second term makes

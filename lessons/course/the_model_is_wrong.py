@@ -28,7 +28,7 @@ EXACT = (
 )
 
 EXACTLY = Step(
-    title="If only",
+    title="An exact model",
     text=r"""
     OSF computes its torque from a model, $\tau = M_n \ddot q_{ref} + N_n$. Here the model has the exact
     masses, inertias and viscous friction, and the arm has no dry friction. The model (19) is equal to the

@@ -29,7 +29,8 @@ class VelocityController(Protocol):
         ...
 
     def step(self, q: Array, v: Array, previews: Mapping[str, Preview]) -> VelocityPlan:
-        """One control period; never raises for a state, and the motion is finite."""
+        """Computes one control period. It raises no exception, whatever the state, and all numbers of the
+        motion are finite."""
         ...
 
 

@@ -102,8 +102,8 @@ VELOCITY_ENTRIES = (
     Entry("rounds", "Rounds", "Number of visits to each person", low=1, high=10),
     Entry("cruise", "Cruise", "Speed along the planned paths of the base", "m/s", 0.1, 1.0, 0.05),
     Entry("goal", "Goal", "Goal of the base, x and y", "m"),
-    Entry("false_report", "Reported wrongly", "Whether the controller is told for a while that the crate is "
-          "where it is not",
+    Entry("false_report", "Reported wrongly", "Whether the controller is told a wrong position of the crate "
+          "for a while",
           tries=("false", "true"), name="false report"),
     Entry("report_offset", "Reported minus true position", "Position of the crate as it is reported, minus "
           "its true position, while the report is wrong", "m", -3.0, 3.0, 0.05),

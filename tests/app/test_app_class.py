@@ -292,10 +292,9 @@ def test_a_server_without_a_class_has_none_of_its_pages(one_fork_server: None) -
 
 
 def test_the_command_starts_a_class(monkeypatch: pytest.MonkeyPatch) -> None:
-    from app.server import serving
-
     asked: dict[str, Any] = {}
-    monkeypatch.setattr(serving, "serve", lambda _, **options: asked.update(options) or 0)
+    monkeypatch.setattr("app.server.server.PageServer", lambda _, **options: asked.update(options))
+    monkeypatch.setattr("app.server.serving.serve", lambda _, **options: 0)
     for given, names in (([], None), (["--class"], True), (["--class", "--no-names"], False)):
         assert main(["--no-browser", *given]) == 0
         assert asked["class_names"] is names

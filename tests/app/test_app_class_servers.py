@@ -465,7 +465,7 @@ def test_a_port_that_was_taken_meanwhile_gives_one_sentence(monkeypatch: pytest.
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
-        monkeypatch.setattr(server, "_check_address", lambda *_: None)
+        monkeypatch.setattr(server, "check_address", lambda *_: None)
         with pytest.raises(InputError, match="is in use"):
             PageServer(START, port=taken.getsockname()[1], max_sessions=1)
 

@@ -17,7 +17,8 @@ import pytest
 
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
-from app.server.greeting import greeting, seen_from_outside
+from app.server.address import seen_from_outside
+from app.server.greeting import greeting
 from app.server.opening import opened_in_a_browser
 from app.server.server import PageServer
 from lessons.own.folder import Folder
@@ -106,7 +107,7 @@ def made(**more: object) -> Iterator[PageServer]:
 
 def test_who_works_alone_reads_one_line() -> None:
     with made(own_files=Folder.at(".")) as server:
-        assert [*greeting(server, "127.0.0.1", ())] == [f"himpc-lab ready at {server.link}"]
+        assert [*greeting(server)] == [f"himpc-lab ready at {server.link}"]
         assert str(server.passes.owner) in server.link
 
 
@@ -114,22 +115,26 @@ def test_who_serves_others_reads_which_address_is_for_whom() -> None:
     """The first address is the owner's, and no other line contains the owner's secret."""
     origin = "https://lab.example.org"
     with made(own_files=Folder.at("."), trusted_origins=[origin], classroom=True) as server:
-        first, *others = greeting(server, "127.0.0.1", (origin,))
+        first, *others = greeting(server)
         owner, token = server.passes.owner, server.passes.token
         assert owner and token and owner != token
         assert first == f"himpc-lab ready at {server.link}" and first.endswith(owner)
         assert all(line.startswith("  ") for line in others)
         assert owner not in "".join(others)
         assert others[0] == f"  for others:           {server.url}/?himpc-token={token}"
-        numbers = seen_from_outside("0.0.0.0", server.url, ())
-        assert f"  for others:           {numbers}/?himpc-token={token}" in [*greeting(server, "0.0.0.0", ())]
         assert others[1] == f"  through the proxy:    {origin}/?himpc-token={token}"
         assert others[2].startswith("  instructor's token:   ")
         assert "Keep the first address secret" in others[3] and "--no-own-files" in others[3]
 
 
+def test_a_server_of_a_network_is_shown_with_its_number() -> None:
+    with made(own_files=Folder.at("."), host="0.0.0.0") as server:
+        numbers = seen_from_outside("0.0.0.0", server.url, ())
+        assert f"  for others:           {numbers}/?himpc-token={server.passes.token}" in [*greeting(server)]
+
+
 def test_no_token_says_what_it_gives_up() -> None:
     with made(ask_token=False) as server:
-        first, told = greeting(server, "127.0.0.1", ())
+        first, told = greeting(server)
         assert first == f"himpc-lab ready at {server.url}"
         assert "--no-token: every user of this machine" in told

@@ -17,8 +17,7 @@ from viser import _messages
 
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
-from app.server.server import PageServer
-from app.server.serving import serve
+from app.server.server import FIRST, PageServer
 from browsing.wire import let_in
 from lessons.scenes.run_spec import RunSpec
 from robots import InputError
@@ -51,22 +50,25 @@ def test_wrong_addresses_and_scenes_are_one_sentence() -> None:
         taken.listen()
         port = taken.getsockname()[1]
         with pytest.raises(InputError, match=r"in use.*--port"):
-            serve(port=port, open_browser=False)
+            PageServer(FIRST, port=port)
     with pytest.raises(InputError, match="--host"):
-        serve(host="203.0.113.7", port=0, open_browser=False)
+        PageServer(FIRST, host="203.0.113.7", port=0)
     with pytest.raises(InputError, match="Port 70000"):
-        serve(port=70_000, open_browser=False)
+        PageServer(FIRST, port=70_000)
     with pytest.raises(InputError, match="iiwa14-hold"):
-        serve(SceneChoice(RunSpec("iiwa14-hodl")), open_browser=False)
+        PageServer(SceneChoice(RunSpec("iiwa14-hodl")))
     with pytest.raises(InputError):
-        serve(SceneChoice(RunSpec("hold", "/nowhere.urdf")), open_browser=False)
+        PageServer(SceneChoice(RunSpec("hold", "/nowhere.urdf")))
     with pytest.raises(InputError, match="1 or more"):
-        serve(max_sessions=0, open_browser=False)
+        PageServer(FIRST, max_sessions=0)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_one_line_and_a_clean_end(number: signal.Signals) -> None:
-    code = "from app.server.serving import serve; import sys; sys.exit(serve(port=0, open_browser=False))"
+    code = (
+        "import sys; from app.server.server import FIRST, PageServer; from app.server.serving import serve; "
+        "sys.exit(serve(PageServer(FIRST, port=0), open_browser=False))"
+    )
     process = subprocess.Popen(
         [sys.executable, "-c", code],
         cwd=ROOT,

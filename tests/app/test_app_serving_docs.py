@@ -471,10 +471,9 @@ def test_a_place_that_cannot_be_read_is_none(text: str) -> None:
 
 def test_the_command_takes_what_the_page_shows(monkeypatch: pytest.MonkeyPatch) -> None:
     """The command also accepts several proxies."""
-    from app.server import serving
-
     asked: dict[str, Any] = {}
-    monkeypatch.setattr(serving, "serve", lambda _, **options: asked.update(options) or 0)
+    monkeypatch.setattr("app.server.server.PageServer", lambda _, **options: asked.update(options))
+    monkeypatch.setattr("app.server.serving.serve", lambda _, **options: 0)
     first, second = "https://lab.example.org", "https://b.example.org"
     assert main(["--no-browser", "--trusted-origin", first, "--trusted-origin", second]) == 0
     assert tuple(asked["trusted_origins"]) == (first, second) and asked["ask_token"]

@@ -65,7 +65,7 @@ def _jobs(quick: bool) -> tuple[EigenvalueJob, ...]:
 FIGURES = {
     "RMS distance of the TCP after 1 s": ("rms_mm", "mm"),
     "largest eigenvalue of M⁻¹M̄": ("largest", "1"),
-    "ticks on end beyond 2": ("beyond_2", "1"),
+    "most consecutive ticks with an eigenvalue above 2": ("beyond_2", "1"),
 }
 
 

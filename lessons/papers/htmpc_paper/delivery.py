@@ -101,7 +101,8 @@ def _ratios(time: dict[tuple[str, str], Array]) -> tuple[Row, ...]:
     strict, own = "5 cm, at rest", "80 cm"
     paper = printed("htmpc_text")["delivery_time_ratio"]
     unprinted = (
-        "four rounds of our seats; when the base counts as there is not printed, nor where people stood"
+        "four rounds, people at our seats; the paper prints neither when the base counts as arrived nor "
+        "where people stood"
     )
     apart = "no comparison of architectures alone: each has another rule"
 
