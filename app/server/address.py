@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import socket
-from collections.abc import Sequence
 from urllib.parse import urlsplit
 
 from robots import InputError
@@ -43,11 +42,9 @@ def local_url(host: str, port: int) -> str:
     return f"http://{shown}:{port}"
 
 
-def seen_from_outside(host: str, url: str, origins: Sequence[str]) -> str:
-    """The address of the server for other machines: the first proxy's, or the one of this machine in its
-    network if the server listens there."""
-    if origins:
-        return origins[0]
+def seen_from_outside(host: str, url: str) -> str:
+    """The address of the server for other machines without a proxy: that of this machine in its network if
+    the server listens there, else `url`, its address for this machine."""
     if host not in ("0.0.0.0", "::"):
         return url
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as line:

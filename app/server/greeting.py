@@ -38,9 +38,7 @@ def _has_an_instructor(server: PageServer) -> bool:
 
 
 def _for_others(server: PageServer) -> Iterator[str]:
-    here = seen_from_outside(
-        server.host, server.url, ()
-    )  # an IP address: few networks resolve a laptop's name
+    here = seen_from_outside(server.host, server.url)  # as numbers: few networks resolve a laptop's name
     by_proxy = [("through the proxy:", each) for each in server.proxies]
     for what, address in by_proxy if server.proxy_only else (("for others:", here), *by_proxy):
         link = address if server.proxy_only else server.passes.link(address, "guest")

@@ -96,6 +96,7 @@ class PageServer:
                 f"{VARIABLE}, and leave out --no-token"
             )
         self.host = host
+        """Where it listens."""
         self.proxies = tuple(map(as_origin, trusted_origins))
         """The addresses of the trusted proxies."""
         framing = frozenset(each if each == SELF else as_origin(each, "--embed-in") for each in embed_in)
@@ -116,7 +117,7 @@ class PageServer:
         self.sessions = room or alone or Sessions(choice, max_sessions, grace)
         self._own_files, self._key, self._refers = own_files, key, refers
         self._visits: dict[int, Visit] = {}
-        self._closed = False  # once True, no visit is added to `_visits`
+        self._closed = False  # once True, no visit begins
         self._lock = threading.Lock()
         self._sockets: Sockets | None = None
         self._link: Link | None = None
@@ -130,7 +131,7 @@ class PageServer:
             self.close()
             raise address_in_use(host, port)
         self.url = local_url(host, found)
-        self.outside = seen_from_outside(host, self.url, self.proxies)
+        self.outside = self.proxies[0] if self.proxies else seen_from_outside(host, self.url)
         """The address for other machines, as numbers: phones rarely find a machine by its name."""
         self._viser.gui.configure_theme(show_share_button=False, show_logo=False)
         self._viser.on_client_connect(self._connect)
@@ -211,21 +212,18 @@ class PageServer:
     # ---------------------------------------------------------------- clients, on viser's loop
 
     async def _connect(self, client: viser.ClientHandle) -> None:
-        visit = Visit(
-            self._viser,
-            client,
-            self.sessions,
-            self._own_files,
-            self._key,
-            room=self._room,
-            refers=self._refers,
-        )
         with self._lock:
-            closed = self._closed
-            if not closed:
-                self._visits[client.client_id] = visit
-        if closed:
-            visit.leave()
+            if self._closed:
+                return
+            visit = self._visits[client.client_id] = Visit(
+                self._viser,
+                client,
+                self.sessions,
+                self._own_files,
+                self._key,
+                room=self._room,
+                refers=self._refers,
+            )
         await visit.arrive()
 
     async def _disconnect(self, client: viser.ClientHandle) -> None:

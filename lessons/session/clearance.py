@@ -21,7 +21,7 @@ EVERY = 5
 
 
 class Nearest(NamedTuple):
-    """The pair whose distance exceeds the distance that it must keep by the least.
+    """The nearest pair: its distance minus the distance that it must keep is the smallest of all pairs.
 
     Attributes:
         distance: m, negative inside; NaN if no pair is near.

@@ -129,7 +129,7 @@ def test_who_serves_others_reads_which_address_is_for_whom() -> None:
 
 def test_a_server_of_a_network_is_shown_with_its_number() -> None:
     with made(own_files=Folder.at("."), host="0.0.0.0") as server:
-        numbers = seen_from_outside("0.0.0.0", server.url, ())
+        numbers = seen_from_outside("0.0.0.0", server.url)
         assert f"  for others:           {numbers}/?himpc-token={server.passes.token}" in [*greeting(server)]
 
 

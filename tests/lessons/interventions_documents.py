@@ -75,7 +75,8 @@ DOCUMENT_ROWS = (
         of("error/orientation", "deg", "rms", column=2), (0.8, 1.4), FIVE, (0.15, 0.35),
     ),
     RT4(
-        "disagreements", "our errors are those of time-delay estimation and are proportional to T_s·M/M̄",
+        "disagreements",
+        "our errors are those of time-delay estimation and are roughly proportional to T_s·M/M̄",
         of("error/position", "mm", "rms"), (0.55, 0.85), ("M_bar_scale=2",), (0.25, 0.43),
     ),
     # ---------------------------------------- RT1

@@ -43,7 +43,7 @@ def approach(pair: int, other: int, normal: Array, velocity: Array) -> float:
 
     Args:
         pair: which one.
-        other: index of the pair's second shape; the first b shapes are objects, the others do not move.
+        other: index of the pair's second shape; only the first b shapes are objects.
         normal: of all pairs, see `near`.
         velocity: (b, 3) m/s, of the objects.
     """

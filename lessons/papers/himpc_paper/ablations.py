@@ -126,7 +126,7 @@ def _over(
 
 def _remark_6(results: Results, quick: bool) -> Section:
     runs = {scene: {ms: results[_period_job(scene, ms)] for ms in _PERIODS} for scene in _SCENES[quick]}
-    note = "**Remark 6, sampling period.** T_s is also the delay of time-delay estimation; M̄ is the same."
+    note = "**Remark 6, sampling period.** T_s is also the delay of time-delay estimation; M̄ is fixed."
     section = _over("Remark 6", "sampling period (ms)", _PERIODS, runs, note, log=True)
     ratio = _level_1(runs[RT1][4.0]) / _level_1(runs[RT1][0.5])
     row = Row(
