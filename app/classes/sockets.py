@@ -65,7 +65,7 @@ class Sockets:
         self._states: dict[str, asyncio.Future[str]] = {}  # that other servers were asked for, by learner
         self._said: dict[str, str] = {}
         self._behind: set[Any] = set()
-        """Pages that were too slow for the last news; they get all of it as soon as they can."""
+        """Pages that were too slow for the last changes; they then get the whole news instead."""
         self._loop: asyncio.AbstractEventLoop | None = None
 
     def start(self, loop: asyncio.AbstractEventLoop) -> None:

@@ -35,6 +35,6 @@ class Phase:
 
 
 def column(rate: Array | float) -> Array | float:
-    """Returns a rate per sample as a column, to be multiplied by rows of coordinates; a plain number stays
-    one."""
+    """Returns a rate per sample as a column, which can be multiplied by rows of coordinates; returns a plain
+    number unchanged."""
     return rate[:, None] if isinstance(rate, np.ndarray) else rate

@@ -32,11 +32,12 @@ class OrientationTask(OnAxes):
       between the two, ẋ = ω on the two axes (reduced attitude: a rotation about f of any angle is no error);
     - one axis a: x̃ = aᵀ log₃ E, ẋ = aᵀ J_l⁻¹(log₃ E) ω with the inverse of SO(3)'s left Jacobian.
 
-    On one axis ẋ is the derivative of x̃. On two or three axes ẋ is the derivative along x̃ and to first
-    order in x̃: always d/dt ½‖x̃‖² = x̃ᵀ(ẋ − ẋ_d), so that (4) decreases ½‖ẋ − ẋ_d‖² + ½ K_p‖x̃‖² at the rate
-    K_v‖ẋ − ẋ_d‖² at every angle below 180°. (Components of log₃ E with ẋ = ω on their axes alone do not have
-    this property: with the free rotation θ they give s² + K_v s + K_p (θ/2)(cot θ/2 ± i), unstable where K_v²
-    cot θ/2 < K_p θ/2.)
+    On one axis ẋ is the derivative of x̃. On two or three axes this holds for the component along x̃, and for
+    the others to first order in x̃. The first is enough: d/dt ½‖x̃‖² = x̃ᵀ(ẋ − ẋ_d), so that (4) decreases
+    ½‖ẋ − ẋ_d‖² + ½ K_p‖x̃‖² at the rate K_v‖ẋ − ẋ_d‖² at every angle below 180°. (Single components of
+    log₃ E, with ẋ = ω on the same axes, do not have this property: if the free rotation is θ, the
+    characteristic polynomial is s² + K_v s + K_p (θ/2)(cot θ/2 ± i), which is unstable where
+    K_v² cot θ/2 < K_p θ/2.)
     """
 
     K_p: Gain = 50.0

@@ -146,7 +146,7 @@ THERE = Step(
     ghost=ONE_BY_ONE,
     controls=(
         ARCHITECTURE,
-        Control("base_tolerance", "Base is at its place within, m", 0.05, 0.8),
+        Control("base_tolerance", "Base has arrived within, m", 0.05, 0.8),
         Control("base_at_rest", "and at rest", choices=(False, True)),
     ),
     plots=PLOTS,

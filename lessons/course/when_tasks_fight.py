@@ -82,8 +82,8 @@ PROJECTION = Step(
 BETTER_MODEL = Step(
     title="Would a better model help?",
     text=r"""
-    TDEOSF replaces the model by time-delay estimation, as HIMPC does, and keeps the projection:
-    $(J_{2|1} \bar M^{-1} J_{2|1}^\top)^{-1}$. Until the conflict it is far more accurate than OSF.
+    TDEOSF replaces the model by time-delay estimation, as HIMPC does, but it keeps the projection and its
+    inverse, $(J_{2|1} \bar M^{-1} J_{2|1}^\top)^{-1}$. Until the conflict it is far more accurate than OSF.
     """,
     do="Let joint 1 swing by 20° only and compare OSF with TDEOSF.",
     why=r"""

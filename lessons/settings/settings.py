@@ -100,8 +100,8 @@ class SceneSettings(ABC):
         return 0
 
     def place(self, path: str) -> Place:
-        """The place of a path, also of a path that no list contains. Raises InputError, which names the
-        nearest path, for an unknown one.
+        """The place of a path; the path may also be one element of a value, such as M_bar.3, which `places`
+        does not contain. Raises InputError, which names the nearest path, for an unknown path.
         """
         places = self.places()
         if path in places:

@@ -76,7 +76,7 @@ REFERENCE = (
     Exempt("mathematics", HIMPC + (
         "errors.py::test_what_controllers_take_for_its_derivative_is_the_errors_own"
     ), (
-        ("himpc/tasks/orientation.py", "On two or three axes ẋ is the derivative along x̃"),
+        ("himpc/tasks/orientation.py", "The first is enough: d/dt ½‖x̃‖²"),
     )),
     Exempt("mathematics", HIMPC + "references.py::test_a_dragged_position_keeps_its_caps_and_its_promises", (
         ("himpc/references/target.py", "A dragged target: filtered so that"),
