@@ -1,4 +1,4 @@
-"""Derivations and questions that a lesson's page adds to the lesson: one file per lesson, each defines
+"""Derivations and questions on the page of each lesson. There is one file per lesson, and each file defines
 `FURTHER`."""
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ from docs.further.kit import Further, Line, Question, inertia, measured
 T_S = 1e-3
 K_P = 56.2
 ASKED = K_P * 0.01
-"""K_p of the hand times one centimetre, m/s²."""
+"""The desired acceleration, m/s², at an error of the hand of one centimetre."""
 GROWTH = measured("a-blind-arm", "In the last half second") / 0.5
 SPRING = measured("a-blind-arm", "At the end the arm presses", there=True)
 
@@ -48,38 +48,39 @@ def _spring(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 FURTHER = Further(
     derivation=(
         Line(
-            "The arm moves by $M \\ddot q + n = \\tau - J^\\top f$, where $f$ is the force with which the "
-            "hand presses. Time-delay estimation attributes the following torque to the arm's own dynamics:",
+            r"The arm obeys $M \ddot q + n = \tau - J^\top f$, where $f$ is the force with which the hand "
+            "presses. Time-delay estimation attributes the following torque to the arm's own dynamics:",
             r"\tau_0 - \bar M \ddot q_0 = (M - \bar M)\, \ddot q_0 + n + J^\top f",
             _estimate,
         ),
         Line(
-            "At rest on the table nothing moves, and the desired acceleration is $\\ddot x = -K_p \\tilde "
-            "x$. An increment that would produce this acceleration, with $\\bar\\Lambda = (J \\bar M^{-1} "
-            "J^\\top)^{-1}$, is $\\Delta\\tau = J^\\top \\bar\\Lambda \\ddot x$:",
+            r"When the hand rests on the table, the desired acceleration is $\ddot x = -K_p \tilde x$. Let "
+            r"$\bar\Lambda = (J \bar M^{-1} J^\top)^{-1}$. In free space, the increment $\Delta\tau = "
+            r"J^\top \bar\Lambda \ddot x$ would produce this acceleration:",
             r"J \bar M^{-1} (J^\top \bar\Lambda\, \ddot x) = \ddot x",
             _increment,
         ),
         Line(
-            "But the table does not move. The increment is added to the force, and at the next tick the "
-            "desired acceleration is the same. After $k$ ticks the force is",
+            "But the table does not move. The increment only increases the force, and the desired "
+            "acceleration at the next tick is the same. After $k$ ticks the force is",
             r"f_k = f_0 + k\, \bar\Lambda\, \ddot x",
             _growth,
         ),
         Line(
-            "OSF computes its torque anew from the model, with $\\Lambda = (J M^{-1} J^\\top)^{-1}$. At rest "
-            "it presses with",
+            r"OSF computes its torque anew from the model at each tick, with $\Lambda = (J M^{-1} "
+            r"J^\top)^{-1}$. At rest the hand presses with the force",
             r"f = \Lambda\, \ddot x = -\Lambda K_p \tilde x",
             _spring,
         ),
     ),
     questions=(
         Question(
-            "The hand's $K_p$ is 56.2 1/s². Which mass corresponds to the growth of the force in the last "
-            "half second?",
-            r"One centimetre asks for ⟨asked⟩ m/s². The force grows by ⟨rate⟩ N per second, ⟨tick⟩ N per "
-            r"millisecond. With $\bar\Lambda\, \ddot x$ this corresponds to a mass of ⟨mass⟩ kg: $\bar M$ "
-            r"is small, and still the force grows without end.",
+            r"The hand's $K_p$ is 56.2 1/s². By the third line, which mass $\bar\Lambda$ explains the "
+            "growth of the force in the last half second, if the error is one centimetre?",
+            "At an error of one centimetre the desired acceleration is ⟨asked⟩ m/s². The force grows by "
+            r"⟨rate⟩ N per second, that is, by ⟨tick⟩ N per millisecond. This growth equals $\bar\Lambda\, "
+            r"\ddot x$ for a mass of ⟨mass⟩ kg. The mass is small like $\bar M$, but the force grows "
+            "without end.",
             {
                 "asked": (ASKED, ".2f"),
                 "rate": (GROWTH, ".0f"),
@@ -88,8 +89,9 @@ FURTHER = Further(
             },
         ),
         Question(
-            "The ghost presses with a constant force. Which mass of the hand corresponds to this force?",
-            r"$f = \Lambda\, \ddot x$ with ⟨asked⟩ m/s² and ⟨force⟩ N: ⟨mass⟩ kg.",
+            r"The ghost presses with a constant force. By the fourth line, which mass $\Lambda$ of the hand "
+            "explains this force at an error of one centimetre?",
+            r"With $f = \Lambda\, \ddot x$, ⟨asked⟩ m/s² and ⟨force⟩ N, the mass is ⟨mass⟩ kg.",
             {"asked": (ASKED, ".2f"), "force": (SPRING, ".1f"), "mass": (SPRING / ASKED, ".1f")},
         ),
         Question(

@@ -36,44 +36,46 @@ def _torques(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 FURTHER = Further(
     derivation=(
         Line(
-            "The hand is where the joints put it, $x = f(q)$ (2). The chain rule gives its velocity (3):",
+            "The position of the hand is a function of the joint angles, $x = f(q)$ (2). The chain rule "
+            "gives the velocity of the hand (3):",
             r"\dot x = \frac{\partial f}{\partial q}\,\dot q = J(q)\,\dot q",
             _difference,
             1e-6,
         ),
         Line(
-            "Let $J^+$ be the pseudoinverse. If $J$ has full rank, every velocity of the form",
+            "Let $J^+$ be the pseudoinverse of $J$. If $J$ has full rank, the following joint velocity "
+            r"gives the hand the velocity $\dot x$, for any vector $z$:",
             r"\dot q = J^+ \dot x + (I - J^+ J)\,z \quad\Rightarrow\quad J \dot q = \dot x",
             _all_solutions,
         ),
         Line(
-            "makes the hand move as asked, whatever $z$ is. $I - J^+ J$ projects onto the null space. Its "
-            "trace is the number of motions that are left over; a coordinate that repeats another one does "
-            "not reduce it:",
+            "The matrix $I - J^+ J$ projects onto the null space of $J$. The trace of this matrix is the "
+            "number of motions that are left over. A coordinate that repeats another coordinate does not "
+            "reduce this number:",
             r"\operatorname{tr}(I - J^+ J) = n - \operatorname{rank} J",
             _freedoms,
         ),
         Line(
-            r"The controller decides on torques. By (13) a change of torque moves the hand by $J \bar "
-            r"M^{-1} \Delta\tau$. The changes that do not move the hand are",
+            "The controller computes torques. By (13) a change of torque changes the acceleration of the "
+            r"hand by $J \bar M^{-1} \Delta\tau$. The following changes of torque do not move the hand:",
             r"\Delta\tau = \bar M (I - J^+ J)\,z \quad\Rightarrow\quad J \bar M^{-1} \Delta\tau = 0",
             _torques,
         ),
     ),
     questions=(
         Question(
-            "A seven-joint arm holds a glass. The tasks control the place of the glass and keep it upright; "
-            "its rotation about its own axis is free. How many motions are left over? And how many if "
-            "*upright* is asked for twice, on two levels?",
-            "The place has three coordinates and *upright* has two: $7 - 5 = 2$. If *upright* is asked for "
-            "twice, it still removes two motions: the rank of all rows together counts, not their number.",
+            "A seven-joint arm holds a glass. Two tasks control the position of the glass and keep the "
+            "glass upright. Its rotation about its own axis is free. How many motions are left over? How "
+            "many are left over if two levels contain the task *upright*?",
+            "The position has three coordinates and *upright* has two: $7 - 5 = 2$. If *upright* appears "
+            "twice, the number is the same: the rank of all rows counts, not the number of rows.",
         ),
         Question(
-            "The planar arm has three links of 0.3 m. It lies straight along $x$. What are its Jacobian and "
-            "its rank, and which joint velocities leave the hand at rest?",
-            r"No joint moves the hand along $x$; sideways the levers are ⟨l1⟩, ⟨l2⟩ and ⟨l3⟩ m. The rank is "
-            "⟨rank⟩, so two motions are free, one more than in any bent pose: for example the velocities "
-            "$(1, -⟨back⟩, 0)$ and $(1, 0, -⟨far⟩)$.",
+            "The planar arm has three links of 0.3 m and is stretched along $x$. What is its Jacobian, and "
+            "which rank does the Jacobian have? Which joint velocities leave the hand at rest?",
+            "No joint moves the hand along $x$. Along $y$ the joints have levers of ⟨l1⟩, ⟨l2⟩ and ⟨l3⟩ m. "
+            "The rank is ⟨rank⟩, so two motions are free, one more than in any bent pose. Examples are the "
+            "joint velocities $(1, -⟨back⟩, 0)$ and $(1, 0, -⟨far⟩)$.",
             {
                 "l1": (STRAIGHT[1, 0], ".1f"),
                 "l2": (STRAIGHT[1, 1], ".1f"),
@@ -84,12 +86,12 @@ FURTHER = Further(
             },
         ),
         Question(
-            "In *Drag the elbow*, joint 3 is asked to turn by 60°. How far does it turn, and why does it "
-            "not turn further?",
-            "It turns by ⟨turn⟩°, ⟨share⟩ % of the desired angle. The posture asks joint 3 to turn and all "
-            "other joints to stay; these are seven targets for one free motion. Level 3 moves along this "
-            "free motion as long as the sum of the seven errors becomes smaller. There the remaining error "
-            "is perpendicular to the free motion.",
+            "In *Drag the elbow*, joint 3 is asked to turn by 60°. How far does the joint turn, and why "
+            "does it not turn further?",
+            "Joint 3 turns by ⟨turn⟩°, ⟨share⟩ % of the desired angle. The posture task has seven targets: "
+            "joint 3 is to turn, and the other six joints are to stay. But only one motion is free. Level 3 "
+            "uses this motion until it cannot reduce the sum of the squared errors of the seven joints "
+            "further. There the vector of the errors is perpendicular to the free motion.",
             {"turn": (ELBOW, ".0f"), "share": (100 * ELBOW / 60, ".0f")},
         ),
     ),

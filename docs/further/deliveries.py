@@ -24,8 +24,8 @@ def _serial(rng: np.random.Generator) -> tuple[float, float]:
 
 
 def _overlapped(rng: np.random.Generator) -> tuple[float, float]:
-    """Returns both sides for a round as a sequence of events: base and hand start at the same time, and the
-    next delivery begins when both have finished."""
+    """Returns the duration of a simulated round, and the duration by the formula. Base and hand start at the
+    same time, and the next delivery begins when both have finished."""
     drive, reach, wait = rng.uniform(1, 9, 3)
     ready = 0.0
     for _ in range(4):
@@ -52,28 +52,27 @@ def _along(rng: np.random.Generator) -> tuple[float, float]:
 FURTHER = Further(
     derivation=(
         Line(
-            "One task at a time, a round to $m$ people takes the sum of everything: driving $t_b$, "
-            "reaching $t_h$, waiting $t_w$,",
+            "With one task at a time, each delivery takes the sum of the times for driving $t_b$, reaching "
+            "$t_h$ and waiting $t_w$. A round to $m$ people takes",
             r"T_1 = m\,(t_b + t_h + t_w)",
             _serial,
         ),
         Line(
-            "With a window of two, driving and reaching go on together. The time is then the longer of the "
-            "two plus the wait:",
+            "With a window of two tasks, driving and reaching happen at the same time. Each delivery takes "
+            "the longer of these two times plus the waiting time:",
             r"T_2 = m\,(\max(t_b, t_h) + t_w)",
             _overlapped,
         ),
         Line(
-            r"While the hand waits at $p$, the base may be anywhere within $\rho$ of it. For a goal $g$ "
-            r"beyond that, (12) leaves "
-            "as the best place",
+            r"While the hand waits at $p$, the base may be anywhere within the distance $\rho$ of $p$. If "
+            "the goal $g$ of the base is outside this circle, the best place that (12) allows is",
             r"p + \rho\, \frac{g - p}{\lVert g - p \rVert}",
             _edge,
             1e-5,
         ),
         Line(
-            r"If the goal moves, this place moves along the edge of that circle. If the direction to the "
-            r"goal turns by $\varphi$, the base drives",
+            "If the goal moves, this place moves along the edge of the circle. If the direction to the goal "
+            r"turns by $\varphi$, the base drives the distance",
             r"s = \rho\, \varphi",
             _along,
             1e-6,
@@ -81,12 +80,14 @@ FURTHER = Further(
     ),
     questions=(
         Question(
-            "One round takes 31 s with one task at a time. How long does it take with two, by the ratio that "
-            "the first step measures, and how long if both must stop at every place (second step, 41 s)? "
-            "What factors are these? The paper has one over four rounds.",
-            "The ratios are ⟨ratio⟩ and ⟨strict⟩, so ⟨time⟩ and ⟨strict_time⟩ s: factors of ⟨factor⟩ and "
-            "⟨strict_factor⟩. The paper has 2.3, compared with a robot whose base and arm take turns; the "
-            "paper does not print its rule.",
+            "One round takes 31 s with one task at a time. The first step measures the ratio for two tasks "
+            "at a time: how long does the round take with two tasks? In the second step base and hand must "
+            "stop at every place, and one task at a time takes 41 s. How long does the round take there "
+            "with two tasks? By which factors are two tasks faster? Compare with the factor that the paper "
+            "reports for four rounds.",
+            "The ratios are ⟨ratio⟩ and ⟨strict⟩, so the rounds take ⟨time⟩ and ⟨strict_time⟩ s. The "
+            "factors are ⟨factor⟩ and ⟨strict_factor⟩. The paper reports 2.3 in comparison with a robot "
+            "whose base and arm move in turn. It does not say when a task of the base is done.",
             {
                 "ratio": (RATIO, ".2f"),
                 "strict": (STRICT, ".2f"),
@@ -97,19 +98,19 @@ FURTHER = Further(
             },
         ),
         Question(
-            "By the two first lines, how large can the factor $T_1/T_2$ be if nobody waits ($t_w = 0$)? A "
-            "report claims a larger factor. What would you ask its authors?",
-            r"$(t_b + t_h)/\max(t_b, t_h)$ is at most 2, where both take equally long. The lines assume "
-            r"that $t_b$ and $t_h$ are the same in both runs. So ask whether they were the same: if the "
-            r"base may pass far from its place in one run and has to go all the way to it in the other, the "
-            r"two runs have different $t_b$.",
+            "By the first two lines, how large can the factor $T_1/T_2$ be without any waiting ($t_w = 0$)? "
+            "A report claims a larger factor. What would you ask its authors?",
+            r"$(t_b + t_h)/\max(t_b, t_h)$ is at most 2. It is 2 if driving and reaching take equally long. "
+            "The lines assume that $t_b$ and $t_h$ are the same in both runs. So ask whether they were the "
+            "same in the report. For example, $t_b$ differs if the base may pass its place at a distance in "
+            "one run but must reach the place in the other run.",
         ),
         Question(
-            "The base waits at the edge, $\\rho = 1.2$ m from the point below the hand, and the next "
-            "person moves so that the direction to them turns by 40°. How far does the base drive while "
-            "the hand stays?",
-            r"$\rho\,\varphi = ⟨way⟩$ m. This way is not lost: it is the part of the new way that the base "
-            r"can drive before the ball is taken.",
+            r"The base waits at the edge of the circle, $\rho = 1.2$ m from the point below the hand. The "
+            "next person moves so that the direction to this person turns by 40°. How far does the base "
+            "drive while the hand stays?",
+            r"The base drives $\rho\,\varphi = ⟨way⟩$ m. This distance is not wasted: it is the part of the "
+            "new way that the base can drive before the ball is taken.",
             {"way": (RADIUS * TURN, ".2f")},
         ),
     ),

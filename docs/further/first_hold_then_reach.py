@@ -14,7 +14,8 @@ LEFT = measured("first-hold-then-reach", "The error of the hand is then")
 
 
 def _integrated(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Returns (4) and (5) with G = I over one knot, by the matrix exponential and as printed."""
+    """Returns the state after one knot by (4) and (5) with G = I: by the matrix exponential, and by the
+    printed formula."""
     dt, q, v, u = 0.1, *rng.normal(size=3)
     A = np.array([[0, 1, 0], [0, 0, 1], [0, 0, 0.0]])  # acts on (q, v, u)
     return (expm(A * dt) @ np.array([q, v, u]))[:2], np.array([q + v * dt + 0.5 * u * dt**2, v + u * dt])
@@ -39,7 +40,8 @@ def _held(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _nearest(rng: np.random.Generator) -> tuple[float, float]:
-    """Returns the least distance from the goal to a grid of points around the hand, and the formula."""
+    """Returns the least distance from the goal to a grid of points around the hand, and the distance by the
+    formula."""
     goal = np.array([3.5, 0.0])
     reach = rng.uniform(1.0, 2.0)
     r, angle = np.meshgrid(np.linspace(0, reach, 400), np.linspace(0, 2 * np.pi, 721))
@@ -50,15 +52,15 @@ def _nearest(rng: np.random.Generator) -> tuple[float, float]:
 FURTHER = Further(
     derivation=(
         Line(
-            r"The model (4), (5) is $\dot q = v$, $\dot v = u$ for a base that rolls in every direction "
-            r"($G = I$). With $u$ constant between knots (7b) is exact:",
+            r"If the base rolls in every direction ($G = I$), the model (4), (5) is $\dot q = v$, $\dot v = "
+            "u$. If $u$ is constant between the knots, (7b) is exact:",
             r"q_{k+1} = q_k + v_k \Delta t + \tfrac12 u_k \Delta t^2, \qquad v_{k+1} = v_k + u_k \Delta t",
             _integrated,
         ),
         Line(
-            r"The lexicographic minimum (7a) takes the smallest $\mathcal J_2$ among all plans that make "
-            r"$\mathcal J_1$ "
-            "smallest. For linear errors it is the limit of a weighted sum:",
+            r"The lexicographic minimum (7a) is the plan with the smallest $\mathcal J_2$ among all plans "
+            r"with the smallest $\mathcal J_1$. For linear errors it is the limit of the minimum of a "
+            "weighted sum:",
             r"\operatorname{lex\,min}\,[\mathcal J_1, \mathcal J_2] = \lim_{w \to \infty} "
             r"\arg\min\, (w\, \mathcal J_1 + \mathcal J_2)",
             _lexicographic,
@@ -71,8 +73,9 @@ FURTHER = Further(
             _held,
         ),
         Line(
-            r"This is impossible where the arm is stretched. While the hand rests, the base stays within a "
-            r"distance $\rho$ of it; the nearest such place to a goal at a distance $d > \rho$ leaves",
+            "Where the arm is stretched, this is impossible. While the hand rests, the base stays within a "
+            r"distance $\rho$ of the hand. If the goal of the base is at a distance $d > \rho$ from the "
+            "hand, the least remaining distance to the goal is",
             r"\min_{\lVert p \rVert \le \rho} \lVert p - p_{goal} \rVert = d - \rho",
             _nearest,
             1e-6,
@@ -80,26 +83,26 @@ FURTHER = Further(
     ),
     questions=(
         Question(
-            "The goal of *Out of reach* is 3.5 m from the hand, the arm reaches 1.86 m. How far before "
-            "its goal should the base stop? What is measured?",
-            "⟨expected⟩ m in the plane; in the run the base stops ⟨seen⟩ m before its goal. The difference "
-            "is geometry: the hand is not at the shoulder's height, and the shoulder not in the middle of "
-            "the base.",
+            "In *Out of reach* the goal of the base is 3.5 m from the hand, and the arm reaches 1.86 m. How "
+            "far before its goal should the base stop, and which distance does the lesson measure?",
+            "In the plane it should stop ⟨expected⟩ m before its goal. In the run the base stops ⟨seen⟩ m "
+            "before its goal. The geometry in space differs: the hand is not at the height of the shoulder, "
+            "and the shoulder is not in the middle of the base.",
             {"expected": (3.5 - 1.86, ".2f"), "seen": (STOPS, ".2f")},
         ),
         Question(
-            "In the last step the tasks change places. How far is the hand from its goal in the end, and "
-            "why is it the same number?",
-            "⟨left⟩ m. The distance between the two goals and the length of the arm are what they were; "
-            "only the task that has the error has changed.",
+            "In the last step the two tasks swap their levels. How far is the hand from its goal at the "
+            "end, and why is this the distance of question 1?",
+            "It is ⟨left⟩ m from its goal. The distance between the two goals and the length of the arm are "
+            "the same as before. The error is now in the other task.",
             {"left": (LEFT, ".2f")},
         ),
         Question(
-            "In *Nine joints, two tasks* the base's goal is 0.5 m ahead and 0.4 m to the side. Why is this "
-            "called 64 cm, and how many degrees of freedom are left over?",
-            r"$\sqrt{0.5^2 + 0.4^2} = ⟨way⟩$ m. Of nine joints, three coordinates of the hand and two of "
-            r"the base leave "
-            "⟨free⟩: the base may turn, and the arm may move its elbow and turn the hand.",
+            "In *Nine joints, two tasks* the goal of the base is 0.5 m ahead and 0.4 m to the side. Why "
+            "does the lesson state a distance of 64 cm? How many degrees of freedom are left over?",
+            r"$\sqrt{0.5^2 + 0.4^2} = ⟨way⟩$ m. The robot has nine joints. The hand's task has three "
+            "coordinates and the base's task has two, which leaves ⟨free⟩ degrees of freedom: the base may "
+            "turn, and the arm may move its elbow and turn the hand.",
             {"way": (math.hypot(0.5, 0.4), ".2f"), "free": (9.0 - 5, ".0f")},
         ),
     ),

@@ -30,9 +30,9 @@ class Line:
 
     Attributes:
         words: the reason for the step.
-        equation: in LaTeX.
+        equation: the equation in LaTeX.
         sides: returns both sides of the equation for random numbers, computed independently where possible.
-        tolerance: the allowed difference of the sides, relative to the larger and absolute.
+        tolerance: the allowed difference between the sides, both relative and absolute.
     """
 
     words: str
@@ -48,8 +48,8 @@ class Question:
     Attributes:
         asked: the question.
         answer: the answer; ⟨name⟩ marks the place of a number.
-        numbers: name: value and format. All other numbers of the answer are given in the question or in the
-            lesson.
+        numbers: the value and the format of each name. All other numbers of the answer appear in the question
+            or in the lesson.
     """
 
     asked: str
@@ -58,7 +58,7 @@ class Question:
 
     @property
     def answered(self) -> str:
-        """The answer with its numbers. Raises KeyError for a name that is not in `numbers`."""
+        """The answer with all its numbers inserted. Raises KeyError for a name that is not in `numbers`."""
         return _HOLE.sub(lambda hole: format(*self.numbers[hole[1]]), self.answer)
 
 
@@ -72,8 +72,8 @@ class Further:
 
 def measured(lesson: str, claim: str, there: bool = False) -> float:
     """Returns the value that `himpc-lab lessons --check` measured for the claim whose text begins with
-    `claim`; there: under the setting with which the claim fails. Raises KeyError if the lesson has no such
-    claim."""
+    `claim`. With `there`, it returns the value under the setting that makes the claim fail. Raises KeyError
+    if the lesson has no such claim."""
     for check in _checks().get(lesson, ()):
         if check["what"].startswith(claim):
             return float(check["measured_there" if there else "measured"])

@@ -49,7 +49,7 @@ TEXTS = (
         ("contributing", "Each sentence that gives a reason needs a run"),
     )),
     Exempt("definition", "", (
-        ("further/deliveries", "The base waits at the edge, $\\rho = 1.2$ m"),
+        ("further/deliveries", "The next person moves so that the direction"),
         ("disagreements", "So a number that differs need not be wrong"),
         ("disagreements", "Here is every row that does not agree"),
         ("lessons/papers/disagreements.py", "So a number that differs need not be wrong"),
