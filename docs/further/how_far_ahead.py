@@ -1,4 +1,4 @@
-"""How far ahead: the stacked prediction, why it is deadbeat, and the effect of the horizon on the cost."""
+"""How far ahead: the stacked prediction, its deadbeat solution, and the effect of the horizon on the cost."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def first_left(N: int, Q: float, R: float, g: float) -> float:
 
 
 def _printed(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the result of (15) with its own matrices, N times, and the sums of c_l."""
+    """Returns e after each of N steps of (15) with the printed matrices, and e by the sums of c_l."""
     T, N, K_p, K_v = 1e-3, 6, 100.0, 20.0
     A_11 = np.array([[1, T, 0], [0, 2, 0], [0, 0, 1.0]])
     A_12 = np.diag([0.0, -1.0, 0.0])
@@ -61,8 +61,8 @@ def _gradient(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 FURTHER = Further(
     derivation=(
         Line(
-            r"Apply (15) $N$ times. Every $\Delta\tau$ acts on all later knots, with the numbers $c_l$ of "
-            r"*One task under MPC*, so the residuals of the whole horizon are",
+            r"Apply (15) $N$ times. Every $\Delta\tau$ acts on all later knots, with the factors $c_l$ of "
+            "*One task under MPC*, so the residuals of the whole horizon are",
             r"\bar e = \bar e_{free} + C\, \bar u, \qquad C_{js} = c_{j-s} \;(s \le j), "
             r"\qquad u_s = J \bar M^{-1} \Delta\tau_{k+s}",
             _printed,
@@ -74,32 +74,33 @@ FURTHER = Further(
             1e-5,
         ),
         Line(
-            "$C$ is triangular, and no entry of its diagonal is zero. If $R$ is small enough, all residuals "
-            "can be made zero, and the first one is made zero by the first increment alone:",
+            "$C$ is triangular, and no entry of its diagonal is zero. In the limit of a small $R$, all "
+            "residuals become zero. The first increment alone makes the first residual zero:",
             r"R \to 0: \quad C\, \bar u = -\bar e_{free} \quad\Rightarrow\quad e_{k+1} = 0",
             _deadbeat,
         ),
         Line(
-            "This first increment is all that is applied. It does not depend on how many rows follow:",
+            "The controller applies this first increment only. The increment does not depend on the number "
+            "of knots:",
             r"u_0^{(N = 20)} = -e_{k+1}/c_0 = u_0^{(N = 1)}",
             _same_first,
         ),
     ),
     questions=(
         Question(
-            r"$K_P = 100$, $K_V = 20$, $T_s = 1$ ms. Compute $c_0$, $c_4$ and $c_{19}$. What would the "
-            r"matrix $C$ be if "
-            "they were all 1?",
-            "$⟨c0⟩$, $⟨c4⟩$ and $⟨c19⟩$. If they were all 1, each $e$ would be the sum of the changes up to "
-            "it: within 20 ms a change has an effect on almost nothing but acceleration, and velocity and "
-            "position hardly change.",
+            "$K_P = 100$, $K_V = 20$, $T_s = 1$ ms. Compute $c_0$, $c_4$ and $c_{19}$. What would the "
+            "matrix $C$ be if all $c_l$ were 1?",
+            "They are $⟨c0⟩$, $⟨c4⟩$ and $⟨c19⟩$. If all $c_l$ were 1, $C$ would be a lower triangle of "
+            "ones: each $e$ would be the sum of all changes up to its knot. Within 20 ms a change acts "
+            "mainly on the acceleration; velocity and position hardly change.",
             {f"c{k}": (effects(20)[k, 0], ".3f") for k in (0, 4, 19)},
         ),
         Question(
-            "Seven joints. How many unknowns has a level's QP with $N = 5$ and with $N = 20$, and how "
-            "many entries its Hessian? Compare with the times that the lesson names.",
-            "⟨n5⟩ and ⟨n20⟩ unknowns, ⟨h5⟩ and ⟨h20⟩ entries, ⟨ratio⟩ times as many. The measured times "
-            "are only ⟨times⟩ times as long: much of a step does not depend on $N$.",
+            "An arm has seven joints. How many unknowns does the QP of a level have with $N = 5$ and with "
+            "$N = 20$? How many entries does its Hessian have? Compare the ratio with the times that the "
+            "lesson states.",
+            "The QP has ⟨n5⟩ and ⟨n20⟩ unknowns. The Hessian has ⟨h5⟩ and ⟨h20⟩ entries, ⟨ratio⟩ times as "
+            "many. The measured time is only ⟨times⟩ times as long: much of the work does not depend on $N$.",
             {
                 "n5": (7.0 * 5, ".0f"),
                 "n20": (7.0 * 20, ".0f"),
@@ -110,12 +111,13 @@ FURTHER = Further(
             },
         ),
         Question(
-            "One coordinate, $g = 1$, a constant $e$, and $R$ equal to $Q$. Which share of $e$ is left at "
-            "the first knot with $N = 1$, and which with $N = 20$? Why? And with $g = 18$, as for torques?",
-            "⟨one⟩ % and ⟨twenty⟩ %. A change of acceleration stays in force at all later knots: with $N = "
-            "20$ its cost counts once and its benefit twenty times, so a larger change is optimal. A "
-            "smaller $R$ has the same effect with $N = 1$. With $g = 18$ there is ⟨tiny⟩ % left for both: "
-            "where the cost of a change hardly counts, a longer horizon has no advantage.",
+            "A task has one coordinate with the gain $g = 1$, a constant $e$, and $R$ equal to $Q$. Which "
+            "share of $e$ is left at the first knot with $N = 1$ and with $N = 20$, and why? Which shares "
+            "are left with $g = 18$, the size of a torque's gain?",
+            "The shares are ⟨one⟩ % and ⟨twenty⟩ %. A change of acceleration stays in force at all later "
+            "knots: with $N = 20$ its cost counts once and its benefit twenty times, so a larger change is "
+            "optimal. A smaller $R$ has the same effect with $N = 1$. With $g = 18$ the share is ⟨tiny⟩ % "
+            "for both horizons: if the cost of a change hardly counts, a longer horizon has no advantage.",
             {
                 "one": (100 * first_left(1, 1, 1, 1), ".0f"),
                 "twenty": (100 * first_left(20, 1, 1, 1), ".0f"),

@@ -43,31 +43,31 @@ def _flat(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 FURTHER = Further(
     derivation=(
         Line(
-            r"A plan that keeps (12) makes no $|e_{kp}|$ larger than it is in the best plan of level $i$. "
-            r"Then no term of (8) is "
-            "larger either, so it keeps (11):",
+            "In a plan that satisfies (12), no $|e_{kp}|$ is larger than in the best plan of level $i$. "
+            "Then no term of (8) is larger either, so the plan also satisfies (11):",
             r"|e_{kp}| \le |e_{kp}|^* \;\; \forall k, p \quad\Rightarrow\quad "
             r"\max\left(0,\; \mathcal J_i - \mathcal J_i^*\right) = 0",
             _inner,
         ),
         Line(
-            r"The QP contains the linearization of $e$, a tangent. A step of length $\alpha$ along the "
-            r"tangent leaves the curve by a term of second order: half the step has a quarter of the error,",
+            r"The QP contains the linearization of $e$, which is a tangent. After a step of length $\alpha$ "
+            "along the tangent, the distance from the curve is of second order: half the step gives a "
+            "quarter of the distance.",
             r"\lVert f(q + \alpha d) - f(q) - \alpha J d \rVert = \tfrac12 \kappa\, \alpha^2 + O(\alpha^3)",
             _bent,
             5e-3,
         ),
         Line(
-            r"so that the line search accepts, under (13),",
+            r"This distance must be at most $\delta$ (13), so that the line search accepts only steps with",
             r"\tfrac12 \kappa \alpha^2 \le \delta \quad\Leftrightarrow\quad \alpha \le \sqrt{2 \delta / "
             r"\kappa}",
             _allowed,
         ),
         Line(
-            r"and no step at all for $\delta = 0$. For (11) one might also suspect that the cost has no "
-            r"slope. This does not explain the short steps (third step of the lesson: where level 1 pays "
-            r"for its effort, the cost has a slope, and the steps are as short). Where level 1 is at its "
-            r"optimum with $e^* = 0$, its cost has no slope:",
+            r"For $\delta = 0$ the line search accepts no step at all. A cost without slope does not "
+            "explain the short steps under (11). In the third step of the lesson, where level 1 pays for "
+            "its effort, the cost has a slope, and the steps are as short. Only where level 1 is at its "
+            "optimum with $e^* = 0$, its cost has no slope:",
             r"\nabla \mathcal J_1 = J^\top Q\, e^* = 0",
             _flat,
         ),
@@ -76,27 +76,29 @@ FURTHER = Further(
         Question(
             "A hand is to stay on a circle of radius 1 m and steps along the tangent. How long may the "
             "step be with $\\delta = 1$ mm, and with $\\delta = 1$ cm?",
-            r"It leaves the circle by $\alpha^2/2$ (with $\kappa = 1$ 1/m), so $\alpha = \sqrt{2\delta}$: "
-            r"⟨fine⟩ cm and ⟨rough⟩ cm. Ten times the tolerance allows three times the step.",
+            r"It leaves the circle by $\alpha^2/2$ (with $\kappa = 1$ 1/m), so $\alpha = \sqrt{2\delta}$. "
+            "The step may be ⟨fine⟩ cm long with 1 mm, and ⟨rough⟩ cm with 1 cm. Ten times the tolerance "
+            "allows three times the step.",
             {
                 "fine": (100 * math.sqrt(2 * 0.001), ".1f"),
                 "rough": (100 * math.sqrt(2 * 0.01), ".1f"),
             },
         ),
         Question(
-            "(11) allows the cost of 1 cm at each of the eleven knots of a plan with $N = 10$. How large "
-            "an error does it allow at a single knot, if all weights are equal?",
-            "The square root of eleven, ⟨all⟩ cm, if the whole cost is that of one knot. (12) allows 1 cm "
-            "there, and not more at any other knot.",
+            "The best plan of level 1 has an error of 1 cm at each of its eleven knots ($N = 10$). How "
+            "large an error does (11) allow at a single knot, if all weights are equal?",
+            "(11) allows the square root of eleven, ⟨all⟩ cm, if the error is zero at all other knots. (12) "
+            "allows at most 1 cm at every knot.",
             {"all": (math.sqrt(11), ".1f")},
         ),
         Question(
-            "The paper's Table I has 6.25 mm with (11) and 3.42 mm with (12) for the hand at high δ. By "
-            "how much is (12) better there? Is that what the derivation says?",
-            "By ⟨less⟩ %. The derivation says that (12) is the stricter one, so that the hand must be no "
-            "worse; it does not say by how much, nor that the base profits. Under the paper's formulation "
-            "level 1's best is a compromise between error and effort, and the order depends on $Q$: with 1 "
-            "we find the hand worse under (12), with 100 better.",
+            "In Table I of the paper, the error of the hand at high δ is 6.25 mm with (11) and 3.42 mm with "
+            "(12). By how much is (12) better? Does this agree with the derivation?",
+            "(12) is better by ⟨less⟩ %. The derivation says that (12) is the stricter one, so that the "
+            "hand must be no worse. It does not say how much better the hand is, or whether the base "
+            "profits. In the paper's formulation the best plan of level 1 is a compromise between error and "
+            "effort, and the result depends on $Q$. In our runs (12) is worse for the hand with $Q = 1$, "
+            "and better with $Q = 100$.",
             {"less": (100 * (1 - 3.42 / 6.25), ".0f")},
         ),
     ),

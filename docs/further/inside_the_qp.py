@@ -39,8 +39,8 @@ def _touching(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _cut(rng: np.random.Generator) -> tuple[float, float]:
-    """Returns the decrease of level 2's cost per unit by which a bound is relaxed, and the multiplier of that
-    bound, which cuts the line before its optimum."""
+    """Returns the derivative of level 2's least cost with respect to a bound, and minus the multiplier of
+    this bound. The bound cuts the line before the optimum of level 2."""
     _, H, slope, Z, first, second = _level_2(rng)
     z = Z[:, 0]
     joint = int(np.argmax(np.abs(z)))
@@ -61,23 +61,23 @@ def _cut(rng: np.random.Generator) -> tuple[float, float]:
 FURTHER = Further(
     derivation=(
         Line(
-            r"With $N = 1$ and one coordinate let $g = c_0 \bar M^{-1} J_1^\top$, a vector in the plane. "
-            r"The cost (31) of level 1 is $Q (e + g^\top \Delta\tau)^2 + R \lVert \Delta\tau \rVert^2$; "
-            r"its optimum lies on the normal of the "
-            "valley through zero:",
+            r"For $N = 1$ and one coordinate, $g = c_0 \bar M^{-1} J_1^\top$ is a vector in the plane. The "
+            r"cost (31) of level 1 is $Q (e + g^\top \Delta\tau)^2 + R \lVert \Delta\tau \rVert^2$ and has "
+            "the shape of a valley. Its optimum lies on the line through zero that is perpendicular to the "
+            "valley:",
             r"\Delta\tau_1^* = -(Q g g^\top + R I)^{-1} Q g\, e = -\frac{Q e}{Q \lVert g \rVert^2 + R}\; g",
             _optimum,
         ),
         Line(
-            r"(33) allows all $\Delta\tau_2 = \Delta\tau_1^* + z s$ with $z$ perpendicular to $g$, the "
-            r"orange line:",
+            r"(33) allows all $\Delta\tau_2 = \Delta\tau_1^* + z s$ with $z$ perpendicular to $g$. These "
+            "points form the orange line:",
             r"g^\top \Delta\tau_2 = g^\top \Delta\tau_1^*",
             _line,
         ),
         Line(
-            r"Level 2 has an ellipse through every point, $\tfrac12 x^\top H x + h^\top x$. Along the "
-            r"line it is least where "
-            "the ellipse touches the line, that is, where its gradient is perpendicular to it:",
+            r"The cost of level 2, $\tfrac12 x^\top H x + h^\top x$, has ellipses as contours. On the line, "
+            "the cost is least where an ellipse touches the line, that is, where the gradient of the cost "
+            "is perpendicular to the line:",
             r"z^\top (H \Delta\tau_2^* + h) = 0",
             _touching,
         ),
@@ -93,11 +93,10 @@ FURTHER = Further(
     ),
     questions=(
         Question(
-            r"Two joints with $\bar M = 0.033$ kg·m², $J_1 = (-0.3, -0.2)$ m, $e = 12$ m/s², $Q = 200$, "
-            r"$R = 10$, $c_0 = 1$. "
-            "Where is the disc 1?",
-            r"$g = (⟨g1⟩, ⟨g2⟩)$, so $\Delta\tau_1^* = (⟨t1⟩, ⟨t2⟩)$ N·m: each joint acts in proportion to "
-            r"its lever, and the effect of $R$ is not visible in three digits.",
+            r"Two joints with $\bar M = 0.033$ kg·m², $J_1 = (-0.3, -0.2)$ m, $e = 12$ m/s², $Q = 200$, $R "
+            "= 10$, $c_0 = 1$. Where is disc 1, the optimum of level 1?",
+            r"$g = (⟨g1⟩, ⟨g2⟩)$, so $\Delta\tau_1^* = (⟨t1⟩, ⟨t2⟩)$ N·m. The torque of each joint is in "
+            "proportion to its lever, and the effect of $R$ is not visible in three digits.",
             {
                 "g1": (ROW[0, 0], ".2f"),
                 "g2": (ROW[0, 1], ".2f"),
@@ -106,12 +105,11 @@ FURTHER = Further(
             },
         ),
         Question(
-            r"Level 2 has circles for contours, around $(0.05, 0.05)$ N·m. In which direction is the "
-            r"line, and where is the "
-            "disc 2?",
-            r"The line is perpendicular to $g$, along $(⟨d1⟩, ⟨d2⟩)$ up to its length. For circles the disc "
-            r"2 is the point of the line that is nearest to their centre: $\Delta\tau_2^* = (⟨t1⟩, ⟨t2⟩)$ "
-            r"N·m. Check: $J_1 \bar M^{-1}\Delta\tau_2^* = ⟨same⟩$ m/s², as for the disc 1.",
+            "The contours of level 2 are circles around $(0.05, 0.05)$ N·m. In which direction does the "
+            "line run, and where is disc 2, the optimum of level 2?",
+            "The line is perpendicular to $g$ and runs in the direction $(⟨d1⟩, ⟨d2⟩)$. Disc 2 is the point "
+            r"of the line that is nearest to the centre of the circles: $\Delta\tau_2^* = (⟨t1⟩, ⟨t2⟩)$ "
+            r"N·m. Check: $J_1 \bar M^{-1}\Delta\tau_2^* = ⟨same⟩$ m/s², as for disc 1.",
             {
                 "t1": (SECOND[0], ".3f"),
                 "t2": (SECOND[1], ".3f"),
@@ -121,11 +119,10 @@ FURTHER = Further(
             },
         ),
         Question(
-            "Now joint 1 has only 1.2 N·m left upwards. Which of the two discs does this bound affect? What "
-            "happens to each?",
-            r"Neither of them if both lie below 1.2 N·m, and here they do: $⟨t1⟩$ and $⟨t2⟩$ N·m. A bound "
-            r"that is not met has the "
-            "multiplier zero and changes nothing, however close it is.",
+            "Now the torque of joint 1 can increase by at most 1.2 N·m. Which of the two discs does this "
+            "bound affect, and how?",
+            "It affects neither disc: both are below 1.2 N·m, at $⟨t1⟩$ and $⟨t2⟩$ N·m. A bound that is not "
+            "reached has the multiplier zero and changes nothing, even if it is close.",
             {"t1": (FIRST[0], ".2f"), "t2": (SECOND[0], ".2f")},
         ),
     ),

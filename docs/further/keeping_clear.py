@@ -56,14 +56,14 @@ def _leak(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 FURTHER = Further(
     derivation=(
         Line(
-            "Between the nearest points of a link and an object runs the normal $n$; $J$ is the Jacobian of "
-            "the link's point. The distance changes with",
+            "The normal $n$ points from the nearest point of an object to the nearest point of a link, and "
+            "$J$ is the Jacobian of the link's point. The distance changes at the rate",
             r"\dot d = n^\top J\, \dot q = \nabla d^\top \dot q",
             _slope,
         ),
         Line(
-            "The bound is the one of *Stopping takes distance*, applied to the distance. The lab uses, with "
-            "$d_s$ including the margin,",
+            "The bound of *Stopping takes distance* is applied to the distance. With $d_s$, which includes "
+            "the margin, the lab uses",
             r"\nabla d^\top \dot q \ge -a \left( -t + \sqrt{t^2 + 2 (d - d_s)/a} \right)",
             _bound,
         ),
@@ -74,8 +74,8 @@ FURTHER = Further(
             _filter,
         ),
         Line(
-            "The effect of this change on level 1, $J_1 \\nabla d$ times a number, is not zero. Inside the "
-            "hierarchy the change lies in the null space $N$ of level 1:",
+            r"The effect of this change on level 1, $J_1 \nabla d$ times a number, is not zero. Inside the "
+            "hierarchy, the projection $N$ keeps the change in the null space of level 1:",
             r"J_1 \frac{b\, N \nabla d}{\nabla d^\top N \nabla d} = 0, \qquad "
             r"\nabla d^\top \frac{b\, N \nabla d}{\nabla d^\top N \nabla d} = b",
             _leak,
@@ -83,23 +83,24 @@ FURTHER = Further(
     ),
     questions=(
         Question(
-            "A link approaches at 0.5 m/s; $t = 0.2$ s, $a = 2$ m/s², and 20 mm are kept. At which distance "
-            "does the row begin to act?",
-            "From $v t + v^2/2a$ = ⟨room⟩ mm before those 20 mm, that is, at ⟨far⟩ mm.",
+            "A link approaches an object at 0.5 m/s. The row has $t = 0.2$ s and $a = 2$ m/s² and keeps a "
+            "distance of 20 mm. At which distance does the row begin to act?",
+            "The row begins to act $v t + v^2/2a$ = ⟨room⟩ mm before those 20 mm, that is, at ⟨far⟩ mm.",
             {
                 "room": (1e3 * (0.5 * T + 0.25 / (2.0 * A)), ".1f"),
                 "far": (1e3 * (0.5 * T + 0.25 / (2.0 * A) + KEPT), ".1f"),
             },
         ),
         Question(
-            "How fast may a link approach at a distance of 100 mm? And at 30 mm?",
-            r"⟨far⟩ m/s, and ⟨near⟩ m/s.",
+            "How fast may a link approach at a distance of 100 mm, and how fast at 30 mm?",
+            "At 100 mm it may approach at ⟨far⟩ m/s, and at 30 mm at ⟨near⟩ m/s.",
             {"far": (speed(0.1 - KEPT), ".2f"), "near": (speed(0.03 - KEPT), ".3f")},
         ),
         Question(
-            "Which error of the hand would ask for the acceleration that the filter leaks into its level, "
-            "with $K_p = 56.2$ 1/s²?",
-            "The largest leak is ⟨leak⟩ m/s²; an error of ⟨error⟩ cm asks for the same acceleration.",
+            "The filter leaks an acceleration into the level of the hand. Which error of the hand gives a "
+            "desired acceleration of the same size, with $K_p = 56.2$ 1/s²?",
+            "The largest leak is ⟨leak⟩ m/s². An error of ⟨error⟩ cm gives a desired acceleration of the "
+            "same size.",
             {"leak": (LEAK, ".0f"), "error": (100.0 * LEAK / 56.2, ".0f")},
         ),
     ),

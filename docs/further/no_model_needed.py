@@ -53,7 +53,7 @@ def _ramp(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 FURTHER = Further(
     derivation=(
         Line(
-            r"The arm obeys $M \ddot q + n = \tau$, with everything that is not inertia in $n$. Add and "
+            r"The arm obeys $M \ddot q + n = \tau$, where $n$ contains all forces except inertia. Add and "
             r"subtract $\bar M \ddot q$ (6):",
             r"\bar M \ddot q + \underbrace{(M - \bar M)\,\ddot q + n}_{H_q} = \tau",
             _lumped,
@@ -65,9 +65,9 @@ FURTHER = Further(
             _delayed,
         ),
         Line(
-            r"Use it as the present value, and ask for the acceleration $a$: $\Delta\tau = \bar M (a - "
-            r"\ddot q_0)$. If $M$ and $n$ have hardly changed meanwhile, $M(\ddot q - \ddot q_0) = "
-            r"\Delta\tau$, thus",
+            r"Use this value as the present one. For the desired acceleration $a$ this gives $\Delta\tau = "
+            r"\bar M (a - \ddot q_0)$. If $M$ and $n$ have hardly changed meanwhile, $M(\ddot q - \ddot "
+            r"q_0) = \Delta\tau$, thus",
             r"\ddot q - a = (I - M^{-1} \bar M)(\ddot q_0 - a)",
             _mapped,
         ),
@@ -90,24 +90,26 @@ FURTHER = Further(
         Question(
             r"One joint, $M = 0.1$ kg·m², $\bar M = 0.033$ kg·m². A load is added. After how many "
             r"milliseconds is less than a hundredth (0.01) of the error in its acceleration left?",
-            r"Each step leaves $1 - \bar M/M = ⟨left⟩$ of it. $⟨left⟩^k < 0.01$ from $k = ⟨k⟩$ on.",
+            r"Each step leaves the share $1 - \bar M/M = ⟨left⟩$ of the error. $⟨left⟩^k < 0.01$ from $k = "
+            "⟨k⟩$ on, that is, after ⟨k⟩ ms.",
             {"left": (LEFT, ".2f"), "k": (float(math.ceil(math.log(0.01) / math.log(LEFT))), ".0f")},
         ),
         Question(
             r"The same joint, $M = 0.1$ kg·m². Which $\bar M$ removes the whole error in one step? From "
             r"which $\bar M$ on does the error grow?",
-            r"$\bar M = M = 0.1$ kg·m² leaves nothing. Beyond it the error changes its sign in every step, "
-            r"and from $\bar M = 2 M = ⟨edge⟩$ kg·m² on it grows. That is why $\bar M$ is raised in small "
-            r"steps: the best value is only half of the value at which the loop becomes unstable.",
+            r"$\bar M = M = 0.1$ kg·m² removes the whole error. With a larger $\bar M$ the error changes "
+            r"its sign in every step, and from $\bar M = 2 M = ⟨edge⟩$ kg·m² on the error grows. That is "
+            r"why $\bar M$ is raised in small steps: the best value is only half of the value at which the "
+            "loop becomes unstable.",
             {"edge": (2 * 0.1, ".1f")},
         ),
         Question(
-            r"On the iiwa the gauge shows 0.985 with $\bar M$ and 0.94 with four times as much. After how "
-            r"many milliseconds is a tenth of the slowest component of an error left? What does the last "
-            r"line of the derivation say about an error along a curve?",
-            r"$⟨slow⟩$ ms and $⟨fast⟩$ ms. Along a curve the error is about $M/\bar M$ times the change of "
-            r"acceleration per step, so four times the $\bar M$ leaves a quarter or less: *Further than the "
-            r"proof* measures ⟨left⟩.",
+            r"On the iiwa the gauge shows 0.985 with $\bar M$ and 0.94 with four times this $\bar M$. After "
+            "how many milliseconds is a tenth of the slowest component of an error left? What does the last "
+            "line of the derivation say about an error along a curve?",
+            r"It takes $⟨slow⟩$ ms with $\bar M$ and $⟨fast⟩$ ms with four times this $\bar M$. Along a "
+            r"curve the error is about $M/\bar M$ times the change of acceleration per step, so four times "
+            r"the $\bar M$ leaves a quarter or less: *Further than the proof* measures ⟨left⟩.",
             {
                 "left": (measured("no-model-needed", "The largest error is at most a quarter"), ".2f"),
                 "slow": (math.log(0.1) / math.log(0.985), ".0f"),

@@ -28,7 +28,7 @@ def _critically(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 
 
 def simulated(K_p: float, K_v: float, T: float, steps: int) -> np.ndarray:
-    """Returns e at knots 1 … after a unit of J M̄⁻¹Δτ at knot 0, by (14) as it is printed."""
+    """Returns e at the knots from 1 on if J M̄⁻¹Δτ is 1 at knot 0 and else 0, by (14) as printed."""
     x = v = v_before = a = 0.0
     found = []
     for k in range(steps):
@@ -59,24 +59,24 @@ FURTHER = Further(
     derivation=(
         Line(
             r"The desired error dynamics (4) with $K_P = \omega^2$ and $K_V = 2\omega$ are critically "
-            r"damped. Their solution",
+            "damped. Their solution returns to zero without oscillation:",
             r"\tilde x(t) = \left( \tilde x_0 + (\dot{\tilde x}_0 + \omega \tilde x_0)\,t \right) "
             r"e^{-\omega t} \quad\Rightarrow\quad \ddot{\tilde x} + 2 \omega \dot{\tilde x} + \omega^2 "
             r"\tilde x = 0",
             _critically,
         ),
         Line(
-            r"returns to zero without oscillation. How does torque change $e$ (28)? By (13) and the Euler "
-            r"steps (14) a change $\Delta\tau$ at knot $k$ adds $J \bar M^{-1} \Delta\tau$ to the "
-            r"acceleration at once, $T_s$ times as much to the velocity at every later knot, and to the "
-            r"position one knot later. The sum of these effects at knot $k + l + 1$ is",
+            "A change of torque has three effects on $e$ (28). By (13) and the Euler steps (14) a change "
+            r"$\Delta\tau$ at knot $k$ adds $J \bar M^{-1} \Delta\tau$ to the acceleration at once. It adds "
+            "$T_s$ times as much to the velocity at every later knot. The velocity changes the position one "
+            "knot later. The sum of these effects at knot $k + l + 1$ is",
             r"\frac{\partial e_{k+l+1}}{\partial (J \bar M^{-1} \Delta\tau_k)} = c_l "
             r"= 1 + K_V T_s (l+1) + K_P T_s^2 \, \tfrac{l(l+1)}{2}",
             _effect,
         ),
         Line(
-            r"With one knot and one coordinate let $g = c_0 J \bar M^{-1}$. The minimum of $Q (e + g "
-            r"\Delta\tau)^2 + R \Delta\tau^2$ leaves",
+            r"For one knot and one coordinate let $g = c_0 J \bar M^{-1}$. At the minimum of $Q (e + g "
+            r"\Delta\tau)^2 + R \Delta\tau^2$ the following residual is left:",
             r"e + g \Delta\tau^* = \frac{R}{Q g^2 + R}\, e",
             _left,
         ),
@@ -84,9 +84,9 @@ FURTHER = Further(
     questions=(
         Question(
             "$K_P = 100$, $K_V = 20$. The hand is released at rest 10 mm from its target. When is it within "
-            "0.5 mm?",
-            r"With $\omega = 10$ rad/s the distance is $(1 + \omega t)\,e^{-\omega t}$ of what it was. "
-            r"That is a twentieth at $\omega t = ⟨phase⟩$, after ⟨t⟩ s.",
+            "0.5 mm of the target?",
+            r"With $\omega = 10$ rad/s the distance is $(1 + \omega t)\,e^{-\omega t}$ times the initial "
+            r"distance. This factor is a twentieth at $\omega t = ⟨phase⟩$, that is, after ⟨t⟩ s.",
             {"phase": (10 * HOME, ".2f"), "t": (HOME, ".2f")},
         ),
         Question(
@@ -102,10 +102,11 @@ FURTHER = Further(
             },
         ),
         Question(
-            r"A joint with $\bar M = 0.033$ kg·m² and a lever of 0.6 m, $Q = 200$. For which $R$ does one "
-            r"step remove only half of $e$? What is left with $R = 10$? (Take $c_0 = 1$.)",
-            r"$g = 0.6/0.033 = ⟨g⟩$ 1/(kg·m). Half is left where $R = Q g^2 = ⟨R⟩$, of the order of "
-            r"$10^5$, as the lesson says. With $R = 10$ it is $R/(Q g^2 + R) = ⟨share⟩\cdot 10^{-4}$ of it.",
+            r"A joint has $\bar M = 0.033$ kg·m² and a lever of 0.6 m; $Q = 200$ and $c_0 = 1$. For which "
+            "$R$ does one step remove only half of $e$? Which share of $e$ is left with $R = 10$?",
+            "$g = 0.6/0.033 = ⟨g⟩$ 1/(kg·m). Half of $e$ is left if $R = Q g^2 = ⟨R⟩$, which is of the "
+            r"order of $10^5$, as the lesson says. With $R = 10$ the share is $R/(Q g^2 + R) = ⟨share⟩\cdot "
+            "10^{-4}$.",
             {
                 "g": (LEVER, ".1f"),
                 "R": (ALIKE, ".0f"),

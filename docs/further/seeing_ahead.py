@@ -1,5 +1,4 @@
-"""Seeing ahead: the knots that preview changes, the response of a gain, and the limits that accelerations
-set."""
+"""Seeing ahead: the knots that preview a change, the response of a gain, and the limits of accelerations."""
 
 from __future__ import annotations
 
@@ -13,14 +12,14 @@ V, A = 1.1, 2.5
 
 
 def shortest(d: float) -> float:
-    """Returns the shortest time, s, from rest to rest over d, m, with the base's limits of speed and
-    acceleration."""
+    """Returns the shortest time, s, in which the base moves from rest to rest over the distance d, m, within
+    its limits of speed and acceleration."""
     return d / V + V / A if d >= V**2 / A else 2 * math.sqrt(d / A)
 
 
 def _preview(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the number of knots k = 1 … 10 whose reference is already the new one at a time before the
-    jump, counted and by the formula."""
+    """Returns, for several times before a jump, how many of the knots 1 … 10 already have the new reference:
+    counted, and by the formula."""
     before = np.round(rng.uniform(0.05, 1.0, 20), 3)
     knots = np.arange(1, 11)
     counted = [(8.0 - t + 0.1 * knots >= 8.0 - 1e-9).sum() for t in before]
@@ -55,8 +54,8 @@ def _fastest(rng: np.random.Generator) -> tuple[float, float]:
 FURTHER = Further(
     derivation=(
         Line(
-            r"Knot $k$ of a plan is compared with the reference of its own time, $e_k = f(q_k) - r(t + k "
-            r"\Delta t)$. At a time $s$ before a jump the new reference already counts at",
+            "Knot $k$ of a plan is compared with the reference at the time of this knot, $e_k = f(q_k) - "
+            r"r(t + k \Delta t)$. At a time $s$ before a jump, the new reference already applies to",
             r"N + 1 - \lceil s / \Delta t \rceil \text{ of the knots } 1, \ldots, N",
             _preview,
         ),
@@ -68,14 +67,14 @@ FURTHER = Further(
             1e-4,
         ),
         Line(
-            "A plan may use all available acceleration. To stop from the speed $v$ it needs the time and "
+            "A plan may use the largest acceleration $a$. To stop from the speed $v$, it needs the time and "
             "the distance",
             r"t = \frac{v}{a}, \qquad d = \frac{v^2}{2a}",
             _stop,
             1e-6,
         ),
         Line(
-            r"From rest to rest over a distance $d \ge v^2/a$ it needs at least",
+            r"To move from rest to rest over a distance $d \ge v^2/a$, a plan needs at least the time",
             r"t = \frac{d}{v} + \frac{v}{a}",
             _fastest,
             1e-6,
@@ -85,16 +84,17 @@ FURTHER = Further(
         Question(
             "HTIDKC drives the base home with $K = 0.3$ 1/s, from 1.5 m away. How far is it from home after "
             "8 s, if it always reaches the desired velocity?",
-            r"$1.5\,e^{-0.3 \cdot 8} = ⟨left⟩$ m: the lesson measures 16 cm. The base does not reach the "
-            r"desired velocity: each level also pays $\rho \lVert \dot q \rVert^2$ for its speed. With a "
-            r"thousandth of this $\rho$ the difference goes.",
+            r"$1.5\,e^{-0.3 \cdot 8} = ⟨left⟩$ m, but the lesson measures 16 cm. The base does not reach "
+            r"the desired velocity: each level also pays $\rho \lVert \dot q \rVert^2$ for its speed. With "
+            r"a thousandth of this $\rho$ the difference disappears.",
             {"left": (1.5 * math.exp(-0.3 * 8), ".2f")},
         ),
         Question(
             "Along one axis the base has a top speed of 1.1 m/s and brakes with 2.5 m/s². How long does it "
-            "need to stop, how far does it go, and how many knots of 0.1 s must a plan have to contain the "
+            "take to stop, and over which distance? How many knots of 0.1 s must a plan have to contain the "
             "whole braking?",
-            "⟨t⟩ s and ⟨d⟩ m: ⟨N⟩ knots. A plan with $N = 2$ ends in the middle of the braking.",
+            "The base needs ⟨t⟩ s and ⟨d⟩ m to stop, and the plan needs ⟨N⟩ knots. A plan with $N = 2$ ends "
+            "in the middle of the braking.",
             {
                 "t": (V / A, ".2f"),
                 "d": (V**2 / (2 * A), ".2f"),
@@ -102,11 +102,12 @@ FURTHER = Further(
             },
         ),
         Question(
-            "What is the shortest time for 1.5 m from rest to rest, with 1.1 m/s and 2.5 m/s²? After which "
-            "time is one per cent (0.01) of the distance left with HTIDKC and $K = 2$ 1/s?",
-            "$1.5/1.1 + 1.1/2.5 = ⟨fast⟩$ s. $e^{-2t} = 0.01$ at $t = ⟨gain⟩$ s, but at the start such a "
-            "gain asks for ⟨wish⟩ m/s, which the base cannot reach: a gain that is fast at the end asks for "
-            "too much speed at the beginning.",
+            "What is the shortest time for 1.5 m from rest to rest, with at most 1.1 m/s and 2.5 m/s²? "
+            "HTIDKC drives the same way with $K = 2$ 1/s. After which time is one per cent (0.01) of the "
+            "distance left?",
+            "The shortest time is $1.5/1.1 + 1.1/2.5 = ⟨fast⟩$ s. With HTIDKC $e^{-2t} = 0.01$ at $t = "
+            "⟨gain⟩$ s. But at the start this gain requires ⟨wish⟩ m/s, which the base cannot reach. A gain "
+            "that is fast at the end requires too much speed at the start.",
             {
                 "fast": (shortest(1.5), ".2f"),
                 "gain": (math.log(100) / 2, ".1f"),

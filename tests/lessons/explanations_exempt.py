@@ -67,7 +67,7 @@ TEXTS = (
         ("further/sensors-are-coarse", "A deadbeat controller answers"),
         ("further/the-model-is-wrong", "At rest there is none, so the error vanishes"),
         ("further/how-strict-is-strict", "Then no term of (8) is larger either"),
-        ("further/how-strict-is-strict", "so that the line search accepts"),
+        ("further/how-strict-is-strict", "This distance must be at most"),
         ("further/how-strict-is-strict", "The derivation says that (12) is the stricter one"),
         ("further/your-robot", "The eigenvalues of $M^{-1} \\bar M$ are those of a symmetric matrix"),
         ("further/your-robot", "so that a real lamp may be 13 % lighter"),

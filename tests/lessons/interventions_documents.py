@@ -230,7 +230,7 @@ DOCUMENT_ROWS = (
         of=("formulation=paper", "lexicographic=per_coordinate", "Q=100"),
     ),
     STRICT(
-        "further/how-strict-is-strict", "with 100 better",
+        "further/how-strict-is-strict", "and better with $Q = 100$",
         of("error/ee", "mm", "mean"), (1.2, 2.8), ("lexicographic=cost",), (3.0, 5.0),
         of=("formulation=paper", "lexicographic=per_coordinate", "Q=100"),
     ),

@@ -85,7 +85,7 @@ MOBILE_ROWS = (
         BASE_10, (0.85, 0.95), ("limits.acceleration_scale=0.33",), (0.85, 0.95), stays=True,
     ),
     Intervention(
-        "further/seeing-ahead", "With a thousandth of this $\\rho$ the difference goes.",
+        "further/seeing-ahead", r"With a thousandth of this $\rho$ the difference disappears.",
         of("error/base", "m", "mean", 15.9), (0.15, 0.17), ("rho=1e-5",), (0.13, 0.14), on="seeing-ahead/2",
     ),
     Intervention(
