@@ -13,7 +13,7 @@ T_S = 1e-3
 
 
 def digit(degrees: float, T: float = T_S) -> float:
-    """Returns the torque, N·m, that one digit of an encoder, degrees, causes."""
+    """Returns the torque, N·m, for one digit of an encoder that has a digit of this size in degrees."""
     return M_BAR * math.radians(degrees) / T**2
 
 
@@ -45,40 +45,41 @@ def _scaling(rng: np.random.Generator) -> tuple[float, float]:
 FURTHER = Further(
     derivation=(
         Line(
-            r"Position is read in multiples of $\delta$ (one digit); velocity and acceleration are "
-            r"differences of readings. The second formula is the acceleration if the last reading is one "
-            r"digit larger and the readings before it are equal:",
+            r"An encoder reports the position in multiples of $\delta$ (one digit). Velocity and "
+            "acceleration are differences of these readings. The second formula is the acceleration if the "
+            "last reading is one digit larger than the two equal readings before it:",
             r"\ddot q_k = \frac{q_k - 2 q_{k-1} + q_{k-2}}{T_s^2}, \qquad "
             r"\text{one digit: } \frac{\delta}{T_s^2}",
             _differences,
         ),
         Line(
-            r"While the joint moves on through many digits, rounding errors are spread evenly over "
-            r"$\pm\delta/2$, each of variance $\delta^2/12$. The sum of three independent errors with the "
-            r"weights $1, -2, 1$ has six times this variance:",
+            "While the joint moves through many digits, the rounding errors are spread evenly over "
+            r"$\pm\delta/2$. Each error has the variance $\delta^2/12$. The sum of three independent errors "
+            "with the weights $1, -2, 1$ has six times this variance:",
             r"\operatorname{rms} \ddot q = \frac{1}{T_s^2} \sqrt{(1 + 4 + 1)\, \frac{\delta^2}{12}} "
             r"= \frac{\delta}{\sqrt 2\, T_s^2}",
             _spread,
             1e-2,
         ),
         Line(
-            r"A deadbeat controller answers $\Delta\tau = \bar M (a - \ddot q_0)$, so an error of $\ddot "
-            r"q_0$ goes into the "
-            "torque as it is:",
+            r"A deadbeat controller computes $\Delta\tau = \bar M (a - \ddot q_0)$, so an error of $\ddot "
+            "q_0$ acts on the torque in full:",
             r"\delta(\Delta\tau) = -\bar M\, \delta(\ddot q_0)",
             _torque,
         ),
         Line(
-            r"The period enters squared, and $\bar M$ and $\delta$ once:",
+            r"The torque of one digit is in proportion to $\bar M$ and $\delta$, and inversely proportional "
+            "to the square of the period:",
             r"\frac{\bar M \delta}{(k T_s)^2} = \frac{1}{k^2}\, \frac{\bar M \delta}{T_s^2}",
             _scaling,
         ),
     ),
     questions=(
         Question(
-            r"$\bar M = 0.033$ kg·m², $T_s = 1$ ms. To which torque does one digit of 0.005° correspond, "
-            r"and one of 0.00125°, the encoder of the paper's arm?",
-            r"$\bar M \delta/T_s^2 = ⟨coarse⟩$ and $⟨paper⟩$ N·m; the motor has 4 N·m.",
+            r"$\bar M = 0.033$ kg·m², $T_s = 1$ ms. To which torque does one digit of 0.005° correspond? "
+            "And to which torque does one digit of 0.00125° correspond, as in the encoders of the paper's "
+            "arm?",
+            r"$\bar M \delta/T_s^2$ is $⟨coarse⟩$ and $⟨paper⟩$ N·m. The motor can produce 4 N·m.",
             {"coarse": (digit(0.005), ".1f"), "paper": (digit(0.00125), ".2f")},
         ),
         Question(
@@ -89,10 +90,11 @@ FURTHER = Further(
             {"T": (1e3 * math.sqrt(M_BAR * math.radians(0.005) / 0.1), ".1f")},
         ),
         Question(
-            "The encoder of 0.005° is put on the motor's side of a gear of 100 : 1. To which torque does a "
-            "digit correspond at the joint now? Which $T_s$ would have the same effect?",
-            "To a hundredth of the torque: ⟨digit⟩ N·m. With $T_s$ alone it would take ten times the "
-            "period, since it enters squared. (A real gear has play and bends, which is another error.)",
+            "The encoder of 0.005° is moved to the motor side of a gear of 100 : 1. To which torque at the "
+            "joint does a digit correspond now? Which $T_s$ would have the same effect without the gear?",
+            "A digit corresponds to a hundredth of the torque, ⟨digit⟩ N·m. Without the gear, ten times the "
+            "period would have the same effect, since the period enters squared. (A real gear has play and "
+            "bends, which adds another error.)",
             {"digit": (digit(0.005 / 100), ".3f")},
         ),
     ),

@@ -50,27 +50,27 @@ def _what_runs(rng: np.random.Generator) -> tuple[float, float]:
 FURTHER = Further(
     derivation=(
         Line(
-            "With the deceleration $a$ a joint of speed $v$ needs the time $v/a$ to stop, and meanwhile "
-            "moves by",
+            "A joint of speed $v$ that brakes with the deceleration $a$ stops after the time $v/a$. During "
+            "this time it moves by",
             r"d = \int_0^{v/a} (v - a t)\, dt = \frac{v^2}{2a}",
             _distance,
             1e-6,
         ),
         Line(
-            "Rows on the next $N$ positions (32d) have no effect until the limit is $N T_s v$ away. To stop "
-            "within this distance takes the deceleration",
+            "Bounds on the next $N$ positions (32d) begin to act when the limit is $N T_s v$ away. To stop "
+            "within this distance, the joint needs the deceleration",
             r"a = \frac{v^2}{2 N T_s v} = \frac{v}{2 N T_s}",
             _seen_too_late,
         ),
         Line(
-            "The reverse question is: from which speed can the joint still stop before $q_s$, if it begins "
-            "to brake after a time $t$? This speed is the root of a quadratic equation:",
+            "Conversely, there is a largest speed from which the joint can still stop before $q_s$, if it "
+            "begins to brake after a time $t$. This speed is the root of a quadratic equation:",
             r"\dot q\, t + \frac{\dot q^2}{2a} = q_s - q \quad\Leftrightarrow\quad "
             r"\dot q = a \left( -t + \sqrt{t^2 + 2 (q_s - q)/a} \right)",
             _root,
         ),
         Line(
-            "This bound on the speed is a row of the next knot. The lab uses",
+            "The controller bounds the speed at the next knot by this value. The lab uses",
             r"\dot q_{k+1} \le a \left( -t + \sqrt{t^2 + 2 (q_s - q)/a} \right), \qquad "
             r"t = T_s + \tfrac{5}{15}\,\mathrm s, \quad q_s = q_{\max} - 7\,\mathrm{mrad}",
             _what_runs,
@@ -78,11 +78,12 @@ FURTHER = Further(
     ),
     questions=(
         Question(
-            "How many knots must the printed rows see for 20 rad/s² to suffice from 57°/s? What is that "
-            "in a QP of a seven-joint arm?",
-            r"$v/(2 N T_s) \le 20$ gives $N \ge ⟨N⟩$; braking all the way takes $v/(a T_s)$, ⟨all⟩ knots. "
-            r"With seven joints the smaller number gives ⟨size⟩ unknowns per level, five times as many as "
-            r"with $N = 5$.",
+            "A joint moves at 57°/s and brakes with at most 20 rad/s². How large must $N$ be if the printed "
+            "bounds are to stop the joint in time? How many unknowns does the QP of a seven-joint arm then "
+            "have?",
+            r"$v/(2 N T_s) \le 20$ gives $N \ge ⟨N⟩$. A horizon that contains the whole braking has $v/(a "
+            "T_s)$, ⟨all⟩ knots. With seven joints the smaller number gives ⟨size⟩ unknowns per level, five "
+            "times as many as with $N = 5$.",
             {
                 "N": (float(math.ceil(V / (2 * A * T_S))), ".0f"),
                 "all": (float(math.ceil(V / (A * T_S))), ".0f"),
@@ -90,11 +91,12 @@ FURTHER = Further(
             },
         ),
         Question(
-            "A joint approaches at 100°/s; $t = 0.33$ s, $a = 20$ rad/s². How far before $q_s$ does the "
-            "bound on its speed begin to act? And with $t = T_s$?",
-            r"The bound begins to act $v t + v^2/2a = ⟨far⟩$° before $q_s$. Only ⟨brake⟩° of these are for "
-            r"braking; the rest, $v t$, is the way during the reaction time. With $t = T_s$ the bound begins "
-            r"to act ⟨near⟩° before $q_s$.",
+            "A joint approaches its limit at 100°/s, with $t = 0.33$ s and $a = 20$ rad/s². How far before "
+            "$q_s$ does the bound on its speed begin to act? How far before $q_s$ does it begin to act with "
+            "$t = T_s$?",
+            "The bound begins to act $v t + v^2/2a = ⟨far⟩$° before $q_s$. Only ⟨brake⟩° of this distance "
+            "are for braking. During the reaction time the joint moves by the rest, $v t$. With $t = T_s$ "
+            "the bound begins to act ⟨near⟩° before $q_s$.",
             {
                 "far": (
                     math.degrees(math.radians(100) * REACTION_TIME + math.radians(100) ** 2 / (2 * A)),
@@ -105,10 +107,10 @@ FURTHER = Further(
             },
         ),
         Question(
-            "Compute the two speeds that *A speed from which the joint can stop* quotes for 5° before the "
+            "Compute the two speeds that *A speed from which the joint can stop* states for 5° before the "
             "limit.",
-            r"Exact model, $t = T_s$, $q_s$ at the limit: ⟨exact⟩°/s. Ours, $t = 0.33$ s and $q_s$ lying "
-            r"0.4° before it: ⟨ours⟩°/s.",
+            "With an exact model, $t = T_s$ and $q_s$ is the limit: the speed is ⟨exact⟩°/s. In the lab, $t "
+            "= 0.33$ s and $q_s$ is 0.4° before the limit: the speed is ⟨ours⟩°/s.",
             {
                 "exact": (math.degrees(viable(math.radians(5), T_S)), ".0f"),
                 "ours": (math.degrees(viable(math.radians(5) - POSITION_MARGIN, REACTION_TIME)), ".1f"),

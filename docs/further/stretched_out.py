@@ -56,14 +56,14 @@ FURTHER = Further(
             2e-4,
         ),
         Line(
-            "An inverse would be $-e/g$. Both agree as long as $Q g^2$ outweighs $R$. Where the direction "
-            "is lost, the inverse goes to infinity and the optimum to zero:",
+            "An inverse would give $-e/g$. Both agree while $Q g^2$ is much larger than $R$. Where the gain "
+            "goes to zero, the inverse goes to infinity and the optimum to zero:",
             r"\lim_{g \to 0} \frac{Q g}{Q g^2 + R}\, e = 0",
             _gone,
             1e-7,
         ),
         Line(
-            "Damped inverses have the same form and leave an error where they damp. Here $R$ weighs a "
+            "A damped inverse has the same form and leaves an error where it damps. Here $R$ weighs a "
             "*change* of torque, so the step is repeated until a constant $e$ has vanished:",
             r"e_{k+1} = \frac{R}{Q g^2 + R}\, e_k \;\to\; 0",
             _unbiased,
@@ -72,10 +72,10 @@ FURTHER = Further(
     ),
     questions=(
         Question(
-            "The planar arm lies straight along $x$, three links of 0.3 m. What are the singular values "
-            "of its Jacobian, and what does that mean for $J M^{-1} J^\\top$?",
-            r"Only the row of $y$ is not zero: $(⟨a⟩, ⟨b⟩, ⟨c⟩)$. One singular value is its length, ⟨s⟩, "
-            r"the other is 0. $J M^{-1} J^\top$ has rank 1 for any $M$, and no inverse.",
+            "The planar arm has three links of 0.3 m and is stretched along $x$. What are the singular "
+            r"values of its Jacobian? Does $J M^{-1} J^\top$ have an inverse?",
+            "Only the row of $y$ is not zero: $(⟨a⟩, ⟨b⟩, ⟨c⟩)$. One singular value is the length of this "
+            r"row, ⟨s⟩, and the other is 0. $J M^{-1} J^\top$ has rank 1 for any $M$ and has no inverse.",
             {
                 "a": (STRAIGHT[1, 0], ".1f"),
                 "b": (STRAIGHT[1, 1], ".1f"),
@@ -84,20 +84,21 @@ FURTHER = Further(
             },
         ),
         Question(
-            "A small error $e = 10^{-9}$ m/s² is left along the arm, where $g = 10^{-12}$. What do an "
-            "inverse and HIMPC ask for? ($Q = 200$, $R = 10$.)",
-            r"The inverse asks for $e/g = ⟨inverse⟩$ N·m for an error that is nearly zero. HIMPC asks for "
-            r"$Q g e/R = ⟨himpc⟩\cdot 10^{-20}$ N·m.",
+            "A small error $e = 10^{-9}$ m/s² is left along the arm, where $g = 10^{-12}$. Which torques do "
+            "an inverse and HIMPC compute? ($Q = 200$, $R = 10$.)",
+            "The inverse computes $e/g = ⟨inverse⟩$ N·m for an error that is nearly zero. HIMPC computes $Q "
+            r"g e/R = ⟨himpc⟩\cdot 10^{-20}$ N·m.",
             {"inverse": (1e-9 / 1e-12, ".0f"), "himpc": (1e20 * 200 * 1e-12 * 1e-9 / 10, ".0f")},
         ),
         Question(
-            r"In a good direction a lever of 0.6 m and $\bar M = 0.033$ kg·m² give $g = 18.2$. How much "
-            r"of $e$ is left "
-            "after one step with $R = 10$, and with $R = 1000$? What does that say about the lesson's ghost?",
-            "$R/(Q g^2 + R)$ is ⟨small⟩ % and ⟨large⟩ %. Both vanish within a few milliseconds, which is "
-            "why the ghost does as well: no tuning is needed between the two values. At $R = 10^5$ it would "
-            "be ⟨more⟩ %, and at $10^7$ it takes ⟨slow⟩ ms until a third is left. In such a long time $e$ "
-            "does not stay constant, and the run with $R = 10^7$ swings by decimetres.",
+            r"In a direction that is not singular, a lever of 0.6 m and $\bar M = 0.033$ kg·m² give $g = "
+            "18.2$. Which share of $e$ is left after one step with $R = 10$, and which with $R = 1000$ as "
+            "in the lesson's ghost? Does the ghost need other tuning?",
+            "The share $R/(Q g^2 + R)$ is ⟨small⟩ % and ⟨large⟩ %. With both values $e$ vanishes within a "
+            "few milliseconds, which is why the ghost does as well: no tuning is needed between the two "
+            "values. With $R = 10^5$ the share would be ⟨more⟩ %, and with $10^7$ it takes ⟨slow⟩ ms until "
+            "a third of $e$ is left. In such a long time $e$ does not stay constant, and the run with $R = "
+            "10^7$ swings by decimetres.",
             {
                 "small": (100 * 10 / (200 * G**2 + 10), ".3f"),
                 "large": (100 * 1000 / (200 * G**2 + 1000), ".1f"),

@@ -53,45 +53,47 @@ def _at_rest(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 FURTHER = Further(
     derivation=(
         Line(
-            r"Level $i$ may choose among the $\Delta\tau_i$ that satisfy (33) for all levels $p$ above it. "
-            r"They are $\Delta\tau_{i-1}^*$ plus any vector that all those $J_p \bar M^{-1}$ map to zero. "
-            r"The space of these vectors has the dimension",
+            r"Level $i$ may choose any $\Delta\tau_i$ that satisfies (33) for all levels $p$ above it. Each "
+            r"of these is $\Delta\tau_{i-1}^*$ plus a vector that all $J_p \bar M^{-1}$ map to zero. The "
+            "space of these vectors has the dimension",
             r"\dim = n - \operatorname{rank} \operatorname{col}(J_1, \ldots, J_{i-1})",
             _dimension,
         ),
         Line(
             r"A posture has $J = I$. For the levels below it, (33) reads $\bar M^{-1} \Delta\tau_p^* = \bar "
-            r"M^{-1} \Delta\tau_i$, and they have no choice:",
+            r"M^{-1} \Delta\tau_i$, and these levels have no choice:",
             r"\Delta\tau_i = \Delta\tau_p^*",
             _all_taken,
         ),
         Line(
-            "The order enters nowhere else. In particular, where no task has an error ($e_i = 0$ for all "
-            "$i$), every order has the same result, an unchanged torque:",
+            "The order of the levels has no other effect. In particular, if no task has an error ($e_i = 0$ "
+            "for all $i$), every order gives the same result, an unchanged torque:",
             r"e_1 = e_2 = e_3 = 0 \quad\Rightarrow\quad \Delta\tau^* = 0 \text{ in every order}",
             _at_rest,
         ),
     ),
     questions=(
         Question(
-            "Seven joints, three levels: position (3 coordinates), orientation (3), posture (7). How many "
-            "free motions does each level have, in the order of the lesson, with the posture in the middle, "
-            "and with the posture first?",
-            "As in the lesson: 7, 4, 1. Posture in the middle: 7, 4, and then none, for the posture takes "
-            "all four. Posture first: 7, none, none.",
+            "An arm has seven joints and three levels: position (3 coordinates), orientation (3), posture "
+            "(7). How many free motions does each level have in the order of the lesson? How many does each "
+            "level have with the posture in the middle, and with the posture first?",
+            "In the order of the lesson, the levels have 7, 4 and 1 free motions. With the posture in the "
+            "middle, they have 7, 4 and none: the posture uses all four. With the posture first, they have "
+            "7, none and none.",
         ),
         Question(
-            "The posture asks the shoulder to go on by 25° and the elbow by 20°. Why is its error called "
-            "32°?",
+            "The shoulder is 25° and the elbow 20° from the target of the posture. Why does the lesson "
+            "state an error of 32°?",
             r"The error of a level is the length of its vector: $\sqrt{25^2 + 20^2} = ⟨norm⟩$.",
             {"norm": (math.hypot(25, 20), ".1f")},
         ),
         Question(
-            "With the posture first, the hand does not reach its target. Compute from the two postures "
-            "alone how far it is off, and compare the result with the measurement of the lesson.",
-            "The forward kinematics of both postures put the hand ⟨apart⟩ mm apart; the run ends at ⟨seen⟩ "
-            "mm. The distance does not depend on the controller: the tasks below a posture that is reached "
-            "have no effect.",
+            "With the posture first, the hand does not reach its target. Compute its distance from the "
+            "target from the two postures alone, and compare the distance with the measurement of the "
+            "lesson.",
+            "By the forward kinematics, the positions of the hand in the two postures are ⟨apart⟩ mm apart. "
+            "The run ends at ⟨seen⟩ mm. The distance does not depend on the controller: if the posture is "
+            "reached, the tasks below it have no effect.",
             {"apart": (_between_hands(), ".0f"), "seen": (GONE, ".0f")},
         ),
     ),

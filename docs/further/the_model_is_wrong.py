@@ -49,38 +49,40 @@ def _delayed(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 FURTHER = Further(
     derivation=(
         Line(
-            r"The arm obeys $M \ddot q + N + \tau_d = \tau$; the model (19) says $M_n \ddot q + N_n = "
-            r"\tau$. With $\tilde M = M - M_n$ and $\tilde N = N - N_n$ the acceleration it predicts is "
-            r"wrong by (21)",
+            r"The arm obeys $M \ddot q + N + \tau_d = \tau$, but the model (19) is $M_n \ddot q + N_n = "
+            r"\tau$. With $\tilde M = M - M_n$ and $\tilde N = N - N_n$ the error of the predicted "
+            "acceleration is (21)",
             r"\gamma = M_n^{-1} \left( \tilde M \ddot q + \tilde N + \tau_d \right)",
             _nominal,
         ),
         Line(
-            "and in the task's coordinates by (24)",
+            "In the coordinates of the task this error is (24)",
             r"\beta = J M_n^{-1} \left( \tilde M \ddot q + \tilde N + \tau_d \right)",
             _task,
         ),
         Line(
-            r"A controller that relies on the model gets $\ddot{\tilde x} + K_V \dot{\tilde x} + K_P \tilde "
-            r"x = -\beta$, up to the sign of $\tilde x$. With a constant $\beta$ the task comes to rest off "
-            r"its target:",
+            r"If the controller relies on the model, the task obeys $\ddot{\tilde x} + K_V \dot{\tilde x} + "
+            r"K_P \tilde x = -\beta$, up to the sign of $\tilde x$. With a constant $\beta$ the task comes "
+            "to rest at a distance from its target:",
             r"|\tilde x| \to |\beta| / K_P",
             _at_rest,
             1e-6,
         ),
         Line(
-            "The error of time-delay estimation is (25), where the index 0 means one millisecond ago. Here "
-            "all terms that have not changed in this millisecond cancel, friction and loads included:",
+            "The error of time-delay estimation is (25), where the index 0 means one millisecond ago. All "
+            "terms that have not changed in this millisecond cancel, including friction and loads:",
             r"\delta = \bar M^{-1} \left[ (M - \bar M)\ddot q - (M_0 - \bar M)\ddot q_0 + n - n_0 \right]",
             _delayed,
         ),
     ),
     questions=(
         Question(
-            "A joint with $M_n = 0.05$ kg·m² and 0.1 N·m of dry friction that the model does not know; "
-            "$K_P = 200$ 1/s². How far from its target may it stop? And with $K_P = 50$?",
-            r"$\beta = 0.1/0.05 = ⟨beta⟩$ rad/s², so up to $\beta/K_P$: ⟨stiff⟩° and ⟨soft⟩°. At rest, "
-            r"friction takes any value up to 0.1 N·m: the joint stops somewhere within this range.",
+            "A joint has $M_n = 0.05$ kg·m² and 0.1 N·m of dry friction, which the model does not contain. "
+            "How far from its target may the joint stop with $K_P = 200$ 1/s², and how far with $K_P = 50$ "
+            "1/s²?",
+            r"$\beta = 0.1/0.05 = ⟨beta⟩$ rad/s², so the joint may stop up to $\beta/K_P$ from its target: "
+            "⟨stiff⟩° and ⟨soft⟩°. At rest, friction takes any value up to 0.1 N·m: the joint stops "
+            "somewhere within this distance.",
             {
                 "beta": (0.1 / 0.05, ".0f"),
                 "stiff": (math.degrees(0.1 / 0.05 / 200), ".2f"),
@@ -88,21 +90,22 @@ FURTHER = Further(
             },
         ),
         Question(
-            "A model that is 20 % too light (0.2) and right in everything else, on an arm in the horizontal "
-            "plane. How wrong is the acceleration it predicts? How large is the error at rest?",
-            r"With $M_n = M - 0.2\,M$ it is $\gamma = M_n^{-1} (0.2\,M)\,\ddot q = ⟨share⟩\,\ddot q$: a "
-            r"quarter of the acceleration. At rest "
-            "there is none, so the error vanishes: without gravity, wrong masses matter only while the "
-            "arm accelerates. That is why most of OSF's error in *As identified* is friction's.",
+            "An arm moves in the horizontal plane. The masses of its model are 20 % too small (0.2), and "
+            "all else in the model is exact. How large is the error of the predicted acceleration? How "
+            "large is it at rest?",
+            r"With $M_n = M - 0.2\,M$ the error is $\gamma = M_n^{-1} (0.2\,M)\,\ddot q = ⟨share⟩\,\ddot "
+            "q$, a quarter of the acceleration. At rest the acceleration is zero, so the error vanishes: "
+            "without gravity, wrong masses matter only while the arm accelerates. That is why most of OSF's "
+            "error in *As identified* is due to friction.",
             {"share": (0.2 / 0.8, ".2f")},
         ),
         Question(
-            r"Dry friction of 0.05 N·m changes its sign when a joint with $M = 0.1$ kg·m² reverses its "
-            r"motion. How large is the error of acceleration under time-delay estimation with $\bar M = "
-            r"0.033$ kg·m² at once, and 10 ms later?",
-            r"The force jumps by twice 0.05 N·m: ⟨jump⟩ rad/s². Each step leaves $1 - \bar M/M$, ⟨left⟩; "
-            r"after ten ⟨later⟩ rad/s². "
-            "A force that does not change leaves no error.",
+            "Dry friction of 0.05 N·m changes its sign when a joint with $M = 0.1$ kg·m² reverses its "
+            r"motion. Time-delay estimation uses $\bar M = 0.033$ kg·m². How large is the error of the "
+            "acceleration immediately after the change, and 10 ms later?",
+            "The friction jumps by twice 0.05 N·m, which gives an error of ⟨jump⟩ rad/s². Each step leaves "
+            r"the share $1 - \bar M/M$, that is, ⟨left⟩. After ten steps the error is ⟨later⟩ rad/s². A "
+            "force that does not change leaves no error.",
             {
                 "jump": (2 * 0.05 / 0.1, ".0f"),
                 "left": (LEFT, ".2f"),

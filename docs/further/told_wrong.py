@@ -15,7 +15,7 @@ SPEED, DECELERATION, PERIOD = 0.4, 1.0, 0.1
 
 
 def to_box(p: np.ndarray, centre: np.ndarray, half: np.ndarray) -> float:
-    """Returns the distance of a point from a box, both outside of each other."""
+    """Returns the distance of a point from a box. The point is outside the box."""
     return float(np.linalg.norm(np.maximum(np.abs(p - centre) - half, 0.0)))
 
 
@@ -56,13 +56,14 @@ def _braking(rng: np.random.Generator) -> tuple[float, float]:
 FURTHER = Further(
     derivation=(
         Line(
-            "A point $p$ of the robot is outside a box with centre $c$ and half edges $h$. Its distance is, "
-            "with absolute value and maximum taken coordinate by coordinate,",
+            "A point $p$ of the robot is outside a box with centre $c$ and half edges $h$. Absolute value "
+            "and maximum are taken for each coordinate. The distance of the point from the box is",
             r"\mathrm{sd}(p; c) = \lVert \max(|p - c| - h, 0) \rVert",
             _box,
         ),
         Line(
-            "A report that is off by $\\Delta$ is the same as a robot that is off by $-\\Delta$:",
+            r"An error $\Delta$ of the reported box has the same effect as an error $-\Delta$ of the "
+            "robot's position:",
             r"\mathrm{sd}(p; c + \Delta) = \mathrm{sd}(p - \Delta; c)",
             _shifted,
         ),
@@ -73,8 +74,8 @@ FURTHER = Further(
             _worst,
         ),
         Line(
-            "If the report is corrected, the robot acts at the next plan, a time $t$ later, and brakes with "
-            "$a$. From the speed $v$ it needs",
+            "When the report is corrected, the robot reacts at the next plan, a time $t$ later, and brakes "
+            "with the deceleration $a$. From the speed $v$ it needs the distance",
             r"s = v t + \frac{v^2}{2 a}",
             _braking,
             1e-6,
@@ -84,16 +85,17 @@ FURTHER = Further(
         Question(
             "Reports are wrong by at most 20 cm, in any direction. Which $d_{\\mathrm{safe}}$ keeps a "
             "distance of 5 cm?",
-            "By the third line $5 + 20$ = ⟨margin⟩ cm: an error of the report that is bounded can be covered "
-            "by the margin.",
+            "By the third line it must be $5 + 20$ = ⟨margin⟩ cm. A margin can cover a bounded error of the "
+            "report.",
             {"margin": (5.0 + 20.0, ".0f")},
         ),
         Question(
-            "And which $d_{\\mathrm{safe}}$ would have covered the report of the lesson? What would the "
-            "robot have done?",
-            "$5 + ⟨offset⟩$ = ⟨margin⟩ cm. With that margin the base would have to leave its line also for "
-            "a crate beside the line that is reported at its true place. In the lesson the robot overlapped "
-            "the crate by ⟨depth⟩ cm; with a correct report from 5 s on it kept ⟨kept⟩ cm.",
+            r"Which $d_{\mathrm{safe}}$ would have covered the error of the report in the lesson? What is "
+            "the disadvantage of this margin?",
+            "It is $5 + ⟨offset⟩$ = ⟨margin⟩ cm. With this margin the base would also have to leave its "
+            "line for a crate that is beside the line and correctly reported. In the lesson the robot "
+            "overlapped the crate by ⟨depth⟩ cm. With a correct report from 5 s on, it kept a distance of "
+            "⟨kept⟩ cm.",
             {
                 "offset": (OFFSET, ".0f"),
                 "margin": (5.0 + OFFSET, ".0f"),
@@ -103,9 +105,10 @@ FURTHER = Further(
         ),
         Question(
             "A base drives at 0.4 m/s towards the crate, plans ten times a second and brakes with 1 m/s². "
-            "How far from the crate must the base still be when the report is corrected, if 5 cm are to be "
-            "kept?",
-            "It needs ⟨room⟩ cm to stop, and 5 cm are kept: ⟨far⟩ cm before the crate at the latest.",
+            "How far from the crate must the base still be when the report is corrected, if the base must "
+            "keep 5 cm?",
+            "The base needs ⟨room⟩ cm to stop and must keep 5 cm. It must still be at least ⟨far⟩ cm from "
+            "the crate.",
             {
                 "room": (100.0 * (SPEED * PERIOD + SPEED**2 / (2.0 * DECELERATION)), ".0f"),
                 "far": (100.0 * (SPEED * PERIOD + SPEED**2 / (2.0 * DECELERATION)) + 5.0, ".0f"),

@@ -58,23 +58,23 @@ def _price(rng: np.random.Generator) -> tuple[float, float]:
 FURTHER = Further(
     derivation=(
         Line(
-            "The bounds are on the torque, and the QP chooses its changes. Stacked over the horizon, (32f) "
-            "consists of linear rows with blocks $I$ on and below the diagonal:",
+            "The bounds apply to the torque, but the unknowns of the QP are its changes. Over the whole "
+            "horizon, (32f) consists of linear rows with blocks $I$ on and below the diagonal:",
             r"\tau_0 + \sum_{s=0}^{j} \Delta\tau_{k+s} = \tau_0 + (L \otimes I)\, U \big|_j, "
             r"\qquad L = \begin{bmatrix} 1 & & \\ 1 & 1 & \\ \vdots & & \ddots \end{bmatrix}",
             _rows,
         ),
         Line(
-            r"As long as $\tau_0$ is within its limits $U = 0$ satisfies them, so level 1 is always "
-            r"feasible. And the choice of level $i-1$ satisfies everything that level $i$ must keep "
-            r"(Theorem 2), for $p < i$:",
+            r"As long as $\tau_0$ is within its limits, $U = 0$ satisfies all bounds, so level 1 is always "
+            "feasible. The solution of level $i-1$ satisfies all constraints of level $i$ (Theorem 2), for "
+            "$p < i$:",
             r"J_p \bar M^{-1} \Delta\tau_{i-1}^* = J_p \bar M^{-1} \Delta\tau_p^*",
             _inherited,
         ),
         Line(
-            r"So no level can make the one below it infeasible; it can only leave no freedom to it. A bound "
-            r"$\Delta\tau \le b$ that is active has a multiplier $\lambda \ge 0$, which says how much the "
-            r"cost would decrease with a little more torque:",
+            "So no level can make the level below infeasible; it can only leave no freedom to that level. "
+            r"An active bound $\Delta\tau \le b$ has a multiplier $\lambda \ge 0$. The multiplier is the "
+            "rate at which the cost decreases if the bound allows more torque:",
             r"\frac{\partial \mathcal J^*}{\partial b} = -\lambda, \qquad "
             r"\lambda = -\left( 2 Q g (e + g b) + 2 R b \right)",
             _price,
@@ -83,26 +83,26 @@ FURTHER = Further(
     ),
     questions=(
         Question(
-            "The motors can produce 4 N·m. How many N·m are allowed with a factor of 0.06, and how much of "
-            "that does *Enough for all* need?",
-            "⟨limit⟩ N·m; the run needs ⟨share⟩ % of it, ⟨used⟩ N·m.",
+            "The motors can produce 4 N·m. Which torque is allowed with a factor of 0.06, and how much of "
+            "this torque does *Enough for all* need?",
+            "⟨limit⟩ N·m are allowed. The run needs ⟨share⟩ % of this torque, that is, ⟨used⟩ N·m.",
             {"limit": (4 * 0.06, ".2f"), "share": (NEED, ".0f"), "used": (4 * 0.06 * NEED / 100, ".2f")},
         ),
         Question(
-            r"$\tau_0 = 0.10$ N·m, the limit is 0.16 N·m, $N = 5$. How large may the first $\Delta\tau$ "
-            r"be, and how "
-            "large the sum of all five?",
-            r"⟨room⟩ N·m in both cases: (32f) bounds every partial sum. The first $\Delta\tau$ alone may "
-            r"reach the limit; each partial sum of the others is then zero or negative.",
+            r"The present torque is $\tau_0 = 0.10$ N·m, the limit is 0.16 N·m, and $N = 5$. How large may "
+            r"the first $\Delta\tau$ be, and how large may the sum of all five be?",
+            r"Each of them may be ⟨room⟩ N·m: (32f) bounds every partial sum. If the first $\Delta\tau$ "
+            "alone reaches the limit, each partial sum of the others is zero or negative.",
             {"room": (0.16 - 0.10, ".2f")},
         ),
         Question(
-            "Joint 1 swings by 30° as a cosine with a period of 8 s. What is its largest acceleration, and "
-            "which torque does this acceleration need for the inertia alone that the arm has about joint 1 "
-            "at the start of the circle?",
-            r"A swing of 30° is a cosine of ⟨half⟩°: $⟨half⟩° \cdot (2\pi/8)^2 = ⟨a⟩$ rad/s². With "
-            r"$M_{11} = ⟨M⟩$ kg·m² that is ⟨tau⟩ N·m. The dry friction of joint 1 takes ⟨dry⟩ N·m. That is "
-            "most of the ⟨three⟩ N·m, three per cent of 4 N·m.",
+            "Joint 1 swings by 30° as a cosine with a period of 8 s. What is its largest acceleration? Take "
+            "the inertia that the arm has about joint 1 at the start of the circle. Which torque does this "
+            "inertia alone need?",
+            "A swing of 30° is a cosine with an amplitude of ⟨half⟩°. Its largest acceleration is $⟨half⟩° "
+            r"\cdot (2\pi/8)^2 = ⟨a⟩$ rad/s². With $M_{11} = ⟨M⟩$ kg·m² the inertia needs ⟨tau⟩ N·m. The "
+            "dry friction of joint 1 needs ⟨dry⟩ N·m. Three per cent of 4 N·m are ⟨three⟩ N·m, and friction "
+            "alone uses most of this torque.",
             {
                 "half": (30 / 2, ".0f"),
                 "a": (PEAK, ".2f"),

@@ -27,8 +27,8 @@ def _stationary(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _between(rng: np.random.Generator) -> tuple[float, float]:
-    """Returns where a coordinate comes to rest whose acceleration is changed every millisecond by the optimum
-    of the sum, and the formula."""
+    """Returns the value at which a coordinate comes to rest if the optimum of the sum changes its
+    acceleration every millisecond, and the value by the formula."""
     Q, K, z = rng.uniform(1, 9, 2), rng.uniform(50, 200, 2), rng.normal(size=2)
     at, speed, acceleration = 0.0, 0.0, 0.0
     for _ in range(4000):
@@ -56,29 +56,29 @@ def _limit(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 FURTHER = Further(
     derivation=(
         Line(
-            r"Write $G_i = c_0 J_i \bar M^{-1}$ for the effect of a change of torque on $e_i$. The sum is "
-            r"smallest where its gradient vanishes:",
+            r"Let $G_i = c_0 J_i \bar M^{-1}$ be the effect of a change of torque on $e_i$. The weighted "
+            "sum is smallest where its gradient vanishes:",
             r"\sum_i Q_i G_i^\top (e_i + G_i \Delta\tau) + R\, \Delta\tau = 0",
             _stationary,
         ),
         Line(
-            r"In this sum every task affects all others. Suppose that both tasks control the same "
-            r"coordinate $z$, one with the target $z_1$ and one with $z_2$. At rest $\Delta\tau = 0$ and "
-            r"$e_i = K_{P,i}(z - z_i)$. Take $c_0 = 1$ for both. Then the gradient vanishes at",
+            "In this sum every task affects all others. Suppose that two tasks control the same coordinate "
+            r"$z$ and have the targets $z_1$ and $z_2$. At rest $\Delta\tau = 0$ and $e_i = K_{P,i}(z - "
+            "z_i)$. Take $c_0 = 1$ for both. Then the gradient vanishes at",
             r"z = \frac{Q_1 K_{P,1} z_1 + Q_2 K_{P,2} z_2}{Q_1 K_{P,1} + Q_2 K_{P,2}}",
             _between,
             1e-6,
         ),
         Line(
-            r"where the gains act as weights, too. A strict second level solves another problem. Let the "
+            "The gains act as weights, too. A strict second level solves a different problem. Let the "
             r"columns of $Z$ span the null space of $J_1 \bar M^{-1}$. Then (33) holds for",
             r"\Delta\tau_2 = \Delta\tau_1^* + Z s \quad\Rightarrow\quad "
             r"J_1 \bar M^{-1} \Delta\tau_2 = J_1 \bar M^{-1} \Delta\tau_1^*",
             _kept,
         ),
         Line(
-            r"with any $s$, and level 2 is a smaller problem in $s$ alone. A weighted sum reaches its "
-            r"solution only in the limit:",
+            "This is true for any $s$, and level 2 is a smaller problem in $s$ alone. A weighted sum "
+            "reaches the solution of this problem only in the limit:",
             r"\lim_{Q_1 \to \infty} \Delta\tau_{\mathrm{sum}} = \Delta\tau_1^* + Z s^*",
             _limit,
             1e-6,
@@ -88,25 +88,24 @@ FURTHER = Further(
         Question(
             "Two tasks have targets for the same coordinate: 0 with $K_P = 200$, 1 with $K_P = 50$, and "
             "equal $Q$. Where does a weighted controller come to rest?",
-            "At $z = 50/(200 + 50) = ⟨z⟩$: the gains act as weights, 4 to 1, although both tasks have the "
-            "same $Q$. With $Q_2$ four times as large it is ⟨half⟩.",
+            "It comes to rest at $z = 50/(200 + 50) = ⟨z⟩$: the gains act as weights, 4 to 1, although both "
+            "tasks have the same $Q$. With $Q_2$ four times as large, $z$ is ⟨half⟩.",
             {"z": (SHARE, ".1f"), "half": (4 * 50 / (200 + 4 * 50), ".1f")},
         ),
         Question(
-            "How many times larger than $Q_2$ must $Q_1$ be there for $z$ to stay below 0.001, and below "
-            "$10^{-6}$? What is the disadvantage of so large a weight?",
-            r"From $z = 50\, Q_2/(200\, Q_1 + 50\, Q_2)$ it is $Q_1/Q_2 > ⟨much⟩$, and ⟨more⟩ for a "
-            r"millionth. Level 2 then weighs little beside $R$, so it is followed less well even where it "
-            r"could be followed: the last step of the lesson shows this.",
+            "In the same example, which ratio $Q_1/Q_2$ keeps $z$ below 0.001, and which ratio keeps it "
+            "below $10^{-6}$? What is the disadvantage of such a large weight?",
+            r"By $z = 50\, Q_2/(200\, Q_1 + 50\, Q_2)$ the ratio must be larger than ⟨much⟩, and larger "
+            "than ⟨more⟩ for a millionth. Level 2 then weighs little beside $R$, so its task has a larger "
+            "error even where both tasks are possible: the last step of the lesson shows this.",
             {"much": ((1 / 0.001 - 1) / 4, ".0f"), "more": ((1 / 1e-6 - 1) / 4, ",.0f")},
         ),
         Question(
-            "Three joints; level 1 has two coordinates, level 2 one. How many numbers does level 2 "
-            "choose? Why does "
-            r"it make no difference to level 1 whether $Q_2$ is 1 or 1000?",
-            r"One: $3 - 2$. $Q_2$ decides where along the line $\Delta\tau_1^* + Z s$ level 2 stops, and "
-            r"every point "
-            "of that line is the same to level 1.",
+            "An arm has three joints, level 1 has two coordinates, and level 2 has one coordinate. How many "
+            "numbers does level 2 choose? Why does it make no difference to level 1 whether $Q_2$ is 1 or "
+            "1000?",
+            r"Level 2 chooses one number: $3 - 2$. $Q_2$ decides at which point of the line $\Delta\tau_1^* "
+            "+ Z s$ level 2 stops, and all points of this line have the same effect on level 1.",
         ),
     ),
 )

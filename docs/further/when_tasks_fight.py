@@ -50,16 +50,15 @@ FURTHER = Further(
             _projected,
         ),
         Line(
-            r"On the planar arm one motion leaves the hand at rest. It is along the cross product $n$ of "
-            r"the two rows of $J_1$, and the share that joint 1 has in it vanishes where links 2 and 3 "
-            r"come into line:",
+            "On the planar arm one motion leaves the hand at rest. It is along the cross product $n$ of the "
+            "two rows of $J_1$. The component $n_1$ of joint 1 vanishes where links 2 and 3 are in line:",
             r"n = J_{1,x} \times J_{1,y}, \qquad n_1 = l_2 l_3 \sin q_3, \qquad J_1 n = 0",
             _free_direction,
         ),
         Line(
-            r"There $J_{2|1} = J_2 P_1$ is a row of length $\sigma = |n_1| / \lVert n \rVert \to 0$, "
-            r"though $J_2 = (1, 0, 0)$ never is. The torque that gives task 2 the acceleration $a$ is, "
-            r"with $\bar M = m I$,",
+            r"There the row $J_{2|1} = J_2 P_1$ has the length $\sigma = |n_1| / \lVert n \rVert \to 0$, "
+            r"although $J_2 = (1, 0, 0)$ always has the length 1. With $\bar M = m I$, the torque that "
+            "gives task 2 the acceleration $a$ is",
             r"\lVert J_{2|1}^\top (J_{2|1} \bar M^{-1} J_{2|1}^\top)^{-1} a \rVert = \frac{m\,|a|}{\sigma}",
             _force,
         ),
@@ -75,30 +74,29 @@ FURTHER = Further(
     questions=(
         Question(
             r"$\bar M = 0.033$ kg·m² at every joint, $q_1 = -40°$, $q_2 = 100°$. How much torque does the "
-            r"projection "
-            "ask for to accelerate joint 1 by 1 rad/s² if $q_3$ is −90°, −10°, −1°?",
-            r"$\sigma$ is ⟨s90⟩, ⟨s10⟩ and ⟨s1⟩; the torque $m/\sigma$ is ⟨t90⟩, ⟨t10⟩ and ⟨t1⟩ N·m. From "
-            r"−10° on every degree matters: where links 2 and 3 are nearly in line, the torque is in "
-            r"proportion to one over the angle.",
+            "projection need to accelerate joint 1 by 1 rad/s² if $q_3$ is −90°, −10° or −1°?",
+            r"$\sigma$ is ⟨s90⟩, ⟨s10⟩ and ⟨s1⟩. The torque $m/\sigma$ is ⟨t90⟩, ⟨t10⟩ and ⟨t1⟩ N·m. Where "
+            "links 2 and 3 are nearly in line, the torque is inversely proportional to the angle, and every "
+            "degree matters.",
             {
                 **{f"s{k}": (_sigma(-float(k)), ".3f") for k in (90, 10, 1)},
                 **{f"t{k}": (M_BAR / _sigma(-float(k)), ".2f") for k in (90, 10, 1)},
             },
         ),
         Question(
-            "Joint 1 is one radian behind and its $K_P$ is 50 1/s². At which $\\sigma$ does the projection "
-            "ask for more than the 4 N·m of the motor?",
+            r"Joint 1 is one radian behind its target, and its $K_P$ is 50 1/s². Below which $\sigma$ does "
+            "the projection ask for more than the 4 N·m of the motor?",
             r"The task asks for $a = 50$ rad/s², so $\sigma = m a / 4 = ⟨sigma⟩$. With links 2 and 3 at a "
-            r"right angle it is ⟨s90⟩: even far from the singularity the margin is small, and the "
-            r"projection does not take the limit into account.",
+            r"right angle, $\sigma$ is ⟨s90⟩: even far from the singularity the margin is small, and the "
+            "projection does not take the limit into account.",
             {"sigma": (M_BAR * 50 / 4, ".3f"), "s90": (_sigma(-90.0), ".3f")},
         ),
         Question(
-            "The last line bounds a change of torque with $Q = 200$, $R = 10$ and $e = 50$ rad/s². Is that "
-            "small? What else keeps the torque within its limits?",
-            r"$\tfrac12\sqrt{Q/R}\,e = ⟨cap⟩$ N·m, far beyond any motor: a finite torque is not always a "
-            r"possible one. $R$ makes the problem well posed at the singularity (Lemma 1); the bounds (34f) "
-            r"keep the torque within its limits, and a projection does not have them.",
+            "The last line bounds a change of torque. Is this bound small with $Q = 200$, $R = 10$ and $e = "
+            "50$ rad/s²? Which other part of HIMPC keeps the torque within its limits?",
+            r"The bound is $\tfrac12\sqrt{Q/R}\,e = ⟨cap⟩$ N·m, far beyond any motor: a finite torque is "
+            "not always possible. $R$ makes the problem well posed at the singularity (Lemma 1). The bounds "
+            "(34f) keep the torque within its limits. A projection does not have such bounds.",
             {"cap": (0.5 * math.sqrt(200 / 10) * 50, ".0f")},
         ),
     ),

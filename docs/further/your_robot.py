@@ -1,4 +1,4 @@
-"""Your robot: the rule that suggests M̄ for a robot of which no measurements exist."""
+"""Your robot: the rule that suggests M̄ for a robot without measurements."""
 
 from __future__ import annotations
 
@@ -101,14 +101,15 @@ FURTHER = Further(
             _suggested,
         ),
         Line(
-            "Between these poses there are worse ones. A search over all poses of the lesson's lamp finds",
+            "Between these poses there are poses with a larger eigenvalue. A search over all poses of the "
+            "lesson's lamp finds",
             r"\max_q \lambda_{\max}(M^{-1} \bar M) \approx 1.74",
             _between,
             5e-3,
         ),
         Line(
-            "so that a real lamp may be 13 % lighter than its file says before the stability limit is "
-            "reached in that pose:",
+            "The stability limit is 2, so that a real lamp may be 13 % lighter than its file says before it "
+            "reaches this limit in the worst pose:",
             r"\max_q \lambda_{\max}\left( (0.87\, M)^{-1} \bar M \right) \approx 2",
             _lighter,
             5e-3,
@@ -116,12 +117,12 @@ FURTHER = Further(
     ),
     questions=(
         Question(
-            r"By which factor may the suggested $\bar M$ be raised if the lamp must be safe in its worst "
-            r"pose (1.74 in place of 2)? "
-            "Why could the lesson double it?",
-            r"By $2/1.74 = ⟨factor⟩$. The lamp of the lesson moves little, and where it starts "
-            r"$\lambda_{\max}$ is ⟨here⟩: if it is doubled, it stays below 2. In the worst pose the doubled "
-            r"value would be ⟨there⟩.",
+            "In the worst pose the largest eigenvalue is 1.74, and the stability limit is 2. By which "
+            r"factor may the suggested $\bar M$ be raised if the lamp must be stable in this pose? Why "
+            "could the lesson double it?",
+            "It may be raised by the factor $2/1.74 = ⟨factor⟩$. The lamp of the lesson moves little, and "
+            r"$\lambda_{\max}$ in its initial pose is ⟨here⟩. Twice this value is still below 2. In the "
+            "worst pose the doubled value would be ⟨there⟩.",
             {
                 "factor": (2 / 1.74, ".2f"),
                 "here": (_largest(_lamp()[1]), ".2f"),
@@ -129,19 +130,19 @@ FURTHER = Further(
             },
         ),
         Question(
-            "The real lamp is half as heavy again as its file (1.5 times). What happens to the largest "
-            "eigenvalue of 1.5, and to the smallest? Is the heavier robot safer?",
-            "All eigenvalues are divided by 1.5: the largest becomes ⟨largest⟩, in the middle between the "
-            "stability limits 0 and 2. The small ones become smaller, so slow components are corrected more "
-            "slowly still. Safer, and less accurate.",
+            "The real lamp is 1.5 times as heavy as its file says. What happens to the largest eigenvalue, "
+            "1.5, and to the smallest? Is the heavier robot safer?",
+            "All eigenvalues are divided by 1.5. The largest becomes ⟨largest⟩, in the middle between the "
+            "stability limits 0 and 2. The small eigenvalues become smaller, so slow components are "
+            "corrected even more slowly. The heavier robot is safer, but less accurate.",
             {"largest": (LARGEST_EIGENVALUE / 1.5, ".0f")},
         ),
         Question(
-            "Five joints, six coordinates of the head. How many degrees of freedom has the orientation "
-            "after the position, and how does the measured tilt fit that?",
-            "Two: $5 - 3$. Three coordinates of orientation cannot all be had with two freedoms, so the "
-            "head stays tilted by ⟨tilt⟩° while its position is reached. The posture task has no freedom "
-            "left.",
+            "The lamp has five joints, and its head has six coordinates. How many degrees of freedom does "
+            "the position leave to the orientation? Does the measured tilt agree with this number?",
+            "It leaves two: $5 - 3$. Two degrees of freedom cannot reach all three coordinates of the "
+            "orientation, so the head stays tilted by ⟨tilt⟩° while its position is reached. The posture "
+            "task has no freedom left.",
             {"tilt": (TILT, ".1f")},
         ),
     ),

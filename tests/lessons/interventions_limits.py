@@ -226,7 +226,7 @@ LIMIT_ROWS = (
         HAND, (0.9, 1.6), NO_FRICTION, (0, 0.3), of=("controller=hqp",), seconds=0.6,
     ),
     Intervention(
-        "further/the-model-is-wrong", "That is why most of OSF's error in *As identified* is friction's",
+        "further/the-model-is-wrong", "That is why most of OSF's error in *As identified* is due to friction",
         HAND, (0.7, 1.6), ("plant.friction=0",), (0, 0.3), on="the-model-is-wrong/1", seconds=0.75,
     ),
     # ---------------------------------------- inside-the-qp

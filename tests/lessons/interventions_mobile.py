@@ -161,7 +161,7 @@ MOBILE_ROWS = (
         TILT, (11, 12), ("levels.orientation.enabled=false",), (17, 20),
     ),
     Intervention(
-        "further/your-robot", "Three coordinates of orientation cannot all be had with two freedoms",
+        "further/your-robot", "Two degrees of freedom cannot reach all three coordinates of the orientation",
         TILT, (11, 12), ("levels.position.enabled=false",), (0, 1), on="your-robot/0",
     ),
     Intervention(
@@ -182,8 +182,8 @@ MOBILE_ROWS = (
     ),
     Intervention(
         "further/your-robot",
-        "The small ones become smaller, so slow components are corrected more slowly still. Safer, and less "
-        "accurate.",
+        "The small eigenvalues become smaller, so slow components are corrected even more slowly. The "
+        "heavier robot is safer, but less accurate.",
         HAND, (9, 16), ("plant.mass_scale=1", "plant.inertia_scale=1"), (5, 8.5), on="your-robot/1",
     ),
 )
