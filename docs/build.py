@@ -1,9 +1,9 @@
 """Builds the documentation site: `python -m docs.build [--out out/site]`.
 
-Each build makes all pages anew: lessons from the course, the reference from docstrings, examples from their
-files, the rest from README, CONTRIBUTING and docs/. Every warning is an error. The result is static and needs
-no server: open index.html. With Node and the extra `export` the figures of lessons run in the browser, and
-there is the page try.html; without them the site has recordings.
+Each build makes all pages anew. The lessons are made from the course, the reference from docstrings, the
+examples from their files, and the other pages from README, CONTRIBUTING and docs/. Every warning is an error.
+The site is static and needs no server: open index.html. With Node and the extra `export`, the site has live
+figures and the page try.html. Without them, it has recordings only.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ ROOT = Path(__file__).parents[1]
 
 
 def write_sources(folder: Path, live: bool) -> None:
-    """Writes all pages in the form that Sphinx reads, with places for live figures if there are any."""
+    """Writes the sources of all pages for Sphinx; live: whether the pages have live figures."""
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(ROOT / "docs" / "site", folder, ignore=shutil.ignore_patterns("__pycache__", "*.json"))
     pages: dict[str, str] = {}
@@ -42,7 +42,8 @@ def write_sources(folder: Path, live: bool) -> None:
 
 
 def with_live(text: str, live: bool) -> str:
-    """Returns the first page with the link to *Try it*, or with a sentence that says why there is none."""
+    """Returns the first page with the link to *Try it*, or with a sentence that says why the site has no such
+    page."""
     return text.replace("@try@", front.INVITATION if live else front.WITHOUT)
 
 
@@ -75,7 +76,7 @@ def build(out: Path) -> int:
 
 
 def main() -> int:
-    """Builds the site as the command line says."""
+    """Builds the site in the folder that the command line names."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--out", type=Path, default=ROOT / "out" / "site")
     out = parser.parse_args().out.resolve()

@@ -1,7 +1,7 @@
 """3D recordings of the lessons that need no server: viser's own player, and one recorded scene per lesson.
 
-All scenes use the same player file. A scene is a JavaScript file beside it, because a page that was opened
-from a disk may load scripts, but no other files.
+All scenes use the same player file. A scene is a JavaScript file in the same folder, because a page that is
+opened from a disk may load scripts, but no other files.
 """
 
 from __future__ import annotations

@@ -49,7 +49,7 @@ def walk(page: Page, lesson: Lesson) -> list[tuple[str, Image.Image, Image.Image
 
 
 def look(page: Page) -> Image.Image:
-    page.mouse.move(PLOTS + 100, HEIGHT - 20)  # elsewhere the mouse would show a hint over the page
+    page.mouse.move(PLOTS + 100, HEIGHT - 20)  # at other positions the mouse would show a hint
     page.wait_for_timeout(1200)
     return Image.open(io.BytesIO(page.screenshot())).convert("RGB")
 
@@ -96,8 +96,8 @@ def write_index(out: Path) -> None:
     lines = [
         "# The lessons, walked through",
         "",
-        "Every step before and after its run, as the page shows it. `python -m docs.gallery` makes",
-        "these pictures; the predictions are the tempting ones, so many of them are wrong.",
+        "Each step before and after its run, as the page shows it. `python -m docs.gallery` makes these",
+        "pictures. Its predictions are the tempting answers, so many of them are wrong.",
     ]
     for number, name in enumerate(COURSE, start=1):
         if (out / f"{name}.webp").exists():

@@ -22,7 +22,7 @@ OUT = Path(__file__).parents[1] / "docs" / "page.webp"
 EXERCISE = LessonPlace("a-redundant-arm", 2)
 SIZE = (1080, 675)
 EVERY, LAST = 100, 1500
-"""Time, ms, for which a picture is shown; the last one is shown longer so that it can be read."""
+"""Time, ms, for which a picture is shown; the last picture is shown longer so that it can be read."""
 
 
 def main() -> None:
@@ -54,10 +54,10 @@ def main() -> None:
 
 
 def played_back(page: Page, seconds: float) -> list[Image.Image]:
-    """Returns pictures of the run, one per tenth of a second of simulated time, taken while looking back at
-    it, so that the speed of the machine does not matter."""
-    press(page, "Pause")  # looking back requires a paused robot
-    page.mouse.move(700, 850)  # elsewhere the mouse would show a hint over the page
+    """Returns pictures of the run, one per tenth of a second of simulated time. They show the playback of the
+    finished run, so that the speed of the machine does not matter."""
+    press(page, "Pause")  # playback requires a paused robot
+    page.mouse.move(700, 850)  # at other positions the mouse would show a hint
     for _ in range(round(seconds) + 1):
         key(page, "Shift+J")
     pictures = []

@@ -1,7 +1,7 @@
 """Runs every step of every lesson once and stores the site's curves: `python -m docs.record [NAME …]`.
 
-docs/site/recorded/NAME.json holds, per step, the curves of its plots, of the run and of its ghost, and per
-lesson the robot's motion in one of its steps.
+docs/site/recorded/NAME.json contains the plotted curves of each step, for the run and for its ghost. It also
+contains the robot's motion in one step of the lesson.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ FOLDER = Path(__file__).parents[1] / "docs" / "site" / "recorded"
 RATE = 25.0
 """The largest number of stored configurations per second of a motion."""
 PLAYED = {"a-redundant-arm": 1, "no-model-needed": 1, "one-task": 1, "swap-the-priorities": 2, "two-tasks": 1}
-"""The step of a lesson whose motion is stored; for other lessons the first step."""
+"""For some lessons, the place of the step whose motion is stored. For the other lessons it is the first
+step."""
 
 Array = NDArray[np.float64]
 

@@ -15,8 +15,8 @@ _HEAD = """# Settings
 These are the settings that `--set PATH=VALUE` and the page's controls change. `himpc-lab run SCENE
 --settings` lists the settings of one scene with their present values. In a path, `*` is a name or a place:
 `levels.position.Q` or `levels.1.Q`. If a value is a list with one number per joint, a number after the path
-selects a joint: `M_bar.3=0.05`; `gains.2=0.4` selects the gain of a level. `obstacles.NAME=[x,y,z,radius]`
-adds a ball, and `obstacles.NAME=null` removes it.
+selects a joint: `M_bar.3=0.05`. In the same way, `gains.2=0.4` selects the gain of a level.
+`obstacles.NAME=[x,y,z,radius]` adds a ball, and `obstacles.NAME=null` removes it.
 
 Made by `python -m docs.settings`.
 """

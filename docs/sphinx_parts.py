@@ -44,7 +44,8 @@ class Names(PythonDomain):
         type: str | None,
         searchmode: int = 0,
     ) -> list[tuple[str, ObjectEntry]]:
-        """Returns Sphinx's result, stored as long as the number of known names is the same."""
+        """Returns Sphinx's result. A stored result is used as long as the number of known names is the
+        same."""
         key = (modname, classname, name, type, searchmode, len(self.objects))
         if key not in self._found:
             self._found[key] = super().find_obj(env, modname, classname, name, type, searchmode)
@@ -52,7 +53,7 @@ class Names(PythonDomain):
 
 
 def _titles_alone(app: Sphinx, page: str, template: str, context: dict[str, Any], doctree: Any) -> None:
-    """Builds the tree beside every page from page titles alone, without copying the pages' sections."""
+    """Builds the navigation tree of each page from the titles of the pages alone, without their sections."""
     tree, known = context["toctree"], app.env.metadata
     leaves = app.env.found_docs - set(app.env.toctree_includes)
 
@@ -96,11 +97,11 @@ def _plain(app: Sphinx, what: str, name: str, obj: object, options: object, line
 
 
 def safe(text: str) -> str:
-    """Returns a line in which only code is markup for reStructuredText."""
+    """Returns a line in which everything except code is escaped for reStructuredText."""
     parts = _CODE.split(text)
     for k, part in enumerate(parts):
         if k % 2:
-            # Code must not touch a word.
+            # reStructuredText requires a separator between code and a word.
             after = "\\ " if re.match(r"\w", parts[k + 1]) else ""
             before = "\\ " if re.search(r"\w$", parts[k - 1]) else ""
             parts[k] = f"{before}``{part.strip('`').strip()}``{after}"

@@ -1,4 +1,4 @@
 """Live figures of the site: robots, scenes and lesson steps as data that a browser simulates.
 
-`robot`, `model` and `scene` give the data, `steps` says which steps of lessons are live, `front` builds the
-program of docs/browser/ and writes everything beside the built pages."""
+`robot`, `model` and `scene` produce the data. `steps` selects the steps of lessons that run in a browser.
+`front` builds the program of docs/browser/ and writes all files beside the built pages."""

@@ -1,5 +1,5 @@
-"""The controls of a live figure as HTML: native inputs that name the setting which they change. The page adds
-the list of levels, and acts on what is changed."""
+"""The controls of a live figure as HTML inputs. Each input names the setting that it changes. The page adds
+the list of levels and applies the changes."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ def controls(scene: dict[str, Any], robot: Robot, reach: float, horizons: Iterab
     """Returns the controls of a scene.
 
     Args:
-        scene: its settings as for the page, see `docs.figures.scene`.
-        robot: gives the links that can be pushed.
-        reach: m, see `docs.figures.robot.mechanics`.
-        horizons: N that can be chosen.
-        wide: whether there is room to open the most used groups at first.
+        scene: the data of the scene, see `docs.figures.scene`.
+        robot: the robot whose links can be pushed.
+        reach: the reach of the robot, m, see `docs.figures.robot.mechanics`.
+        horizons: the values of N that can be chosen.
+        wide: whether the most used groups of controls are open at first.
     """
     strict, plant, limits = scene["controller"] != "weighted", scene["plant"], scene["limits"]
     known = sorted({scene["horizon"], *horizons})
@@ -44,7 +44,9 @@ def controls(scene: dict[str, Any], robot: Robot, reach: float, horizons: Iterab
                 "Levels, highest priority first",
                 True,
                 '<ol class="hl-levels"></ol>',
-                "" if strict else _small("This controller weighs all levels: none can be switched or moved."),
+                ""
+                if strict
+                else _small("This controller weighs all levels: no level can be switched off or moved."),
             ),
             _group("Target", wide, *targets) if targets else "",
             _group(
@@ -121,7 +123,8 @@ def _small(words: str) -> str:
 
 
 def _told(**given: str) -> str:
-    """Returns what a control changes: `path` of a setting, or the `axis` of the target of a `task`."""
+    """Returns attributes that name what a control changes: `path` of a setting, or `task` and `axis` of a
+    target."""
     return "".join(f' data-{name}="{escape(value)}"' for name, value in given.items())
 
 
@@ -145,7 +148,8 @@ def _scale(path: str, words: str, ends: tuple[float, float], value: float) -> st
 def _slider(
     words: str, unit: str, ends: tuple[float, float], value: Any, *, log: bool = False, **given: str
 ) -> str:
-    """Returns a slider; with `log` its value is a power of ten. Of several values it shows the first one."""
+    """Returns a slider. With `log`, its position is the logarithm of the value. It shows the first of several
+    values."""
     first = float(value[0] if isinstance(value, list | tuple) else value)
     low, high, at = ((math.log10(max(each, 1e-9)) if log else each) for each in (*ends, first))
     told = f"{float(f'{first:.3g}'):g} {unit}".strip()

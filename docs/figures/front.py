@@ -1,6 +1,6 @@
 """Writes the live figures beside the built pages: the program of docs/browser/, MuJoCo, the kernel, the data.
 
-Without Node, npm or a linker for WebAssembly there are no live figures, and the site says so.
+Without Node, npm or a linker for WebAssembly, the site has no live figures and states this.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ from robots import InputError
 ROOT = Path(__file__).parents[2]
 PROGRAM = ROOT / "docs" / "browser"
 TRIED = ("iiwa14-hold", "panda-hold", "planar3-hold")
-"""The scenes of the page *Try it*."""
+"""The names of the scenes on the page *Try it*."""
 HORIZONS = (1, 2, 5, 10, 20)
-"""The horizons N of that page."""
+"""The horizons N that can be chosen on this page."""
 
 
 def missing() -> str | None:
-    """Returns a sentence about what live figures need and this machine lacks; None if nothing is missing."""
+    """Returns a sentence that names what this machine lacks for live figures; None if nothing is missing."""
     for program in ("node", "npm"):
         if shutil.which(program) is None:
             return f"live figures need {program}, which is not installed: the site has recordings instead"
@@ -46,8 +46,9 @@ def missing() -> str | None:
 
 
 INVITATION = (
-    '<p class="try"><a href="try.html">Try it</a>: drag the target of an iiwa, a Panda or a planar arm here, '
-    "in the browser. It is the compiled controller of himpc-lab, and nothing is loaded from elsewhere.</p>"
+    '<p class="try"><a href="try.html">Try it</a>: drag the target of an iiwa, a Panda or a planar arm '
+    "here, in the browser. The figure runs the compiled controller of himpc-lab and loads nothing from "
+    "elsewhere.</p>"
 )
 WITHOUT = (
     "This site was built without Node: lessons have recordings, and nothing is simulated in the browser."
@@ -55,7 +56,7 @@ WITHOUT = (
 
 
 def write(site: Path) -> None:
-    """Writes try.html and all scripts of the live figures into a folder with a site."""
+    """Writes try.html and all scripts of the live figures into the folder of a built site."""
     out = site / "live"
     out.mkdir(parents=True)
     told = {name: {"robot": as_torque_scene(load_scene(name), "a live page's").robot.name} for name in TRIED}
@@ -85,7 +86,7 @@ def write(site: Path) -> None:
 
 
 def _program(path: Path) -> None:
-    """Bundles the program; installs its packages, whose versions are exact, if they are not there."""
+    """Bundles the program. If its packages are missing, they are installed first, in exact versions."""
     if not (PROGRAM / "node_modules").exists():
         install = ("npm", "install", "--no-package-lock", "--ignore-scripts", "--no-audit", "--no-fund")
         subprocess.run(install, cwd=PROGRAM, check=True, stdout=subprocess.DEVNULL)
@@ -93,8 +94,8 @@ def _program(path: Path) -> None:
 
 
 def about() -> str:
-    """Says which kernel and commit the figures are made from, and how they differ from the lab; the page puts
-    the version of its own MuJoCo in the place of @mujoco@."""
+    """Returns a text that names the kernel and the commit of the figures, and their differences from
+    himpc-lab. The page replaces @mujoco@ by the version of its own MuJoCo."""
     try:
         told = subprocess.run(
             ("git", "-C", str(ROOT), "describe", "--always", "--dirty", "--abbrev=10"),
@@ -105,9 +106,9 @@ def about() -> str:
     except (OSError, subprocess.CalledProcessError):
         told = "not known"
     return (
-        f"Kernel {layout_number():014x} of himpc-lab {version('himpc-lab')}, commit {told}, as WebAssembly; "
-        f"the robot is simulated by MuJoCo @mujoco@, in himpc-lab by {mujoco.__version__}. Unlike himpc-lab "
-        "this page has no controllers that need Python (OSF, HQP, HTMPC), no tasks to add, no recordings and "
-        "no QP drawings, and three rare fallbacks are missing. The code opens in himpc-lab: himpc-lab "
+        f"Kernel {layout_number():014x} of himpc-lab {version('himpc-lab')}, commit {told}, as WebAssembly. "
+        f"MuJoCo @mujoco@ simulates the robot; himpc-lab uses MuJoCo {mujoco.__version__}. Unlike himpc-lab, "
+        "this page has no controllers that need Python (OSF, HQP, HTMPC), no added tasks, no recordings, no "
+        "drawings of the QP, and without three rare fallbacks. To open the code in himpc-lab: himpc-lab "
         "--state CODE."
     )

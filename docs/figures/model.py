@@ -1,5 +1,5 @@
-"""A robot and its world in MuJoCo's language, for a browser: the model of `robots.mechanics.model`, with a
-place `@NAME JOINT@` for each number that a setting of the plant changes while the robot moves."""
+"""A robot and its world as a MuJoCo XML text for a browser. It is the model of `robots.mechanics.model`, with
+a placeholder `@NAME JOINT@` for each number that a setting of the plant changes while the robot moves."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ def model_of(robot: Robot, world: World) -> mujoco.MjModel:
 
 
 def model_text(robot: Robot, world: World) -> str:
-    """Returns the model as text. Places of a joint k, counted from 1: @mass k@, @ipos k@, @inertia k@ (xx yy
-    zz xy xz yz), @armature k@, @damping k@, @friction k@, @stops k@ (true or false); of all: @gravity 0@ and
-    @contacts 0@ (enable or disable)."""
+    """Returns the model as text. Placeholders of a joint k, counted from 1: @mass k@, @ipos k@, @inertia k@
+    (xx yy zz xy xz yz), @armature k@, @damping k@, @friction k@, @stops k@ (true or false). Placeholders of
+    the whole model: @gravity 0@ and @contacts 0@ (enable or disable)."""
     model = model_of(robot, world)
     top = np.flatnonzero(model.body_parentid == 0)[1:]
     objects = [body for body in top if model.body(body).name.startswith("object")]
@@ -100,8 +100,8 @@ def _joint(model: mujoco.MjModel, joint: int, k: int) -> str:
 
 
 def _geom(model: mujoco.MjModel, robot: Robot, geom: int) -> str:
-    """Returns a geom as text. A hull has the coordinates of its body; MuJoCo moves those of its model to the
-    centre of the hull."""
+    """Returns a geom as text. A hull is written in the coordinates of its body. In MuJoCo's compiled model
+    its origin is the centre of the hull."""
     solids = robot.collision.solids
     told: dict[str, object] = {"name": model.geom(geom).name, "priority": model.geom_priority[geom]}
     told |= {"friction": model.geom_friction[geom], "solref": model.geom_solref[geom]}
@@ -114,7 +114,7 @@ def _geom(model: mujoco.MjModel, robot: Robot, geom: int) -> str:
 
 
 def _tag(name: str, /, **given: object) -> str:
-    """Returns the beginning of an element; its numbers have all their digits."""
+    """Returns the start tag of an element. Its numbers have all their digits."""
 
     def told(value: object) -> str:
         if isinstance(value, str):

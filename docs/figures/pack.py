@@ -1,5 +1,5 @@
-"""Data for the browser: one script per pack. A page that was opened from a disk may load scripts, but no
-other files."""
+"""Data for the browser: one script per pack. A page that is opened from a disk may load scripts, but no other
+files."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ from collections.abc import Sequence
 from typing import Any
 
 _LINE = 8
-"""Pieces begin at multiples of this number of bytes."""
+"""Each piece begins at a multiple of this number of bytes."""
 
 
 class Pack:
-    """A description with pieces of bytes that it refers to by (offset, bytes)."""
+    """A description and pieces of bytes. The description refers to a piece by its offset and its length in
+    bytes."""
 
     def __init__(self) -> None:
         self._pieces = bytearray()
@@ -28,22 +29,22 @@ class Pack:
         return start, len(piece)
 
     def script(self, name: str, told: dict[str, Any]) -> str:
-        """Returns the script that gives the pack to the page: length of the description (8 bytes),
-        description, pieces."""
+        """Returns the script that gives the pack to the page. The pack consists of the length of the
+        description (8 bytes), the description and the pieces."""
         text = json.dumps(told, ensure_ascii=False, separators=(",", ":"), allow_nan=False).encode()
         text += b" " * (-len(text) % _LINE)
         return wrapped(name, len(text).to_bytes(8, "little") + text + bytes(self._pieces))
 
 
 def wrapped(name: str, content: bytes) -> str:
-    """Returns the script that gives bytes to the page, compressed."""
+    """Returns the script that gives the compressed bytes to the page."""
     packed = base64.b64encode(gzip.compress(content, 9, mtime=0)).decode()
     return f'(window.HIMPC_PACKS??={{}})["{name}"]="{packed}";\n'
 
 
 def without_names(wasm: bytes) -> bytes:
-    """Returns a WebAssembly module without its custom sections: names and notes for debuggers, more than half
-    of MuJoCo's module, of which a browser executes nothing."""
+    """Returns a WebAssembly module without its custom sections. These contain names and notes for debuggers,
+    and a browser does not execute them. They are more than half of MuJoCo's module."""
     kept, at = bytearray(wasm[:8]), 8
     while at < len(wasm):
         size, shift, start, more = 0, 0, at + 1, True

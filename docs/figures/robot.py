@@ -1,4 +1,4 @@
-"""A robot as data for a browser: its mechanics, its limits, and what is drawn of it."""
+"""A robot as data for a browser: its mechanics, its limits and its drawn shapes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from robots.truth import inertial, joint_axis, true_model
 FACES = 16_000
 """Largest number of triangles of a robot."""
 _GRID = 1e-4
-"""m: the coordinates of drawn shapes are multiples of this length."""
+"""The coordinates of drawn shapes are multiples of this length, m."""
 
 
 def robot_script(robot: Robot, name: str) -> str:
@@ -25,9 +25,10 @@ def robot_script(robot: Robot, name: str) -> str:
 
 
 def mechanics(robot: Robot) -> dict[str, Any]:
-    """Returns inertia and limits of the nominal robot; `model_text` has the rest. SI units; None: no limit.
+    """Returns inertia and limits of the nominal robot in SI units. None means no limit. `model_text` has the
+    rest.
 
-    `reach` is the sum of the distances from joint to joint, m; `planar` says that all of them lie in one
+    `reach` is the sum of the distances from joint to joint, m; `planar` is true if all joints lie in one
     horizontal plane."""
     model = true_model(robot, PlantSettings())
     bodies = []

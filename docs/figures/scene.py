@@ -28,13 +28,13 @@ from robots.world import Floor
 def scene_data(
     scene: TorqueScene, pack: Pack, horizons: Sequence[int] = (), wide: bool = False
 ) -> dict[str, Any]:
-    """Returns a scene; the controllers' memory goes into the pack.
+    """Returns the data of a scene and adds the memory of its controllers to the pack.
 
     Args:
-        scene: with its settings.
-        pack: for the memory of the controllers.
-        horizons: N that can be chosen besides the scene's own.
-        wide: whether its page has room for controls.
+        scene: the scene with its settings.
+        pack: receives the memory of the controllers.
+        horizons: the values of N that can be chosen besides the scene's own N.
+        wide: whether the most used groups of controls are open at first.
 
     Raises:
         InputError: the scene's controller cannot be exported.
@@ -142,7 +142,8 @@ def _poses(scene: TorqueScene) -> list[float]:
 
 
 def _objects(scene: TorqueScene) -> list[dict[str, Any]]:
-    """Returns the shapes of the objects, in the order of their bodies; a floor is part of every picture."""
+    """Returns the shapes of the objects in the order of their bodies. Floors are omitted, because every
+    picture has a floor."""
     model = model_of(scene.robot, scene.world)
     found = []
     for place, thing in enumerate(scene.world):
@@ -164,8 +165,8 @@ def _told(image: Image, pack: Pack) -> dict[str, Any]:
 
 
 def _fields(image: Image) -> list[tuple[str, str, int, int]]:
-    """Fields of telemetry, and where the kernel has them: (name, array, first number, count); the page writes
-    those without an array."""
+    """Returns the fields of telemetry and their places in the kernel's memory: (name, array, first number,
+    count). The page writes the fields that have no array."""
     manifest = image.manifest
     arrays = {each["name"]: each for each in manifest["arrays"]}
     n, place = len(manifest["joints"]), arrays["task"]["offset"]

@@ -32,7 +32,7 @@ FIELDS += (
     "late",
     "contact_force",
 )
-"""Fields of telemetry that a browser has, besides error/TASK, active/LEVEL and, of positions and joints,
+"""Fields of telemetry that a browser has. It also has error/TASK, active/LEVEL and, for positions and joints,
 x/TASK."""
 _DERIVED = (
     "torque share",
@@ -63,7 +63,8 @@ def _prepared(run: RunSpec) -> Scene:
 
 @cache
 def why_not(name: str, place: int) -> str | None:
-    """Returns a sentence on why a step (0 is the first) has no live figure; None if it has one."""
+    """Returns the reason why a step (0 is the first) has no live figure; None if the step has a live
+    figure."""
     lesson = load_lesson(name)
     try:
         refuse(_scene_of(lesson.run_of(lesson.steps[place])))
@@ -90,7 +91,7 @@ def scene_of_step(lesson: Lesson, step: Step) -> Scene:
 
 
 def lesson_script(lesson: Lesson) -> str | None:
-    """Returns the script that gives the live steps of a lesson to the page; None if there is none."""
+    """Returns the script that gives the live steps of a lesson to the page; None if it has no live steps."""
     pack = Pack()
     steps = {
         str(place + 1): _step(lesson, place, pack)
@@ -150,7 +151,8 @@ def _ghost_told(step: Step, missing: str | None) -> str:
 
 
 def _asking(name: str, step: Step, with_ghost: bool) -> str:
-    """Returns the prediction before the run and the list of claims as HTML; `name`: of the radio buttons."""
+    """Returns the question of the prediction and the list of claims as HTML; `name`: the name of the radio
+    buttons."""
     claims = "".join(
         f"<li>{escape(claim.text)}{'' if judged(claim.measure, with_ghost) else _NOT_HERE}</li>"
         for claim in step.claims

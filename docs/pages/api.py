@@ -52,6 +52,6 @@ def documented(path: Path) -> bool:
 
 
 def one(module: str) -> str:
-    """Returns a module's part of a page."""
+    """Returns the section of a page about a module."""
     directive = f".. automodule:: {module}\n   :members:\n   :show-inheritance:"
     return f"## {module}\n\n```{{eval-rst}}\n{directive}\n```\n"

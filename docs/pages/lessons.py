@@ -30,7 +30,8 @@ Checks = dict[tuple[str, str], dict[str, Any]]
 
 
 def pages(root: Path, live: bool = False) -> dict[str, str]:
-    """Returns the name and Markdown of each page and of their index; live: whether figures run here."""
+    """Returns the name and Markdown of each page and of their index; live: whether the pages have live
+    figures."""
     known = measured(root / MEASURED)
     found, rows = {}, []
     for number, name in enumerate(COURSE, start=1):
@@ -53,7 +54,8 @@ def pages(root: Path, live: bool = False) -> dict[str, str]:
 
 
 def measured(path: Path) -> dict[str, Checks]:
-    """Returns the measured results of each lesson, by step and claim; nothing if the file does not exist."""
+    """Returns the measured results of each lesson, by step and claim; an empty dictionary if the file does
+    not exist."""
     if not path.exists():
         return {}
     told = json.loads(path.read_text(encoding="utf-8"))
@@ -91,7 +93,8 @@ def page(
     if picture:
         parts += [
             "## On the page",
-            "Every step before and after its run. The drawn predictions are the tempting ones, often wrong.",
+            "The page before and after the run of each step. The predictions shown are tempting, and many "
+            "are wrong.",
             f"![{card.title}, step by step]({lesson.name}.webp)",
         ]
     return "\n\n".join(parts) + "\n"
@@ -129,10 +132,11 @@ def questions(more: Further) -> list[str]:
 
 
 def runs_here(lesson: Lesson, place: int) -> str:
-    """Returns the HTML of a step's live figure, which is loaded on a click, or why there is none."""
+    """Returns the HTML of a step's live figure, which is loaded on a click, or the reason why the step has no
+    live figure."""
     reason = why_not(lesson.name, place)
     if reason is not None:
-        told = f"This step runs in himpc-lab only; here is its recording. {escape(reason)}."
+        told = f"This step runs in himpc-lab only. Its recording follows. {escape(reason)}."
         return f'<p class="recorded">{told}</p>'
     step = lesson.steps[place]
     robot, own = robot_of(lesson, step), told_settings(lesson, step)

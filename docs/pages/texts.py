@@ -26,15 +26,15 @@ LINKS = {
     "README.md": "index.md",
     "CHANGELOG.md": "changelog.md",
 }
-"""The page of the site for each of the project's texts; texts in `docs/` also link to each other by name
-alone."""
+"""The page of the site for each of the project's texts. Links between the texts in `docs/` contain the file
+name only."""
 FROM_README = {
     "start": ("Start", "Start"),
     "own": ("Bring your own", "Bring your own"),
     "own-program": ("In your own program", "In your own program"),
     "limits": ("Limits", "Limits"),
 }
-"""For each page: its title and the README's section."""
+"""For each page: its title, and the section of the README that it contains."""
 
 
 def pages(root: Path) -> dict[str, str]:
@@ -54,7 +54,7 @@ def pages(root: Path) -> dict[str, str]:
         found[name] = (root / file).read_text(encoding="utf-8")
     citation = (root / "CITATION.cff").read_text(encoding="utf-8")
     found["cite"] = (
-        f"# How to cite\n\nThis file stands in the repository as `CITATION.cff`.\n\n```yaml\n{citation}```\n"
+        f"# How to cite\n\nThis file is in the repository as `CITATION.cff`.\n\n```yaml\n{citation}```\n"
     )
     return {name: relinked(text) for name, text in found.items()}
 

@@ -1,4 +1,4 @@
-// Live figures are loaded when they are asked for. All they need are scripts beside the pages: a page that was opened
+// Live figures are loaded on a click. They are scripts in a folder beside the pages: a page that is opened
 // from a disk may load scripts, but no other files.
 const himpcScripts = {};
 function himpcScript(address) {
@@ -25,7 +25,7 @@ document.addEventListener("click", (event) => {
 async function himpcStep(button, assignments) {
   const [file, step, robot] = button.dataset.live.split("/"), figure = button.closest("figure");
   const place = Object.assign(document.createElement("div"), { textContent: "Loading: the controller and MuJoCo, about 2 MB …" });
-  // One figure runs at a time; the place of an earlier one has its button again.
+  // Only one figure runs at a time: a figure that was open before is replaced by its button.
   for (const other of document.querySelectorAll("figure.live.open")) other.replaceChildren(...other.himpcBefore), other.classList.remove("open");
   figure.himpcBefore = [...figure.childNodes];
   figure.classList.add("open");
@@ -37,7 +37,7 @@ async function himpcStep(button, assignments) {
     figure.replaceChildren(...figure.himpcBefore, Object.assign(document.createElement("p"), { textContent: `This did not work: ${error.message}.` }));
   }
 }
-// A link with the code of a step opens it.
+// A link with the code of a step opens the figure of this step.
 document.addEventListener("DOMContentLoaded", async () => {
   const code = location.hash.slice(1), first = document.querySelector("button[data-live]");
   if (!code.startsWith("hl") || !first) return;

@@ -1,4 +1,4 @@
-// A film is loaded when it is asked for: the player and its scene are files beside the pages.
+// A film is loaded on a click: the player and the scene are files in a folder beside the pages.
 document.addEventListener("click", (event) => {
   const button = event.target instanceof Element ? event.target.closest("button[data-film]") : null;
   if (!button) return;
