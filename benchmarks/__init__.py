@@ -1,1 +1,2 @@
-"""Measurements, which are no part of the tests. `python -m benchmarks.NAME` runs one in a checkout."""
+"""Measurements that are not part of the tests. `python -m benchmarks.NAME` runs a measurement in a
+checkout."""

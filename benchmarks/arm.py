@@ -2,8 +2,8 @@
 
     python -m benchmarks.arm [--seconds 60]
 
-The loop of `himpc-lab arm` holds the simulated panda in step with the clock, first without and then with
-real-time priority (as under `chrt -f 50`), if that is allowed on this machine.
+The loop of `himpc-lab arm` holds the posture of the simulated panda in real time. It runs first without
+real-time priority and then, if this machine allows it, with real-time priority (as under `chrt -f 50`).
 """
 
 from __future__ import annotations

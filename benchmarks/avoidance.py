@@ -1,21 +1,22 @@
-"""Random drags of a robot into its surroundings and into itself, with rows that keep distances and without.
+"""Drags robots at random into their surroundings and into themselves, with and without rows that keep
+distances.
 
     python -m benchmarks.avoidance [--chains 25] [--robots iiwa14 panda baxter generated] [--off] [--balls]
                                    [--seed 1] [--controller himpc] [--set PATH=VALUE …]
 
 Every chain drags the hands of a robot four times, once a second, in position alone or in pose. Each new
-target is 0.1 to 0.6 m from the present one in a random direction, so that many targets lie in the floor, in
-the robot or out of reach. Then the robot has three seconds to come to rest. With `--balls`, a ball is dragged
-through the arm four times instead, with 0.15 to 0.5 m/s, from 0.6 m before a moving link to 0.6 m behind it.
-The ball does not pass through the first three joints, which cannot move out of its way. Any controller can
-run.
+target is 0.1 to 0.6 m from the present target in a random direction, so that many targets lie in the floor,
+in the robot or out of reach. Then the robot has three seconds to come to rest. With `--balls`, a ball is
+dragged through the arm four times instead, at 0.15 to 0.5 m/s, from 0.6 m before a moving link to 0.6 m
+behind it. The ball does not pass through the first three joints, which cannot move out of its way. Any
+controller can run.
 
 The program prints a line of a Markdown table for each robot: the drags; the deepest penetration between
-bodies whose distance is kept, by MuJoCo's geometry; the chains in which it exceeds 1 mm; the largest share of
-the velocity limits; lost runs; unsolved QPs; the chains whose joints are slower than 0.05 rad/s at the end;
-and the median and the longest processor time of a step. It prints one line on the error stream after every
-chain. The exit code is 1 if a penetration exceeds 1 mm, a run is lost, or more than 5 % of the chains do not
-come to rest.
+bodies whose distance is kept, by MuJoCo's geometry; the chains in which this penetration exceeds 1 mm; the
+largest share of the velocity limits; lost runs; unsolved QPs; the chains whose joints are slower than 0.05
+rad/s at the end; and the median and the longest processor time of a step. It prints one line on the error
+stream after every chain. The exit code is 1 if a penetration exceeds 1 mm, a run is lost, or more than 5 % of
+the chains do not come to rest.
 """
 
 from __future__ import annotations
@@ -53,8 +54,8 @@ DEEP_M, AT_REST = 1e-3, 0.05
 BALL_M, BESIDE_M, BALL_SPEED = 0.08, 0.6, (0.15, 0.5)
 """Radius of a dragged ball, the length of its path before and behind a link, and its range of speeds, m/s."""
 PAST_M, CLEAR_M = 0.25, 0.35
-"""The smallest distance of its path from the first three joints of an arm, and of its start from the whole
-arm."""
+"""The smallest distance, m, of the ball's path from the first three joints of an arm, and of its start from
+the whole arm."""
 AWAY = np.array([0.0, 0.0, 10.0])
 """The position at which the ball waits, m."""
 SCENES = {"iiwa14": "iiwa14-hold", "panda": "panda-hold", "baxter": "baxter-hold"}

@@ -1,4 +1,5 @@
-"""Runs both routes with many active bounds: long horizons, low velocity and torque limits, dragged targets.
+"""Runs the compiled and the explicit route with many active bounds: long horizons, low limits, dragged
+targets.
 
     python -m benchmarks.bounds [--quick] [--seconds 0.3] [--scenes NAME …] [--horizons N …]
                                 [--velocity SCALE …] [--torque SCALE …] [--still | --dragged] [--alone]
@@ -8,8 +9,8 @@ and, if it has a target, once with a target that jumps every 50 ms. For each run
 a Markdown table: the number of QPs without a verified optimum, the largest joint velocity as a share of its
 limit, the processor time of the longest step, and the largest share of its budget that a tick of the compiled
 route used. --quick runs only the few hardest cases; --alone leaves out the explicit route. The exit code is 1
-if the compiled route leaves more QPs unsolved than the explicit one, if a joint is more than 2 % faster, or
-if a step takes more than 20 ms.
+if the compiled route leaves a larger share of QPs unsolved than the explicit route, if a joint exceeds its
+limit and its speed with the explicit route by more than 2 %, or if a step takes more than 20 ms.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ _EVERY = 50
 
 
 class Cell(NamedTuple):
-    """A row of the table."""
+    """The settings of a row of the table."""
 
     scene: str
     N: int
@@ -53,7 +54,7 @@ class Found(NamedTuple):
     Attributes:
         unsolved, of: QPs without a verified optimum, and all QPs.
         speed: the largest joint velocity as a share of its limit.
-        longest_ms: processor time of the longest step, without the first.
+        longest_ms: processor time of the longest step, ms. The first step is not counted.
         spent: the largest share of its budget that a tick of the compiled route used.
     """
 
@@ -74,7 +75,7 @@ QUICK = (
 
 
 def run(cell: Cell, route: Route, ticks: int) -> Found:
-    """Runs one cell with one route."""
+    """Returns the results of one cell with one route."""
     scene = torque_scene(cell.scene)
     limits = replace(scene.settings.limits, velocity_scale=cell.velocity, torque_scale=cell.torque)
     session = TorqueSession(
@@ -149,8 +150,8 @@ def main() -> int:
     parser.add_argument("--horizons", nargs="+", type=int, default=HORIZONS)
     parser.add_argument("--velocity", nargs="+", type=float, default=VELOCITY)
     parser.add_argument("--torque", nargs="+", type=float, default=TORQUE)
-    parser.add_argument("--still", action="store_true", help="only runs in which nothing is dragged")
-    parser.add_argument("--dragged", action="store_true", help="only runs in which a target is dragged")
+    parser.add_argument("--still", action="store_true", help="does only the runs without a dragged target")
+    parser.add_argument("--dragged", action="store_true", help="does only the runs with a dragged target")
     parser.add_argument("--alone", action="store_true", help="leaves out the explicit route")
     given = parser.parse_args()
     print(

@@ -94,14 +94,14 @@ class Viewer:
         return connection
 
     def watch(self, client: int, asked: SimpleQueue[int]) -> None:
-        """Stays connected until it is cancelled, and prints a line of JSON every second. asked: numbers of
-        reloads to make."""
+        """Stays connected until it is cancelled, and prints a line of JSON every second. asked: receives the
+        numbers of reloads to make."""
         while self._watch(client, asked):
             came = sum(self.visit() for _ in range(asked.get()))
             _tell({"client": client, "came": came})
 
     def _watch(self, client: int, asked: SimpleQueue[int]) -> bool:
-        """Watches until a reload is requested; returns False if the connection ends before."""
+        """Receives messages until a reload is requested. Returns False if the connection ends first."""
         with self.connect() as page:
             began = time.monotonic()
             while asked.empty():

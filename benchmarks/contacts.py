@@ -30,7 +30,7 @@ from robots.mechanics import model
 LOW = {
     "iiwa14-hold": ("position", (0.6, 0.1, -0.3)),
     "panda-hold": ("position", (0.55, 0.1, -0.15)),
-    "baxter-hold": ("right", (0.1, -0.3, 0.8)),  # in its own chest, because the floor is out of reach
+    "baxter-hold": ("right", (0.1, -0.3, 0.8)),  # inside its own chest, because it cannot reach the floor
 }
 """Targets that lie inside the floor or the robot."""
 BENT = {"iiwa14": (0, 60, 0, -30, 0, 30, 0), "panda": (0, 60, 0, -60, 0, 90, 45)}

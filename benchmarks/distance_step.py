@@ -1,5 +1,5 @@
-"""Compares the time of a control step with rows of distances to that of a step without them, in turns in
-one process: `python -m benchmarks.distance_step [SCENE ...]`.
+"""Compares the times of a control step with and without rows of distances. The two kinds of steps alternate
+in one process: `python -m benchmarks.distance_step [SCENE ...]`.
 
 Each scene runs twice: at its home posture, and with its first target dragged 0.7 m down in the first tick, so
 that the rows hold the arm above the floor.
@@ -40,7 +40,7 @@ def sessions(scene: TorqueScene, dragged: bool) -> list[TorqueSession]:
 
 
 def measure(name: str, dragged: bool) -> str:
-    """Runs both sessions in turns; returns one line with their times."""
+    """Runs both sessions alternately and returns one line with their times."""
     pair = sessions(torque_scene(name), dragged)
     steps: list[list[float]] = [[], []]
     for _ in range(TICKS):

@@ -1,5 +1,5 @@
-"""Every kind of task on every robot of the catalog, in closed loop under two controllers: the task is held,
-then dragged to the value that it has in another posture, so that it can be reached.
+"""Runs every kind of task on every robot of the catalog in closed loop under two controllers. The task is
+held. Then its target is dragged to the value of the task in another posture, so that it can be reached.
 
     python -m benchmarks.every_task [--seconds 3] [--json -]
 
@@ -116,7 +116,7 @@ def run(session: TorqueSession, seconds: float) -> None:
 
 
 def off(session: TorqueSession, tasks: tuple[Task, ...]) -> float:
-    """Returns the largest error in units of `SETTLED`, and infinity after control was lost."""
+    """Returns the largest error in units of `SETTLED`, or infinity if control was lost."""
     plan = session.plan
     if plan is None or session.diverged_at is not None:
         return float("inf")

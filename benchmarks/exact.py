@@ -1,11 +1,12 @@
-"""Computes the optimum of every level of a hierarchy to far more digits than a double has. It is the
-reference for both routes.
+"""Computes the optimum of every level of a hierarchy to far more digits than a double has. The results are
+the reference for the compiled and the explicit route.
 
-Only the problem's data come from `himpc`. Under a set of active rows the optimality conditions of (32) or
-(34), with (33) as printed, are linear: they are solved in doubles, and corrected until their residuals,
-evaluated in integers of several hundred bits, vanish. The dual method of Goldfarb and Idnani finds the set.
-It starts from a guess if all multipliers of the guess have the right signs, and without any row otherwise.
-The cost is strictly convex, so a point that satisfies the conditions is the optimum, whatever the guess was.
+Only the problem's data come from `himpc`. For a set of active rows the optimality conditions of (32) or (34),
+with (33) as printed, are linear. They are solved in doubles. The solution is then corrected until the
+residuals vanish, which are evaluated in integers of several hundred bits. The dual method of Goldfarb and
+Idnani finds the set of active rows. It starts from a guess if all multipliers of the guess have the right
+signs. Otherwise it starts without any row. The cost is strictly convex, so a point that satisfies the
+conditions is the optimum for any guess.
 """
 
 from __future__ import annotations
@@ -28,12 +29,12 @@ Fixed = NDArray[Any]
 
 _BITS = 300
 _RANK = 1e-10
-"""A direction whose effect on a level is below this share of its rows is left to lower levels, as in
-himpc."""
+"""If a direction has an effect on a level below this share of the level's rows, lower levels may use the
+direction, as in himpc."""
 _DEPENDENT = 1e-13
-"""A bound depends on the rows that are held if at most this share of it is independent of them."""
+"""A bound counts as dependent on the held rows if at most this share of it is independent of these rows."""
 _BEYOND = 1e-11
-"""N·m by which a dependent row may exceed its bound, since the data are doubles."""
+"""The torque, N·m, by which a dependent row may exceed its bound, since the data are doubles."""
 _CORRECTIONS = 60
 _CHANGES = 400
 
@@ -43,9 +44,9 @@ class Exact:
     """The optimum of a level.
 
     Attributes:
-        U: (N, n) N·m, rounded.
-        fixed: the same, not rounded.
-        active: the number of bounds that hold it.
+        U: the changes of torque (N, n), N·m, rounded to doubles.
+        fixed: U as fixed-point numbers, not rounded.
+        active: the number of active bounds.
     """
 
     U: Array
@@ -71,10 +72,10 @@ def times(a: Fixed, b: Fixed) -> Fixed:
 def optimum(
     problem: LevelProblem, rows: Rows, above: Sequence[tuple[LevelProblem, Exact]], guess: ActiveRows
 ) -> Exact | None:
-    """The optimum of Problem i; None if `_CHANGES` changes of the rows that are held do not lead to it.
+    """Returns the optimum of Problem i; None if it is not found within `_CHANGES` changes of the held rows.
 
     Args:
-        problem: its data.
+        problem: the data of Problem i.
         rows: all bounds.
         above: the levels above and their optima, highest priority first.
         guess: rows that may bind.
@@ -91,10 +92,10 @@ def optimum(
 
 
 def _dual_method(system: _System, point: _Point, side: Array) -> Exact | None:
-    """Goldfarb and Idnani's method, from a point whose multipliers have the right signs.
+    """Runs Goldfarb and Idnani's method from a point whose multipliers have the right signs.
 
     Multipliers change linearly between the present point and the point that holds one more row. At the step
-    at which the first of them vanishes, its row is released, and the method continues from there.
+    at which the first multiplier vanishes, its row is released, and the method continues from there.
     """
     for _ in range(_CHANGES):
         value = times(system.L, point.U)
@@ -112,13 +113,13 @@ def _dual_method(system: _System, point: _Point, side: Array) -> Exact | None:
                 if following is None:
                     return None
                 change = following.multipliers - multipliers
-            else:  # the point stays, and multipliers move from the rows that are held to the new one
+            else:  # the point stays, and multipliers move from the held rows to the new row
                 following, change = None, sign * shares
             step, leaving = _first_to_vanish(side, new, multipliers, change)
             if following is not None and step >= 1.0:
                 point = following
                 break
-            if leaving is None:  # no point satisfies this row and those held
+            if leaving is None:  # no point satisfies this row and the held rows
                 return None
             multipliers = multipliers + step * change
             multipliers[leaving] = side[leaving] = 0.0
@@ -141,7 +142,7 @@ def _first_to_vanish(
 
 @dataclass(frozen=True, eq=False)
 class _Point:
-    """The solution of the conditions for a set of rows that are held: U (N, n), and a multiplier per row."""
+    """The solution of the conditions for a set of held rows: U (N, n), and a multiplier per row."""
 
     U: Fixed
     multipliers: Array
@@ -216,8 +217,8 @@ class _System:
         return chosen
 
     def solve(self, side: Array) -> _Point | None:
-        """The point for independent rows that are held at their upper (1) or lower (−1) bounds; None if the
-        conditions do not determine it."""
+        """Returns the point at which independent rows are held at their upper (1) or lower (−1) bounds; None
+        if the conditions do not determine the point."""
         K, n = self._K, self._n
         row, joint = np.nonzero(side)
         bound = np.where(side > 0, self.upper, self.lower)[row, joint]
@@ -303,7 +304,8 @@ class _System:
         return rows.reshape(len(rows), K * n)
 
     def independent(self, side: Array) -> NDArray[np.bool_]:
-        """Returns a largest set of the given rows that depend neither on (33) nor on one another."""
+        """Returns a largest subset of the given rows that is linearly independent, also of the rows of
+        (33)."""
         row, joint = np.nonzero(side)
         held = np.zeros(side.shape, bool)
         if not len(row):
@@ -318,8 +320,9 @@ class _System:
         return held
 
     def dependence(self, side: Array, new: tuple[Any, ...]) -> Array | None:
-        """Returns the changes of the multipliers of the rows that are held per unit of the new row's
-        multiplier, if the new row depends on those rows and on (33); None if it is independent of them."""
+        """Returns the changes of the held rows' multipliers per unit of the new row's multiplier. This
+        requires that the new row depends on the held rows and on (33). If it is independent of them, returns
+        None."""
         held = side != 0.0
         held[new] = False
         row, joint = (np.append(*pair) for pair in zip(new, np.nonzero(held), strict=True))
@@ -337,7 +340,8 @@ class _System:
         return shares
 
     def _directions(self, row: NDArray[Any], joint: NDArray[Any], count: int) -> tuple[Array, Array, Array]:
-        """The first rows as unit vectors, an orthonormal basis of all the others, and the rows' lengths."""
+        """Returns the first `count` rows as unit vectors, an orthonormal basis of the other rows, and the
+        lengths of all rows."""
         rows = self._scaled_rows(row, joint)
         size = np.maximum(np.linalg.norm(rows, axis=1), 1e-300)
         unit = rows / size[:, None]

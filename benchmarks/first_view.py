@@ -2,11 +2,12 @@
 
     python -m benchmarks.first_view SITE [SITE ...] [--runs N]
 
-The program opens try.html of sites that `python -m docs.build` wrote, in turns and each time in a new
-Chromium, until the robot moves. It prints medians of the size of the scripts (MB, and compressed by gzip -9),
-of the time from the opening of the page to its first picture and to the robot's first motion, and of the
-processor time until then of the page's thread, of the simulation's thread, of the threads that compile
-WebAssembly, and of the whole browser, in s. Chromium draws with the processor here (SwiftShader).
+The program opens try.html of each site in turn, each time in a new Chromium, until the robot moves. `python
+-m docs.build` writes such sites. The program prints the size of the scripts (MB, and compressed by gzip -9)
+and medians of times, s. The times are those from the opening of the page to its first picture and to the
+robot's first motion. The program also prints the processor time until this motion, s: of the page's thread,
+the simulation's thread, the threads that compile WebAssembly, and the whole browser. Chromium draws with the
+processor here (SwiftShader).
 """
 
 from __future__ import annotations

@@ -3,10 +3,10 @@
     python franka_server.py ROBOT.xml ROBOT.urdf M_BAR Q_0 CLOCK
 
 This script runs in another Python environment, because franka-sim needs an older MuJoCo and NumPy. M_BAR and
-Q_0 are numbers separated by commas: the gains with which the arm itself holds its posture, and its initial
-posture. If CLOCK is "step", the arm moves by one period with each state that it sends, after the answer to
-the state before has arrived, as if its drives and its network shared a clock. If CLOCK is "own", franka-sim
-works as usual: the simulation runs beside the network.
+Q_0 are numbers separated by commas. M_BAR is in proportion to the gains with which the arm itself holds its
+posture, and Q_0 is the arm's initial posture. If CLOCK is "step", the arm waits for the answer to its last
+state, moves by one period and sends the next state, as if its drives and its network shared a clock. If CLOCK
+is "own", franka-sim works as usual: the simulation runs beside the network.
 """
 
 import logging
@@ -22,7 +22,7 @@ FrankaSimServer: Any = import_module("franka_sim").FrankaSimServer
 
 
 class Stepped(simulation.MujocoFrankaSim):
-    """A simulation that moves only when it is told to move."""
+    """A simulation that moves only when its method `step` is called."""
 
     def run_simulation(self):
         self._read_and_publish_state()

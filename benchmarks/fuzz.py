@@ -1,13 +1,14 @@
-"""Runs torque-level scenes with hostile states, settings and events; none may raise, give NaN or take long.
+"""Runs torque-level scenes with hostile states, settings and events, and counts exceptions, NaN and slow
+ticks.
 
     python -m benchmarks.fuzz [--ticks 1000000] [--seed 0] [--minutes 60] [--episode SEED]
 
-Every episode is a random scene and controller with some hundred ticks. Between the ticks the robot is put
-into impossible states, the torque sensor returns invalid values, and settings and targets change. The program
+Every episode runs a random scene and controller for some hundred ticks. Between the ticks the robot is set to
+impossible states, the torque sensor returns invalid values, and settings and targets change. The program
 counts exceptions, numbers that are not finite, torques above the robot's own limit, and ticks that used more
-than 20 ms of processor time. It prints a line for each fault with the episode's seed, with which `--episode`
-repeats the episode, and a summary in JSON at the end or after an interruption. The exit code is 1 if there
-was any fault.
+than 20 ms of processor time. For each fault it prints a line with the seed of the episode; `--episode SEED`
+repeats this episode. At the end or after an interruption it prints a summary in JSON. The exit code is 1 if
+there was any fault.
 """
 
 from __future__ import annotations

@@ -67,7 +67,7 @@ def measure(server: PageServer, own: tuple[str, ...], seconds: float) -> dict[st
     assert client.stdout is not None
     threading.Thread(target=lines.extend, args=(client.stdout,), daemon=True).start()
     try:
-        assert wait_until(lambda: bool(server.sessions.learners), LONG), "the client was not let in"
+        assert wait_until(lambda: bool(server.sessions.learners), LONG), "the client was not admitted"
         learner = server.sessions.learners[0]
         assert wait_until(lambda: simulated(learner) > 0.5, LONG), "nothing runs"
         if own:

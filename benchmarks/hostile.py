@@ -30,8 +30,8 @@ class HostileUser:
         return sum(self.actions.values()) >= len(self._actions())
 
     def act(self) -> None:
-        """Does a hostile action, or a normal one that changes the state of the page for the next action.
-        Every action is done once first; later ones are chosen at random."""
+        """Does a hostile action, or a normal action that changes the state of the page for the next action.
+        At first every action is done once. After that, actions are chosen at random."""
         actions = self._actions()
         if not self._due:
             self._due = self._random.choices([each for each, _ in actions], [weight for _, weight in actions])
@@ -91,7 +91,8 @@ class HostileUser:
         self._send("ViewerCameraMessage", said)
 
     def _look_while_built(self) -> None:
-        """Loads another scene; until it is built the camera looks at its own position, or has no size."""
+        """Loads another scene. Until the scene is built, the page's messages contain a camera that looks at
+        its own position or has no size."""
         odd, before = self._random.choice(LOOKS), len(self.page.made)
         self._choose_scene()
         for _ in range(100):

@@ -3,9 +3,9 @@
     PATH=FOLDER/node_modules/.bin:$PATH python -m benchmarks.hub [--pictures FOLDER]
 
 The program needs the hub's own proxy (`npm install configurable-http-proxy`) and a Chromium. The exit code is
-0 if both texts are signed and name the account of the hub, the step and nothing else, and if every request
+0 under two conditions. Both texts are signed and name only the account of the hub and the step. Every request
 that does not come through the user's own Jupyter server is refused: over the port itself, over Jupyter's path
-of any port, and without a login. The program prints the times that the two users waited.
+for any port, and without a login. The program prints the waiting times of the two users.
 """
 
 from __future__ import annotations
@@ -80,7 +80,8 @@ def judged(text: str, user: str) -> list[str]:
 
 
 def let_in(page: Page, url: str, user: str, port: int) -> list[str]:
-    """Returns the ways past the user's Jupyter server that a user's lab leaves open. There should be none."""
+    """Returns the addresses at which a user's lab accepts requests without the user's Jupyter server. There
+    should be none."""
     forged = {USER_HEADER: "somebody", HEADER: "somebody's-token"}
     ways = {
         "the port": (f"http://127.0.0.1:{port}/", {}),

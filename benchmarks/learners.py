@@ -5,9 +5,9 @@ frame rates.
 
 The program starts the real server and, in a process of their own, K clients that use the page's protocol and
 draw nothing (benchmarks/client.py). Each client has the plots of one tab visible. The exit code is 0 if every
-learner costs the server at most 8 % of a core and 300 kB/s and gets poses at 30 Hz (27 are accepted, as
-packets come in bunches) and plots at 10 Hz. The real-time factor of the simulations depends on the machine's
-cores; it is not judged.
+learner costs the server at most 8 % of a core and 300 kB/s and receives poses at 30 Hz and plots at 10 Hz.
+Poses at 27 Hz are accepted, as packets arrive in groups. The real-time factor of the simulations depends on
+the machine's cores; it is not judged.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ def _came(said: list[dict[str, Any]]) -> list[int]:
 def measured(server: PageServer, clients: int, tab: str, seconds: float) -> dict[str, Any]:
     """Returns the server's load and bytes per learner, and the figures of each learner."""
     with Viewers(server.link, "--clients", str(clients), "--tab", tab) as viewers:
-        assert wait_until(lambda: len(server.sessions.learners) == clients, LONG), "not all were let in"
+        assert wait_until(lambda: len(server.sessions.learners) == clients, LONG), "not all were admitted"
         learners = server.sessions.learners
         assert wait_until(lambda: all(simulated(each) > 0.5 for each in learners), LONG), "nothing runs"
         time.sleep(SETTLE)

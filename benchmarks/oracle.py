@@ -1,12 +1,12 @@
-"""Compares both routes with the optimum to many digits, for random stacks on every robot of the catalog.
+"""Compares the compiled and the explicit route with the exact optimum, for random stacks on every robot.
 
     python -m benchmarks.oracle [--stacks 200] [--seed 0] [--longest 30] [--json -]
 
 A stack has one to four levels with random tasks, weights (Q over five decades, R on the torque or on the
 acceleration), horizons and limits, in a random state and with random targets. Each route solves the problem
 of the controller at that tick, and `benchmarks.exact` computes the optimum. The program prints a row per
-robot: how often a route gave no point although there is an optimum, and the distance of its points from the
-optimum, N·m.
+robot: how often a route returned no point although there is an optimum, and the distance of the route's
+points from the optimum, N·m.
 """
 
 from __future__ import annotations
@@ -62,8 +62,9 @@ class Stack:
 
 @dataclass(frozen=True)
 class Found:
-    """The result of a route at one level: the number of bounds that hold the optimum, and the distance of the
-    route's point from it, N·m; None if the route gave no point."""
+    """The result of a route at one level: the number of bounds that are active at the optimum, and the
+    distance of the route's point from the optimum, N·m. The distance is None if the route returned no
+    point."""
 
     robot: str
     seed: int

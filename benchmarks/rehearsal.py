@@ -3,11 +3,11 @@
     python -m benchmarks.rehearsal [--learners 20] [--phones 200] [--lesson L] [--json -]
 
 The program starts two servers, each with half of the learners. The first server has the teacher's page and
-the phones, and the second follows its class. The class goes to each step of the lesson, votes, votes again,
-and runs the step on all robots. Then every learner hands in, and all texts are graded. Learners and phones
-use the protocol of their pages and draw nothing. The exit code is 0 if no vote, step or text was lost.
-Waiting times and real-time factors depend on the cores and on their other load; they are printed and not
-judged.
+the phones, and the second server follows this class. The class goes to each step of the lesson, votes, votes
+again, and runs the step on all robots. Then every learner hands in, and all texts are graded. Learners and
+phones use the protocol of their pages and draw nothing. The exit code is 0 if no vote, step or text was lost.
+Waiting times and real-time factors depend on the cores and on their other load. They are printed, but they do
+not change the exit code.
 """
 
 from __future__ import annotations
@@ -156,7 +156,7 @@ def _lecture(
 
 
 def _ready(page: Learner) -> bool:
-    """Returns whether the step on the page can be run, or asks for a prediction first."""
+    """Returns whether the page shows a step that was not run yet and that has a button to run it."""
     labels = ("Run this step", "Run (first say what you expect)")
     return any(page.find(label) for label in labels) and not page.shows("DONE")
 

@@ -92,7 +92,7 @@ class Host:
     """One server in a process of its own."""
 
     def __init__(self, learners: int, lesson: str, follows: str | None = None) -> None:
-        """follows: the address of the server whose class it follows; None if it has the class."""
+        """follows: the address of the server whose class it follows; None if this server has the class."""
         more = [] if follows is None else ["--class-of", follows]
         self._process = subprocess.Popen(
             [sys.executable, "-m", "benchmarks.rehearsal_host", str(learners), lesson, *more],

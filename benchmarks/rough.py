@@ -1,4 +1,5 @@
-"""Disturbs the page: simulations are killed, stopped or hang, uploads are large, and memory is small.
+"""Disturbs the page: simulations are killed, stopped, or hang while they load; uploads are large, and memory
+is small.
 
     python -m benchmarks.rough [--kills 100] [--stops 20] [--shm 8]
 
@@ -165,8 +166,8 @@ def _recovers(
 
 
 def _upload(page: Wire, answers: list[str]) -> None:
-    """Uploads an unwanted file as fast as possible; the server may close the connection. Its response goes to
-    `answers`."""
+    """Uploads an unwanted file as fast as possible; the server may close the connection. The response is
+    added to `answers`."""
     eventually(lambda: page.find("Upload a URDF") is not None, LONG)
     button = page.find("Upload a URDF")
     assert button is not None, "the page has no button to upload a robot"
@@ -228,7 +229,7 @@ def _memory_left() -> set[str]:
     process still maps."""
     found = {f"/dev/shm/{path.name}" for path in Path("/dev/shm").glob("*")}
     others = {line.split()[-1] for each in psutil.pids() if each != os.getpid() for line in _maps(each)}
-    # Its owner may have removed a name meanwhile.
+    # The owner may have removed the name meanwhile.
     named = {name for name in found - others if os.path.exists(name)}
     return named | {line.strip() for line in _maps(os.getpid()) if "himpc-lab" in line}
 

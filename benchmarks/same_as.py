@@ -1,7 +1,7 @@
 """Compares the results of all scenes under all controllers with those of another commit.
 
 python benchmarks/same_as.py COMMIT [--seconds S] runs every scene with every controller that fits, without a
-page, here and in a checkout of COMMIT, and compares the results of `himpc-lab run --json`, except the keys of
+page, here and in a checkout of COMMIT. It compares the results of `himpc-lab run --json`, except the keys of
 `TIMING`. With --tolerance T, two numbers may differ by T times the larger of the two, or by 1e-9 if that is
 more, and the keys of `_HOW` (the route and its residuals) are not compared. The exit code is 1 if any result
 differs.

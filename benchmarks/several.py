@@ -3,11 +3,11 @@ prints.
 
     python -m benchmarks.several [--picture FILE]
 
-Six learners come in, one of them in a browser, and the seventh is asked to wait. Two learners leave. Then the
-server of the browser is killed, and its two learners continue on another server, at the step of the lesson
-where they were; the program prints after how many seconds. At the end, a server gets SIGTERM: it admits
-nobody, and its page is informed and continues on another server. The exit code is 0 if all of this happened,
-each move after the kill within 10 s.
+Six learners connect, one of them in a browser, and the seventh learner is asked to wait. Two learners leave.
+Then the server of the browser is killed. Its two learners continue on another server, at the same step of the
+lesson. The program prints after how many seconds they continue. At the end, a server receives SIGTERM. It
+admits nobody, and its page is informed and continues on another server. The exit code is 0 if all of this
+happened and each learner of the killed server continued within 10 s.
 """
 
 from __future__ import annotations
@@ -168,8 +168,8 @@ def _drained(
 
 
 def _again(stack: ExitStack, tab: Tab, link: str) -> tuple[Tab, bool]:
-    """Returns the tab after its server has ended, as soon as it shows the second step of the lesson, and
-    whether it shows this step."""
+    """Waits until the server of a tab has ended. Returns the tab on its new server, and whether it shows the
+    second step of the lesson."""
     assert eventually(lambda: not tab.is_open, _LONG)
     until = time.monotonic() + _LONG
     while time.monotonic() < until:
@@ -254,7 +254,7 @@ def _server(port: int, address: int) -> Iterator[subprocess.Popen[bytes]]:
 
 @contextmanager
 def _balancer(nginx: str, folder: Path, port: int, ports: list[int]) -> Iterator[None]:
-    """Runs nginx with the printed configuration. It also says which server answered."""
+    """Runs nginx with the printed configuration. A header of each response names the server that answered."""
     text = (ROOT / "docs" / "serving.md").read_text()
     (site,) = re.findall(r"```text\n(upstream .*?)```", text, re.DOTALL)
     lines = "".join(f"    server 127.0.0.1:{each} max_fails=0;\n" for each in ports)

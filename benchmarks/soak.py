@@ -3,15 +3,17 @@
     python -m benchmarks.soak [--minutes M] [--clients K] [--reconnects N] [--scene S] [--json -]
 
 The program runs a server and, in a process of their own, K clients that use the page's protocol
-(benchmarks/client.py). It measures for M minutes. The first ten of them (or the first half of a shorter run)
-fill the histories for looking back and for export, at twice the speed, and last until every robot has run for
-two minutes of its own time. Then one of the clients reloads its page N times. The program prints a table. The
-exit code is 0 if the memory of the server and of its children grew by at most 5 % since the histories were
-full, the numbers of threads and handles are the same as before, and 100 reloads cost at most 5 MB.
+(benchmarks/client.py). It measures for M minutes. In the first ten minutes (or the first half of a shorter
+run) the robots run at twice the speed and fill the histories for playback and export. This phase lasts until
+every robot has run for two minutes of simulated time. Then one of the clients reloads its page N times. The
+program prints a table. The exit code is 0 if the memory of the server and of its children grew by at most 5 %
+since the histories were full, the numbers of threads and handles are the same as before, and 100 reloads cost
+at most 5 MB.
 
-The measured memory is what a process has written and shares with no other process, after free memory was
-returned to the system. The free memory that an allocator keeps varies by more than a leak would, and so do
-the pages of libraries, which are shared as long as another program on the machine uses them.
+The measured memory is the memory that a process has written and does not share with other processes. Free
+memory is returned to the system first. Without this, the memory that an allocator keeps would vary by more
+than a leak. The pages of libraries also vary, because they are shared only as long as another program on the
+machine uses them; they are not counted.
 """
 
 from __future__ import annotations
@@ -199,7 +201,7 @@ def tidy() -> None:
 def judged(later: list[Sample], cost: float | None) -> list[str]:
     """Returns sentences about exceeded limits. later: the samples after the histories were full."""
     if len(later) < 2 * NEAR:
-        return [f"Too short: {len(later)} samples since everything was filled."]
+        return [f"Too short: {len(later)} samples since the histories were full."]
     some = max(NEAR, len(later) // 10)  # data on the way to a client vary within minutes
     first, last = later[:some], later[-some:]
     faults: list[str] = []
@@ -226,7 +228,7 @@ def table(samples: list[Sample], cost: float | None, faults: list[str]) -> str:
     ]
     if cost is not None:
         lines.append(f"100 reconnects: {cost:.1f} MB")
-    return "\n".join([*lines, *(faults or ["Everything stayed as it was."])])
+    return "\n".join([*lines, *(faults or ["No limit was exceeded."])])
 
 
 if __name__ == "__main__":

@@ -3,8 +3,9 @@ compiling.
 
     python benchmarks/start.py [--runs 5] [--cold]
 
-CPU time is user and system time: of the server's process alone, or of a command and its children. The program
-prints medians of several runs. With `--cold` it also compiles once, into a folder of its own.
+CPU time is the sum of user and system time. It is measured for the server's process alone, and for a command
+with its children. The program prints medians of several runs. With `--cold` it also compiles everything once,
+into a temporary folder.
 """
 
 from __future__ import annotations

@@ -7,8 +7,8 @@ The program starts the real server and, in a process of their own, K clients tha
 random. The simulations run at X times real time, so that a small machine can run all of them. Memory is
 measured every five seconds, without garbage collection before it. A line of JSON is printed for every five
 minutes (in a shorter run for every sixth part): the median and the maximum of the server's memory in that
-time, MB. At the end all learners return to the first scene, and the server's memory is compared with that
-after the warm-up.
+time, MB. At the end all learners return to the first scene, and the server's memory is compared with its
+memory after the warm-up.
 
 The exit code is 0 if memory was never more than BASE + K · EACH, nothing was left behind, and memory in the
 last third of the time was at most 10 % more than in the first. Thirds are compared only if each is at least
@@ -81,7 +81,7 @@ def main() -> int:
     server = PageServer(SceneChoice(RunSpec(SCENES[0])), port=0, max_sessions=count)
     try:
         with Viewers(server.link, "--clients", str(count)):
-            assert wait_until(lambda: len(server.sessions.learners) == count, LONG), "not all were let in"
+            assert wait_until(lambda: len(server.sessions.learners) == count, LONG), "not all were admitted"
             learners = server.sessions.learners
             for learner in learners:
                 learner.send(Speed(options.speed))

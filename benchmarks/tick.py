@@ -2,8 +2,8 @@
 
     python benchmarks/tick.py [SCENE] [TICKS]
 
-The program prints JSON: medians and 99th percentiles in microseconds, and how many simulated seconds pass per
-second.
+The program prints JSON: medians and 99th percentiles in microseconds, and the simulated seconds per second of
+real time.
 """
 
 from __future__ import annotations

@@ -4,10 +4,10 @@
 
 The program starts the real server in a process of its own and tries to connect as other sites do: with a
 foreign origin, `null`, another port's origin, a rebinding name, and with 40 sockets from a page of another
-site in Chromium. Then, while a page is open, it opens many silent connections (half without a request, half
-web sockets without a message) and one that sends as fast as it can, and a new visitor arrives. It prints
-JSON. The exit code is 0 if the foreign sites read, started and closed nothing, the new visitor was served
-within 2 s, and the page kept at least half its rate.
+site in Chromium. Then, while a page is open, it opens many silent connections: half of them send no request,
+and half are web sockets without a message. Another connection sends as fast as it can. Meanwhile a new
+visitor connects. It prints JSON. The exit code is 0 if the foreign sites read, started and closed nothing,
+the new visitor was served within 2 s, and the page kept at least half its rate.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ _FOREIGN = """async ([url, protocol]) => {
 
 
 def serve(pipe: Any) -> None:
-    """Runs the server's process, which answers questions about its state until it is told to end."""
+    """Runs the server's process, which reports its state on request until it is asked to end."""
     server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=3, grace=600.0)
     pipe.send(server.link)
     while pipe.recv() == "seen":
@@ -163,7 +163,7 @@ def from_chromium(url: str) -> int:
 
 @contextlib.contextmanager
 def besieged(url: str, silent: int) -> Iterator[subprocess.Popen[bytes]]:
-    """Opens silent connections, and starts a process with one that floods the server."""
+    """Opens silent connections, and starts a process whose connection floods the server."""
     parts = urlsplit(url)
     address = (parts.hostname or "", parts.port or 0)
     with contextlib.ExitStack() as stack:

@@ -109,6 +109,6 @@ def about() -> str:
         f"Kernel {layout_number():014x} of himpc-lab {version('himpc-lab')}, commit {told}, as WebAssembly. "
         f"MuJoCo @mujoco@ simulates the robot; himpc-lab uses MuJoCo {mujoco.__version__}. Unlike himpc-lab, "
         "this page has no controllers that need Python (OSF, HQP, HTMPC), no added tasks, no recordings, no "
-        "drawings of the QP, and without three rare fallbacks. To open the code in himpc-lab: himpc-lab "
+        "drawings of the QP, and it lacks three rare fallbacks. To open the code in himpc-lab: himpc-lab "
         "--state CODE."
     )
