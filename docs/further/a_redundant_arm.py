@@ -23,7 +23,7 @@ def _all_solutions(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 
 def _freedoms(rng: np.random.Generator) -> tuple[float, float]:
     J = rng.normal(size=(6, 7))
-    J[5] = J[4]  # a row that depends on another one
+    J[5] = J[4]  # a linearly dependent row
     return float(np.trace(np.eye(7) - np.linalg.pinv(J) @ J)), 7.0 - np.linalg.matrix_rank(J)
 
 
@@ -65,8 +65,8 @@ FURTHER = Further(
     questions=(
         Question(
             "A seven-joint arm holds a glass. Two tasks control the position of the glass and keep the "
-            "glass upright. Its rotation about its own axis is free. How many motions are left over? How "
-            "many are left over if two levels contain the task *upright*?",
+            "glass upright. The rotation of the glass about its own axis is free. How many motions are left "
+            "over? How many are left over if two levels contain the task *upright*?",
             "The position has three coordinates and *upright* has two: $7 - 5 = 2$. If *upright* appears "
             "twice, the number is the same: the rank of all rows counts, not the number of rows.",
         ),

@@ -85,9 +85,9 @@ FURTHER = Further(
         Question(
             "In *Out of reach* the goal of the base is 3.5 m from the hand, and the arm reaches 1.86 m. How "
             "far before its goal should the base stop, and which distance does the lesson measure?",
-            "In the plane it should stop ⟨expected⟩ m before its goal. In the run the base stops ⟨seen⟩ m "
-            "before its goal. The geometry in space differs: the hand is not at the height of the shoulder, "
-            "and the shoulder is not in the middle of the base.",
+            "In the plane the base should stop ⟨expected⟩ m before its goal. In the run the base stops "
+            "⟨seen⟩ m before its goal. The geometry in space differs: the hand is not at the height of the "
+            "shoulder, and the shoulder is not in the middle of the base.",
             {"expected": (3.5 - 1.86, ".2f"), "seen": (STOPS, ".2f")},
         ),
         Question(

@@ -85,8 +85,8 @@ FURTHER = Further(
         Question(
             "Reports are wrong by at most 20 cm, in any direction. Which $d_{\\mathrm{safe}}$ keeps a "
             "distance of 5 cm?",
-            "By the third line it must be $5 + 20$ = ⟨margin⟩ cm. A margin can cover a bounded error of the "
-            "report.",
+            r"By the third line $d_{\mathrm{safe}}$ must be $5 + 20$ = ⟨margin⟩ cm. A margin can cover a "
+            "bounded error of the report.",
             {"margin": (5.0 + 20.0, ".0f")},
         ),
         Question(

@@ -96,7 +96,7 @@ FURTHER = Further(
         ),
         Line(
             "Errors vanish if the largest eigenvalue is below 2 (*No model needed*). In the worst of the "
-            "200 poses the suggestion has",
+            r"200 poses the suggested $\bar M$ gives",
             r"\max_{200\, q} \lambda_{\max}(M^{-1} \bar M) = 1.5",
             _suggested,
         ),
