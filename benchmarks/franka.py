@@ -202,7 +202,7 @@ def drive_on_a_page(folder: Path, picture: str | None) -> None:
 
 
 def sides(page: Page) -> tuple[float, float]:
-    """Returns y of the hand and of its ghost as the page draws them, m."""
+    """Returns the coordinates y, m, of the hand and of its ghost as the page draws them."""
     return position(page, "/actual")[1], position(page, "/ghost/7")[1]
 
 

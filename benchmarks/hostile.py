@@ -91,8 +91,7 @@ class HostileUser:
         self._send("ViewerCameraMessage", said)
 
     def _look_while_built(self) -> None:
-        """Loads another scene. Until the scene is built, the page's messages contain a camera that looks at
-        its own position or has no size."""
+        """Loads another scene. Until it is built, the camera looks at its own position or has no size."""
         odd, before = self._random.choice(LOOKS), len(self.page.made)
         self._choose_scene()
         for _ in range(100):

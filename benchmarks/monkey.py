@@ -197,7 +197,7 @@ class Monkey:
         settings = self.learner.settings
         if not isinstance(settings, TorqueSettings):
             return
-        # Null-space methods have no bounds: motors without saturation apply whatever torque is requested.
+        # Null-space methods have no bounds: motors without saturation apply any requested torque.
         if settings.controller in UNBOUNDED and not settings.plant.saturate:
             self._unbounded = block
         if self._unbounded is not block:

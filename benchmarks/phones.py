@@ -4,8 +4,8 @@
 
 The program starts a server with a class and, in a process of their own, phones that use the page's protocol
 and draw nothing. The teacher's robot moves all the time, so that each phone gets five pictures a second. Then
-all phones vote at once, twice. The exit code is 0 if the server, without the robot's own process, needs at
-most one core and every vote was counted.
+all phones vote at the same time. They vote twice. The exit code is 0 if the server, without the robot's own
+process, needs at most one core and every vote was counted.
 """
 
 from __future__ import annotations

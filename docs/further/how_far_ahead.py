@@ -88,8 +88,8 @@ FURTHER = Further(
     ),
     questions=(
         Question(
-            "$K_P = 100$, $K_V = 20$, $T_s = 1$ ms. Compute $c_0$, $c_4$ and $c_{19}$. What would the "
-            "matrix $C$ be if all $c_l$ were 1?",
+            "Let $K_P = 100$, $K_V = 20$ and $T_s = 1$ ms. Compute $c_0$, $c_4$ and $c_{19}$. What would "
+            "the matrix $C$ be if all $c_l$ were 1?",
             "They are $⟨c0⟩$, $⟨c4⟩$ and $⟨c19⟩$. If all $c_l$ were 1, $C$ would be a lower triangle of "
             "ones: each $e$ would be the sum of all changes up to its knot. Within 20 ms a change acts "
             "mainly on the acceleration; velocity and position hardly change.",

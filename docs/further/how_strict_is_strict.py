@@ -66,8 +66,8 @@ FURTHER = Further(
         Line(
             r"For $\delta = 0$ the line search accepts no step at all. A cost without slope does not "
             "explain the short steps under (11). In the third step of the lesson, where level 1 pays for "
-            "its effort, the cost has a slope, and the steps are as short. Only where level 1 is at its "
-            "optimum with $e^* = 0$, its cost has no slope:",
+            "its effort, the cost has a slope, and the steps are as short. The cost has no slope only where "
+            "level 1 is at its optimum with $e^* = 0$:",
             r"\nabla \mathcal J_1 = J^\top Q\, e^* = 0",
             _flat,
         ),

@@ -93,8 +93,8 @@ FURTHER = Further(
     ),
     questions=(
         Question(
-            r"Two joints with $\bar M = 0.033$ kg·m², $J_1 = (-0.3, -0.2)$ m, $e = 12$ m/s², $Q = 200$, $R "
-            "= 10$, $c_0 = 1$. Where is disc 1, the optimum of level 1?",
+            r"Two joints have $\bar M = 0.033$ kg·m² and $J_1 = (-0.3, -0.2)$ m. Let $e = 12$ m/s², $Q = "
+            "200$, $R = 10$ and $c_0 = 1$. Where is disc 1, the optimum of level 1?",
             r"$g = (⟨g1⟩, ⟨g2⟩)$, so $\Delta\tau_1^* = (⟨t1⟩, ⟨t2⟩)$ N·m. The torque of each joint is in "
             "proportion to its lever, and the effect of $R$ is not visible in three digits.",
             {

@@ -88,14 +88,14 @@ FURTHER = Further(
     ),
     questions=(
         Question(
-            r"One joint, $M = 0.1$ kg·m², $\bar M = 0.033$ kg·m². A load is added. After how many "
-            r"milliseconds is less than a hundredth (0.01) of the error in its acceleration left?",
+            r"A joint has $M = 0.1$ kg·m² and $\bar M = 0.033$ kg·m². A load is added. After how many "
+            "milliseconds is less than a hundredth (0.01) of the error in its acceleration left?",
             r"Each step leaves the share $1 - \bar M/M = ⟨left⟩$ of the error. $⟨left⟩^k < 0.01$ from $k = "
             "⟨k⟩$ on, that is, after ⟨k⟩ ms.",
             {"left": (LEFT, ".2f"), "k": (float(math.ceil(math.log(0.01) / math.log(LEFT))), ".0f")},
         ),
         Question(
-            r"The same joint, $M = 0.1$ kg·m². Which $\bar M$ removes the whole error in one step? From "
+            r"The same joint has $M = 0.1$ kg·m². Which $\bar M$ removes the whole error in one step? From "
             r"which $\bar M$ on does the error grow?",
             r"$\bar M = M = 0.1$ kg·m² removes the whole error. With a larger $\bar M$ the error changes "
             r"its sign in every step, and from $\bar M = 2 M = ⟨edge⟩$ kg·m² on the error grows. That is "

@@ -83,8 +83,8 @@ FURTHER = Further(
     ),
     questions=(
         Question(
-            "$K_P = 100$, $K_V = 20$. The hand is released at rest 10 mm from its target. When is it within "
-            "0.5 mm of the target?",
+            "The gains are $K_P = 100$ and $K_V = 20$. The hand is released at rest 10 mm from its target. "
+            "When is it within 0.5 mm of the target?",
             r"With $\omega = 10$ rad/s the distance is $(1 + \omega t)\,e^{-\omega t}$ times the initial "
             r"distance. This factor is a twentieth at $\omega t = ⟨phase⟩$, that is, after ⟨t⟩ s.",
             {"phase": (10 * HOME, ".2f"), "t": (HOME, ".2f")},

@@ -60,8 +60,8 @@ FURTHER = Further(
             _preview,
         ),
         Line(
-            r"HTIDKC asks for $\dot x = \dot r + K (r - x)$. If the robot reaches this velocity, the error "
-            r"obeys $\dot e = -K e$ and is",
+            r"The desired velocity of HTIDKC is $\dot x = \dot r + K (r - x)$. If the robot reaches this "
+            r"velocity, the error obeys $\dot e = -K e$ and is",
             r"e(t) = e(0)\, e^{-K t}",
             _gain,
             1e-4,

@@ -76,9 +76,9 @@ FURTHER = Further(
     ),
     questions=(
         Question(
-            r"$\bar M = 0.033$ kg·m², $T_s = 1$ ms. To which torque does one digit of 0.005° correspond? "
-            "And to which torque does one digit of 0.00125° correspond, as in the encoders of the paper's "
-            "arm?",
+            r"Let $\bar M = 0.033$ kg·m² and $T_s = 1$ ms. To which torque does one digit of 0.005° "
+            "correspond? And to which torque does one digit of 0.00125° correspond, as in the encoders of "
+            "the paper's arm?",
             r"$\bar M \delta/T_s^2$ is $⟨coarse⟩$ and $⟨paper⟩$ N·m. The motor can produce 4 N·m.",
             {"coarse": (digit(0.005), ".1f"), "paper": (digit(0.00125), ".2f")},
         ),

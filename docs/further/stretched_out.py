@@ -42,9 +42,9 @@ def _unbiased(rng: np.random.Generator) -> tuple[float, float]:
 FURTHER = Further(
     derivation=(
         Line(
-            r"With the predictions inserted, level $i$ is the QP (35). For any vector $X$ it is $X^\top "
-            r"\bar B^\top \bar Q \bar B X \ge 0$, so the Hessian has no eigenvalue below $R$, whatever the "
-            r"rank of $J$ (Lemma 1):",
+            r"With the predictions inserted, level $i$ is the QP (35). For any vector $X$ we have $X^\top "
+            r"\bar B^\top \bar Q \bar B X \ge 0$, so the Hessian has no eigenvalue below $R$, for any rank "
+            "of $J$ (Lemma 1):",
             r"\lambda_{\min}(\bar B^\top \bar Q \bar B + R I) \ge R > 0, "
             r"\qquad \text{and } = R \text{ where } \bar B \text{ loses rank}",
             _hessian,

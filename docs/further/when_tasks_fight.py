@@ -73,8 +73,8 @@ FURTHER = Further(
     ),
     questions=(
         Question(
-            r"$\bar M = 0.033$ kg·m² at every joint, $q_1 = -40°$, $q_2 = 100°$. How much torque does the "
-            "projection need to accelerate joint 1 by 1 rad/s² if $q_3$ is −90°, −10° or −1°?",
+            r"Every joint has $\bar M = 0.033$ kg·m². Let $q_1 = -40°$ and $q_2 = 100°$. How much torque "
+            "does the projection need to accelerate joint 1 by 1 rad/s² if $q_3$ is −90°, −10° or −1°?",
             r"$\sigma$ is ⟨s90⟩, ⟨s10⟩ and ⟨s1⟩. The torque $m/\sigma$ is ⟨t90⟩, ⟨t10⟩ and ⟨t1⟩ N·m. Where "
             "links 2 and 3 are nearly in line, the torque is inversely proportional to the angle, and every "
             "degree matters.",

@@ -59,7 +59,7 @@ TEXTS = (
     Exempt("mathematics", FURTHER + "an_equation_holds", (
         ("further/no-model-needed", "If $M$ and $n$ have hardly changed meanwhile"),
         ("further/no-model-needed", "They are real, since $M^{-1} \\bar M$ is similar"),
-        ("further/stretched-out", "For any vector $X$ it is"),
+        ("further/stretched-out", "For any vector $X$ we have"),
         ("further/stretched-out", "Here $R$ weighs a *change* of torque, so the step is repeated"),
         ("further/torque-has-a-limit", "As long as $\\tau_0$ is within its limits"),
         ("further/torque-has-a-limit", "So no level can make the level below infeasible"),
