@@ -26,7 +26,8 @@ class PreviewWriter:
         self._read: dict[int, Reference | Preview | None] = {}
 
     def write(self, previews: Mapping[str, Preview]) -> None:
-        """Writes the changed previews of all tasks, or the coefficients of the references."""
+        """Writes the reference of every task that has changed: as coefficients if the kernel can evaluate it,
+        otherwise as a preview."""
         f = self._arena.f
         references: Mapping[str, Reference] = {}
         t = 0.0
