@@ -15,7 +15,7 @@ CONTROLLERS: dict[str, str] = {
     "osf_damped": "OSF with damped least squares near singularities; the paper's OSF has no damping",
     "tdeosf_damped": "TDEOSF with damped least squares near singularities",
     "hqp": "one-step hierarchical QP on the nominal model, within the torque bounds",
-    "himpc_filtered": "HIMPC without distances in its levels; a QP after them changes the torque to keep distances",
+    "himpc_filtered": "HIMPC without distances in its levels; a QP then changes the torque to keep distances",
 }
 """Torque-level controllers: name and description."""
 

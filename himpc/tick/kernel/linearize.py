@@ -1,4 +1,4 @@
-"""From the measured state and the references to the data of all QPs."""
+"""Computes the data of all QPs from the measured state and the references."""
 
 from __future__ import annotations
 
@@ -33,7 +33,8 @@ _MODE = 9
 
 @always_inline_kernel
 def jacobian_at(t: TickArrays, q: Array, given: Array, J: Array) -> None:
-    """J_i of (3) of all tasks at q into J (M, n), with the rows that are `given`, (G, n)."""
+    """Writes J_i of (3) of all tasks at q to J (M, n); `given` (G, n) contains the rows that Python
+    computes."""
     forward_kinematics(q, t.parent, t.is_revolute, t.rotation, t.translation, t.axis, t.placed, t.axis_now)
     points(t.placed, t.frame_joint, t.frame_translation, t.point)
     jacobian(
@@ -48,7 +49,7 @@ def jacobian_at(t: TickArrays, q: Array, given: Array, J: Array) -> None:
 
 @always_inline_kernel
 def errors(t: TickArrays) -> None:
-    """x, x̃ and ẋ of all tasks in the measured state."""
+    """Computes x, x̃ and ẋ of all tasks in the measured state."""
     for task in range(len(t.task)):
         kind, frame, first, size = t.task[task, 0], t.task[task, 1], t.task[task, 2], t.task[task, 3]
         R, R_d, turned = t.R_now[task], t.R_d[task], t.slope
