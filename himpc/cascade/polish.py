@@ -31,8 +31,8 @@ active."""
 
 
 def polished(solution: QPSolution, c: Array, A: Array, low: Array, high: Array) -> QPSolution | None:
-    """Finds the optimum from the rows that are active at a solver's point. None if the point is too
-    inaccurate, or if these rows and a few others do not lead to the optimum."""
+    """Computes the optimum from the rows that are active at a solver's point. Returns None if the point is
+    too inaccurate, or if these rows and a few others do not lead to the optimum."""
     multipliers = solution.multipliers
     if not (np.isfinite(multipliers).all() and solution.kkt_residual <= _NEAR):
         return None
@@ -55,12 +55,12 @@ def polished(solution: QPSolution, c: Array, A: Array, low: Array, high: Array) 
 
 
 def descended(solution: QPSolution, c: Array, A: Array, low: Array, high: Array) -> QPSolution | None:
-    """Finds the optimum from x = 0 by the primal active-set method; None if x = 0 is not feasible.
+    """Computes the optimum from x = 0 by the primal active-set method; returns None if x = 0 is not feasible.
 
     Below a level that uses nearly all freedom, the feasible set is almost a point. A solver that starts from
-    an infeasible point then takes rounding errors for a contradiction; this one starts from a feasible point.
-    A row that blocks a step is linearly independent of the active rows. After a step of length zero, the
-    first row in order enters or leaves (Bland's rule). Therefore no active set occurs twice.
+    an infeasible point then takes rounding errors for a contradiction. This method starts from a feasible
+    point. A row that blocks a step is linearly independent of the active rows. After a step of length zero,
+    the first row in order enters or leaves (Bland's rule). Therefore no active set occurs twice.
     """
     if not ((low <= 0.0) & (high >= 0.0)).all():
         return None
@@ -90,7 +90,8 @@ def descended(solution: QPSolution, c: Array, A: Array, low: Array, high: Array)
 
 
 def _held(side: Array, c: Array, A: Array, low: Array, high: Array) -> tuple[Array, Array]:
-    """The optimum where rows are held at their upper (side 1) or lower (−1) bounds, and all multipliers."""
+    """Returns the optimum with rows held at their upper (side 1) or lower (−1) bounds, and all
+    multipliers."""
     held, pull = np.flatnonzero(side), np.zeros(len(A))
     if not held.size:
         return -c, pull

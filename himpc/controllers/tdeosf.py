@@ -18,7 +18,7 @@ class TDEOSF(OneStepController):
 
     τ = Ĥ_q + Σ_i J_{i|prec}ᵀ Λ̄_{i|prec} (…), both projected with M̄. q̈₀ is the backward difference of q̇,
     τ₀ the torque that was applied; J̇_i q̇ is exact kinematics (Remarks 2 and 3). Gains, bounds and damping
-    as in `OSF`.
+    are those of `OSF`.
     """
 
     incremental = True

@@ -22,7 +22,7 @@ class Memory(NamedTuple):
         q, v: measured state of the last tick, (n,).
         period: seconds between that tick and this one.
         x_dot: ẋ of the last tick, all rows of `form`, (m,); None: not known.
-        form: the prepared levels those rows belong to.
+        form: the prepared levels to which the rows of `x_dot` belong.
         predicted_q: q* at knots 0 … N of the last plan, (N+1, n).
         solutions: the last plan's levels by name.
     """

@@ -27,7 +27,7 @@ REFERENCE = (
         ("himpc/formulation/forms.py", "All active levels, their rows stacked"),
         ("himpc/limits/rows.py", "All rows are in N·m"),
         ("himpc/references/square_wave.py", "s: a switch counts as reached this much earlier"),
-        ("himpc/stack.py", "Generic: the largest rank over a few random configurations"),
+        ("himpc/stack.py", "The generic rank is the largest rank over a few random"),
         ("lessons/own/deadline.py", "The waiting time is read only after the first alarm"),
         ("lessons/papers/himpc_paper/ablations.py", "All tasks are in one cost, one step ahead"),
         ("lessons/scenes/planar.py", "The plant applies any torque"),
