@@ -8,7 +8,7 @@ from typing import Literal
 CONTROLLERS: dict[str, str] = {
     "himpc": "hierarchical incremental MPC: torque level, strict priorities, no dynamic model",
     "hiqp": "HIMPC with a horizon of one knot: it optimises the next step only",
-    "nhimpc": "HIMPC with the Jacobians along its own prediction: sequential QPs until they agree",
+    "nhimpc": "HIMPC with the Jacobians along its own prediction: sequential QPs until they converge",
     "weighted": "HIMPC without priorities: one cost for all tasks, in which each level has the weight Q",
     "osf": "operational-space control with null-space projection on the nominal model; no bounds, no damping",
     "tdeosf": "OSF with time-delay estimation in place of the model; no bounds, no damping",

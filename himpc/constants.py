@@ -7,7 +7,7 @@ RETURN_RATE = 5.0
 """1/s: a joint beyond its limit must return at this rate times the excess."""
 
 WITHIN = 0.25
-"""m: pairs of links or objects that are farther apart have no row."""
+"""m: a pair of links, or of a link and an object, has no row if its distance is larger."""
 FADE = 0.05
 """m: from WITHIN − FADE to WITHIN, a bound fades out with growing distance. The bound of a pair that comes
 nearer than WITHIN appears without a jump."""
@@ -22,7 +22,7 @@ AT_TORQUE, AT_VELOCITY, AT_POSITION = 1, 2, 4
 position."""
 
 APPROACH_RATE = 6.0
-"""1/s: rate at which a dragged target reduces the remaining distance near the hand."""
+"""1/s: rate at which a dragged target reduces its remaining distance near the raw target."""
 VELOCITY_RATE = 36.0
 """1/s: rate at which the velocity of a dragged target approaches the desired velocity."""
 STILL = 1e-9
@@ -34,7 +34,7 @@ FREE_LOAD, FULL_LOAD = 0.55, 0.95
 """Shares of the torque limit. Below the first, a motor does not slow its joints down. Above the second, its
 joints have their lowest velocity limit."""
 SLOWEST_SHARE = 0.03
-"""The lowest velocity limit of a joint whose motor is loaded, as a share of its own limit."""
+"""The velocity limit of a joint whose motor is loaded is not reduced below this share."""
 HEAVY_LOAD = 0.85
 """If a motor has at least this load and the tasks make no progress, the robot counts as stalled."""
 
@@ -44,10 +44,10 @@ measure of the acceleration."""
 LEAD = 0.1
 """s: the velocity is extrapolated over this time, and the extrapolated velocity must be within its limit."""
 LEAST_WHILE_FASTER = 0.5
-"""The lowest velocity limit of a joint that accelerates, as a share of its own limit."""
+"""The velocity limit of a joint that accelerates is not reduced below this share."""
 
 BLOCKED = 0.1
-"""m: a robot counts as stalled only if the distance of a pair is less than this above d_safe."""
+"""m: a robot counts as stalled only if the distance of a pair exceeds d_safe by less than this."""
 INSIDE = -0.03
 """m: a pair that is nearer than d_safe by more than this must move apart, and the robot is not slowed down. A
 robot with a smaller violation counts as stalled if the violation does not decrease."""
@@ -60,7 +60,7 @@ decrease ten times as fast."""
 CLOSE_ENOUGH = 0.01
 """m, rad: a task with a smaller error has reached its target."""
 SLOWING, RECOVERY = 0.1, 0.05
-"""s: time constants with which the joints of a stalled robot become slow, and fast again."""
+"""s: time constants with which the joints of a stalled robot slow down, and later speed up again."""
 DISTURBED = 0.03
 """m, rad: if the error of the first task grows by more than this, a disturbance has moved the robot, and the
 robot may move back."""

@@ -1,4 +1,4 @@
-"""From Problem 1 to Problem r, with a fallback for every level that cannot be solved."""
+"""Solves Problem 1 to Problem r, with a fallback for every level that cannot be solved."""
 
 from __future__ import annotations
 

@@ -19,10 +19,10 @@ from himpc.qp import KKT_TOLERANCE, QPSolution, Solver, solve_qp
 Array = NDArray[np.float64]
 
 _BINDING = 1e-9
-"""A row is active if its multiplier is larger than this and its distance from its bound, N·m, is smaller than
-a thousand times this."""
+"""A row is active if its multiplier exceeds this value and its distance from its bound, N·m, is smaller than
+a thousand times this value."""
 _NOISE = 1e-11
-"""If the projection of a row on the free directions of (33) is a smaller share of the row, the projection is
+"""If the projection of a row on the free directions of (33) is below this share of the row, the projection is
 rounding noise: the row's joint is no longer free."""
 _ROOM = 1e-9
 """N·m by which bounds are widened for a last attempt. The optimum is then computed from the active rows of

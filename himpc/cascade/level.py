@@ -27,7 +27,7 @@ class LevelProblem(NamedTuple):
         weighted_free: (N, m), √Q free.
         root_Q: (m,), √Q.
         weighted_C: (K, m, K), √Q C over the level's own knots.
-        R: (n,).
+        R: (n,), weight of the increments.
         knots: K ≤ N, the number of knots that this level looks ahead.
         common_R: R if it is the same for all joints, else None.
     """

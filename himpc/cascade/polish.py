@@ -15,19 +15,19 @@ Array = NDArray[np.float64]
 _NEAR = 1e-3
 """A point with a larger residual does not show which rows are active."""
 _LEFT = 1e-12
-"""A multiplier that is a smaller share of the largest one counts as an error of the solver."""
+"""A multiplier below this share of the largest multiplier counts as an error of the solver."""
 _BEYOND = 1e-9
-"""A row that violates its bound by no more than this counts as satisfied."""
+"""A row with at most this violation counts as satisfied."""
 _WRONG = 1e-12
-"""A multiplier of the wrong sign that is a smaller share of the largest one counts as zero."""
+"""A multiplier of the wrong sign below this share of the largest multiplier counts as zero."""
 _ALONG = 1e-11
 """A row whose slope along the step is smaller than this share of the step's length is parallel to the step:
 it is linearly dependent on the active rows."""
 _STILL = 1e-9
-"""A step that is a smaller share of the unconstrained optimum counts as zero."""
+"""A step below this share of the unconstrained optimum counts as zero."""
 _CHANGES = 30
-"""Largest number of rows that are added or removed one by one, besides those that a solver reported as
-active."""
+"""Largest number of rows that are added or removed one by one, in addition to the rows that a solver reported
+as active."""
 
 
 def polished(solution: QPSolution, c: Array, A: Array, low: Array, high: Array) -> QPSolution | None:

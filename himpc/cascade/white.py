@@ -39,8 +39,8 @@ def white(problem: LevelProblem, U_above: Array, upper: Sequence[Array], Z: Arra
     H = GᵀQG + R is never computed: if weights or inertias differ greatly, its condition number is 10¹⁷ and R
     is lost in rounding. Instead, at each knot √R ∘ U is rotated into directions that change the level's
     residual and directions that do not. A direction belongs to the second group if its effect is below _FELT
-    of the size of the rows, which is rounding; only bounds need these directions. The first group is
-    reduced by a QR factorisation.
+    of the size of the rows, which is rounding. Only bounds need the second group. The first group is reduced
+    by a QR factorisation.
 
     Args:
         problem: the level's data.

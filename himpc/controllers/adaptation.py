@@ -1,9 +1,9 @@
 """Adaptation of M̄: the payload is estimated from the gravity torque, and M̄ is fitted to the payload.
 
-While the robot moves, the applied torque is on average the torque that holds it: τ ≈ g(q) + m φ(q), with g
-the nominal model's gravity (`Settings.nominal`) and φ the additional gravity torque of one kilogram at the
-tip. The payload m is found by least squares over the last LAG seconds, with each joint's torque divided by
-its limit:
+While the robot moves, the applied torque is on average the torque that holds the robot: τ ≈ g(q) + m φ(q),
+with g the nominal model's gravity (`Settings.nominal`) and φ the additional gravity torque of one kilogram at
+the tip. The payload m is found by least squares over the last LAG seconds, with each joint's torque divided
+by its limit:
 
     m̂ = Σ φᵀ(τ − g) / (Σ φᵀφ + μ), at least 0.
 
@@ -23,8 +23,9 @@ requires eigenvalues of M⁻¹M̄ between 0 and 2. By construction M̄ ⪯ M̂, 
 These statements hold for a constant M̄. Its change as the arm moves acts as a disturbance, like the change of
 M in Remark 4; `himpc-lab reproduce himpc-adaptation` shows its effect.
 
-The estimate uses no derivative, and a coarse encoder does not disturb it. It is disturbed by lasting friction
-in τ and by a wrong nominal model; a payload whose weight loads no joint is not detected (m̂ stays 0).
+The estimate uses no derivative, and a coarse encoder does not disturb it. The estimate is disturbed by
+lasting friction in τ and by a wrong nominal model; a payload whose weight loads no joint is not detected (m̂
+stays 0).
 """
 
 from __future__ import annotations
@@ -67,12 +68,12 @@ class LoadModel:
         self.tau_limit = robot.tau_limit
 
     def inertia(self, q: Array) -> tuple[Array, Array]:
-        """M_n, and Φ, the additional inertia per kilogram of payload, (n, n) kg·m² each."""
+        """Returns M_n, and Φ, the additional inertia per kilogram of payload, (n, n) kg·m² each."""
         M = self._without.mass_matrix(q)
         return M, self._with.mass_matrix(q) - M
 
     def gravity(self, q: Array) -> tuple[Array, Array]:
-        """g, and φ, the additional gravity torque per kilogram of payload, (n,) N·m each."""
+        """Returns g, and φ, the additional gravity torque per kilogram of payload, (n,) N·m each."""
         g = self._without.bias(q, self._still)
         return g, self._with.bias(q, self._still) - g
 

@@ -1,4 +1,4 @@
-"""A safety filter: the torque closest to a given one that keeps distances."""
+"""A safety filter. Of all torques that keep distances, it chooses the one closest to the argument."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 
 ENABLE_SECONDS = 0.5
 FAINTEST = 1e-8
-"""A task that is switched on starts with this share of its Q, which then grows exponentially to 1."""
+"""A task that is switched on starts with this share of its Q. The share grows exponentially to 1."""
 
 
 class HIMPC(TorqueController):

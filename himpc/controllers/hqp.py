@@ -19,8 +19,8 @@ from robots import NominalModel
 Array = NDArray[np.float64]
 
 _BINDING = 1e-9
-"""A row is active if its multiplier is larger than this and its distance from its bound, N·m, is smaller than
-a thousand times this."""
+"""A row is active if its multiplier exceeds this value and its distance from its bound, N·m, is smaller than
+a thousand times this value."""
 
 
 _REST = 5.0
@@ -125,7 +125,8 @@ class HQP(OneStepController):
 
 
 def _binding(multipliers: Array, step: Array, lower: Array, upper: Array) -> ActiveRows:
-    """Returns the active bounds of lower ≤ step ≤ upper, which have a multiplier; all arguments are (n,)."""
+    """Returns the bounds of lower ≤ step ≤ upper that are active and have a multiplier; arguments are
+    (n,)."""
     pressed = np.abs(multipliers) > _BINDING
     if not pressed.any():
         return NO_ROWS

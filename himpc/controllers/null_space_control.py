@@ -18,8 +18,8 @@ ROUNDING = 1e-10
 """Singular values below this share of ‖J_i L⁻ᵀ‖, where M = L Lᵀ, are rounding errors and count as zero."""
 
 DAMPED = 0.2
-"""Value of `damping` in the damped variants. On RT2 of the HIMPC paper OSF demands 18 times the torque limit
-with 0.1, and the error of level 1 is a quarter larger with 0.4; RT1 never comes that close to a
+"""Value of `damping` in the damped variants. On RT2 of the HIMPC paper, OSF with 0.1 demands 18 times the
+torque limit; with 0.4 the error of level 1 is a quarter larger. RT1 never comes that close to a
 singularity."""
 
 
@@ -42,9 +42,9 @@ def prioritised_torques(
     """Returns Σ_p J_{p|prec}ᵀ Λ_{p|prec} (ẍ_p − J_p M⁻¹ Σ_{s<p} τ_s) for every level, highest priority first.
 
     J_{p|prec} is J_p projected into the directions that the levels above leave free, and Λ_{p|prec} is the
-    inverse of J_{p|prec} M⁻¹ J_{p|prec}ᵀ. With M = L Lᵀ (Cholesky), in the coordinates z = Lᵀ q̈, the
-    dynamically consistent inverse is the Moore–Penrose inverse of J_p L⁻ᵀ restricted to the free directions,
-    and every projector is orthogonal: no product of small numbers is inverted.
+    inverse of J_{p|prec} M⁻¹ J_{p|prec}ᵀ. With M = L Lᵀ (Cholesky) and the coordinates z = Lᵀ q̈, the
+    dynamically consistent inverse is the Moore–Penrose inverse of J_p L⁻ᵀ, restricted to the free directions.
+    Every projector is then orthogonal, and no product of small numbers is inverted.
 
     Without damping, the torque near a singularity grows as 1/σ without a limit. If σ is only a rounding
     error, the direction is dropped. With damping, σ/ε² replaces 1/σ for σ below ε = damping · ‖J_p L⁻ᵀ‖. This

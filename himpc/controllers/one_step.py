@@ -132,7 +132,7 @@ class OneStepController(TorqueController):
         `HIMPC.step`.
 
         Returns:
-            the plan, whose torque is finite. A state that is not finite holds the last torque.
+            the plan, whose torque is finite. If the state is not finite, the last torque is held.
         """
         started = perf_counter_ns()
         if tau_applied is not None and usable(tau_applied):

@@ -61,7 +61,7 @@ class Bounds:
     Attributes:
         tau_lower, tau_upper: (n,) N·m.
         v_lower, v_upper: bounds on the next velocity, (n,) rad/s. With position limits by viability they
-            include the velocity from which a joint can still stop before its end.
+            include the velocity from which a joint can still stop before its limit.
         q_lower, q_upper: (n,) rad.
         approach: 1/s, largest rate at which the distance to a velocity bound may shrink; 0: no such limit.
     """

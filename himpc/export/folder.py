@@ -21,9 +21,9 @@ MOVE = 8
 
 
 _LOOP = """\
-| `loop.cpp` | a loop in real time, with MuJoCo's C library as the robot. To build it, \ set MUJOCO to the
-folder of the Python package mujoco: \ `g++ -O2 -I$MUJOCO/include loop.cpp himpc.o $MUJOCO/libmujoco.so.*
--Wl,-rpath,$MUJOCO -o loop` |
+| `loop.cpp` | a loop in real time, with MuJoCo's C library as the robot. To build it, \
+set MUJOCO to the folder of the Python package mujoco: \
+`g++ -O2 -I$MUJOCO/include loop.cpp himpc.o $MUJOCO/libmujoco.so.* -Wl,-rpath,$MUJOCO -o loop` |
 """
 
 

@@ -34,7 +34,7 @@ class Settings:
             installed, "qpoases". If no QP solver is used, only "daqp" is accepted, see `check_solver`.
         R_on: the quantity that R in (31) weighs: the "torque" increments Δτ as printed, or the "acceleration"
             M̄⁻¹Δτ (in HQP with M_n of its model).
-        damping: add the damping level whenever the enabled levels leave freedom.
+        damping: whether the damping level is added if the enabled levels leave freedom.
         nominal: the dynamic model that model-based controllers and `M_bar_adapt` use; other controllers do
             not use it.
     """

@@ -37,7 +37,7 @@ Indices = NDArray[np.intp]
 _AT_HOME = 0.5
 """Links must keep at most this share of their distance at home: d_safe must not forbid the home posture."""
 _GRID = 15
-"""Number of postures of a joint between two links that are checked."""
+"""Number of positions of each joint between two links that are checked."""
 _NEVER = 0.03
 """m: two links with at most two joints between them need no row if they are farther apart in all postures."""
 
@@ -127,7 +127,8 @@ def _placements(robot: Robot, data: pin.Data, q: Array) -> tuple[Array, Array]:
 
 
 class Distances:
-    """The distances of a robot's cover from the objects that a controller knows, and between its links.
+    """Computes the distances of a robot's cover from the objects that a controller knows, and between its
+    links.
 
     Attributes:
         carried: (n, n), entry [k, j]: whether the motor of joint j carries joint k; true for k = j.
@@ -153,8 +154,8 @@ class Distances:
 
     @property
     def room(self) -> float:
-        """The distance of a pair at the last tick minus the distance that it must keep, m: the smallest value
-        of all pairs. Infinite if no pair was within `WITHIN`."""
+        """The smallest difference, m, between the distance of a pair at the last tick and the distance that
+        the pair must keep. Infinite if no pair was within `WITHIN`."""
         return float(self._about[ROOM])
 
     @property

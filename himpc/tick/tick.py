@@ -186,7 +186,8 @@ class CompiledTick:
         arena.f["budget"][:] = self.budget
         while iterations == 0 or (change > self._tolerance and iterations < self._most):
             if iterations:
-                # J_i(q_{k+j|k}): the knots of this tick's own prediction replace those of the last tick's.
+                # J_i(q_{k+j|k}): the knots of this tick's own prediction replace the knots of the last tick's
+                # prediction.
                 arena.f["path"][1:] = arena.f["predicted"][:-1]
                 before = arena.f["U"].copy()
             else:

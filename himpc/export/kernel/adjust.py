@@ -217,7 +217,7 @@ def arrange(t: TickArrays, p: LoopArrays) -> None:
 
 @inline_kernel
 def close_in(now: float, goal: float, present: float, size: float, T_s: float) -> float:
-    """An upper limit one period later, see `himpc.limits.ramp`."""
+    """Returns an upper limit one period later, see `himpc.limits.ramp`."""
     start = min(now, max(present, goal))
     if not (math.isfinite(start) and math.isfinite(goal)):
         return goal

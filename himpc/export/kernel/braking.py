@@ -54,7 +54,7 @@ def braking(t: TickArrays, p: LoopArrays, U: Array) -> None:
             position += before
         gained = 0.0
         for j in range(N):
-            # Returns the second differences of w.
+            # The increments are the second differences of w.
             step = p.w[j, a] - (p.w[j - 1, a] if j else 0.0)
             U[j, a] = step - gained
             gained = step

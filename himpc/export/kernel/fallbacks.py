@@ -94,7 +94,7 @@ def kept_rows(t: TickArrays, p: LoopArrays, keep: bool) -> None:
 
 @inline_kernel
 def contain(t: TickArrays, U: Array) -> None:
-    """Widens the rows until U meets them: the point from which lower levels start is feasible."""
+    """Widens the rows until U meets them: lower levels then start from a feasible point."""
     constraint_values(U, bounds_of(t, t.reached))
     for row in range(len(t.L)):
         for a in range(U.shape[1]):
@@ -166,7 +166,7 @@ def on_the_way(t: TickArrays, p: LoopArrays, i: int, fallback: int) -> int:
 
 @inline_kernel
 def cost(t: TickArrays, p: LoopArrays, i: int, U: Array) -> float:
-    """(32a) or (34a) of level i."""
+    """Returns the cost (32a) or (34a) of level i."""
     first, last = t.level[i, FIRST], t.level[i, LAST]
     effects(t.B, U, first, last, t.pushed)
     for j in range(len(U)):

@@ -1,4 +1,4 @@
-"""Dragged targets: `himpc.references.target` on arrays."""
+"""Dragged targets: the functions of `himpc.references.target` on arrays."""
 
 from __future__ import annotations
 

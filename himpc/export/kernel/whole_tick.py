@@ -1,4 +1,4 @@
-"""The entry of an exported controller: a whole control period, a reset, or a setting; see
+"""The entry point of an exported controller: a whole control period, a reset, or a setting; see
 `himpc.export.entries`."""
 
 from __future__ import annotations
@@ -124,13 +124,14 @@ def whole_tick(
 
 @inline_kernel
 def iterate(t: TickArrays, p: LoopArrays, data: Array, where: Whole, whole: Whole, whole_where: Whole) -> int:
-    """Solves all levels, once or, for NHIMPC, until no increment changes any more; returns the last of the
+    """Solves all levels once; for NHIMPC, it repeats this until no increment changes. Returns the last of the
     fallbacks that acted, HOLD if there is no torque."""
     t.budget[0] = p.setup[BUDGET]
     most, change, count, fallback = int(p.setup[MOST]), math.inf, 0, SOLVE
     while count == 0 or (change > p.setup[TOLERANCE] and count < most):
         if count:
-            # J_i(q_{k+j|k}): the knots of this tick's own prediction replace those of the last tick's.
+            # J_i(q_{k+j|k}): the knots of this tick's own prediction replace the knots of the last tick's
+            # prediction.
             for j in range(1, len(t.path)):
                 copy(t.predicted[j - 1], t.path[j], t.q.size)
             for i in range(t.sizes[4]):

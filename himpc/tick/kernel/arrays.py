@@ -17,8 +17,8 @@ class TickArrays(NamedTuple):
     """The arrays of a tick. Each annotation contains the shape, the unit, and "files that write the array →
     files that read it"; files that write an array may also read it.
 
-    Units are those of revolute joints and of positions. For prismatic joints and for angles, rad and m are
-    exchanged, and N·m and N.
+    Units are those of revolute joints and of positions. For prismatic joints and for angles, rad is exchanged
+    with m, and N·m with N.
 
     Sizes: n joints, N knots, N1 = N + 1; M rows of all tasks, m of those that are solved; r levels; T tasks;
     F frames; G rows of tasks that Python computes; J = n + 1 placements, the world first; b rows of bounds, N

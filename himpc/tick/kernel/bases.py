@@ -29,7 +29,7 @@ def projected_rows(
         B: Ĵ M̄⁻¹ of the knot, (m, n).
         metric: √(ρ/R) per joint; with U = metric ∘ V the effort is ρ‖V‖².
         reflector, count: the reflections, and their number; Q is their product.
-        first, last: which rows.
+        first, last: range of rows.
         projected_jacobian: (m, n), the result.
     """
     n = metric.size
@@ -43,7 +43,7 @@ def projected_rows(
 
 @inline_kernel
 def reflect(v: Array, x: Array, first: int) -> None:
-    """x ← (1 − v vᵀ) x from index `first` on; ‖v‖² = 2."""
+    """Computes x ← (1 − v vᵀ) x from index `first` on; ‖v‖² = 2."""
     n = x.size - first
     subtract(dot(v[first:], x[first:], n), v[first:], x[first:], n)
 
@@ -61,7 +61,7 @@ def take_directions(
 
     Args:
         projected_jacobian: (m, n), the level's rows in the old coordinates; afterwards in the new ones.
-        first, last: which rows.
+        first, last: range of rows.
         count: number of directions that the levels above have taken.
         reflector: (n, n), one reflection is added for each direction.
         Q: (n, n), its columns are the directions; the first `count` columns do not change.

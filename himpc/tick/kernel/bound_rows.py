@@ -24,7 +24,7 @@ def directed_normal(level: LevelQP, weights: Array, along: Array, normal: Array)
     Args:
         level: determines the coordinates.
         weights: the row's time profile, (N,).
-        along: its direction, (n,).
+        along: the row's direction, (n,).
         normal: the result.
     """
     n, before = along.size, 0.0

@@ -1,4 +1,4 @@
-"""From Problem 1 to Problem r: each level uses the directions that (33) leaves free."""
+"""Prepares Problem 1 to Problem r: each level uses the directions that (33) leaves free."""
 
 from __future__ import annotations
 

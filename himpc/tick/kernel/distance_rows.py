@@ -32,9 +32,9 @@ def least_rate(distance: float, d_safe: float, margin: float, reaction: float, d
 
 
 ROOM, FASTEST, CHANGED = range(3)
-"""Numbers about the pairs. ROOM: the least distance of a pair minus what the pair must keep, m. FASTEST: the
-largest speed at which an object of a chosen pair moves towards or away from the link, m/s. CHANGED: 1 if
-other pairs are chosen than before."""
+"""Numbers about the pairs. ROOM: the smallest difference between a pair's distance and the distance that the
+pair must keep, m. FASTEST: the largest speed at which an object of a chosen pair moves towards or away from
+the link, m/s. CHANGED: 1 if other pairs are chosen than before."""
 
 
 @inline_kernel

@@ -81,7 +81,7 @@ def jacobian(
 
     Args:
         task: (T, 4) kind, frame, first row and number of rows of each task.
-        part: (M,) index of the axis, of the joint or in `given` that belongs to each row.
+        part: (M,) for each row, the index of its axis, of its joint, or of its row in `given`.
         parent, is_revolute, placed, z: as in `forward_kinematics`.
         frame_joint, point: the joint that carries each frame, and its origin.
         given: rows of the tasks that Python computes, (G, n).

@@ -73,8 +73,8 @@ def errors(t: TickArrays) -> None:
 @inline_kernel
 def linearize(data: Any, where: Whole, whole: Whole, whole_where: Whole) -> bool:
     """Computes the data of all QPs from the measured state and the references: kinematics along the last
-    prediction (30), residuals, free motion (15) and bounds (32d)–(32f). Returns False if they are not finite.
-    The knots q*_{k+j|k−1} are the last prediction, shifted to begin at the measured q.
+    prediction (30), residuals, free motion (15) and bounds (32d)–(32f). Returns False if these data are not
+    finite. The knots q*_{k+j|k−1} are the last prediction, shifted to begin at the measured q.
     """
     t = arrays_of(data, where, whole, whole_where)
     M, m = t.sizes[2], t.sizes[3]
