@@ -236,7 +236,7 @@ class CompiledTick:
 
         def evidence() -> Evidence:
             if self._ticks != ticks:
-                raise RuntimeError("the controller has moved on since this plan: store plan.freeze() instead")
+                raise RuntimeError("a later tick has replaced this plan's data: store plan.freeze() instead")
             return self._evidence()
 
         return Plan(

@@ -12,7 +12,7 @@ REFERENCE = (
     # ---------------------------------------- sentences that cannot be false
     Exempt("definition", "", (
         ("himpc/cascade/null_space.py", "Nothing is inverted: the bases come from an SVD"),
-        ("himpc/cascade/polish.py", "None if the point is too inaccurate"),
+        ("himpc/cascade/polish.py", "Returns None if the point is too inaccurate"),
         ("himpc/controllers/nhimpc.py", "The problem is then nonlinear, because"),
         ("himpc/controllers/null_space_control.py", "There is no QP, so the KKT residual is NaN."),
         ("himpc/controllers/one_step.py", "accelerations: q̈_p (n,)"),
