@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 _FELT = 1e-13
 """The effect of a direction on a level is rounding if it is smaller than this share of the level's rows."""
 _APART = 1e-6
-"""A singular value that is smaller than this share of the previous one belongs to a direction that no row
+"""A singular value below this share of the previous singular value belongs to a direction that no row
 fixes."""
 
 

@@ -36,8 +36,8 @@ Calling = Callable[[Law, View], Any]
 """Calls the law. Raises OwnFault with one sentence if the call fails."""
 
 REST = 5.0
-"""1/s: rate at which the robot is brought to rest after the user's law has failed. The torque is then
-τ = τ₀ − M̄ (q̈ + REST · q̇), which damps the remaining motion."""
+"""1/s: rate at which the robot comes to rest after the user's law has failed. The torque is then τ = τ₀ − M̄
+(q̈ + REST · q̇), which damps the remaining motion."""
 OPENING_SECONDS = 0.3
 """s: time after a change of settings until the law's torque is applied in full."""
 _FIRST_SHARE = 0.02

@@ -25,7 +25,7 @@ class Configuration:
     """Frames and Jacobians at the measured q_k and at the knots q*_{k+j|k−1}, j = 1 … N−1.
 
     Jacobians are computed once per frame and tick, for any number of tasks on that frame. Only geometry is
-    used, no inertia or gravity, so the controller needs no dynamic model; the only exception is a task of the
+    used, no inertia or gravity, so the controller needs no dynamic model. The only exception is a task of the
     centre of mass, which uses masses.
 
     Args:

@@ -24,7 +24,7 @@ _NOISE = 1e-12
 """A multiplier counts as constant if its change is below this share of the largest change of a multiplier."""
 _HARD = 0.5
 """Rows whose multiplier has the wrong sign are removed together if their multipliers exceed this share of the
-largest one."""
+largest such multiplier."""
 
 
 @inline_kernel

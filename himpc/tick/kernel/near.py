@@ -125,7 +125,7 @@ def _along_segment(p: Vector3, d: Vector3, e: Array) -> float:
     de = d[0] * e[0] + d[1] * e[1] + d[2] * e[2]
     square = dd * ee - de * de
     if square <= _PARALLEL * dd * ee:
-        # The shares at which the ends of the other segment lie beside this one.
+        # The shares of this segment that lie beside the ends of the other segment.
         at_start, at_end = _clipped(-dp / dd), _clipped((de - dp) / dd)
         return 0.5 * (at_start + at_end)
     t = _clipped((de * ep - ee * dp) / square)
