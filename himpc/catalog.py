@@ -7,22 +7,22 @@ from typing import Literal
 
 CONTROLLERS: dict[str, str] = {
     "himpc": "hierarchical incremental MPC: torque level, strict priorities, no dynamic model",
-    "hiqp": "HIMPC with a horizon of one knot: the best next step, and nothing beyond it",
-    "nhimpc": "HIMPC with the Jacobians along its own prediction: sequential QPs until they agree",
-    "weighted": "HIMPC without priorities: all tasks in one cost, a level counts as much as its Q",
+    "hiqp": "HIMPC with a horizon of one knot: it optimises the next step only",
+    "nhimpc": "HIMPC with the Jacobians along its own prediction: sequential QPs until they converge",
+    "weighted": "HIMPC without priorities: one cost for all tasks, in which each level has the weight Q",
     "osf": "operational-space control with null-space projection on the nominal model; no bounds, no damping",
     "tdeosf": "OSF with time-delay estimation in place of the model; no bounds, no damping",
-    "osf_damped": "OSF with damped least squares near singularities; what the paper's OSF leaves out",
+    "osf_damped": "OSF with damped least squares near singularities; the paper's OSF has no damping",
     "tdeosf_damped": "TDEOSF with damped least squares near singularities",
     "hqp": "one-step hierarchical QP on the nominal model, within the torque bounds",
-    "himpc_filtered": "HIMPC whose levels know no distance; a QP behind them changes the torque to keep it",
+    "himpc_filtered": "HIMPC without distances in its levels; a QP then changes the torque to keep distances",
 }
 """Torque-level controllers: name and description."""
 
 VELOCITY_CONTROLLERS: dict[str, str] = {
     "htmpc": "hierarchical-task MPC: velocity level, lexicographic, previews its references",
-    "htmpc_wpt": "the same without preview: a trajectory arrives as separate waypoints",
-    "stmpc": "single-task MPC: the first task of the window, nothing else",
+    "htmpc_wpt": "HTMPC without preview: it receives a trajectory as separate waypoints",
+    "stmpc": "single-task MPC: it solves only the first task of the window",
     "htidkc": "hierarchical-task inverse differential kinematics: cascaded QPs, no prediction",
 }
 """Velocity-level controllers: name and description."""
@@ -36,7 +36,7 @@ OWN_METHOD = "goldfarb-idnani"
 
 def qp_method(controller: str, route: Route, solver: str) -> str | None:
     """Returns the method that solves the QPs of a torque-level controller: `OWN_METHOD`, the solver, or None
-    for a controller that solves none. If the method finds no optimum of a level, DAQP may be used in
+    if the controller solves no QP. If the method finds no optimum of a level, DAQP may be used in
     addition."""
     if controller == "hqp":
         return solver

@@ -7,25 +7,26 @@ RETURN_RATE = 5.0
 """1/s: a joint beyond its limit must return at this rate times the excess."""
 
 WITHIN = 0.25
-"""m: pairs of links or objects that are farther apart have no row."""
+"""m: a pair of links, or of a link and an object, has no row if its distance is larger."""
 FADE = 0.05
-"""m: width of the range of distances just below WITHIN in which a bound fades out with growing distance. The
-bound of a pair that comes nearer than WITHIN appears without a jump."""
+"""m: from WITHIN − FADE to WITHIN, a bound fades out with growing distance. The bound of a pair that comes
+nearer than WITHIN appears without a jump."""
 RETREAT = 0.2
-"""m/s: the fastest retreat that a row of a distance asks for."""
+"""m/s: the fastest retreat that a row of a distance demands."""
 TURN_PULL = 5.0
-"""rad/m: ratio between the largest error on which a task of angles acts and that of a task of positions."""
+"""rad/m: the largest error on which a task of angles acts, divided by the largest error on which a task of
+positions acts."""
 
 AT_TORQUE, AT_VELOCITY, AT_POSITION = 1, 2, 4
 """Bits of telemetry's `at_bound`: which limits bind. Velocity rows that impose a position limit count as
 position."""
 
 APPROACH_RATE = 6.0
-"""1/s: rate at which a dragged target reduces the remaining distance near the hand."""
+"""1/s: rate at which a dragged target reduces its remaining distance near the raw target."""
 VELOCITY_RATE = 36.0
-"""1/s: rate at which its velocity approaches the desired velocity."""
+"""1/s: rate at which the velocity of a dragged target approaches the desired velocity."""
 STILL = 1e-9
-"""Below this distance and speed the target is set to rest: it must not drift."""
+"""A dragged target with a smaller distance and speed is set to rest and does not drift."""
 
 LOAD_SECONDS = 0.1
 """s: time constant of the mean load of a motor. A short peak of torque does not slow the robot down."""
@@ -33,7 +34,7 @@ FREE_LOAD, FULL_LOAD = 0.55, 0.95
 """Shares of the torque limit. Below the first, a motor does not slow its joints down. Above the second, its
 joints have their lowest velocity limit."""
 SLOWEST_SHARE = 0.03
-"""The lowest velocity limit of a joint whose motor is loaded, as a share of its own limit."""
+"""The velocity limit of a joint whose motor is loaded is not reduced below this share."""
 HEAVY_LOAD = 0.85
 """If a motor has at least this load and the tasks make no progress, the robot counts as stalled."""
 
@@ -41,33 +42,33 @@ MEAN_SECONDS = 0.02
 """s: time constant of the mean velocity. The difference between velocity and mean velocity is a smooth
 measure of the acceleration."""
 LEAD = 0.1
-"""s: the velocity is extrapolated over this time, and that velocity must be within its limit."""
+"""s: the velocity is extrapolated over this time, and the extrapolated velocity must be within its limit."""
 LEAST_WHILE_FASTER = 0.5
-"""The lowest velocity limit of a joint that accelerates, as a share of its own limit."""
+"""The velocity limit of a joint that accelerates is not reduced below this share."""
 
 BLOCKED = 0.1
-"""m: a robot counts as stalled only if the distance of a pair is less than this above d_safe."""
+"""m: a robot counts as stalled only if the distance of a pair exceeds d_safe by less than this."""
 INSIDE = -0.03
 """m: a pair that is nearer than d_safe by more than this must move apart, and the robot is not slowed down. A
-robot with a smaller violation that does not decrease counts as stalled."""
+robot with a smaller violation counts as stalled if the violation does not decrease."""
 PROGRESS = 0.05
 """m/s, rad/s: the least decrease of an error that counts as progress. A reference that is faster than this
 counts as moving."""
 PROGRESS_SHARE = 0.25
-"""1/s: the least decrease as a share of the error. The errors of tasks without an obstacle decrease ten times
-as fast."""
+"""1/s: the least decrease that counts as progress, as a share of the error. Without an obstacle, errors
+decrease ten times as fast."""
 CLOSE_ENOUGH = 0.01
 """m, rad: a task with a smaller error has reached its target."""
 SLOWING, RECOVERY = 0.1, 0.05
-"""s: time constants with which the joints of a stalled robot become slow, and fast again."""
+"""s: time constants with which the joints of a stalled robot slow down, and later speed up again."""
 DISTURBED = 0.03
-"""m, rad: if the error of the first task grows by more, a disturbance moved the robot, and the robot may move
-back."""
+"""m, rad: if the error of the first task grows by more than this, a disturbance has moved the robot, and the
+robot may move back."""
 STALLED, REST = 0.5, 0.02
 """Shares of the velocity limits. Below the first, a robot stays stalled until something changes. Below the
-second, it has come to rest. Between the two, it brakes, and errors that change are neither progress nor a
-disturbance."""
+second, the robot has come to rest. Between the two shares, the robot brakes, and a change of errors is
+neither progress nor a disturbance."""
 SLOWEST = 0.02
-"""rad/s: no joint of a stalled robot becomes slower than this."""
+"""rad/s: the velocity limit of a stalled robot's joint is not reduced below this."""
 LEAST_SHARE = 1e-9
-"""The share of a velocity limit that remains at least: a joint whose limit is infinite keeps it."""
+"""The least share of a velocity limit that remains. It is positive, and an infinite limit stays infinite."""

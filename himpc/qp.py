@@ -72,7 +72,8 @@ def solve_qp(
         iterations: largest number of iterations of all attempts of DAQP together; None: no limit.
 
     Returns:
-        The solver's point with the KKT residual computed here; the solver's status is not relied on.
+        The solver's point and its KKT residual. The residual is computed here; the solver's status is not
+        used.
     """
     left = _Iterations(iterations)
     attempts = _ATTEMPTS[solver]
@@ -133,7 +134,7 @@ def _daqp(
 ) -> tuple[Array, Array, str]:
     if scaled:
         # DAQP treats rows that are small relative to √H as zero and ignores them without a message. H is
-        # therefore scaled to size one and rows to length one; rows that are rounding errors must not be
+        # therefore scaled to size one and rows to length one. Rows that are rounding errors must not be
         # scaled up to constraints.
         size = float(H.trace()) / len(H)
         length = np.sqrt(np.einsum("ij,ij->i", A, A))
@@ -162,8 +163,8 @@ _DAQP = (
     partial(_daqp, eps_prox=1e-2, eta_prox=1e-12),
     partial(_daqp, scaled=False),
 )
-"""DAQP does not terminate on, or calls infeasible, 1 % of hard but feasible QPs; proximal steps or another
-scaling then find the optimum."""
+"""DAQP fails on 1 % of hard but feasible QPs: it does not terminate, or reports that they are infeasible.
+Proximal steps or another scaling then find the optimum."""
 
 
 def _proxqp(

@@ -26,7 +26,7 @@ class Level:
         tasks: tasks of equal priority.
         Q: weight of the residual e (28), scalar or one per coordinate, > 0.
         R: weight of the increments Δτ, scalar or one per joint, > 0.
-        horizon: knots this level looks ahead, at most the controller's N (Remark 8); None: all of them.
+        horizon: number of knots that this level looks ahead, at most the controller's N (Remark 8); None: N.
         enabled: whether the level takes part.
     """
 
@@ -38,7 +38,7 @@ class Level:
 
     @property
     def name(self) -> str:
-        """The stable identity of the level, independent of its place in the stack."""
+        """The stable identity of the level, independent of its position in the stack."""
         return "+".join(task.name for task in self.tasks)
 
     def __post_init__(self) -> None:
@@ -58,17 +58,17 @@ def check_names(stack: Stack) -> None:
     names = [task.name for level in stack for task in level.tasks]
     twice = {name for name in names if names.count(name) > 1}
     if twice:
-        raise InputError(f"task name {json.dumps(min(twice))} stands twice in the stack: rename one of them")
+        raise InputError(f"task name {json.dumps(min(twice))} is used twice in the stack: rename one of them")
 
 
 def essence(task: Task) -> Task:
-    """Returns the task without its gains: they do not change the quantity that it controls."""
+    """Returns the task without its gains, which do not change the controlled quantity."""
     return replace(task, K_p=0.0, K_v=0.0)
 
 
 def about(task: Task) -> Task:
-    """Returns the task without gains, name and axes: equal results control the same quantity of the same
-    frame or joints."""
+    """Returns the task without gains, name and axes. Tasks with equal results control the same quantity of
+    the same frame or joints."""
     task = replace(task, name="", K_p=0.0, K_v=0.0)
     return replace(task, axes=AXES) if isinstance(task, OnAxes) else task
 
@@ -78,7 +78,7 @@ def active_levels(stack: Stack, damping: bool, freedom: int) -> Stack:
 
     Args:
         stack: all levels.
-        damping: whether the last level may be added.
+        damping: whether the damping level may be added as the last level.
         freedom: number of directions that the enabled levels leave free (`freedom_left`).
     """
     enabled = tuple(level for level in stack if level.enabled)
@@ -92,8 +92,9 @@ def ranks(stack: Stack, configuration: Configuration) -> dict[str, tuple[int, in
     """Returns for each enabled level the number of directions that it can control at this configuration, and
     its number of rows.
 
-    The first number is the amount by which its Jacobian increases the rank of the levels above. If it is
-    smaller than the number of rows, the levels above or the arm itself leave too few directions.
+    The first number is the amount by which the level's Jacobian increases the rank of the levels above. If
+    this number is smaller than the number of rows, the levels above or the arm itself leave too few
+    directions.
     """
     found: dict[str, tuple[int, int]] = {}
     J, before = np.zeros((0, configuration.q.size)), 0
@@ -115,7 +116,7 @@ _RANK = 1e-6
 def freedom_left(robot: Robot, stack: Stack) -> int:
     """Returns n minus the generic rank of the enabled levels' stacked Jacobian.
 
-    Generic: the largest rank over a few random configurations, so that a singularity at a single
+    The generic rank is the largest rank over a few random configurations, so that a singularity at a single
     configuration does not count as freedom.
     """
     tasks = [task for level in stack if level.enabled for task in level.tasks]

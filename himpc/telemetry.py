@@ -79,15 +79,17 @@ class TaskInfo:
 class Layout:
     """The position of each field in a row.
 
-    `q` and `v` are the plant's, `q_measured` and `v_measured` the values that the controller received;
-    `tau_0` is the torque that acted until then. `contact_depth` (m) and `contact_force` (N) are the deepest
-    penetration and the largest force of the tick that begins with the row, 0 without a contact. `distance`
-    and `distance_kept` (m) are those of the nearest pair of links, or of a link and an object, and d_safe
-    with its margin, which is kept; NaN where none is measured or kept. Per task
-    `x/<task>` and `x_d/<task>` (coordinates, or a quaternion x y z w), `error/<task>`, `v_d/<task>`,
-    `a_d/<task>` (m each; three if the target is a point to look at); per level the fields cost, kkt, rung
-    (index into FALLBACKS), time_us, leak and active (number of binding constraints), NaN for a level that was
-    not solved.
+    `q` and `v` are the plant's state, `q_measured` and `v_measured` the values that the controller received;
+    `tau_0` is the torque that acted until this tick. `contact_depth` (m) and `contact_force` (N) are the
+    deepest penetration and the largest force of the tick that begins with the row; both are 0 without a
+    contact. `distance` (m) is that of the nearest pair of two links, or of a link and an object; NaN if no
+    distance is measured. `distance_kept` (m) is the distance to keep, d_safe with its margin; NaN if no
+    distance is kept.
+
+    Fields of a task: `x/<task>` and `x_d/<task>` contain its coordinates, or a quaternion x y z w.
+    `error/<task>`, `v_d/<task>` and `a_d/<task>` have one number per coordinate; if the target is a point to
+    look at, `v_d` and `a_d` have three. Fields of a level: cost, kkt, rung (index into FALLBACKS), time_us,
+    leak and active (number of active constraints); NaN for a level that was not solved.
     """
 
     size: int
@@ -98,8 +100,8 @@ class Layout:
 
 
 def layout_of(robot: Robot, stack: Stack) -> Layout:
-    """Returns the layout for a robot and all levels of a stack, independent of their order; damping comes
-    last."""
+    """Returns the layout for a robot and all levels of a stack. The order of the levels has no effect on the
+    layout; the damping level comes last."""
     ordered = tuple(sorted(stack, key=lambda level: level.name))
     levels = (*(level.name for level in ordered), DAMPING_LEVEL.name)
     return arranged(robot, ordered, levels, _SCALARS, _PER_JOINT, PER_LEVEL)
@@ -121,7 +123,7 @@ def arranged(
         stack: gives the tasks.
         levels: names of the levels.
         scalars, per_joint, per_level: names of the fields of each kind.
-        per_task: names of further fields of one number per task.
+        per_task: names of further fields with one number per task.
     """
     fields: dict[str, slice] = {}
     size = 0
@@ -156,8 +158,8 @@ def arranged(
 
 
 def relaid(rows: Array, old: Layout, new: Layout) -> Array:
-    """Converts rows, (k, size), to another layout; fields that do not exist in the rows with the same width
-    become NaN."""
+    """Converts rows, (k, size), to another layout. A field that the rows do not contain with the same width
+    becomes NaN."""
     found = np.full((len(rows), new.size), math.nan)
     for name, where in new.fields.items():
         before = old.fields.get(name)

@@ -1,4 +1,4 @@
-"""From Problem 1 to Problem r, with a fallback for every level that cannot be solved."""
+"""Solves Problem 1 to Problem r, with a fallback for every level that cannot be solved."""
 
 from __future__ import annotations
 
@@ -28,19 +28,20 @@ def solve_cascade(
     """Solves the levels in order; each level satisfies the priority constraints (33) of the levels above.
 
     Level 1 has four fallbacks, which are tried in this order. "solve" solves the printed problem. "soften"
-    widens the state rows by the least slack that makes them feasible; the lower levels get the widened rows
-    (Theorem 2 needs this). "previous" is last tick's plan of this level, shifted by one tick; it is used if
-    it was an optimum and meets all rows. "brake" brings the joints to rest as far as the rows allow.
+    widens the state rows by the least slack that makes them feasible; the lower levels then use the widened
+    rows, as Theorem 2 requires. "previous" is this level's plan of the last tick, shifted by one tick; it is
+    used if that plan was an optimum and the shifted plan meets all rows. "brake" brings the joints to rest as
+    far as the rows allow.
 
-    A lower level has two: "solve", and "inherit", which takes over U_{i−1}, the increments of the level
-    above; this keeps every priority.
+    A lower level has two fallbacks: "solve", and "inherit", which uses U_{i−1}, the increments of the level
+    above. "inherit" keeps every priority.
 
-    So the increments meet all rows whenever there are increments that do.
+    So the increments meet all rows whenever such increments exist.
 
     Args:
         problems: the levels, highest priority first; at least one.
         rows: all bounds of this tick.
-        previous: last tick's solutions by level name: warm starts and the "previous" fallback.
+        previous: last tick's solutions by level name, for the "previous" fallback.
         solver: QP solver.
     """
     N, _, n = problems[0].B.shape
@@ -103,11 +104,11 @@ def _climb_down(
 
 
 def _leaks(upper: Sequence[Array], B: Array, increments: Sequence[Array]) -> list[float]:
-    """‖J_p M̄⁻¹(Δτ_i − Δτ_p)‖∞ over knots and levels p above, for every level i.
+    """Returns ‖J_p M̄⁻¹(Δτ_i − Δτ_p)‖∞ over knots and levels p above, for every level i.
 
     Args:
         upper: B_p of all levels but the last.
-        B: the same, one below the other.
+        B: the same matrices, stacked.
         increments: U_i of all levels, (N, n) each.
     """
     if not upper:

@@ -19,13 +19,14 @@ from himpc.qp import KKT_TOLERANCE, QPSolution, Solver, solve_qp
 Array = NDArray[np.float64]
 
 _BINDING = 1e-9
-"""N·m: a row closer than this to its bound is active."""
+"""A row is active if its multiplier exceeds this value and its distance from its bound, N·m, is smaller than
+a thousand times this value."""
 _NOISE = 1e-11
-"""If the projection of a row on the free directions of (33) is a smaller share of the row, it is rounding
-noise: its joint is no longer free."""
+"""If the projection of a row on the free directions of (33) is below this share of the row, the projection is
+rounding noise: the row's joint is no longer free."""
 _ROOM = 1e-9
-"""N·m by which bounds are widened for a last attempt. The rows that are active in it are then solved with
-their exact bounds."""
+"""N·m by which bounds are widened for a last attempt. The optimum is then computed from the active rows of
+this attempt with their exact bounds."""
 _ACCURATE = 1e-9
 """Points with a larger residual of their optimality conditions are refined."""
 
@@ -41,24 +42,24 @@ def solve_explicit(
 ) -> Point | None:
     """Solves Problem i, (32) or (34), over all N·n increments, with every bound as a row of the QP.
 
-    The QP is stated in the level's white coordinates, see `white`: its Hessian is the identity however far
-    weights and inertias are apart, (33) holds for all of them, and rows have length one. A point whose
-    residual is larger than rounding is refined from the rows that it reports as active, see `polished`.
-    Knots beyond the level's own horizon keep the increments of the level above.
+    The QP is stated in the level's white coordinates, see `white`. In them the Hessian is the identity for
+    all weights and inertias, every point satisfies (33), and rows have length one. If the residual of the
+    solver's point is larger than rounding, the point is refined from its active rows, see `polished`. Knots
+    beyond the level's own horizon keep the increments of the level above.
 
     Args:
         problem: the level's data.
         rows: all bounds.
         U_above: U_{i−1}, (N, n).
         above: (B_p, U_p) of every level above.
-        Z: orthonormal bases of what (33) leaves free, (N, n, d).
+        Z: orthonormal bases of the directions that (33) leaves free, (N, n, d).
         solver: name of the QP solver.
         iterations: largest number of iterations of one attempt, see `solve_qp`; None: no limit.
 
     Returns:
-        the optimum, or None if a violated row does not depend on the free directions, or if no solver gave a
-        point that is within `KKT_TOLERANCE` of its optimality conditions: in N·m for every increment, or as a
-        share of increments larger than 1 N·m.
+        the optimum. None if a violated row does not depend on the free directions, or if no point satisfies
+        its optimality conditions to `KKT_TOLERANCE`. This tolerance is in N·m for increments up to 1 N·m, and
+        a share of larger increments.
     """
     n = U_above.shape[1]
     level = white(problem, U_above, [B for B, _ in above], Z)
@@ -122,7 +123,7 @@ def _judged(
 
 
 def quadratic(problem: LevelProblem, n: int) -> tuple[Array, Array]:
-    """H (N·n, N·n) and f (N·n,) of a level: its cost is UᵀHU + 2fᵀU and a constant."""
+    """Returns H (N·n, N·n) and f (N·n,) of a level, whose cost is UᵀHU + 2fᵀU plus a constant."""
     N, m, K = len(problem.B), problem.B.shape[1], problem.knots
     G = (problem.C[..., None] * problem.B.transpose(1, 0, 2)).reshape(N, m, N * n)[:K].reshape(K * m, N * n)
     weighted = G * np.tile(problem.root_Q**2, K)[:, None]
@@ -130,7 +131,8 @@ def quadratic(problem: LevelProblem, n: int) -> tuple[Array, Array]:
 
 
 def every_row(rows: Rows, n: int) -> Array:
-    """The rows as one matrix on the increments, knot by knot and joint by joint, (r·n, N·n)."""
+    """Returns the rows as one matrix (r·n, N·n) for the increments, which are ordered by knot, then by
+    joint."""
     A = _every_joint(rows.L.tobytes(), rows.L.shape, n)
     N = rows.L.shape[1]
     if rows.directions:

@@ -12,7 +12,7 @@ from himpc.limits.rows import Rows
 Array = NDArray[np.float64]
 
 ROOM = 1e-7
-"""N·m added to the least slack, so that the widened rows have an interior to rounding."""
+"""N·m added to the least slack, so that the widened rows have an interior in spite of rounding."""
 
 
 def softened(rows: Rows) -> Rows | None:
@@ -22,12 +22,13 @@ def softened(rows: Rows) -> Rows | None:
 
 
 def last_resort(rows: Rows, before: Array | None) -> tuple[Fallback, Array]:
-    """Returns the last fallback: the shifted "previous" plan if it satisfies all rows, else "brake":
-    increments that bring the joints to rest and satisfy all rows whenever this is possible.
+    """Returns the last fallback. It is "previous", the shifted plan, if that plan satisfies all rows.
+    Otherwise it is "brake": increments that bring the joints to rest, and satisfy all rows if this is
+    possible.
 
     Args:
         rows: all bounds.
-        before: the level's increments at the previous tick, if they were an optimum.
+        before: the level's increments at the previous tick if they were an optimum, otherwise None.
 
     Returns:
         the name of the fallback and the increments, (N, n) N·m.

@@ -17,7 +17,7 @@ FALLBACKS: tuple[Fallback, ...] = get_args(Fallback)
 
 
 class LevelProblem(NamedTuple):
-    """The data of Problem i, (32) or (34): min Σ ‖e_{j+1}‖²_Q + ‖Δτ_j‖²_R, e affine in U.
+    """The data of Problem i, (32) or (34): min Σ ‖e_{j+1}‖²_Q + ‖Δτ_j‖²_R, where e is affine in U.
 
     Attributes:
         name: the level's stable identity.
@@ -27,8 +27,8 @@ class LevelProblem(NamedTuple):
         weighted_free: (N, m), √Q free.
         root_Q: (m,), √Q.
         weighted_C: (K, m, K), √Q C over the level's own knots.
-        R: (n,).
-        knots: K, how many knots this level looks ahead, ≤ N.
+        R: (n,), weight of the increments.
+        knots: K ≤ N, the number of knots that this level looks ahead.
         common_R: R if it is the same for all joints, else None.
     """
 
@@ -44,12 +44,12 @@ class LevelProblem(NamedTuple):
     common_R: float | None
 
     def residual(self, U: Array) -> Array:
-        """e at knots 1 … N under U, (N, m)."""
+        """Returns e at knots 1 … N under U, (N, m)."""
         pushed = np.matmul(self.B, U[:, :, None])[:, :, 0]
         return self.free + np.matmul(self.C.transpose(1, 0, 2), pushed.T[:, :, None])[:, :, 0].T
 
     def cost(self, U: Array, error: Array | None = None) -> float:
-        """The value (32a) or (34a) of U over this level's knots; `error` is Q^½ e if it is known."""
+        """Returns the value (32a) or (34a) of U over this level's knots. error: Q^½ e if it is known."""
         e = self.root_Q * self.residual(U)[: self.knots] if error is None else error
         used = U if self.knots == len(U) else U[: self.knots]
         effort = self.R * used if self.common_R is None else self.common_R * used
@@ -73,7 +73,7 @@ class ActiveRows:
         return self.row.size
 
     def labelled(self, rows: Rows, joints: Sequence[str]) -> list[tuple[str, int, str, float, float]]:
-        """(label, knot, name of the direction, multiplier, slack) of each active row."""
+        """Returns (label, knot, name of the direction, multiplier, slack) of each active row."""
 
         def name(row: int, column: int) -> str:
             directions = rows.directions_of(row)
@@ -94,14 +94,14 @@ class LevelSolution(NamedTuple):
 
     Attributes:
         name: the level's identity.
-        U: increments of this level and all above, (N, n) N·m.
+        U: increments of this level and all levels above, (N, n) N·m.
         cost: the optimal value of the level's cost.
         active: the active constraints.
         kkt_residual: scaled KKT residual of the applied point; 0 for fallbacks that apply no optimum.
         status: "optimal", "empty" (no freedom left) or the status of the solver.
         fallback: name of the fallback that gave U; "solve" if none was needed.
         time_us: wall time of this level, microseconds.
-        qp_us: the QP solver's share of it; 0 where no solver was needed.
+        qp_us: the QP solver's share of `time_us`; 0 if no solver was needed.
         leak: ‖J_p M̄⁻¹(Δτ_i − Δτ_p)‖∞ over knots and levels p above, m/s² or rad/s².
     """
 

@@ -14,14 +14,14 @@ from himpc.constants import RANK_TOLERANCE
 Array = NDArray[np.float64]
 
 CLEARLY_REGULAR = 1e-5
-"""Diagonals of a triangular factor above this share of the largest entry prove full rank with a margin."""
+"""If all diagonal entries of a triangular factor exceed this share of the largest entry, the rank is full."""
 
 
 def nested_bases(levels: Sequence[Array]) -> list[Array]:
-    """Orthonormal bases Z_i of {z : B_p z = 0 for all p < i} at every knot, for i = 2 … r+1.
+    """Returns orthonormal bases Z_i of {z : B_p z = 0 for all p < i} at every knot, for i = 2 … r+1.
 
-    Away from singularities one Householder QR of [B_1ᵀ … B_rᵀ] holds all of them: the columns of Q that
-    follow those of the levels above. Near one, an SVD per level decides the rank.
+    Away from singularities, one Householder QR of [B_1ᵀ … B_rᵀ] contains all bases: Z_i consists of the
+    columns of Q after those of the levels above. Near a singularity, an SVD per level determines the rank.
 
     Args:
         levels: B_p = Ĵ_p M̄⁻¹ of each level above the last, (N, m_p, n).
@@ -54,7 +54,7 @@ def whole_space(N: int, n: int) -> Array:
 
 
 def shrink(Z: Array, B: Array) -> Array:
-    """Orthonormal bases of {z ∈ span Z_j : B_j z = 0} at every knot j.
+    """Returns orthonormal bases of {z ∈ span Z_j : B_j z = 0} at every knot j.
 
     Nothing is inverted: the bases come from an SVD of B_j Z_j. Where the rank differs between knots,
     surplus columns are zero, so that all knots keep one shape.

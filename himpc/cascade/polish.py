@@ -15,24 +15,24 @@ Array = NDArray[np.float64]
 _NEAR = 1e-3
 """A point with a larger residual does not show which rows are active."""
 _LEFT = 1e-12
-"""A multiplier that is a smaller share of the largest one counts as an error of the solver."""
+"""A multiplier below this share of the largest multiplier counts as an error of the solver."""
 _BEYOND = 1e-9
-"""A row that violates its bound by no more than this counts as satisfied."""
+"""A row with at most this violation counts as satisfied."""
 _WRONG = 1e-12
-"""A multiplier of the wrong sign that is a smaller share of the largest one counts as zero."""
+"""A multiplier of the wrong sign below this share of the largest multiplier counts as zero."""
 _ALONG = 1e-11
 """A row whose slope along the step is smaller than this share of the step's length is parallel to the step:
 it is linearly dependent on the active rows."""
 _STILL = 1e-9
-"""A step that is a smaller share of the unconstrained optimum counts as zero."""
+"""A step below this share of the unconstrained optimum counts as zero."""
 _CHANGES = 30
-"""Largest number of rows that are added or removed one by one, besides those that a solver reported as
-active."""
+"""Largest number of rows that are added or removed one by one, in addition to the rows that a solver reported
+as active."""
 
 
 def polished(solution: QPSolution, c: Array, A: Array, low: Array, high: Array) -> QPSolution | None:
-    """Finds the optimum from the rows that are active at a solver's point. None if the point is too
-    inaccurate, or if these rows and a few others do not lead to the optimum."""
+    """Computes the optimum from the rows that are active at a solver's point. Returns None if the point is
+    too inaccurate, or if these rows and a few others do not lead to the optimum."""
     multipliers = solution.multipliers
     if not (np.isfinite(multipliers).all() and solution.kkt_residual <= _NEAR):
         return None
@@ -55,12 +55,12 @@ def polished(solution: QPSolution, c: Array, A: Array, low: Array, high: Array) 
 
 
 def descended(solution: QPSolution, c: Array, A: Array, low: Array, high: Array) -> QPSolution | None:
-    """Finds the optimum from x = 0 by the primal active-set method; None if x = 0 is not feasible.
+    """Computes the optimum from x = 0 by the primal active-set method; returns None if x = 0 is not feasible.
 
     Below a level that uses nearly all freedom, the feasible set is almost a point. A solver that starts from
-    an infeasible point then takes rounding errors for a contradiction; this one starts from a feasible point.
-    A row that blocks a step is linearly independent of the active rows. After a step of length zero, the
-    first row in order enters or leaves (Bland's rule). Therefore no active set occurs twice.
+    an infeasible point then takes rounding errors for a contradiction. This method starts from a feasible
+    point. A row that blocks a step is linearly independent of the active rows. After a step of length zero,
+    the first row in order enters or leaves (Bland's rule). Therefore no active set occurs twice.
     """
     if not ((low <= 0.0) & (high >= 0.0)).all():
         return None
@@ -90,7 +90,8 @@ def descended(solution: QPSolution, c: Array, A: Array, low: Array, high: Array)
 
 
 def _held(side: Array, c: Array, A: Array, low: Array, high: Array) -> tuple[Array, Array]:
-    """The optimum where rows are held at their upper (side 1) or lower (−1) bounds, and all multipliers."""
+    """Returns the optimum with rows held at their upper (side 1) or lower (−1) bounds, and all
+    multipliers."""
     held, pull = np.flatnonzero(side), np.zeros(len(A))
     if not held.size:
         return -c, pull

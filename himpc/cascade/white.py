@@ -17,12 +17,12 @@ Array = NDArray[np.float64]
 _FELT = 1e-13
 """The effect of a direction on a level is rounding if it is smaller than this share of the level's rows."""
 _APART = 1e-6
-"""A singular value that is smaller than this share of the previous one belongs to a direction that no row
+"""A singular value below this share of the previous singular value belongs to a direction that no row
 fixes."""
 
 
 class WhiteLevel(NamedTuple):
-    """min ½‖y + c‖² over y, where U = U_{i−1} + P y at the knots that the level looks ahead.
+    """The problem min ½‖y + c‖² over y, where U = U_{i−1} + P y at the knots that the level looks ahead.
 
     Attributes:
         c: (d,), minus the optimum without bounds.
@@ -34,19 +34,19 @@ class WhiteLevel(NamedTuple):
 
 
 def white(problem: LevelProblem, U_above: Array, upper: Sequence[Array], Z: Array) -> WhiteLevel:
-    """Problem i, (32) or (34), from its least-squares form ‖Q^½ e‖² + ‖R^½ U‖².
+    """Returns Problem i, (32) or (34), in white coordinates, from its least-squares form ‖Q^½ e‖² + ‖R^½ U‖².
 
     H = GᵀQG + R is never computed: if weights or inertias differ greatly, its condition number is 10¹⁷ and R
     is lost in rounding. Instead, at each knot √R ∘ U is rotated into directions that change the level's
     residual and directions that do not. A direction belongs to the second group if its effect is below _FELT
-    of the size of the rows, which is rounding; only bounds need these directions. The first group is
-    reduced by a QR factorisation.
+    of the size of the rows, which is rounding. Only bounds need the second group. The first group is reduced
+    by a QR factorisation.
 
     Args:
         problem: the level's data.
         U_above: U_{i−1}, (N, n).
         upper: B_p of every level above, (N, m_p, n).
-        Z: orthonormal bases of what (33) leaves free, (N, n, d); surplus columns are zero.
+        Z: orthonormal bases of the directions that (33) leaves free, (N, n, d); surplus columns are zero.
     """
     K, m = problem.knots, problem.B.shape[1]
     root_R = np.sqrt(problem.R)
@@ -73,8 +73,8 @@ def white(problem: LevelProblem, U_above: Array, upper: Sequence[Array], Z: Arra
 
 
 def _free(rows: Array | None, root_R: Array, Z: Array) -> Array:
-    """An orthonormal basis of √R ∘ span Z, (n, d). If the weights R of the joints differ greatly, it is
-    computed from the rows (33) instead of Z, since Z has lost the digits of joints with small weights."""
+    """Returns an orthonormal basis of √R ∘ span Z, (n, d). If the weights R of the joints differ greatly, it
+    is computed from the rows (33) instead of Z, since Z has lost the digits of joints with small weights."""
     Z = Z[:, Z.any(axis=0)]
     rank = len(root_R) - Z.shape[1]
     if rows is not None and len(rows) >= rank:
@@ -88,7 +88,7 @@ def _free(rows: Array | None, root_R: Array, Z: Array) -> Array:
 
 
 def _diagonal(blocks: list[Array]) -> Array:
-    """Blocks (n, d_j) along the diagonal of a matrix."""
+    """Returns a matrix with the blocks (n, d_j) along its diagonal."""
     rows = np.cumsum([0, *(block.shape[0] for block in blocks)])
     columns = np.cumsum([0, *(block.shape[1] for block in blocks)])
     matrix = np.zeros((rows[-1], columns[-1]))

@@ -1,15 +1,14 @@
-"""Adaptation of M̄: the payload is estimated from the gravity torque, and M̄ is fitted to it.
+"""Adaptation of M̄: the payload is estimated from the gravity torque, and M̄ is fitted to the payload.
 
-While the robot moves, the applied torque is on average the torque that holds it: τ ≈ g(q) + m φ(q), with g
-the nominal model's gravity (`Settings.nominal`) and φ the additional gravity torque of one kilogram at the
-tip. The payload m is found by least squares over the last LAG seconds, with each joint's torque divided by
-its limit:
+While the robot moves, the applied torque is on average the torque that holds the robot: τ ≈ g(q) + m φ(q),
+with g the nominal model's gravity (`Settings.nominal`) and φ the additional gravity torque of one kilogram at
+the tip. The payload m is found by least squares over the last LAG seconds, with each joint's torque divided
+by its limit:
 
     m̂ = Σ φᵀ(τ − g) / (Σ φᵀφ + μ), at least 0.
 
-The inertia is linear in the payload, M̂ = M_n(q) + m̂ Φ(q). The set value of M̄ gives the shape, which
-becomes larger for a joint for which the payload increases the inertia; a common factor sets the largest
-eigenvalue of M̂⁻¹M̄ to one:
+The inertia is linear in the payload, M̂ = M_n(q) + m̂ Φ(q). The set value M̄⁰ is increased for each joint
+whose inertia the payload increases. Then a common factor sets the largest eigenvalue of M̂⁻¹M̄ to one:
 
     M̄ᵢ = σ M̄ᵢ⁰ M̂ᵢᵢ/M_nᵢᵢ, σ = 1/λ_max.
 
@@ -18,14 +17,15 @@ bound is active, time-delay estimation multiplies its error by 1 − M⁻¹M̄ f
 requires eigenvalues of M⁻¹M̄ between 0 and 2. By construction M̄ ⪯ M̂, so with M the robot's own inertia
 
 - where M ⪰ M̂, for example if the payload is underestimated, no eigenvalue exceeds 1;
-- no eigenvalue reaches 2 as long as M ≻ ½M̂; the bound is reached with links of half the mass, or just after a
-  payload was dropped that is still in the estimate.
+- no eigenvalue reaches 2 as long as M ≻ ½M̂; the bound is reached with links of half the mass, or after a
+  payload is dropped, while it is still in the estimate.
 
 These statements hold for a constant M̄. Its change as the arm moves acts as a disturbance, like the change of
 M in Remark 4; `himpc-lab reproduce himpc-adaptation` shows its effect.
 
-The estimate uses no derivative, and a coarse encoder does not disturb it. It is disturbed by lasting friction
-in τ and by a wrong nominal model; a payload whose weight loads no joint is not detected (m̂ stays 0).
+The estimate uses no derivative, and a coarse encoder does not disturb it. The estimate is disturbed by
+lasting friction in τ and by a wrong nominal model; a payload whose weight loads no joint is not detected (m̂
+stays 0).
 """
 
 from __future__ import annotations
@@ -51,8 +51,8 @@ LAG = 0.1
 EVERY = 5
 """Number of ticks between two evaluations of the model."""
 FAINT = 1e-5
-"""μ: a payload is detected if a kilogram loads the joints with 0.3 % of their torque limits; with larger
-loads the estimate is slightly too small."""
+"""μ: with this value, a payload is detected if a kilogram loads the joints with 0.3 % of their torque limits.
+With larger loads the estimate is slightly too small."""
 
 
 class LoadModel:
@@ -68,12 +68,12 @@ class LoadModel:
         self.tau_limit = robot.tau_limit
 
     def inertia(self, q: Array) -> tuple[Array, Array]:
-        """M_n, and Φ, the additional inertia per kilogram of payload, (n, n) kg·m² each."""
+        """Returns M_n, and Φ, the additional inertia per kilogram of payload, (n, n) kg·m² each."""
         M = self._without.mass_matrix(q)
         return M, self._with.mass_matrix(q) - M
 
     def gravity(self, q: Array) -> tuple[Array, Array]:
-        """g, and φ, the additional gravity torque per kilogram of payload, (n,) N·m each."""
+        """Returns g, and φ, the additional gravity torque per kilogram of payload, (n,) N·m each."""
         g = self._without.bias(q, self._still)
         return g, self._with.bias(q, self._still) - g
 

@@ -40,7 +40,7 @@ def checked(answer: Any, levels: int, n: int, where: str) -> Array:
 
 
 def next_cost(level: LevelView, effort: Array, T_s: float) -> float:
-    """‖e_{k+1}‖²_Q of (28) at the first knot, for Δτ with M̄⁻¹Δτ = `effort`, (n,)."""
+    """Returns ‖e_{k+1}‖²_Q of (28) at the first knot, for Δτ with M̄⁻¹Δτ = `effort`, (n,)."""
     x_ddot = level.x_ddot + level.J @ effort
     x_dot = level.x_dot + T_s * x_ddot
     error = level.error + T_s * level.x_dot - level.displacement_d[1]

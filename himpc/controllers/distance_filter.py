@@ -1,4 +1,4 @@
-"""A safety filter: the torque closest to a given one that keeps distances."""
+"""A safety filter. Of all torques that keep distances, it chooses the one closest to the argument."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from robots import Robot
 Array = NDArray[np.float64]
 
 _MET = 1e-9
-"""N·m: a row with a smaller violation is met; one with a larger multiplier binds."""
+"""N·m: a row with a smaller violation is met. A row with a larger multiplier is active."""
 _FAINT = 1e-8
-"""Weight of the change of torque while rows give way by least squares."""
+"""Weight of the change of torque when rows are relaxed by least squares."""
 
 
 class Filtered(NamedTuple):
@@ -43,11 +43,11 @@ class Filtered(NamedTuple):
 
 
 class DistanceFilter:
-    """min ‖M̄⁻¹(τ − τ_nom)‖² over τ within the torque bounds, subject to the rows of `limits.distance` at the
-    next knot: a discrete control-barrier filter whose barrier is d, of relative degree two.
+    """Solves min ‖M̄⁻¹(τ − τ_nom)‖² over τ within the torque bounds, subject to the rows of `limits.distance`
+    at the next knot. It is a discrete control-barrier filter; its barrier d has relative degree two.
 
-    The prediction is HIMPC's, q̈ = q̈₀ + M̄⁻¹(τ − τ₀). The filter knows no task and no priority. If no torque
-    meets all rows, the rows of distances give way by least squares, and the result says so.
+    The prediction is that of HIMPC, q̈ = q̈₀ + M̄⁻¹(τ − τ₀). The filter does not use tasks and priorities. If
+    no torque meets all rows, the rows of distances are relaxed by least squares, and `met` is false.
     """
 
     def __init__(self, robot: Robot, settings: Settings) -> None:
@@ -80,7 +80,7 @@ class DistanceFilter:
             observed: the objects around the robot.
 
         Returns:
-            a finite torque within the bounds of the torque, whatever the state.
+            for every state, a finite torque within the torque bounds.
         """
         T_s = self._settings.T_s
         v_was, self._v_was = (v if self._v_was is None else self._v_was), v
@@ -127,8 +127,8 @@ class DistanceFilter:
 
 
 def _closest(A: Array, lower: Array, M: Array, box: tuple[Array, Array]) -> tuple[Array, Array] | None:
-    """The shortest a, (n,) rad/s², with A a ≥ lower and M a within the box, and the multipliers; None if
-    there is none."""
+    """Returns the shortest a, (n,) rad/s², with A a ≥ lower and M a within the box, and the multipliers; None
+    if no such a exists."""
     upper = np.concatenate([np.full(len(lower), np.inf), box[1]])
     found = solve_qp(
         np.eye(len(M)), np.zeros(len(M)), np.vstack([A, M]), np.concatenate([lower, box[0]]), upper
@@ -137,8 +137,8 @@ def _closest(A: Array, lower: Array, M: Array, box: tuple[Array, Array]) -> tupl
 
 
 def _given_way(D: Array, lower: Array, box: tuple[Array, Array]) -> Array:
-    """The least violation of the rows D δ ≥ lower, by least squares, (r,) N·m, for changes δ of the torque
-    within the box."""
+    """Returns the least violation of the rows D δ ≥ lower, by least squares, (r,) N·m, for changes δ of the
+    torque within the box."""
     r, n = D.shape
     H = np.diag(np.concatenate([np.full(n, _FAINT), np.ones(r)]))
     rows = np.block([[D, np.eye(r)], [np.eye(n), np.zeros((n, r))]])

@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 
 ENABLE_SECONDS = 0.5
 FAINTEST = 1e-8
-"""A task that is switched on starts with this share of its Q, which then grows exponentially to 1."""
+"""A task that is switched on starts with this share of its Q. The share grows exponentially to 1."""
 
 
 class HIMPC(TorqueController):
@@ -89,8 +89,8 @@ class HIMPC(TorqueController):
         self._M_bar = self._M_bar_set
         self._still = np.zeros((settings.horizon, self.robot.n))
         self._goal = in_force(self.robot, settings.limits)
-        # A joint's torque cannot exceed its limit. A larger reading is wrong and must not be the start of a
-        # bound.
+        # A joint's torque cannot exceed its limit. A larger reading is wrong, and bounds must not start from
+        # it.
         self._reach = np.maximum(self.robot.tau_limit, self._goal.tau_upper)
         self._settings = settings
         self._guard = stall_guard(self._settings, len(self._form.tasks))
@@ -185,8 +185,7 @@ class HIMPC(TorqueController):
         return plan
 
     def _slowed(self, v: Array) -> LimitsInForce:
-        """The limits in force; those of a robot that keeps distances have lower velocities, see
-        `StallGuard`."""
+        """The limits in force. If distances are kept, velocity limits may be lower, see `StallGuard`."""
         distances = self._distances if self.kernel is None else self.kernel.distances
         now = self._limits
         return now if distances is None else self._guard.limits(now, self._tau_0, v, distances)
@@ -239,7 +238,8 @@ class HIMPC(TorqueController):
         values: dict[str, Array],
         errors: dict[str, Array],
     ) -> tuple[list[LevelProblem] | None, Array]:
-        """Returns the QP data of all levels of a form, None if they are not finite, and ẋ_k of all rows."""
+        """Returns the QP data of all levels of a form, or None if the data are not finite; and ẋ_k of all
+        rows."""
         J = form.jacobian(configuration)
         x_dot = J[0] @ configuration.v
         before = memory.x_dot

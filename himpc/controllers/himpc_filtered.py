@@ -1,4 +1,4 @@
-"""HIMPC with a safety filter behind it, for comparison with distances inside the hierarchy."""
+"""HIMPC followed by a safety filter, for comparison with distances inside the hierarchy."""
 
 from __future__ import annotations
 
@@ -28,8 +28,9 @@ FILTER = "filter"
 @final
 class FilteredHIMPC(HIMPC):
     """HIMPC without rows of distances in its levels, and a `DistanceFilter` that changes its torque.
-    Control-barrier filters work in the same way (for example OSCBF, arXiv 2503.06736). With `avoidance.on`
-    false it is HIMPC. The levels get the torque that acted, which is the filtered one.
+    Control-barrier filters work in the same way (for example OSCBF, arXiv 2503.06736). If `avoidance.on` is
+    false, the controller is HIMPC. At the next tick, the levels use the torque that acted, which is the
+    filtered torque.
     """
 
     def reset(self, tau_0: Array) -> None:
@@ -68,7 +69,7 @@ class FilteredHIMPC(HIMPC):
         )
 
     def _done(self, plan: Plan) -> AtOnce | None:
-        """The increments of the levels at this tick; None if none was solved."""
+        """Returns the increments and Jacobians of the levels at this tick; None if no level was solved."""
         if plan.at_once is not None:
             return plan.at_once()
         levels, problems = plan.levels, self._asked
@@ -101,7 +102,7 @@ class FilteredHIMPC(HIMPC):
 
 
 def _with_filter(done: AtOnce, increment: Array) -> AtOnce:
-    """The increments of the levels; the last ones are those that were applied."""
+    """Returns the data of the levels with the applied increment in place of the last level's increment."""
     if not len(done.increments):
         return done
     return AtOnce(np.vstack([done.increments[:-1], increment]), done.jacobians)

@@ -19,12 +19,13 @@ from robots import NominalModel
 Array = NDArray[np.float64]
 
 _BINDING = 1e-9
-"""N·m: a row with a larger multiplier is active if it is closer than a thousand times this to its bound."""
+"""A row is active if its multiplier exceeds this value and its distance from its bound, N·m, is smaller than
+a thousand times this value."""
 
 
 _REST = 5.0
-"""1/s: K_v of the last fallback, q̈ = −K_v q̇ within the torque bounds, if the first QP has no verified
-point."""
+"""1/s: K_v of the last fallback, q̈ = −K_v q̇ within the torque bounds. It is used if the first QP has no
+verified point."""
 
 
 class VerifiedOptimum(NamedTuple):
@@ -42,12 +43,12 @@ class HQP(OneStepController):
     """Level i: min over y = τ − N_n of ‖J_i M_n⁻¹ y − (ẍ_i − J̇_i q̇)‖²_Q + ‖y‖²_R within the torque bounds.
 
     Priority: J_p M_n⁻¹ y_i = J_p M_n⁻¹ y_p for all levels p above, as in (34g) with the nominal M_n
-    (`settings.nominal`) in M̄'s place. ẍ_i closes (4) with the gains of the tasks. As in section V only the
+    (`settings.nominal`) in place of M̄. ẍ_i closes (4) with the gains of the tasks. As in section V only the
     torque is bounded; velocity and position limits are not imposed.
 
     [16] writes the same cost with the force Λ_n (ẍ_i − J̇_i q̇), and Λ_n = (J M_n⁻¹ Jᵀ)⁻¹ does not exist at a
     singularity. This form needs no inverse of a product of Jacobians, and R > 0 keeps every Hessian positive
-    definite. y counts from N_n, so that R does not pull an arm at rest down. With R on accelerations it
+    definite. y is relative to N_n, so that R does not pull an arm at rest down. If R weighs accelerations, it
     weighs M_n⁻¹ y: the inertia of this law is the nominal one.
     """
 
@@ -78,8 +79,8 @@ class HQP(OneStepController):
                 else VerifiedOptimum(y, status="empty")
             )
             if not found.usable:
-                # The solution of the levels above keeps every priority; the first level brings the robot to
-                # rest instead.
+                # A lower level keeps the solution of the levels above, which satisfies every priority. The
+                # first level brings the robot to rest.
                 braking = np.clip(-_REST * (M @ v), rows.lower[0], rows.upper[0])
                 fallback = "inherit" if i else "brake"
                 found = VerifiedOptimum(y if i else braking, status=found.status, qp_us=found.qp_us)
@@ -108,7 +109,8 @@ class HQP(OneStepController):
     def _optimum(
         self, demand: Demand, B: Array, R: Array, y: Array, free: Array, rows: Rows
     ) -> VerifiedOptimum:
-        """The level's QP over w in y_i = y_{i−1} + Z w, Z = `free`: the priorities hold exactly."""
+        """Solves the level's QP over w in y_i = y_{i−1} + Z w with Z = `free`: the priorities hold
+        exactly."""
         weighted = demand.form.root_Q[:, None] * B
         H = free.T @ (weighted.T @ weighted + R) @ free
         f = free.T @ (weighted.T @ demand.residual(B @ y) + R @ y)
@@ -123,7 +125,8 @@ class HQP(OneStepController):
 
 
 def _binding(multipliers: Array, step: Array, lower: Array, upper: Array) -> ActiveRows:
-    """Returns which bounds of lower ≤ step ≤ upper are active with a multiplier, (n,) each."""
+    """Returns the bounds of lower ≤ step ≤ upper that are active and have a multiplier; arguments are
+    (n,)."""
     pressed = np.abs(multipliers) > _BINDING
     if not pressed.any():
         return NO_ROWS

@@ -35,8 +35,8 @@ _MAKERS: dict[str, Callable[[Robot, Settings], Controller]] = {
 
 
 def make_controller(name: str, robot: Robot, settings: Settings) -> Controller:
-    """Creates a controller by its name. Raises InputError: unknown name, or settings that do not fit the
-    robot."""
+    """Creates a controller by its name. Raises InputError if the name is unknown, or if the settings do not
+    fit the robot."""
     if name not in _MAKERS:
         raise unknown_name("controller", name, CONTROLLERS)
     return _MAKERS[name](robot, settings)

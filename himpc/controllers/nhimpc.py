@@ -42,7 +42,7 @@ class NHIMPC(HIMPC):
             robot: its geometry and limits are used.
             settings: as for HIMPC.
             tolerance: N·m, see TOLERANCE.
-            max_iterations: ≥ 1, see MAX_ITERATIONS; with 1 this is HIMPC.
+            max_iterations: ≥ 1, see MAX_ITERATIONS; with 1 the controller is HIMPC.
         """
         self.tolerance = tolerance
         self.max_iterations = max_iterations
@@ -71,10 +71,10 @@ class NHIMPC(HIMPC):
 
 
 def _solved(found: PeriodResult) -> bool:
-    """Whether every level is at its optimum. Further iterations are useless otherwise."""
+    """Whether every level is at its optimum. If not, further iterations are useless."""
     return bool(found.solutions) and all(solution.fallback == "solve" for solution in found.solutions)
 
 
 def _change(before: list[LevelSolution], after: list[LevelSolution]) -> float:
-    """The largest change of an increment at any level, N·m."""
+    """Returns the largest change of an increment at any level, N·m."""
     return max(float(np.abs(new.U - old.U).max()) for new, old in zip(after, before, strict=True))

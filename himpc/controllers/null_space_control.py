@@ -15,11 +15,11 @@ from himpc.controllers.one_step import Demand, Law, leak
 Array = NDArray[np.float64]
 
 ROUNDING = 1e-10
-"""Singular values below this share of ‖J_i L⁻ᵀ‖, M = L Lᵀ, are rounding errors and count as zero."""
+"""Singular values below this share of ‖J_i L⁻ᵀ‖, where M = L Lᵀ, are rounding errors and count as zero."""
 
 DAMPED = 0.2
-"""Value of `damping` in the damped variants. On RT2 of the HIMPC paper OSF demands 18 times the torque limit
-with 0.1, and the error of level 1 is a quarter larger with 0.4; RT1 never comes that close to a
+"""Value of `damping` in the damped variants. On RT2 of the HIMPC paper, OSF with 0.1 demands 18 times the
+torque limit; with 0.4 the error of level 1 is a quarter larger. RT1 never comes that close to a
 singularity."""
 
 
@@ -39,17 +39,16 @@ class Projected(NamedTuple):
 def prioritised_torques(
     M: Array, jacobians: Sequence[Array], accelerations: Sequence[Array], damping: float = 0.0
 ) -> list[Projected]:
-    """Σ_p J_{p|prec}ᵀ Λ_{p|prec} (ẍ_p − J_p M⁻¹ Σ_{s<p} τ_s) for every level, highest priority first.
+    """Returns Σ_p J_{p|prec}ᵀ Λ_{p|prec} (ẍ_p − J_p M⁻¹ Σ_{s<p} τ_s) for every level, highest priority first.
 
     J_{p|prec} is J_p projected into the directions that the levels above leave free, and Λ_{p|prec} is the
-    inverse of J_{p|prec} M⁻¹ J_{p|prec}ᵀ. With M = L Lᵀ (Cholesky), in the coordinates z = Lᵀ q̈, the
-    dynamically consistent inverse is the Moore–Penrose inverse of J_p L⁻ᵀ restricted to the free directions,
-    and every projector is orthogonal: no product of small numbers is inverted.
+    inverse of J_{p|prec} M⁻¹ J_{p|prec}ᵀ. With M = L Lᵀ (Cholesky) and the coordinates z = Lᵀ q̈, the
+    dynamically consistent inverse is the Moore–Penrose inverse of J_p L⁻ᵀ, restricted to the free directions.
+    Every projector is then orthogonal, and no product of small numbers is inverted.
 
-    Without damping nothing limits the torque near a singularity: it grows as 1/σ until σ is a rounding error;
-    the direction is then dropped. With damping, 1/σ becomes σ/ε² below ε = damping · ‖J_p L⁻ᵀ‖, which is
-    damped least squares with λ² = ε² − σ² there; farther away from the singularity nothing changes, and the
-    priorities stay exact.
+    Without damping, the torque near a singularity grows as 1/σ without a limit. If σ is only a rounding
+    error, the direction is dropped. With damping, σ/ε² replaces 1/σ for σ below ε = damping · ‖J_p L⁻ᵀ‖. This
+    is damped least squares with λ² = ε² − σ². For larger σ nothing changes. The priorities stay exact.
 
     Args:
         M: inertia matrix, (n, n) kg·m², positive definite.
@@ -76,11 +75,12 @@ def prioritised_torques(
 
 
 def projected_law(M: Array, bias: Array, tau_0: Array, demands: list[Demand], damping: float) -> Law:
-    """`prioritised_torques` with the evidence of every level. There is no QP, so the KKT residual is NaN.
+    """Returns `prioritised_torques` with the evidence of every level. There is no QP, so the KKT residual is
+    NaN.
 
     Args:
         M, bias: the controller's model M q̈ + bias = τ.
-        tau_0: torque applied last, (n,) N·m; the cost (31) counts increments from it.
+        tau_0: torque applied last, (n,) N·m; increments in the cost (31) are relative to it.
         demands: the levels.
         damping: as in `prioritised_torques`.
     """

@@ -30,7 +30,7 @@ BLEND_SECONDS = 0.5
 """s: time over which the effect of a change of settings on the torque is blended in."""
 
 _NUDGE = 1e-4
-"""rad or m: displacement of the joints to both sides for the central difference of the Jacobians."""
+"""rad or m: displacement of the joints, forward and backward, for central differences of Jacobians."""
 
 
 class Demand(NamedTuple):
@@ -47,7 +47,7 @@ class Demand(NamedTuple):
     acceleration: Array
 
     def residual(self, effect: Array) -> Array:
-        """√Q times the error of J q̈, (m,); effect: J q̈, (m,)."""
+        """Returns √Q times the error of J q̈, (m,); effect: J q̈, (m,)."""
         return self.form.root_Q * (effect - self.acceleration)
 
 
@@ -55,8 +55,8 @@ class Law(NamedTuple):
     """The result of a controller's law at one tick.
 
     Attributes:
-        bias: torque of q̈ = 0 in the controller's model, (n,) N·m.
-        levels: per level, U relative to the bias.
+        bias: torque for q̈ = 0 in the controller's model, (n,) N·m.
+        levels: the solution of each level, with U relative to the bias.
     """
 
     bias: Array
@@ -73,7 +73,7 @@ class OneStepController(TorqueController):
     clips: bool = False
     """Whether the torque bounds are imposed; otherwise the plan's torque is the demand of the law."""
     solves: bool = False
-    """Whether the law solves QPs, by `Settings.solver`."""
+    """Whether the law solves QPs, with the solver in `Settings.solver`."""
     incremental: bool = False
     """Whether the bias contains τ₀: the bias is then continuous, and only the rest of the torque can jump."""
 
@@ -114,7 +114,7 @@ class OneStepController(TorqueController):
 
     @abstractmethod
     def _law(self, q: Array, v: Array, a: Array, demands: list[Demand]) -> Law:
-        """The torque of every level.
+        """Computes the torque of every level.
 
         Args:
             q, v: measured state, (n,).
@@ -122,7 +122,7 @@ class OneStepController(TorqueController):
             demands: the levels, highest priority first; empty if no level is enabled.
 
         Raises:
-            numpy.linalg.LinAlgError: the model cannot be evaluated here; the torque is then held.
+            numpy.linalg.LinAlgError: the model cannot be evaluated in this state; the torque is then held.
         """
 
     def step(
@@ -132,7 +132,7 @@ class OneStepController(TorqueController):
         `HIMPC.step`.
 
         Returns:
-            the plan, whose torque is finite. A state that is not finite holds the last torque.
+            the plan, whose torque is finite. If the state is not finite, the last torque is held.
         """
         started = perf_counter_ns()
         if tau_applied is not None and usable(tau_applied):
@@ -168,7 +168,7 @@ class OneStepController(TorqueController):
         values: dict[str, Array],
         errors: dict[str, Array],
     ) -> list[Demand]:
-        """The demands of a form's levels; x and x̃ of every task are written to `values` and `errors`."""
+        """Returns the demands of a form's levels; writes x and x̃ of every task to `values` and `errors`."""
         h = _NUDGE / max(1.0, float(np.abs(v).max()))
         here = Configuration(self.robot, self._data, q, v, previews=previews)
         # The kernel includes the change of J with q. The Jacobian of an orientation about one axis also
@@ -260,7 +260,7 @@ class WithJacobian(Protocol):
 
 
 def leak(demands: Sequence[WithJacobian], accelerations: list[Array], level: int) -> float:
-    """‖J_p (q̈_i − q̈_p)‖∞ over the levels p above level i.
+    """Returns ‖J_p (q̈_i − q̈_p)‖∞ over the levels p above level i.
 
     accelerations: q̈_p (n,) that the levels down to each p cause in the model.
     """

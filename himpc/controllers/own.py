@@ -36,13 +36,13 @@ Calling = Callable[[Law, View], Any]
 """Calls the law. Raises OwnFault with one sentence if the call fails."""
 
 REST = 5.0
-"""1/s: rate at which the robot is brought to rest after the user's law has failed. The torque is then
-τ = τ₀ − M̄ (q̈ + REST · q̇), which damps the remaining motion."""
+"""1/s: rate at which the robot comes to rest after the user's law has failed. The torque is then τ = τ₀ − M̄
+(q̈ + REST · q̇), which damps the remaining motion."""
 OPENING_SECONDS = 0.3
 """s: time after a change of settings until the law's torque is applied in full."""
 _FIRST_SHARE = 0.02
 _NUDGE = 1e-4
-"""rad or m: displacement of the joints to both sides for the central difference of the Jacobians."""
+"""rad or m: displacement of the joints, forward and backward, for central differences of Jacobians."""
 
 
 class OwnController(TorqueController):
@@ -50,10 +50,11 @@ class OwnController(TorqueController):
     evidence.
 
     The law returns a torque (n,) N·m, or one row per level (r, n): row i is the torque that levels 1 to i
-    would apply. The last row acts, and the leak between levels (33) is then also measured, with M̄.
+    would apply. The last row acts. With a row per level, the leak between levels (33) is also computed, with
+    M̄.
 
-    After the law failed (it raised an exception, or returned a wrong shape or a number that is not finite),
-    the torque is held and damped until `reset`; `Plan.notice` of that tick names the failure.
+    The law fails if it raises an exception, or returns a wrong shape or a number that is not finite. The
+    torque is then held and damped until `reset`, and `Plan.notice` of this tick describes the failure.
     """
 
     def __init__(
@@ -275,8 +276,8 @@ class OwnController(TorqueController):
         started: int,
         notice: str | None,
     ) -> Plan:
-        """Returns the plan of a tick in which the law gives no torque: τ₀ − M̄ · moving, within the torque
-        limits. moving: the acceleration that this torque shall cancel, (n,)."""
+        """Returns the plan of a tick without a torque of the law: τ₀ − M̄ · moving, within the torque limits.
+        moving: the acceleration that this torque shall cancel, (n,)."""
         limits: LimitsInForce = self._limits
         tau = np.clip(self._tau_0 - self._M_bar * moving, limits.tau_lower, limits.tau_upper)
         status = "the code failed" if self._failed else "state not finite"
@@ -289,7 +290,7 @@ class OwnController(TorqueController):
 
 
 def wanted(form: StackForm, previews: Mapping[str, Preview], N: int) -> tuple[Array, Array, Array]:
-    """x_d(k+j) − x_d(k), ẋ_d and ẍ_d of all rows at k … k+N, (N+1, m) each."""
+    """Returns x_d(k+j) − x_d(k), ẋ_d and ẍ_d of all rows at k … k+N, (N+1, m) each."""
     found: tuple[list[Array], list[Array], list[Array]] = ([], [], [])
     for task, rows in zip(form.tasks, form.sizes, strict=True):
         preview = still(N, rows) if isinstance(task, Damping) else previews[task.name]

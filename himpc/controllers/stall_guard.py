@@ -1,5 +1,5 @@
-"""Slows joints down while a controller keeps distances: those of a stalled robot, those with little torque
-left, and those that accelerate."""
+"""Slows joints down while a controller keeps distances: joints of a stalled robot, joints with little torque
+left, and joints that accelerate."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ class StallGuard:
     Attributes:
         errors: (T,) the lengths of the tasks' errors at the last tick, m or rad; None before the first one.
         fastest: the largest velocity of a row of a reference at the last tick, m/s or rad/s.
-        stall: how far it is stalled.
-        load: (n,) the mean load of its joints, as a share of their torque limits; None before the first tick.
-        mean: (n,) rad/s, their mean velocities.
+        stall: the degree to which the robot is stalled.
+        load: (n,) the mean load of each joint, as a share of its torque limit; None before the first tick.
+        mean: (n,) rad/s, the mean velocity of each joint.
     """
 
     def __init__(self, tasks: int, T_s: float) -> None:
@@ -63,6 +63,6 @@ class StallGuard:
 
 
 def stall_guard(settings: Settings, tasks: int) -> StallGuard | CompiledStallGuard:
-    """Returns the guard of a controller with this number of tasks, on the route that it takes."""
+    """Returns the guard for a controller with this number of tasks, on the route of its settings."""
     kind = CompiledStallGuard if settings.route == "compiled" else StallGuard
     return kind(tasks, settings.T_s)

@@ -16,9 +16,9 @@ Array = NDArray[np.float64]
 class TDEOSF(OneStepController):
     """OSF's law with M̄ as the inertia and Ĥ_q = τ₀ − M̄ q̈₀ for all other terms of (6): no model is used.
 
-    τ = Ĥ_q + Σ_i J_{i|prec}ᵀ Λ̄_{i|prec} (…), both projected with M̄. q̈₀ is the backward difference of q̇,
-    τ₀ the torque that was applied; J̇_i q̇ is exact kinematics (Remarks 2 and 3). Gains, bounds and damping
-    as in `OSF`.
+    τ = Ĥ_q + Σ_i J_{i|prec}ᵀ Λ̄_{i|prec} (…), where both factors are projected with M̄. q̈₀ is the backward
+    difference of q̇, τ₀ the applied torque; J̇_i q̇ is exact kinematics (Remarks 2 and 3). Gains, bounds and
+    damping are those of `OSF`.
     """
 
     incremental = True

@@ -16,14 +16,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class LevelView:
-    """One level of the hierarchy at this tick; m coordinates of all its tasks, one after the other.
+    """One level of the hierarchy at this tick. m is the number of coordinates of all its tasks together.
 
     Attributes:
         name: the level's name; "damping" for the level that damps the directions that no other level uses.
         tasks: names of its tasks.
         x: values of its tasks by name: coordinates (m,), or a rotation matrix (3, 3).
-        error: x̃ = x − x_d, (m,) m or rad; log₃(R R_dᵀ) for rotations, on fewer than three axes
-            see `OrientationTask`.
+        error: x̃ = x − x_d, (m,) m or rad; for rotations log₃(R R_dᵀ), and on fewer than three axes the error
+            of `OrientationTask`.
         x_dot: ẋ = J q̇, (m,).
         x_ddot: ẍ, the backward difference of ẋ, (m,).
         J: J_i of (3) at the measured q, (m, n).
@@ -60,8 +60,8 @@ class Bounds:
 
     Attributes:
         tau_lower, tau_upper: (n,) N·m.
-        v_lower, v_upper: on the next velocity, (n,) rad/s. With position limits by viability they include the
-            velocity from which a joint can still stop before its end.
+        v_lower, v_upper: bounds on the next velocity, (n,) rad/s. With position limits by viability they
+            include the velocity from which a joint can still stop before its limit.
         q_lower, q_upper: (n,) rad.
         approach: 1/s, largest rate at which the distance to a velocity bound may shrink; 0: no such limit.
     """
@@ -77,17 +77,18 @@ class Bounds:
 
 @dataclass(frozen=True, eq=False)
 class NearView:
-    """The pairs of two links, or of a link and an object, that could reach d_safe first, nearest first; r is
-    0 unless `avoidance.on`. Pairs that are farther apart than 0.25 m are left out.
+    """The r pairs of two links, or of a link and an object, that could reach d_safe first, sorted by
+    distance. r is 0 if `avoidance.on` is false. Pairs that are farther apart than 0.25 m are left out.
 
     Attributes:
-        names: of each pair.
+        names: the name of each pair.
         d: distance, (r,) m, negative inside.
         gradient: ∇d at the measured q, (r, n) m/rad.
-        d_safe: the distance that is kept, with its margin, (r,) m; less for links that are close at home.
-        moving: what the object's own motion takes from d per second, (r,) m/s.
-        reaction: t, time before the robot brakes, which the bound allows for, s.
-        deceleration: a, of the decrease of d, that the bound counts on, m/s².
+        d_safe: the distance to keep, with its margin, (r,) m; smaller for links that are close together at
+            home.
+        moving: speed at which the object's own motion reduces d, (r,) m/s.
+        reaction: t, time before the robot brakes, as the bound assumes, s.
+        deceleration: a, deceleration of the decrease of d, as the bound assumes, m/s².
     """
 
     names: tuple[str, ...]
@@ -101,7 +102,7 @@ class NearView:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """Everything a controller sees at tick k. Arrays are read-only.
+    """All data that a controller receives at tick k. Arrays are read-only.
 
     Attributes:
         q, q_dot: measured, (n,) rad and rad/s.

@@ -30,16 +30,16 @@ the tasks."""
 
 
 class Weighted(HIMPC):
-    """HIMPC without priorities: min Σ_i V_i over one U, V_i the cost (32a) of level i, under the same rows.
+    """HIMPC without priorities: min Σ_i V_i over one U under the same rows; V_i is the cost (32a) of level i.
 
-    Model, weights, bounds and hand-over are the same as in HIMPC, except that (33) is missing: the importance
-    of a level is its Q, and the order of the levels does not matter. A level's own horizon (Remark 8) ends
-    its residual, not its effort: R of (31) is the sum over all levels, up to the longest horizon.
+    Model, weights, bounds and memory are the same as in HIMPC, but (33) is missing: the importance of a level
+    is its Q, and the order of the levels has no effect. A level's own horizon (Remark 8) limits its residual,
+    but not its effort: R of (31) is the sum over all levels, up to the longest horizon.
 
-    Evidence: entry p of the plan is the solution of the same problem with levels 1 … p alone; the last one is
-    applied. Its leak is, as for HIMPC, the distance by which the levels below p move level p from its
-    solution without them. `cost` is V_p under the applied U. `step_us` does not include the r − 1 QPs that
-    only the evidence needs.
+    Evidence: entry p of the plan is the solution of the same problem with levels 1 … p alone; the last entry
+    is applied. The leak of an entry is, as for HIMPC, the largest change of a level p above it, compared with
+    entry p. `cost` is V_p under the applied U. `step_us` does not include the r − 1 QPs that only the
+    evidence needs.
     """
 
     _evidence_us = 0.0
@@ -88,7 +88,7 @@ class Weighted(HIMPC):
 
 
 def accumulated(levels: Sequence[LevelForm]) -> Iterator[LevelTable]:
-    """Builds the problems of levels 1 … p in one cost, for every p; the evidence of each problem is about
+    """Returns, for every p, the problem whose cost is the sum over levels 1 … p. Its evidence is that of
     level p."""
     R, knots = np.zeros_like(levels[0].R), 0
     for level in levels:
@@ -97,7 +97,7 @@ def accumulated(levels: Sequence[LevelForm]) -> Iterator[LevelTable]:
 
 
 def sum_of_costs(problems: Sequence[LevelProblem]) -> LevelProblem:
-    """Returns one problem whose cost is the sum of the problems' costs; it has the name of the last one."""
+    """Returns one problem whose cost is the sum of the problems' costs, with the name of the last problem."""
     knots = max(problem.knots for problem in problems)
     N = len(problems[0].B)
     weighted_C = []
@@ -150,6 +150,6 @@ def _softened(problem: LevelProblem) -> LevelProblem:
 
 
 def _leak(above: Sequence[LevelProblem], increments: Sequence[Array], place: int) -> float:
-    """‖J_p M̄⁻¹(Δτ_i − Δτ_p)‖∞ over knots and the levels p above level i."""
+    """Returns ‖J_p M̄⁻¹(Δτ_i − Δτ_p)‖∞ over knots and the levels p above level i."""
     effects = (problem.B @ (increments[place] - increments[p])[:, :, None] for p, problem in enumerate(above))
     return max((float(np.abs(effect).max()) for effect in effects), default=0.0)

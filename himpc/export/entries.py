@@ -1,5 +1,5 @@
-"""The C interface of an exported controller, in LLVM's text: it finds the arrays in a controller's memory and
-calls `control`."""
+"""The C interface of an exported controller, as LLVM text. Its functions find the arrays in a controller's
+memory and call `control`."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def entries_text(control_name: str, layout: int) -> str:
     """Returns the functions in EXPORTED.
 
     Args:
-        control_name: as of `kernel_text`.
+        control_name: the name that `kernel_text` returns.
         layout: the number that a controller's memory must have for this kernel.
     """
     return (

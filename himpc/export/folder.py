@@ -21,8 +21,8 @@ MOVE = 8
 
 
 _LOOP = """\
-| `loop.cpp` | a loop in step with the clock, with MuJoCo's C library as the robot. To build it, \
-MUJOCO being the folder of the Python package mujoco: \
+| `loop.cpp` | a loop in real time, with MuJoCo's C library as the robot. To build it, \
+set MUJOCO to the folder of the Python package mujoco: \
 `g++ -O2 -I$MUJOCO/include loop.cpp himpc.o $MUJOCO/libmujoco.so.* -Wl,-rpath,$MUJOCO -o loop` |
 """
 
@@ -49,10 +49,10 @@ def files_of(
 
     Args:
         image: the controller.
-        target: what its code is for.
+        target: the target of the code.
         torques: N·m, the largest torque of each joint.
         recorded: a run to replay.
-        name: the target's.
+        name: the name of the target.
         plant: the simulated robot, for MuJoCo's C library.
     """
     code = object_code(target)
@@ -73,7 +73,8 @@ def files_of(
 
 
 def vector_of(recorded: Recorded) -> bytes:
-    """Returns a recorded run as bytes: how many periods and moves (int64), the moves, then the rows."""
+    """Returns a recorded run as bytes: the numbers of periods and of moves (int64), the moves, then the
+    rows."""
     moves = np.zeros((len(recorded.moves), 3 + MOVE))
     for row, move in zip(moves, recorded.moves, strict=True):
         row[:3], row[3 : 3 + len(move.values)] = (move.tick, move.task, len(move.values)), move.values
@@ -84,7 +85,7 @@ def vector_of(recorded: Recorded) -> bytes:
 def _readme(image: Image, target: Target, object_name: str, ticks: int) -> str:
     wasm = target.ending == "wasm"
     if wasm:
-        commands, needs = "    node replay.mjs", "`sin`, `cos` and the like, which JavaScript has"
+        commands, needs = "    node replay.mjs", "`sin`, `cos` and similar functions of JavaScript"
         extra = "| `himpc.mjs` | the JavaScript interface |\n| `replay.mjs` | replays `vector.bin` |\n"
     else:
         commands = f"    {target.compiler} -O2 replay.c {object_name} -lm -o replay\n    ./replay"

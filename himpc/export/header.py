@@ -14,7 +14,7 @@ def header(manifest: dict[str, Any], torques: Sequence[float]) -> str:
     """Returns the header of a controller.
 
     Args:
-        manifest: of its `Image`.
+        manifest: the manifest of its `Image`.
         torques: N·m, the largest torque of each joint.
     """
     tasks, levels = manifest["tasks"], manifest["levels"]
@@ -51,7 +51,7 @@ def _plain(name: str) -> str:
 
 
 def _strings(names: Sequence[str]) -> str:
-    """Names as string literals of C."""
+    """Returns names as string literals of C."""
     return ", ".join(f'"{"".join(map(_letter, name.encode()))}"' for name in names)
 
 

@@ -42,9 +42,9 @@ from himpc.tick.tables import LevelTable, budget_of
 from robots import InputError, Robot
 
 _LINE = 64
-"""Arrays begin at multiples of so many bytes."""
+"""Arrays begin at multiples of this number of bytes."""
 _MOST_LEVELS = 10
-"""A table has an entry for every set of levels that are on."""
+"""Largest number of levels: a table has an entry for every possible set of enabled levels."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +52,7 @@ class Image:
     """An exported controller.
 
     Attributes:
-        memory: the bytes that a program copies to have a controller.
+        memory: the bytes that a program copies to create a controller.
         manifest: the description of the bytes, as JSON.
     """
 
@@ -65,11 +65,11 @@ def image_of(controller: Controller, robot: Robot, references: Mapping[str, Refe
 
     Args:
         controller: HIMPC, HIQP, NHIMPC or Weighted on the compiled route.
-        robot: whose it is.
-        references: of every task by its name, before the first period.
+        robot: the robot of the controller.
+        references: the references of all tasks by name, before the first period.
 
     Raises:
-        InputError: it uses something that exported controllers do not have.
+        InputError: the controller uses something that cannot be exported.
     """
     settings = controller.settings
     check(controller, settings)
@@ -125,12 +125,12 @@ def image_of(controller: Controller, robot: Robot, references: Mapping[str, Refe
 
 
 def _levels(robot: Robot, settings: Settings, strict: bool) -> tuple[StackForm, list[Task], list[LevelTable]]:
-    """The levels, also those that are off, if there is a strict hierarchy; else those that are on."""
+    """Returns the levels to export: for a strict hierarchy all levels, otherwise the enabled levels."""
     if strict:
         levels = (*settings.stack, DAMPING_LEVEL) if settings.damping else settings.stack
         if len(levels) > _MOST_LEVELS:
             raise InputError(
-                f"the stack has {len(settings.stack)} levels: export takes at most {_MOST_LEVELS}"
+                f"the stack has {len(settings.stack)} levels: export supports at most {_MOST_LEVELS}"
             )
         if not levels:
             raise InputError("the stack is empty and damping is off: export needs at least one level")
@@ -143,8 +143,8 @@ def _levels(robot: Robot, settings: Settings, strict: bool) -> tuple[StackForm, 
 
 
 def _damped(robot: Robot, settings: Settings) -> list[float]:
-    """Whether the damping level is added, for every choice of levels that are on; bit k stands for level
-    k."""
+    """Returns whether the damping level is added, for every set of enabled levels; bit k of the index stands
+    for level k."""
     found = []
     for choice in range(1 << len(settings.stack)):
         stack = tuple(
@@ -186,14 +186,14 @@ def _write_reference(
         return told | {"target": kind}
     if not write_curve(arena, place, span, reference):
         raise InputError(
-            f"task '{task.name}' follows a {type(reference).__name__}, which export does not have: choose a "
+            f"task '{task.name}' follows a {type(reference).__name__}, which cannot be exported: choose a "
             "scene whose references are circles, swings, constants or dragged targets"
         )
     return told | {"target": "fixed"}
 
 
 def _joined(arena: Arena, loop: Array, loop_where: Array, n: int) -> tuple[bytes, dict[str, int]]:
-    """Returns the words with the places of the arrays, followed by all arrays."""
+    """Returns the words that describe where the arrays begin, followed by all arrays."""
     given = (*arena.arguments, loop, loop_where)
     words, offsets, end = np.zeros(WORDS, np.int64), {}, 8 * WORDS
     pieces = []

@@ -13,7 +13,7 @@ from himpc.tick.kernel.arrays import NUMBERS, WHOLES
 
 @cache
 def layout_number() -> int:
-    """Returns a number that is different for every version of the kernel's sources. A kernel refuses memory
-    whose number is not its own."""
+    """Returns a number that is different for every version of the kernel's sources. A kernel refuses a memory
+    with another number."""
     tables = repr((NUMBERS, WHOLES, SHAPES)).encode()
     return int.from_bytes(sha256(tables + digest_of(control.py_func)).digest()[:7], "little")

@@ -19,7 +19,7 @@ _STACK = 1 << 20
 def check_linker() -> None:
     """Raises InputError if there is no linker for WebAssembly."""
     if not _linker():
-        raise InputError('the target wasm32 needs a linker: pip install "himpc-lab[export]" brings one')
+        raise InputError('the target wasm32 needs a linker: pip install "himpc-lab[export]" installs one')
 
 
 def linked(code: bytes) -> bytes:

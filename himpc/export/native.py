@@ -35,7 +35,7 @@ def build(folder: Path) -> Path:
     Raises InputError if there is no C compiler."""
     compiler = shutil.which("cc")
     if compiler is None:
-        raise InputError("the controller is linked by a C compiler, and there is none called cc: install one")
+        raise InputError("the controller is linked by a C compiler, but none named cc was found: install one")
     made, library = folder / "himpc.o", folder / "himpc.so"
     made.write_bytes(object_code(target_named(target_here())))
     link(made, library)
@@ -49,11 +49,11 @@ def link(made: Path, library: Path) -> None:
 
 @final
 class NativeController:
-    """A controller of a shared library: `himpc_tick`, `himpc_reset` and `himpc_set` of `himpc.h`."""
+    """A controller in a shared library: `himpc_tick`, `himpc_reset` and `himpc_set` of `himpc.h`."""
 
     def __init__(self, library: Path, image: bytes, manifest: dict[str, Any]) -> None:
-        """library: as `build` makes it; image, manifest: see `Image`. Raises ValueError if the image is for
-        another kernel."""
+        """library: the library that `build` returns; image, manifest: see `Image`. Raises ValueError if the
+        image is for another kernel."""
         self._c = ctypes.CDLL(str(library))
         pointer, whole = ctypes.c_void_p, ctypes.c_int
         self._c.himpc_tick.argtypes = [pointer] * 5
@@ -78,17 +78,16 @@ class NativeController:
         return cls(library, image.memory, image.manifest)
 
     def check(self, size: int) -> int:
-        """`himpc_check` of its memory."""
+        """Returns the result of `himpc_check` for the controller's memory."""
         return self._c.himpc_check(self._at, size)
 
     def reset(self, tau: Array | None = None) -> None:
-        """Forgets everything but the settings; tau: the torque that acts now, (n,) N·m, zero if it is not
-        given."""
+        """Clears everything except the settings. tau: the torque that acts now, (n,) N·m; None: zero."""
         self._numbers[3] = 0.0 if tau is None else tau
         self._c.himpc_reset(self._at, self._places[3])
 
     def tick(self, q: Array, v: Array, tau_applied: Array | None = None) -> tuple[Array, int]:
-        """One period.
+        """Performs one control period.
 
         Args:
             q, v: measured state, (n,) rad and rad/s.
@@ -106,7 +105,7 @@ class NativeController:
         return numbers[3].copy(), fallback
 
     def set(self, what: int, index: int, values: Any) -> int:
-        """Changes a setting, see `himpc.export.kernel.adjust`; returns 0 or what is wrong."""
+        """Changes a setting, see `himpc.export.kernel.adjust`; returns 0 or a fault."""
         numbers = np.array(values, float).ravel()
         return self._c.himpc_set(self._at, what, index, numbers.ctypes.data, numbers.size)
 

@@ -22,10 +22,10 @@ class Target:
     """A target of the code.
 
     Attributes:
-        triple: as LLVM calls it.
-        features: of the processor, besides those that every one of its kind has.
-        bits: of a pointer.
-        ending: of the object file's name.
+        triple: LLVM's name of the target.
+        features: features of the processor beyond those that all processors of its kind have.
+        bits: number of bits of a pointer.
+        ending: ending of the object file's name.
         compiler: a C compiler that links the replay for the target.
     """
 
@@ -58,7 +58,7 @@ _COUNTS = re.compile(r"^define [^\n]*@(NRT_incref|NRT_decref)\(.*?^\}\n", re.MUL
 
 
 _STRUCTURES = re.compile(r"= alloca (?!i\d+,|ptr,|double,)|getelementptr [\w ]*[{%]")
-"""Local variables that are not numbers, and places inside a structure."""
+"""Matches local variables that are not numbers, and addresses inside a structure."""
 
 
 def target_named(name: str) -> Target:
@@ -111,21 +111,21 @@ def _portable() -> str:
         _optimise(whole, machine, tuning)
         text = str(whole)
         if _STRUCTURES.search(text):
-            raise RuntimeError("structures are left, in which places depend on the size of a pointer")
+            raise RuntimeError("structures are left whose layout depends on the size of a pointer")
         return zlib.compress(text.encode())
 
     return zlib.decompress(kept(control.py_func, f"portable-{_own_digest()}", make)).decode()
 
 
 def _own_digest() -> str:
-    """A digest of the files that make code of Numba's text."""
+    """Returns a digest of the source files that turn Numba's text into code."""
     own = b"".join(Path(__file__).with_name(name).read_bytes() for name in ("objects.py", "entries.py"))
     return sha256(own).hexdigest()[:8]
 
 
 def _machine(target: Target) -> tuple[llvm.TargetMachine, str]:
-    """LLVM's generator for a target, and the first lines of a text for it. Raises InputError if LLVM has no
-    such target."""
+    """Returns LLVM's generator for a target, and the first lines of a text for it. Raises InputError if LLVM
+    has no such target."""
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
     try:
@@ -143,7 +143,8 @@ def _optimise(whole: llvm.ModuleRef, machine: llvm.TargetMachine, tuning: llvm.P
 
 
 def _retargeted(text: str, head: str) -> str:
-    """A module for another target, without reference counts: nothing that a tick uses is allocated."""
+    """Returns a module for another target, without reference counts: nothing that a tick uses is
+    allocated."""
     text = _COUNTS.sub(r"define linkonce_odr void @\1(ptr %p) {\n  ret void\n}\n", text)
     for name in re.findall(r"^define linkonce_odr void @(\w+)\(ptr %p\)", text, re.MULTILINE):
         text = re.sub(rf"^declare .*@{name}\(.*\n", "", text, flags=re.MULTILINE)

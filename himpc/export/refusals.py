@@ -1,4 +1,4 @@
-"""Refuses what cannot be exported, with one sentence for each reason."""
+"""Refuses controllers that cannot be exported, with one sentence for each reason."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from robots import InputError
 
 
 def check(controller: Controller, settings: Settings) -> None:
-    """Raises InputError if an exported controller lacks something that this controller uses."""
+    """Raises InputError if this controller uses something that cannot be exported."""
     if type(controller) not in (HIMPC, HIQP, NHIMPC, Weighted):
         raise InputError(
-            f"the controller {type(controller).__name__} is not compiled: export takes himpc, hiqp, nhimpc "
-            "and weighted"
+            f"the controller {type(controller).__name__} is not compiled: export supports himpc, hiqp, "
+            "nhimpc and weighted"
         )
     if settings.route != "compiled":
-        raise InputError("route=explicit is not compiled: export takes route=compiled")
+        raise InputError("route=explicit is not compiled: export supports route=compiled")
     if settings.M_bar_adapt:
         raise InputError(
             "M_bar_adapt needs the robot's dynamic model, which is not exported: set it to false"
@@ -36,6 +36,6 @@ def check(controller: Controller, settings: Settings) -> None:
         for task in level.tasks:
             if not is_built_in(task):
                 raise InputError(
-                    f"task '{task.name}' is a {type(task).__name__}, which Python computes: export takes "
+                    f"task '{task.name}' is a {type(task).__name__}, which Python computes: export supports "
                     "positions and orientations of frames, joints and postures"
                 )

@@ -33,7 +33,7 @@ class LevelForm:
     Attributes:
         level: the level.
         name: its identity.
-        rows: its rows among those of all levels.
+        rows: its rows among the rows of all levels.
         C: (N, m, N), effect coefficients.
         root_Q: (m,), √Q.
         weighted_C: (K, m, K), √Q C over the level's own knots.
@@ -106,7 +106,8 @@ class StackForm:
     def drift(
         self, robot: Robot, data: pin.Data, q: Array, v: Array, previews: Mapping[str, Preview], h: float
     ) -> Array:
-        """J̇ q̇ of all rows, (m,), from the change of J along the motion of the robot and of the targets.
+        """Returns J̇ q̇ of all rows, (m,), from the change of J along the motion of the robot and of the
+        targets.
 
         Args:
             robot, data, q, v, previews: as for a `Configuration`.
@@ -130,16 +131,16 @@ class StackForm:
         return {**previews, **asked} if asked else previews
 
     def lengths(self, errors: Mapping[str, Array]) -> Array:
-        """The length of each task's error, m or rad."""
+        """Returns the length of each task's error, m or rad."""
         return np.array([float(np.linalg.norm(errors[task.name])) for task in self.tasks])
 
     def fastest(self, previews: Mapping[str, Preview]) -> float:
-        """The largest velocity of a coordinate of the references, m/s or rad/s."""
+        """Returns the largest velocity of a coordinate of the references, m/s or rad/s."""
         led = (task for task in self.tasks if not isinstance(task, Damping))
         return max((float(np.abs(previews[task.name].velocity[0]).max()) for task in led), default=0.0)
 
     def pulling(self, error: Array, pull: float) -> Array:
-        """x̃ on which the tasks act, (m,): errors that are longer than they pull are shortened, see
+        """Returns x̃ on which the tasks act, (m,): an error beyond its limit is shortened, see
         `Avoidance.pull`."""
         parts = np.split(error, np.cumsum(self.sizes)[:-1])
         most = [pull if isinstance(task, FramePosition) else TURN_PULL * pull for task in self.tasks]
@@ -171,7 +172,7 @@ def measure(
     values: dict[str, Array],
     errors: dict[str, Array],
 ) -> Array:
-    """Returns x̃ of tasks, (m,); x and x̃ of each are written to `values` and `errors`."""
+    """Returns x̃ of tasks, (m,); writes x and x̃ of each task to `values` and `errors`."""
     found = []
     for task in tasks:
         value = task.value(configuration)

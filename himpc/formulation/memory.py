@@ -20,9 +20,9 @@ class Memory(NamedTuple):
 
     Attributes:
         q, v: measured state of the last tick, (n,).
-        period: seconds between that tick and this one.
+        period: time between the last tick and this one, s.
         x_dot: ẋ of the last tick, all rows of `form`, (m,); None: not known.
-        form: the prepared levels those rows belong to.
+        form: the prepared levels to which the rows of `x_dot` belong.
         predicted_q: q* at knots 0 … N of the last plan, (N+1, n).
         solutions: the last plan's levels by name.
     """
@@ -41,7 +41,7 @@ class Memory(NamedTuple):
         return cls(q, v, T_s)
 
     def knots(self, q: Array, v: Array, N: int, T_s: float) -> Array:
-        """q*_{k+j|k−1}, j = 1 … N−1, shifted to begin at the measured q: (N−1, n), see (30).
+        """Returns q*_{k+j|k−1}, j = 1 … N−1, shifted to begin at the measured q: (N−1, n), see (30).
 
         If the last prediction is too short for the horizon, it is continued at constant velocity.
         """

@@ -30,12 +30,13 @@ class Settings:
             torques, see `himpc.controllers.adaptation`.
         limits: bounds to impose.
         route: "compiled" (the kernel of `himpc.tick`) or "explicit" (a general solver on all bounds).
-        solver: "daqp", "proxqp" or, with CasADi installed, "qpoases": solves the QPs of the explicit route
-            and of hqp. Where it would change nothing, only "daqp" is accepted, see `check_solver`.
+        solver: the solver of the QPs of the explicit route and of hqp: "daqp", "proxqp" or, with CasADi
+            installed, "qpoases". If no QP solver is used, only "daqp" is accepted, see `check_solver`.
         R_on: the quantity that R in (31) weighs: the "torque" increments Δτ as printed, or the "acceleration"
-            M̄⁻¹Δτ (HQP: with its model's M_n).
-        damping: add the damping level whenever the enabled levels leave freedom.
-        nominal: the dynamic model that model-based controllers and `M_bar_adapt` use; others do not use it.
+            M̄⁻¹Δτ (in HQP with M_n of its model).
+        damping: whether the damping level is added if the enabled levels leave freedom.
+        nominal: the dynamic model that model-based controllers and `M_bar_adapt` use; other controllers do
+            not use it.
     """
 
     stack: Stack
@@ -54,7 +55,7 @@ class Settings:
         check_fields(self)
         if not is_installed(self.solver):
             raise InputError(
-                f"solver '{self.solver}' needs CasADi, which is not here: pip install casadi, or take daqp"
+                f"solver '{self.solver}' needs CasADi, which is missing: pip install casadi, or use daqp"
             )
         check_names(self.stack)
 
@@ -63,6 +64,6 @@ def check_solver(settings: Settings, used: bool) -> None:
     """Raises InputError for a QP solver other than the default if the controller uses no QP solver."""
     if settings.solver != "daqp" and not used:
         raise InputError(
-            f"solver={settings.solver} changes nothing here: only hqp uses a QP solver, and himpc, hiqp, "
-            "nhimpc and weighted with route=explicit do; choose solver=daqp, or one of these"
+            f"solver={settings.solver} changes nothing here: a QP solver is used by hqp, and by himpc, hiqp, "
+            "nhimpc and weighted with route=explicit; choose one of these, or solver=daqp"
         )

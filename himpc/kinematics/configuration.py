@@ -25,7 +25,7 @@ class Configuration:
     """Frames and Jacobians at the measured q_k and at the knots q*_{k+j|k−1}, j = 1 … N−1.
 
     Jacobians are computed once per frame and tick, for any number of tasks on that frame. Only geometry is
-    used, no inertia or gravity, so the controller needs no dynamic model; the only exception is a task of the
+    used, no inertia or gravity, so the controller needs no dynamic model. The only exception is a task of the
     centre of mass, which uses masses.
 
     Args:
@@ -34,7 +34,7 @@ class Configuration:
         q: measured joint positions, (n,) rad or m.
         v: measured joint velocities, (n,).
         knots: predicted joint positions at knots 1 … N−1, (N−1, n); empty for N = 1.
-        previews: references by task, for tasks whose coordinates depend on where their target is.
+        previews: references by task name, for tasks whose coordinates depend on the position of their target.
         jacobians, placed: functions from a frame's name to its Jacobians (N, 6, n) and to its placement at
             q_k, if the caller has computed them already.
     """

@@ -13,7 +13,8 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ResidualModel:
-    """e_{j+1} = free_{j+1} + Σ_s C[j, ·, s] ∘ (J_s M̄⁻¹ Δτ_s) for one set of gains, horizon and period.
+    """The model e_{j+1} = free_{j+1} + Σ_s C[j, ·, s] ∘ (J_s M̄⁻¹ Δτ_s) for one set of gains, horizon and
+    period.
 
     The double integrator (14) makes the effect of Δτ_s on e_{j+1} a scalar per coordinate,
     c_l = 1 + K_v T_s (l+1) + K_p T_s² l(l+1)/2 with l = j − s: no powers of A₁ are needed.

@@ -1,4 +1,4 @@
-"""`StallGuard` by the compiled kernel."""
+"""A `StallGuard` that uses the compiled kernel."""
 
 from __future__ import annotations
 

@@ -89,9 +89,9 @@ def write_tasks(
     Args:
         robot: gives the geometry.
         tasks: in the order of their rows.
-        counts: number of rows of each.
+        counts: number of rows of each task.
         N: knots.
-        solved: number of rows of the tasks that are solved for; they come first.
+        solved: number of rows of the tasks that are solved; these rows come first.
         levels, bounds, directed: number of each, see `sizes`.
     """
     frames = sorted({task.frame or robot.tip for task in tasks if isinstance(task, FrameTask)})
@@ -124,15 +124,15 @@ def write_tasks(
 
 
 def write_limits(arena: Arena, limits: LimitsInForce, paper: bool) -> None:
-    """Writes the bounds in force. The position bounds are the limits themselves for `paper`, otherwise the
-    positions at which joints are stopped; telemetry gets the limits themselves."""
+    """Writes the bounds in force. With `paper` the position bounds are the position limits; otherwise they
+    are the positions at which joints are stopped. Telemetry always gets the position limits."""
     q = limits.q_lower, limits.q_upper
     stops = q if paper else limits.stops
     arena.f["limits"][:] = limits.tau_lower, limits.tau_upper, limits.v_limit, *stops, limits.a_max, *q
 
 
 def write_velocity_limits(arena: Arena, v_limit: Array) -> None:
-    """Writes other velocity limits, (n,) rad/s; all else of `write_limits` remains."""
+    """Writes new velocity limits, (n,) rad/s; all other bounds stay as `write_limits` wrote them."""
     arena.f["limits"][2] = v_limit
 
 

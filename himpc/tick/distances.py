@@ -35,11 +35,11 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 _AT_HOME = 0.5
-"""Share of their distance at home that links keep at most: d_safe must not forbid the posture at home."""
+"""Links must keep at most this share of their distance at home: d_safe must not forbid the home posture."""
 _GRID = 15
-"""Number of postures of a joint between two links that are checked."""
+"""Number of positions of each joint between two links that are checked."""
 _NEVER = 0.03
-"""m: links with at most two joints between them that are farther apart in all postures need no row."""
+"""m: two links with at most two joints between them need no row if they are farther apart in all postures."""
 
 
 _STILL = np.zeros((0, 3))
@@ -47,11 +47,12 @@ _STILL = np.zeros((0, 3))
 
 
 class _Pairs:
-    """The pairs of capsules and shapes that are near, with room for all of some surroundings.
+    """The near pairs of capsules and shapes. The arrays have space for all pairs of the surroundings.
 
     Attributes:
         count: number of pairs.
-        sphere, shape: (count,) or more, indices of each. distance: m. normal: (·, 3). slopes: (·, n).
+        sphere, shape: (count,) or more, indices of the capsule and of the shape of each pair. distance: m.
+            normal: (·, 3). slopes: (·, n).
     """
 
     def __init__(self, tree: Geometry, around: Surroundings) -> None:
@@ -64,8 +65,8 @@ class _Pairs:
         self.count = 0
 
     def find(self, placed: Array, z: Array, within: float) -> None:
-        """Finds the pairs nearer than `within`, m, for placements of the joints as in `forward_kinematics`,
-        (1, n+1, 12) and (1, n+1, 3)."""
+        """Finds the pairs nearer than `within`, m, for placements and axes of the joints, (1, n+1, 12) and
+        (1, n+1, 3), as in `forward_kinematics`."""
         around, tree = self.around, self._tree
         self.count = near(
             *(placed, z, tree.is_revolute, tree.moves, around.joint, around.centre, around.span),
@@ -76,8 +77,8 @@ class _Pairs:
 
 
 class _Links(NamedTuple):
-    """The checks between the links of a robot, (S, S) each: the pairs of capsules, and the largest distance,
-    m, that each pair must keep."""
+    """The pairs of links of a robot that are checked, as two tables (S, S): which capsules form a pair, and
+    the largest distance, m, that a pair may have to keep."""
 
     meets: NDArray[np.bool_]
     kept: Array
@@ -85,8 +86,8 @@ class _Links(NamedTuple):
 
 @per_robot
 def _links(robot: Robot) -> _Links:
-    """All pairs of `cover_surroundings`, but those of links with at most two joints between them that are
-    never nearer than _NEVER: they would take up the rows of pairs that can touch."""
+    """Returns all pairs of `cover_surroundings`, except links with at most two joints between them that are
+    never nearer than _NEVER. Such links would take up the rows of pairs that can touch."""
     tree, around, data = (
         geometry(robot),
         cover_surroundings(robot, cover_of(robot), ()),
@@ -117,7 +118,8 @@ def _links(robot: Robot) -> _Links:
 
 
 def _placements(robot: Robot, data: pin.Data, q: Array) -> tuple[Array, Array]:
-    """The placements of the joints at q, (n,), as in `forward_kinematics`, (1, n+1, 12) and (1, n+1, 3)."""
+    """Returns the placements and axes of the joints at q, (1, n+1, 12) and (1, n+1, 3), see
+    `forward_kinematics`."""
     pin.forwardKinematics(robot.model, data, q)
     placed = np.array([[*each.rotation.ravel(), *each.translation] for each in data.oMi])
     z = [each.rotation @ axis for each, axis in zip(data.oMi, geometry(robot).axis, strict=True)]
@@ -125,7 +127,8 @@ def _placements(robot: Robot, data: pin.Data, q: Array) -> tuple[Array, Array]:
 
 
 class Distances:
-    """The distances of a robot's cover from the objects that a controller knows, and between its links.
+    """Computes the distances of a robot's cover from the objects that a controller knows, and between its
+    links.
 
     Attributes:
         carried: (n, n), entry [k, j]: whether the motor of joint j carries joint k; true for k = j.
@@ -151,8 +154,8 @@ class Distances:
 
     @property
     def room(self) -> float:
-        """The least distance of a pair at the last tick minus what the pair must keep, m; infinite if no pair
-        was within `WITHIN`."""
+        """The smallest difference, m, between the distance of a pair at the last tick and the distance that
+        the pair must keep. Infinite if no pair was within `WITHIN`."""
         return float(self._about[ROOM])
 
     @property
@@ -161,7 +164,7 @@ class Distances:
         return bool(self._about[FASTEST] > PROGRESS)
 
     def observe(self, observed: Observed) -> None:
-        """Takes over the placements of the objects."""
+        """Stores the present placements of the objects."""
         before, self._observed = self._observed, observed
         if observed.shapes == before.shapes:
             return
@@ -172,7 +175,7 @@ class Distances:
             self._know(observed)
 
     def _know(self, observed: Observed) -> None:
-        """Prepares the arrays for other objects than before."""
+        """Prepares the arrays for a new set of objects."""
         around = cover_surroundings(self._robot, cover_of(self._robot), observed.shapes)
         links, B = _links(self._robot), len(observed.shapes)
         around.meets[B:] = links.meets
@@ -202,7 +205,7 @@ class Distances:
         return count
 
     def at(self, q: Array, observed: Observed) -> Near:
-        """The nearest pairs at the positions q, (n,)."""
+        """Returns the nearest pairs at the positions q, (n,)."""
         self.observe(observed)
         count = self._find(*_placements(self._robot, self._data, q))
         pairs, chosen = self._pairs, self._chosen[:count]
@@ -226,6 +229,6 @@ class Distances:
 
 
 def _kind(shape: WorldShape) -> tuple[object, ...]:
-    """The data that stay constant when an object moves."""
+    """Returns the data of a shape that stay constant when the object moves."""
     fixed = (value for name, value in vars(shape).items() if name not in ("centre", "foot", "yaw"))
     return type(shape), *fixed

@@ -1,5 +1,5 @@
-"""A control period on an `Arena` (the numbers of one controller). A level for which no optimum is found
-within the arena's budget, which all levels share, gets a fallback."""
+"""Performs a control period on an `Arena`, which holds the numbers of one controller. All levels share the
+arena's budget. A level whose optimum is not found within this budget gets a fallback."""
 
 from __future__ import annotations
 
@@ -25,10 +25,11 @@ from himpc.tick.printed import printed_problem
 _SMALL = 40
 """Largest number of unknowns for which the printed QP is solved after the kernel has failed."""
 _ITERATIONS = 100
-"""Largest number of iterations of DAQP in each of at most two attempts, which take milliseconds together."""
+"""Largest number of iterations of DAQP per attempt. At most two attempts are made; both together take
+milliseconds."""
 
 _TOLERATED = 1e-6
-"""N·m: rows that are wider than this have no solution for the printed route either."""
+"""N·m: rows that must be widened by more than this have no solution on the printed route either."""
 
 LEAK = 1e-7
 """m/s²: largest change that a point may cause at the levels above."""
@@ -42,21 +43,22 @@ class FallbackBudget:
 
     @property
     def spared(self) -> bool:
-        """Whether the budget left allows all levels to be solved once more."""
+        """Whether the remaining budget allows all levels to be solved once more."""
         return self.left >= 2
 
 
 def perform(arena: Arena, parts: int, like: Rows, budget: FallbackBudget) -> int:
-    """Performs parts of a control period; returns for how many levels no optimum was found, NOT_FINITE if
+    """Performs parts of a control period. Returns the number of levels without an optimum, or NOT_FINITE if
     the problems or the torque are not finite.
 
     The fallbacks are those of `solve_cascade` and one more, "feasible": if the kernel ran out of budget, the
     level moves towards the last point of the kernel as far as the rows allow. All levels share the budget of
-    the arena, which bounds the time of a tick: the part that one level uses is not available to the next
-    ones, which then need further fallbacks.
+    the arena, which bounds the time of a tick. If one level uses most of the budget, the next levels may need
+    fallbacks as well.
 
     Args:
-        arena: the rows may be wider afterwards: levels below also use rows that a fallback has widened.
+        arena: its rows may be wider afterwards: if a fallback widens rows, the levels below use the wider
+            rows.
         parts: see `control_period`.
         like: rows with the constraints, directions and L of the arena; their bounds are not used.
         budget: the budget of this tick, from which every printed QP is deducted.
@@ -118,7 +120,7 @@ def _climb_down(arena: Arena, place: int, like: Rows, budget: FallbackBudget) ->
 
 
 def _contradict(rows: Rows, widened: Rows) -> bool:
-    """Whether rows have no solution: they had to be widened by more than solvers tolerate."""
+    """Whether rows have no solution: `widened` is wider than they are by more than solvers tolerate."""
     return bool(
         (widened.lower < rows.lower - _TOLERATED).any() or (widened.upper > rows.upper + _TOLERATED).any()
     )
@@ -127,8 +129,8 @@ def _contradict(rows: Rows, widened: Rows) -> bool:
 def _on_the_way(
     arena: Arena, place: int, rows: Rows, fallback: Fallback, U: Array, wanted: Array
 ) -> Fallback:
-    """Moves U, which satisfies the rows, towards the point that the kernel reached if that improves the cost;
-    returns the name of the fallback, or the given one if there is no improvement."""
+    """Moves U, which satisfies the rows, towards `wanted`, the point that the kernel reached, if this
+    improves the cost. Returns "feasible" after a move, otherwise the argument `fallback`."""
     f = arena.f
     on_the_way = towards(rows, U, wanted)
     if on_the_way is not None and place and not arena.i["level"][place, ALONE]:
@@ -170,7 +172,7 @@ def _write(arena: Arena, rows: Rows) -> None:
 
 
 def _put(arena: Arena, place: int, point: Point) -> None:
-    """Writes a level's point that was not found by the kernel."""
+    """Writes the point of a level that another solver than the kernel has found."""
     f, i, active = arena.f, arena.i, point.active
     f["U"][place], f["kkt"][place], i["active_count"][place] = point.U, point.kkt_residual, len(active)
     here = place, slice(0, len(active))

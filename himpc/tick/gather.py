@@ -18,12 +18,12 @@ field."""
 
 
 def gathered(arena: Arena, layout: Layout, spans: Sequence[Span], levels: Sequence[str]) -> Whole | None:
-    """Returns for every field that a plan and its references fill its index in `arena.data`, and the index of
-    a NaN for all other fields.
+    """Returns an index into `arena.data` for every field of a row. It is the index of the field's number if a
+    plan or its references fill the field, otherwise the index of a NaN.
 
     Args:
-        arena: of a controller.
-        layout: of the row.
+        arena: the arena of a controller.
+        layout: the layout of the row.
         spans: index, task and rows of every task.
         levels: names of the levels that are solved.
 

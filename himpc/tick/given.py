@@ -44,8 +44,9 @@ class GivenRows:
                     self.turning.add(task.name)
 
     def at_first(self, task: Task, preview: Preview) -> Preview:
-        """Returns a preview without changes. For an orientation on fewer than three axes the reference
-        depends on the robot's configuration; `write` adds this part."""
+        """Returns the preview that is written first: the argument itself or, for an orientation on fewer than
+        three axes, a preview at rest. The motion of such a reference depends on the robot's configuration;
+        `write` adds it."""
         if not isinstance(task, OrientationTask) or len(task.axes) == len(AXES):
             return preview
         self._turned[task.name] = not rests(preview)
@@ -57,7 +58,7 @@ class GivenRows:
         reference.
 
         Args:
-            previews: of every task. The arena must hold the measured state and the memory.
+            previews: the previews of all tasks. The arena must hold the measured state and the memory.
         """
         if not self._given and True not in self._turned.values():
             return

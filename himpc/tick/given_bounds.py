@@ -21,8 +21,8 @@ from robots import Robot
 
 
 class GivenBounds:
-    """The constraints that `given_of` names. Their bounds are in the arena before levels are solved. Those of
-    distances are computed by the kernel, from objects that it does not hold.
+    """The constraints that `given_of` returns. Their bounds are written to the arena before levels are
+    solved. The kernel computes the bounds of distances, from objects that are stored in Python.
 
     Attributes:
         distances: the pairs whose distances are kept; None if none are.
@@ -37,12 +37,12 @@ class GivenBounds:
         self.distances = Distances(robot, settings.limits.avoidance) if DISTANCE in constraints else None
 
     def write(self, rows: Rows, force: LimitsInForce, observed: Observed) -> Rows:
-        """Writes bounds and directions of this tick; returns the rows with the directions. Those of distances
-        are views of the arena, and change at the next tick.
+        """Writes bounds and directions of this tick; returns the rows with the directions. The directions of
+        distances are views of the arena, and change at the next tick.
 
         Args:
-            rows: with the constraints of the arena.
-            force: the limits in force. The arena holds the measured state and what is remembered.
+            rows: rows with the constraints of the arena.
+            force: the limits in force. The measured state and the memory are read from the arena.
             observed: the objects around the robot.
         """
         if not self._given:

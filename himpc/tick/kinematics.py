@@ -16,7 +16,7 @@ from himpc.tick.kernel.control_period import LINEARIZE, NOT_FINITE, control_peri
 from robots import Robot
 
 _NUDGES = 3
-"""Number of states: the state itself, and one to each side of it."""
+"""Number of states: the state itself, one before it and one after it."""
 
 
 class Seen(NamedTuple):
@@ -51,7 +51,7 @@ class Kinematics:
 
         Args:
             q, v: (n,).
-            h: s, time by which the joints are moved along v to both sides for the change of J.
+            h: s, time by which the joints are moved along v, forward and backward, for the difference of J.
             previews: of every task; only the present value is used.
 
         Raises:

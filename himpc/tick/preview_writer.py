@@ -26,7 +26,8 @@ class PreviewWriter:
         self._read: dict[int, Reference | Preview | None] = {}
 
     def write(self, previews: Mapping[str, Preview]) -> None:
-        """Writes the changed previews of all tasks, or the coefficients of the references."""
+        """Writes the reference of every task that has changed: as coefficients if the kernel can evaluate it,
+        otherwise as a preview."""
         f = self._arena.f
         references: Mapping[str, Reference] = {}
         t = 0.0
@@ -50,7 +51,8 @@ class PreviewWriter:
                 self._read[place] = preview if target else None
 
     def _shows(self, place: int, span: slice, target: Target, t: float) -> bool:
-        """Whether a moving target has written its motion to the arrays that the kernel reads."""
+        """Lets a moving target write its motion to the arrays that the kernel reads; returns whether it
+        did."""
         f = self._arena.f
         x_d = target.show(t, self._T_s, f["motion"][:, :, span])
         if x_d is None:

@@ -20,7 +20,7 @@ def solve_problems(
     rows: Rows,
     previous: Mapping[str, LevelSolution],
 ) -> list[LevelSolution]:
-    """Computes `himpc.cascade.cascade.solve_cascade` by the kernel; the arguments are the same."""
+    """Solves a cascade by the kernel, with the arguments of `himpc.cascade.cascade.solve_cascade`."""
     arena = arena_of(problems, rows, previous)
     perform(arena, LEVELS + FINISH, rows, FallbackBudget())
     return solutions([problem.name for problem in problems], arena.snapshot())

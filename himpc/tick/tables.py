@@ -18,8 +18,9 @@ if TYPE_CHECKING:
     from himpc.formulation.forms import LevelForm
 
 BUDGET = 50e6
-"""Largest number of multiplications for changes of active rows in one tick: about ten milliseconds, less than
-twenty on a slower core. The limit is a count and not a time, so that the same seed gives the same run."""
+"""Largest number of multiplications for changes of active rows in one tick. They take about ten milliseconds,
+less than twenty on a slower core. The limit is a count and not a time, so that the same seed gives the same
+run."""
 _ROUNDS = 12_000
 """Largest number of changes of active rows in one tick; a tick that reaches it takes a few milliseconds."""
 ACCURACY = 1e-8
@@ -31,12 +32,12 @@ class LevelTable:
     """The data of a level for the kernel.
 
     Attributes:
-        rows: its rows among all.
+        rows: its rows among the rows of all levels.
         knots: number of knots K of its residual.
         R: (n,) weight of the increments.
         own_rows, own_knots, own_R: rows, knots and R for the level's evidence; they differ from the others
             only without priorities.
-        alone: whether (33) is not imposed on it.
+        alone: whether the level is exempt from (33).
     """
 
     rows: slice
@@ -57,7 +58,8 @@ _BUILT_IN = (TORQUE, VELOCITY, POSITION)
 
 
 def given_of(constraints: Sequence[Constraint]) -> Sequence[Constraint]:
-    """The constraints whose bounds the kernel does not compute itself. They come last."""
+    """Returns the constraints whose bounds the kernel does not compute itself. They come last in
+    `constraints`."""
     known = sum(one is other for one, other in zip(constraints, _BUILT_IN, strict=False))
     return constraints[known:]
 
@@ -94,7 +96,7 @@ def write_effects(arena: Arena, rows: slice, root_Q: Array, weighted_C: Array) -
     f, K = arena.f, len(weighted_C)
     f["root_Q"][rows] = root_Q
     f["C"][rows, :K] = weighted_C[:, :, 0].T
-    # A row that is padded with zeros has fewer knots; its own effect on the next knot is never zero.
+    # A row with fewer knots is padded with zeros. Its effect on the next knot is zero only in the padding.
     arena.i["row_knots"][rows] = (np.diagonal(weighted_C, axis1=0, axis2=2) > 0.0).sum(axis=1)
     by_row = weighted_C.transpose(1, 0, 2)
     f["S"][rows, :K, :K] = by_row.transpose(0, 2, 1) @ by_row
@@ -116,7 +118,7 @@ def sizes(
 
     Args:
         n, N: number of joints and of knots.
-        rows, solved: number of rows of all tasks, and of those that are solved for, which come first.
+        rows, solved: number of rows of all tasks, and of the solved tasks, whose rows come first.
         levels, bounds, tasks, frames: number of each.
         given: number of rows of tasks that are not built into the kernel, at least 1.
         directed: number of constraints that are not built into the kernel.

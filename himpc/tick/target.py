@@ -8,7 +8,7 @@ from himpc.tick.kernel.target import roll
 
 
 def dragged_target(value: Array, caps: Caps = POSITION_CAPS) -> Target:
-    """Returns a target at rest at `value`, like `Target`, with a compiled filter that takes a few
-    microseconds per period: for loops with a fixed period. The compiled code is loaded now, so that no later
-    tick waits for it."""
+    """Returns a target at rest at `value`, like `Target`, for loops with a fixed period. Its filter is
+    compiled and takes a few microseconds per period. The compiled code is loaded now, so that no later tick
+    waits for it."""
     return Target(value, caps, roll)

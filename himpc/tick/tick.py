@@ -43,16 +43,17 @@ from robots import Robot
 
 
 class CompiledTick:
-    """The arena of one controller with one set of settings. `budget`: the most multiplications of a tick.
+    """The arena of one controller with one set of settings. `budget` is the largest number of multiplications
+    in a tick.
 
     Args:
         robot: gives the geometry.
         settings: as for the controller.
         form: the levels that are solved.
         off: tasks of the levels that are not solved; only their errors are computed.
-        levels: the kernel's data of each level; none are solved if this is empty.
+        levels: the kernel's data of each level; if it is empty, no level is solved.
         tolerance: N·m; all levels are solved again, along their own prediction, until no increment changes by
-            more, see `NHIMPC`.
+            more than this, see `NHIMPC`.
         most: largest number of these iterations.
     """
 
@@ -82,7 +83,8 @@ class CompiledTick:
         self._ticks, self.budget = 0, budget_of(self.arena)
 
     def recall(self, memory: Memory | None, q: Array, v: Array) -> None:
-        """Takes over a controller's memory; without one, constant velocity is assumed for the past."""
+        """Copies a controller's memory into the arena. Without a memory, constant velocity is assumed for the
+        past."""
         N, T_s = self._settings.horizon, self._settings.T_s
         memory = memory or Memory.start(q, v, T_s)
         f, i = self.arena.f, self.arena.i
@@ -91,7 +93,7 @@ class CompiledTick:
         if memory.x_dot is not None and memory.form is self._form:
             f["x_dot_was"][: memory.x_dot.size], i["known"][0] = memory.x_dot, 1
         if memory.predicted_q is not None and len(memory.predicted_q) == N + 1:
-            f["path"][:] = memory.predicted_q  # an unchanged memory continues bitwise unchanged
+            f["path"][:] = memory.predicted_q  # an unchanged memory stays bitwise the same
         else:
             f["path"][1], f["path"][2 : N + 1] = q, memory.knots(q, v, N, T_s)
         for place, level in enumerate(self._form.levels if self._levels else ()):
@@ -108,7 +110,7 @@ class CompiledTick:
 
     @property
     def memory(self) -> Memory | None:
-        """The memory, with which another controller can continue."""
+        """A copy of the memory, from which another controller can continue."""
         if not self._started:
             return None
         f, i = self.arena.f, self.arena.i
@@ -130,8 +132,8 @@ class CompiledTick:
         return self._given_bounds.distances
 
     def progress(self) -> tuple[Array, float]:
-        """Returns the length of the last error of each task that is solved for, m or rad, and the largest
-        velocity of a row of a reference, m/s or rad/s."""
+        """Returns the length of the last error of each solved task, m or rad, and the largest velocity of a
+        row of a reference, m/s or rad/s."""
         lengths = np.empty(len(self._ends))
         return lengths, progress(*self.arena.arguments, self._ends, lengths)
 
@@ -172,9 +174,9 @@ class CompiledTick:
 
         Args:
             q, v: measured state, (n,).
-            previews: of every task.
+            previews: the previews of all tasks.
             tau_0: torque that acts now, (n,) N·m.
-            limits: in force.
+            limits: the limits in force.
             started: when the period began, ns.
         """
         self._take(q, v, previews, tau_0, limits)
@@ -184,7 +186,8 @@ class CompiledTick:
         arena.f["budget"][:] = self.budget
         while iterations == 0 or (change > self._tolerance and iterations < self._most):
             if iterations:
-                # J_i(q_{k+j|k}): the knots of this tick's own prediction replace those of the last tick's.
+                # J_i(q_{k+j|k}): the knots of this tick's own prediction replace the knots of the last tick's
+                # prediction.
                 arena.f["path"][1:] = arena.f["predicted"][:-1]
                 before = arena.f["U"].copy()
             else:
@@ -227,13 +230,13 @@ class CompiledTick:
         self, unsolved: int, tau_0: Array, limits: LimitsInForce, iterations: int, started: int
     ) -> Plan:
         ticks = self._ticks
-        # Levels that are solved alone are evidence, except for the last one, which is applied.
+        # Levels that are solved alone are only evidence. The last one is applied.
         alone = bool(self._levels) and self._levels[0].alone
         idle_us = float(self.arena.f["time_us"][:-1].sum()) if alone else 0.0
 
         def evidence() -> Evidence:
             if self._ticks != ticks:
-                raise RuntimeError("the controller has gone on since this plan: keep plan.freeze() instead")
+                raise RuntimeError("a later tick has replaced this plan's data: store plan.freeze() instead")
             return self._evidence()
 
         return Plan(

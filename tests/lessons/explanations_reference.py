@@ -12,7 +12,7 @@ REFERENCE = (
     # ---------------------------------------- sentences that cannot be false
     Exempt("definition", "", (
         ("himpc/cascade/null_space.py", "Nothing is inverted: the bases come from an SVD"),
-        ("himpc/cascade/polish.py", "None if the point is too inaccurate"),
+        ("himpc/cascade/polish.py", "Returns None if the point is too inaccurate"),
         ("himpc/controllers/nhimpc.py", "The problem is then nonlinear, because"),
         ("himpc/controllers/null_space_control.py", "There is no QP, so the KKT residual is NaN."),
         ("himpc/controllers/one_step.py", "accelerations: q̈_p (n,)"),
@@ -27,7 +27,7 @@ REFERENCE = (
         ("himpc/formulation/forms.py", "All active levels, their rows stacked"),
         ("himpc/limits/rows.py", "All rows are in N·m"),
         ("himpc/references/square_wave.py", "s: a switch counts as reached this much earlier"),
-        ("himpc/stack.py", "Generic: the largest rank over a few random configurations"),
+        ("himpc/stack.py", "The generic rank is the largest rank over a few random"),
         ("lessons/own/deadline.py", "The waiting time is read only after the first alarm"),
         ("lessons/papers/himpc_paper/ablations.py", "All tasks are in one cost, one step ahead"),
         ("lessons/scenes/planar.py", "The plant applies any torque"),

@@ -25,16 +25,16 @@ _MODE = 9
 
 @inline_kernel
 def adjust(t: TickArrays, p: LoopArrays, what: int, index: int, values: Array, count: int) -> int:
-    """Changes a setting; returns 0, or FIXED, MISFIT, NOT_USABLE or NO_HIERARCHY, and then nothing has
-    changed.
+    """Changes a setting and returns 0. If the request is not valid, it changes nothing and returns FIXED,
+    MISFIT, NOT_USABLE or NO_HIERARCHY.
 
     Args:
         what: TARGET … ORDER.
-        index: of the task (TARGET, GAINS) or of the level (WEIGHT_Q, WEIGHT_R, ENABLED).
-        values, count: TARGET see `drag`; M̄ (n) kg·m²; K_p (m) 1/s², then K_v (m) 1/s; Q (m); R (n); the
-        limits of
-            torque (n) N·m, velocity (n) rad/s, lower and upper position (n) rad each; 0 or 1; the indices of
-            all levels (r), highest priority first, of which a damping level stays the last.
+        index: index of the task (TARGET, GAINS) or of the level (WEIGHT_Q, WEIGHT_R, ENABLED).
+        values, count: the numbers of the setting. TARGET: see `drag`. M_BAR: (n) kg·m². GAINS: K_p (m) 1/s²,
+            then K_v (m) 1/s. WEIGHT_Q: (m). WEIGHT_R: (n). LIMITS: torque (n) N·m, velocity (n) rad/s, lower
+            and upper position (n) rad each. ENABLED: 0 or 1. ORDER: the indices of all levels (r), highest
+            priority first; a damping level stays the last.
     """
     n, r = t.q.size, int(p.setup[LEVELS])
     if not dot(values, values, count) < 1e18 and what != LIMITS:
@@ -83,7 +83,7 @@ def adjust(t: TickArrays, p: LoopArrays, what: int, index: int, values: Array, c
 
 @inline_kernel
 def set_limits(p: LoopArrays, values: Array, n: int) -> int:
-    """Sets the wanted limits. The limits in force approach them, see `close_in`."""
+    """Sets the desired limits. The limits in force approach them, see `close_in`."""
     for a in range(n):
         torque, speed, low, high = values[a], values[n + a], values[2 * n + a], values[3 * n + a]
         if not (torque > 0.0 and speed > 0.0 and low < high):
@@ -119,7 +119,7 @@ def write_rows(t: TickArrays, p: LoopArrays, first: int, last: int) -> None:
 
 @inline_kernel
 def fade(t: TickArrays, p: LoopArrays) -> None:
-    """Lets the weights of rows that were switched on grow by the share of one period."""
+    """Increases the weights of rows that fade in by the share of one period."""
     if p.state[FADING] == 0.0:
         return
     p.state[FADING] = 0.0
@@ -152,7 +152,7 @@ def switch(t: TickArrays, p: LoopArrays, index: int, on: bool) -> None:
 
 @inline_kernel
 def reorder(t: TickArrays, p: LoopArrays, values: Array) -> int:
-    """Gives the levels another order; returns 0, or NOT_USABLE for an invalid order. The last solution of
+    """Changes the order of the levels; returns 0, or NOT_USABLE for an invalid order. The last solution of
     each level moves with the level, see `himpc.tick.tick.CompiledTick.recall`."""
     r, moved = len(p.order), False
     for k in range(r):
@@ -217,7 +217,7 @@ def arrange(t: TickArrays, p: LoopArrays) -> None:
 
 @inline_kernel
 def close_in(now: float, goal: float, present: float, size: float, T_s: float) -> float:
-    """An upper limit one period later, see `himpc.limits.ramp`."""
+    """Returns an upper limit one period later, see `himpc.limits.ramp`."""
     start = min(now, max(present, goal))
     if not (math.isfinite(start) and math.isfinite(goal)):
         return goal
@@ -227,7 +227,7 @@ def close_in(now: float, goal: float, present: float, size: float, T_s: float) -
 
 @inline_kernel
 def ramp(t: TickArrays, p: LoopArrays) -> None:
-    """Moves the limits in force towards those that are wanted."""
+    """Moves the limits in force towards the desired limits."""
     now, goal, T_s = t.limits, p.goal, t.scalars[T_S]
     margin = 0.0 if t.sizes[_MODE] == PAPER else POSITION_MARGIN
     for a in range(t.q.size):

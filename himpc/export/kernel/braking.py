@@ -1,5 +1,5 @@
-"""Bounds that give way, and increments that bring the joints to rest, joint by joint:
-`himpc.limits.braking`."""
+"""Relaxed bounds, and increments that bring the joints to rest, for each joint separately. The formulas are
+those of `himpc.limits.braking`."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ _ROUNDING = 1e-14
 
 @inline_kernel
 def clamp(x: float, low: float, high: float) -> float:
-    """x within the bounds; of contradicting bounds the upper one holds."""
+    """Returns x limited to the bounds. If the bounds contradict each other, the upper bound holds."""
     return min(max(x, low), high)
 
 
 @inline_kernel
 def braking(t: TickArrays, p: LoopArrays, U: Array) -> None:
-    """Increments (N, n) that always satisfy the torque rows, and that satisfy the velocity rows as well if
-    this is possible. Of the position rows they use the next one only. The rows are `lower` and `upper` of the
+    """Computes increments (N, n) that always satisfy the torque rows, and also the velocity rows if this is
+    possible. Of the position rows, only the next one is used. The bounds are `lower` and `upper` of the
     tick."""
     N, n = U.shape
     T_s, kinds = t.scalars[T_S], len(t.L) // N
@@ -54,7 +54,7 @@ def braking(t: TickArrays, p: LoopArrays, U: Array) -> None:
             position += before
         gained = 0.0
         for j in range(N):
-            # Returns the second differences of w.
+            # The increments are the second differences of w.
             step = p.w[j, a] - (p.w[j - 1, a] if j else 0.0)
             U[j, a] = step - gained
             gained = step
@@ -62,8 +62,8 @@ def braking(t: TickArrays, p: LoopArrays, U: Array) -> None:
 
 @inline_kernel
 def missed(t: TickArrays, p: LoopArrays, U: Array) -> float:
-    """The violation of each row by increments into `size`, (b, n) ≥ 0 N·m, 0 up to rounding; returns the
-    largest."""
+    """Writes the violation of each row by increments to `size`, (b, n) ≥ 0 N·m; returns the largest
+    violation. A violation that is only rounding counts as 0."""
     N, n = U.shape
     for j in range(N):
         for a in range(n):
@@ -81,14 +81,15 @@ def missed(t: TickArrays, p: LoopArrays, U: Array) -> float:
 
 @inline_kernel
 def bounds_of(t: TickArrays, value: Array) -> LevelBounds:
-    """The rows of this tick, all of which bound single joints; their values go to `value`."""
+    """Returns the rows of this tick, all of which bound single joints; their values are written to
+    `value`."""
     return LevelBounds(t.L, t.lower, t.upper, value, t.length, t.direction, len(t.L))
 
 
 @inline_kernel
 def soften(t: TickArrays, p: LoopArrays) -> bool:
-    """Widens the rows of velocity and position by the least slack that makes them feasible; False if they are
-    feasible."""
+    """Widens the rows of velocity and position by the least slack that makes them feasible; returns False if
+    they are feasible."""
     N, n = p.trial.shape
     braking(t, p, p.trial)
     missed(t, p, p.trial)

@@ -20,7 +20,7 @@ from himpc.tick.kernel.residual import add_effects, effects
 from himpc.tick.kernel.solve_level import solve_level
 
 SOLVE, SOFTEN, FEASIBLE, PREVIOUS, INHERIT, BRAKE, HOLD = range(7)
-"""Which fallback gave a level's increments, in the order of `himpc.cascade.level.FALLBACKS`."""
+"""The fallbacks that can determine a level's increments, in the order of `himpc.cascade.level.FALLBACKS`."""
 
 
 @inline_kernel
@@ -48,7 +48,7 @@ def climb_down(
     t: TickArrays, p: LoopArrays, data: Array, where: Whole, whole: Whole, whole_where: Whole, i: int
 ) -> int:
     """Finds increments of level i that satisfy all rows if the rows are feasible; returns the fallback that
-    gave them."""
+    was used."""
     if i > 0 and not t.level[i, ALONE]:
         # If U_{i−1} is almost the only feasible point, a small slack separates the rows.
         if solve_level(data, where, whole, whole_where, i, TOLERANCE):
@@ -83,7 +83,7 @@ def climb_down(
 
 @inline_kernel
 def kept_rows(t: TickArrays, p: LoopArrays, keep: bool) -> None:
-    """Keeps the bounds of this tick, or writes back those that were kept."""
+    """Stores the bounds of this tick, or restores the stored bounds."""
     if keep:
         copy_rows(t.lower, p.lowest)
         copy_rows(t.upper, p.highest)
@@ -94,7 +94,7 @@ def kept_rows(t: TickArrays, p: LoopArrays, keep: bool) -> None:
 
 @inline_kernel
 def contain(t: TickArrays, U: Array) -> None:
-    """Widens the rows until U meets them: the point from which lower levels start is feasible."""
+    """Widens the rows until U meets them: lower levels then start from a feasible point."""
     constraint_values(U, bounds_of(t, t.reached))
     for row in range(len(t.L)):
         for a in range(U.shape[1]):
@@ -104,7 +104,7 @@ def contain(t: TickArrays, U: Array) -> None:
 
 @inline_kernel
 def shifted(U: Array, out: Array) -> None:
-    """The plan of the tick before, one knot later; the torque then stays."""
+    """Computes the previous plan, shifted by one knot; the torque stays constant at its end."""
     N = len(U)
     for j in range(N):
         for a in range(U.shape[1]):
@@ -122,8 +122,9 @@ def settled(U: Array) -> bool:
 
 @inline_kernel
 def on_the_way(t: TickArrays, p: LoopArrays, i: int, fallback: int) -> int:
-    """Moves U_i, which meets the rows, towards `wanted` as far as the rows allow, if that improves the cost
-    and changes nothing at the level above; returns the fallback, FEASIBLE after a move."""
+    """Moves U_i, which meets the rows, towards `wanted` as far as the rows allow, if this improves the cost
+    and changes nothing at the levels above. Returns FEASIBLE after a move, otherwise the argument
+    `fallback`."""
     U, N = t.U[i], len(p.trial)
     t.kkt[i], t.active_count[i] = 0.0, 0
     if not settled(p.wanted):
@@ -165,7 +166,7 @@ def on_the_way(t: TickArrays, p: LoopArrays, i: int, fallback: int) -> int:
 
 @inline_kernel
 def cost(t: TickArrays, p: LoopArrays, i: int, U: Array) -> float:
-    """(32a) or (34a) of level i."""
+    """Returns the cost (32a) or (34a) of level i."""
     first, last = t.level[i, FIRST], t.level[i, LAST]
     effects(t.B, U, first, last, t.pushed)
     for j in range(len(U)):

@@ -1,4 +1,4 @@
-"""Dragged targets: `himpc.references.target` on arrays."""
+"""Dragged targets: the functions of `himpc.references.target` on arrays."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def show(t: TickArrays, task: int, samples: Array, m: int, width: int, moving: b
 
 @inline_kernel
 def rest_at_targets(t: TickArrays, p: LoopArrays) -> None:
-    """Puts all targets where they were dragged to, at rest."""
+    """Sets all targets to rest at their raw targets."""
     for task in range(len(t.task)):
         width = int(p.target[task, WIDTH])
         copy(p.raw[task], p.samples[task, 0], width)
@@ -73,7 +73,7 @@ def rest_at_targets(t: TickArrays, p: LoopArrays) -> None:
 @inline_kernel
 def drag(t: TickArrays, p: LoopArrays, task: int, values: Array, count: int) -> int:
     """Moves a raw target: a position by its three coordinates (m), an orientation by its quaternion x y z w,
-    joints by their coordinates (rad). Returns 0, or what is wrong, see `adjust`."""
+    joints by their coordinates (rad). Returns 0 or a fault, see `adjust`."""
     if p.target[task, DRAGGABLE] == 0.0:
         return FIXED
     m, width = int(p.target[task, ROWS]), int(p.target[task, WIDTH])
@@ -98,7 +98,8 @@ def drag(t: TickArrays, p: LoopArrays, task: int, values: Array, count: int) -> 
 
 @inline_kernel
 def to_rotation(quaternion: Array, R: Array) -> bool:
-    """The rotation matrix of a quaternion x y z w of any length, row by row; False for zero."""
+    """Computes the rotation matrix of a quaternion x y z w of any length, row by row; returns False for
+    zero."""
     length = math.sqrt(dot(quaternion, quaternion, 4))
     if not length > 0.0:
         return False

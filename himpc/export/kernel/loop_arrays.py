@@ -18,10 +18,8 @@ class LoopArrays(NamedTuple):
     """
 
     setup: Annotated[Array, "8", "1", "constants of the export, see MOST and the names after it"]
-    state: Annotated[Array, "4", "1", "what is remembered, see STARTED and the names after it"]
-    goal: Annotated[
-        Array, "8 n", "N·m, rad/s, rad, rad/s²", "the limits that are wanted, rows as in `limits`"
-    ]
+    state: Annotated[Array, "4", "1", "the memory, see STARTED and the names after it"]
+    goal: Annotated[Array, "8 n", "N·m, rad/s, rad, rad/s²", "the desired limits, rows as in `limits`"]
     tau_limit: Annotated[Array, "n", "N·m", "largest torque of each joint; no reading is larger"]
     Q: Annotated[Array, "M", "s⁴/m²", "weight of each row's residual"]
     R: Annotated[Array, "r n", "1/(N·m)²", "weight of the increments of each level"]
@@ -29,29 +27,31 @@ class LoopArrays(NamedTuple):
     damped: Annotated[Array, "D", "1", "whether the damping level is added to this choice of levels"]
     table: Annotated[Array, "r 8", "1", "the table of all levels, columns as in `level`"]
     order: Annotated[Array, "r", "1", "the levels, highest priority first"]
-    place: Annotated[Array, "r", "1", "where each level stands among those that are solved; -1: it is off"]
-    weight: Annotated[Array, "M", "1", "how far a row that was switched on has faded in, 0 … 1"]
-    target: Annotated[Array, "T 4", "1", "of each task: draggable, rows, numbers of its value, samples known"]
-    raw: Annotated[Array, "T V", "m, rad, 1", "where the target was dragged to"]
+    place: Annotated[Array, "r", "1", "index of each level among the solved levels; -1 if it is off"]
+    weight: Annotated[Array, "M", "1", "share of Q in force for a row that fades in, 0 … 1"]
+    target: Annotated[
+        Array, "T 4", "1", "of each task: draggable, number of rows, of values, of known samples"
+    ]
+    raw: Annotated[Array, "T V", "m, rad, 1", "the raw target, which is not filtered"]
     caps: Annotated[Array, "T K", "m/s, m/s², m/s³", "speed, acceleration and jerk limits; then scratch"]
     samples: Annotated[Array, "T N1 W", "m, m/s, m/s²", "the filtered target at this and the next periods"]
     # Scratch.
     lowest: Annotated[Array, "b n", "N·m", "lower bounds before a fallback has widened them"]
     highest: Annotated[Array, "b n", "N·m", "upper bounds before a fallback has widened them"]
-    size: Annotated[Array, "b n", "N·m", "sums of the sizes of what adds up to a row"]
+    size: Annotated[Array, "b n", "N·m", "sum of the magnitudes of each row's terms"]
     wanted: Annotated[Array, "N n", "N·m", "the point that the solver reached"]
     trial: Annotated[Array, "N n", "N·m", "increments of a fallback"]
     w: Annotated[Array, "N n", "N·m", "values of velocity rows"]
-    low: Annotated[Array, "N n", "N·m", "from which later rows can still be met"]
-    high: Annotated[Array, "N n", "N·m", "from which later rows can still be met"]
-    before: Annotated[Array, "r N n", "N·m", "increments of the iteration before"]
+    low: Annotated[Array, "N n", "N·m", "least velocity rows from which later rows can be met"]
+    high: Annotated[Array, "N n", "N·m", "largest velocity rows from which later rows can be met"]
+    before: Annotated[Array, "r N n", "N·m", "increments of the previous iteration"]
     weights: Annotated[Array, "n", "1/(N·m)²", "R of one level"]
 
 
 SHAPES: dict[str, str] = {
     name: hint.__metadata__[0] for name, hint in get_type_hints(LoopArrays, include_extras=True).items()
 }
-"""Every array and its shape, in the order in which they stand."""
+"""The shape of every array by name, in the order of the arrays."""
 
 MOST, TOLERANCE, ON_ACCELERATION, LEVELS, DAMPS, BUDGET, SIMPLE = range(7)
 """Indices of `setup`: largest number of iterations and their tolerance (N·m), see `NHIMPC`; whether R weighs
@@ -65,7 +65,7 @@ DRAGGABLE, ROWS, WIDTH, KNOWN = range(4)
 
 
 def sizes_of(n: int, N: int, M: int, r: int, T: int, b: int) -> dict[str, int]:
-    """Returns what the letters of the shapes stand for."""
+    """Returns the value of each letter in the shapes."""
     widest = max(n, 3)
     return {
         "n": n,
@@ -84,12 +84,12 @@ def sizes_of(n: int, N: int, M: int, r: int, T: int, b: int) -> dict[str, int]:
 
 @always_inline_kernel
 def loop_arrays_of(loop: Array, where: Whole, t: TickArrays) -> LoopArrays:
-    """All arrays as views.
+    """Returns all arrays as views.
 
     Args:
-        loop: their numbers.
-        where: at which of them each array begins, in the order of `SHAPES`.
-        t: gives the sizes.
+        loop: the numbers of all arrays.
+        where: index in `loop` at which each array begins, in the order of `SHAPES`.
+        t: determines the sizes.
     """
     N, n = t.fixed.shape
     M, T, b, r = t.sizes[2], len(t.task), len(t.L), int(loop[where[0] + LEVELS])

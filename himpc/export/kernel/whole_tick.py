@@ -1,4 +1,4 @@
-"""The entry of an exported controller: a whole control period, a reset, or a setting; see
+"""The entry point of an exported controller: a whole control period, a reset, or a setting; see
 `himpc.export.entries`."""
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from himpc.tick.kernel.finish_tick import finish_tick
 from himpc.tick.kernel.linear import copy, copy_rows
 
 TICK, RESET = -2, -1
-"""The request to `control`; all other values are settings, see `adjust`."""
+"""Requests to `control`; all other values are settings, see `adjust`."""
 
 
 @inline_kernel
@@ -48,15 +48,16 @@ def control(
     """Performs a request to a controller.
 
     Args:
-        data, where, whole, whole_where: of the arena of a tick.
+        data, where, whole, whole_where: the arena of a tick.
         loop, loop_where: see `loop_arrays_of`.
         what: TICK, RESET or a setting.
-        index: TICK and RESET: whether a torque is given; else see `adjust`.
-        x: TICK: q, (n,) rad; RESET: the torque that acts now, (n,) N·m; else the values of the setting.
+        index: for TICK and RESET, whether a torque is an argument; otherwise see `adjust`.
+        x: for TICK q, (n,) rad; for RESET the torque that acts now, (n,) N·m; otherwise the values of the
+            setting.
         v, tau_applied, tau: only for TICK.
 
     Returns:
-        TICK: SOLVE or the last of the fallbacks that acted; else 0 or what is wrong, see `adjust`.
+        for TICK, SOLVE or the last of the fallbacks that acted; otherwise 0 or a fault, see `adjust`.
     """
     t = arrays_of(data, where, whole, whole_where)
     p = loop_arrays_of(loop, loop_where, t)
@@ -81,14 +82,15 @@ def whole_tick(
     measured: int,
     tau: Array,
 ) -> int:
-    """One control period: the torque from the measured state; `himpc.controllers.himpc.HIMPC.step`.
+    """Performs one control period: computes the torque from the measured state, as
+    `himpc.controllers.himpc.HIMPC.step` does.
 
     Args:
         t, p: the arrays.
         data, where, whole, whole_where: the arena of a tick.
         q, v: measured state, (n,) rad and rad/s.
         tau_applied: the torque that acted during the last period, (n,) N·m.
-        measured: whether there is one; else it was the torque of the last call.
+        measured: whether `tau_applied` is valid; otherwise the torque of the last call acted.
         tau: the torque to apply from now on, (n,) N·m; finite and within the limits in force for every state.
 
     Returns:
@@ -122,13 +124,14 @@ def whole_tick(
 
 @inline_kernel
 def iterate(t: TickArrays, p: LoopArrays, data: Array, where: Whole, whole: Whole, whole_where: Whole) -> int:
-    """Solves all levels, once or, for NHIMPC, until no increment changes any more; returns the last of the
+    """Solves all levels once; for NHIMPC, it repeats this until no increment changes. Returns the last of the
     fallbacks that acted, HOLD if there is no torque."""
     t.budget[0] = p.setup[BUDGET]
     most, change, count, fallback = int(p.setup[MOST]), math.inf, 0, SOLVE
     while count == 0 or (change > p.setup[TOLERANCE] and count < most):
         if count:
-            # J_i(q_{k+j|k}): the knots of this tick's own prediction replace those of the last tick's.
+            # J_i(q_{k+j|k}): the knots of this tick's own prediction replace the knots of the last tick's
+            # prediction.
             for j in range(1, len(t.path)):
                 copy(t.predicted[j - 1], t.path[j], t.q.size)
             for i in range(t.sizes[4]):
@@ -153,8 +156,8 @@ def iterate(t: TickArrays, p: LoopArrays, data: Array, where: Whole, whole: Whol
 
 @inline_kernel
 def take_torque(t: TickArrays, p: LoopArrays, tau: Array) -> None:
-    """Takes the torque that acts now. It cannot exceed a joint's limit: a larger reading is wrong and must
-    not be the start of a bound."""
+    """Stores the torque that acts now, within the joints' torque limits. A larger reading is wrong, and
+    bounds must not start from it."""
     for a in range(t.q.size):
         reach = max(p.tau_limit[a], p.goal[1, a])
         t.tau_0[a] = min(max(tau[a], -reach), reach)
@@ -162,7 +165,7 @@ def take_torque(t: TickArrays, p: LoopArrays, tau: Array) -> None:
 
 @inline_kernel
 def hold(t: TickArrays, p: LoopArrays) -> None:
-    """The torque that acts now, within the limits in force."""
+    """Computes the torque to hold: the torque that acts now, within the limits in force."""
     for a in range(t.q.size):
         reach = max(p.tau_limit[a], p.goal[1, a])
         t.tau[a] = min(max(t.tau_0[a], max(t.limits[0, a], -reach)), min(t.limits[1, a], reach))
@@ -197,9 +200,9 @@ def begin(t: TickArrays) -> None:
 
 @inline_kernel
 def restart(t: TickArrays, p: LoopArrays, tau: Array, known: int) -> int:
-    """Forgets everything but the settings; targets rest where they were dragged to.
+    """Clears everything except the settings; targets are at rest at their raw targets.
 
-    tau: the torque that acts now, (n,) N·m, if it is `known`, else zero.
+    tau: the torque that acts now, (n,) N·m; if `known` is 0, the torque is zero.
     """
     for a in range(t.q.size):
         t.tau_0[a] = 0.0

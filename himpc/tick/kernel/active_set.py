@@ -1,5 +1,5 @@
-"""The active rows, which hold as equalities: an orthonormal basis of them, their multipliers, and the point
-that they determine. HIMPC's levels and HTMPC's QPs use it."""
+"""The active rows, which hold as equalities: their orthonormal basis, their multipliers, and the point that
+they determine. HIMPC's levels and HTMPC's QPs use this module."""
 
 from __future__ import annotations
 
@@ -32,18 +32,18 @@ class Quadratic(NamedTuple):
 
 
 class ActiveSet(NamedTuple):
-    """The active rows a'x ≤ b, k of them, with room for more.
+    """The k active rows a'x ≤ b. The arrays have space for more rows.
 
     Attributes:
-        row, joint, side: which they are, and whether the upper (1) or the lower bound (−1); 0 is a row that
-            stays an equality, whatever its multiplier is.
-        normal: their a, in the coordinates of the cost.
-        scaled_normal: the same where the Hessian is one: F⁻¹ a, a'/√ρ.
+        row, joint, side: the indices of each row, and its active bound: the upper (1) or the lower one (−1);
+            0 marks a row that stays an equality whatever its multiplier is.
+        normal: the vector a of each row, in the coordinates of the cost.
+        scaled_normal: a in the coordinates in which the Hessian is one: F⁻¹ a, a'/√ρ.
         orthonormal_basis, cholesky_factor: orthonormal rows, and the lower triangle of
             scaled_normal = cholesky_factor · orthonormal_basis.
-        target: their b.
-        multiplier: their multipliers, positive at an upper bound.
-        violation: by how much the point misses them.
+        target: the bound b of each row.
+        multiplier: the multiplier of each row, positive at an upper bound.
+        violation: the violation of each row at the point.
         change: scratch.
     """
 
@@ -62,7 +62,7 @@ class ActiveSet(NamedTuple):
 
 @inline_kernel
 def scale(cost: Quadratic, normal: Array, scaled_normal: Array) -> None:
-    """F⁻¹ a, a'/√ρ from the coefficients of a row, (D,); both arrays may be one."""
+    """Computes F⁻¹ a, a'/√ρ from the coefficients of a row, (D,). Both arguments may be the same array."""
     for c in range(cost.d):
         scaled_normal[c] = normal[c]
     forward(cost.F, scaled_normal, cost.d)
@@ -72,9 +72,9 @@ def scale(cost: Quadratic, normal: Array, scaled_normal: Array) -> None:
 
 @inline_kernel
 def resolve(active: ActiveSet, index: int, D: int, budget: Array) -> float:
-    """Row `index` in terms of those before it: its coefficients go into `cholesky_factor`, the new
-    direction into `orthonormal_basis`, not yet of length one. Returns the length of what is new, 0 if the row
-    depends on the others."""
+    """Splits row `index` into a combination of the rows before it and a new direction. Writes the
+    coefficients to `cholesky_factor` and the direction, not yet of length one, to `orthonormal_basis`.
+    Returns the length of the new direction, 0 if the row depends on the others."""
     budget[0] -= 4.0 * D * (index + 1.0)
     scaled_normal = active.scaled_normal[index]
     left = split(
@@ -100,7 +100,7 @@ def fix(active: ActiveSet, index: int, length: float, D: int) -> None:
 
 @inline_kernel
 def move(active: ActiveSet, source: int, to: int, D: int) -> None:
-    """Copies a row to another place."""
+    """Copies a row to another index."""
     active.row[to], active.joint[to], active.side[to] = (
         active.row[source],
         active.joint[source],
@@ -123,7 +123,7 @@ def without(active: ActiveSet, index: int, k: int, D: int, budget: Array) -> Non
 
 @inline_kernel
 def update_multipliers(active: ActiveSet, cost: Quadratic, k: int) -> None:
-    """Multipliers of k rows as equalities."""
+    """Computes the multipliers of k rows that hold as equalities."""
     for p in range(k):
         active.multiplier[p] = dot(active.scaled_normal[p], cost.ideal, cost.d) - active.target[p]
     forward(active.cholesky_factor, active.multiplier, k)
@@ -132,7 +132,7 @@ def update_multipliers(active: ActiveSet, cost: Quadratic, k: int) -> None:
 
 @inline_kernel
 def point_from_multipliers(active: ActiveSet, cost: Quadratic, k: int, z: Array) -> None:
-    """The point that belongs to the multipliers of k rows, in scaled coordinates, (D,)."""
+    """Computes the point that belongs to the multipliers of k rows, in scaled coordinates, (D,)."""
     for c in range(cost.D):
         z[c] = cost.ideal[c] if c < cost.d else 0.0
     for p in range(k):
@@ -141,7 +141,7 @@ def point_from_multipliers(active: ActiveSet, cost: Quadratic, k: int, z: Array)
 
 @inline_kernel
 def unscale(cost: Quadratic, z: Array, x: Array) -> None:
-    """A point from its scaled coordinates; both arrays may be one."""
+    """Computes a point from its scaled coordinates. Both arguments may be the same array."""
     copy(z, x, cost.D)
     backward(cost.F, x, cost.d)
     for c in range(cost.d, cost.D):
@@ -151,7 +151,7 @@ def unscale(cost: Quadratic, z: Array, x: Array) -> None:
 @inline_kernel
 def evaluate(active: ActiveSet, x: Array, k: int, D: int, slope: Array) -> tuple[float, float]:
     """Adds the multipliers' part to the gradient of the cost at a point, and writes the violations of k rows.
-    Returns the largest violation, and the largest product of a violation and its multiplier."""
+    It returns the largest violation, and the largest product of a violation and its multiplier."""
     violation = worth = 0.0
     for p in range(k):
         subtract(-active.multiplier[p], active.normal[p], slope, D)
@@ -165,7 +165,8 @@ def evaluate(active: ActiveSet, x: Array, k: int, D: int, slope: Array) -> tuple
 
 @inline_kernel
 def correct(active: ActiveSet, cost: Quadratic, k: int, slope: Array, z: Array, x: Array) -> None:
-    """Corrects a point, and the multipliers of k rows, by what `evaluate` found at it: iterative refinement.
+    """Performs a step of iterative refinement: corrects a point and the multipliers of k rows by the gradient
+    and the violations that `evaluate` has computed.
 
     z: scratch, (D,).
     """

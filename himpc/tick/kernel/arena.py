@@ -1,5 +1,5 @@
-"""An arena: one array of real numbers and one of integers with all data that a tick reads and writes. Names
-and shapes of its parts are data."""
+"""An arena: one array of real numbers and one of integers with all data that a tick reads and writes. Tables
+contain the names and shapes of its parts."""
 
 from __future__ import annotations
 
@@ -19,13 +19,14 @@ class Arena:
 
     Attributes:
         data, whole: all numbers, all whole numbers.
-        where, whole_where: at which of them each array begins, in the order of `AT` and `WHOLE_AT`.
+        where, whole_where: index in `data` and `whole` at which each array begins, in the order of `AT` and
+            `WHOLE_AT`.
         f, i: the arrays by name, views into `data` and `whole`.
-        arguments: what compiled functions take.
+        arguments: the arguments of compiled functions that describe the arena.
     """
 
     def __init__(self, **sizes: int) -> None:
-        """sizes: by the letters of the shapes."""
+        """sizes: the value of each letter in the shapes."""
         self.data, self.where, self.f = laid_out(NUMBERS, sizes, np.float64)
         self.whole, self.whole_where, self.i = laid_out(WHOLES, sizes, np.intp)
         self.arguments = (self.data, self.where, self.whole, self.whole_where)
@@ -34,12 +35,12 @@ class Arena:
         self._found = slice(begin, end), slice(whole_begin, whole_end)
 
     def snapshot(self) -> Snapshot:
-        """A copy of the results of this tick, which the next tick does not change."""
+        """Returns a copy of the results of this tick, which the next tick does not change."""
         numbers, wholes = self._found
         return Snapshot(self, self.data[numbers].copy(), self.whole[wholes].copy())
 
     def read(self, snapshot: Snapshot, name: str) -> Any:
-        """An array of a snapshot."""
+        """Returns an array of a snapshot."""
         whole = name in WHOLES
         at, view = (WHOLE_AT, self.i) if whole else (AT, self.f)
         start = (self.whole_where if whole else self.where)[getattr(at, name)] - self._found[whole].start
@@ -55,17 +56,18 @@ class Snapshot(NamedTuple):
     whole: Whole
 
     def __call__(self, name: str) -> Any:
-        """The array of this name."""
+        """Returns the array of this name."""
         return self.arena.read(self, name)
 
 
 def laid_out(shapes: dict[str, str], sizes: dict[str, int], kind: type) -> tuple:
-    """Returns the numbers of arrays, where each of them begins, and the arrays by name.
+    """Returns one array for all numbers, the index at which each named array begins in it, and the named
+    arrays.
 
     Args:
-        shapes: by name.
-        sizes: by the letters of the shapes.
-        kind: of a number.
+        shapes: the shape of each array, by name.
+        sizes: the value of each letter in the shapes.
+        kind: the type of a number.
     """
     where, views, end = np.zeros(len(shapes), np.intp), {}, 0
     sized = {

@@ -10,20 +10,20 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Whole = Any
-"""Whole numbers, NDArray[np.intp]: an element of them is a number, which type checkers do not know."""
+"""An array of whole numbers, NDArray[np.intp]. Type checkers do not know that its elements are numbers."""
 
 
 class TickArrays(NamedTuple):
-    """The arrays of a tick; each annotation says the shape, the unit, and "the files that write it → those
-    that read it", where those that write may read as well.
+    """The arrays of a tick. Each annotation contains the shape, the unit, and "files that write the array →
+    files that read it"; files that write an array may also read it.
 
-    Units are those of revolute joints and of positions: with prismatic joints and angles rad, m and N·m, N
-    change places.
+    Units are those of revolute joints and of positions. For prismatic joints and for angles, rad is exchanged
+    with m, and N·m with N.
 
     Sizes: n joints, N knots, N1 = N + 1; M rows of all tasks, m of those that are solved; r levels; T tasks;
-    F frames; G rows that are given; J = n + 1 places, the world first; b rows of bounds, N per constraint,
-    of which the last ones bound g sets of directions; w = N · n coordinates of a level, and k = w + 1 rows
-    that can hold its point, one of them about to be replaced.
+    F frames; G rows of tasks that Python computes; J = n + 1 placements, the world first; b rows of bounds, N
+    per constraint; g constraints with directions of their own, whose rows are the last ones; w = N · n
+    coordinates of a level; k = w + 1 active rows at most, one of which is about to be replaced.
     """
 
     # The input of a tick.
@@ -189,7 +189,7 @@ class TickArrays(NamedTuple):
     parent: Annotated[Whole, "J", "1", "configure → distance_rows linearize"]
     is_revolute: Annotated[Whole, "J", "1", "configure → distance_rows linearize"]
     frame_joint: Annotated[Whole, "F", "1", "configure → linearize"]
-    # What a tick finds.
+    # Further results of a tick.
     active_row: Annotated[Whole, "r k", "1", "fallbacks solve_level → finish_tick problems"]
     active_joint: Annotated[Whole, "r k", "1", "fallbacks solve_level → finish_tick problems"]
     active_count: Annotated[Whole, "r", "1", "fallbacks solve_level → finish_tick problems"]
@@ -206,26 +206,27 @@ class TickArrays(NamedTuple):
 
 
 def _shapes(kind: Any) -> dict[str, str]:
-    """The shapes of all arrays of a kind."""
+    """Returns the shapes of all arrays of a kind."""
     hints = get_type_hints(TickArrays, include_extras=True)
     return {name: hint.__metadata__[0] for name, hint in hints.items() if hint.__origin__ == kind}
 
 
 def _numbered(name: str, shapes: dict[str, str]) -> Any:
-    """The place of every array among all. A module: what that holds is a constant to the compiler, which
-    would write a whole tuple down anew wherever one of its numbers is used."""
+    """Returns a module with the index of every array. The compiler treats a module's numbers as constants; it
+    would write out a whole tuple wherever one of its numbers is used."""
     places = ModuleType(name)
     vars(places).update({each: place for place, each in enumerate(shapes)})
     return places
 
 
 NUMBERS, WHOLES = _shapes(Array), _shapes(Whole)
-"""Every array of numbers, and of whole numbers, and its shape."""
+"""The shape of every array, by name: arrays of real numbers, and arrays of whole numbers."""
 AT, WHOLE_AT = _numbered("AT", NUMBERS), _numbered("WHOLE_AT", WHOLES)
-"""Where in `Arena.where` and `Arena.whole_where` the place of an array is noted."""
+"""The index of each array in `Arena.where` and in `Arena.whole_where`."""
 
 PERIOD, T_S, REACTION, NOW, PULL = range(5)
-"""What `scalars` holds: s since the tick before, s until the next one, the reaction of `viable_speed`, t, the
-largest error on which tasks act."""
+"""Indices of `scalars`: duration of the previous period (s), duration of this period (s), the reaction of
+`viable_speed`, t, and the largest error on which tasks act."""
 DIRECTED = 11
-"""Where `sizes` holds how many constraints bound directions of their own: their rows are the last ones."""
+"""Index in `sizes` of the number of constraints with directions of their own. Their rows are the last
+ones."""

@@ -23,13 +23,13 @@ def no_directions(Q: Array) -> None:
 def projected_rows(
     B: Array, metric: Array, reflector: Array, count: int, first: int, last: int, projected_jacobian: Array
 ) -> None:
-    """Rows of one knot in its coordinates: seen_i = (b_i ∘ metric) Q.
+    """Transforms rows of one knot to the knot's coordinates: projected_i = (b_i ∘ metric) Q.
 
     Args:
         B: Ĵ M̄⁻¹ of the knot, (m, n).
-        metric: √(ρ/R) per joint: U = metric ∘ V makes the effort ρ‖V‖².
-        reflector, count: the reflections whose product is Q so far.
-        first, last: which rows.
+        metric: √(ρ/R) per joint; with U = metric ∘ V the effort is ρ‖V‖².
+        reflector, count: the reflections, and their number; Q is their product.
+        first, last: range of rows.
         projected_jacobian: (m, n), the result.
     """
     n = metric.size
@@ -43,7 +43,7 @@ def projected_rows(
 
 @inline_kernel
 def reflect(v: Array, x: Array, first: int) -> None:
-    """x ← (1 − v vᵀ) x from index `first` on; ‖v‖² = 2."""
+    """Computes x ← (1 − v vᵀ) x from index `first` on; ‖v‖² = 2."""
     n = x.size - first
     subtract(dot(v[first:], x[first:], n), v[first:], x[first:], n)
 
@@ -52,24 +52,25 @@ def reflect(v: Array, x: Array, first: int) -> None:
 def take_directions(
     projected_jacobian: Array, first: int, last: int, count: int, reflector: Array, Q: Array
 ) -> int:
-    """Householder QR of a level's rows within what the levels above left, one knot; returns how many
-    directions are taken then. The level sees those before that number only; the rest is left to lower levels.
+    """Performs a Householder QR of a level's rows at one knot, within the directions that the levels above
+    leave. Returns the number of directions taken by then; the other directions have no effect on the level
+    and are left to lower levels.
 
-    The row with most left is taken next, so what remains tells the rank: directions that the level feels by
-    less than RANK_TOLERANCE of the size of its rows are left to lower levels.
+    The row with the largest remainder is taken next, so the remainder shows the rank: a direction whose
+    effect is less than RANK_TOLERANCE of the size of the rows is left to lower levels.
 
     Args:
-        projected_jacobian: the level's rows in the coordinates so far, (m, n); then in the new ones.
-        first, last: which rows.
-        count: how many directions the levels above took.
-        reflector: (n, n), one more reflection for each direction.
-        Q: (n, n), its columns the directions; the first `count` stay as they are.
+        projected_jacobian: (m, n), the level's rows in the old coordinates; afterwards in the new ones.
+        first, last: range of rows.
+        count: number of directions that the levels above have taken.
+        reflector: (n, n), one reflection is added for each direction.
+        Q: (n, n), its columns are the directions; the first `count` columns do not change.
     """
     n = len(Q)
     size = 0.0
     for i in range(first, last):
         size += dot(projected_jacobian[i], projected_jacobian[i], n)
-    # Each row counts once: after its direction is taken, only rounding errors are left of it.
+    # Each row is taken once: after its direction is taken, only rounding errors remain of the row.
     for _ in range(min(last - first, n - count)):
         best, most = first, -1.0
         for i in range(first, last):

@@ -18,12 +18,13 @@ _SHORT = 1e-9
 
 @inline_kernel
 def directed_normal(level: LevelQP, weights: Array, along: Array, normal: Array) -> float:
-    """Coefficients of a row with its own direction, into `normal`; returns what the levels above make of it.
+    """Writes the coefficients of a row with its own direction to `normal`; returns the row's value under the
+    increments that the levels above fix.
 
     Args:
-        level: gives the coordinates.
+        level: determines the coordinates.
         weights: the row's time profile, (N,).
-        along: its direction, (n,).
+        along: the row's direction, (n,).
         normal: the result.
     """
     n, before = along.size, 0.0
@@ -42,7 +43,7 @@ def directed_normal(level: LevelQP, weights: Array, along: Array, normal: Array)
 
 @inline_kernel
 def normal_of(level: LevelQP, active: ActiveSet, index: int, bounds: LevelBounds) -> None:
-    """Coefficients, scaled coefficients and target of row `index`."""
+    """Computes the coefficients, scaled coefficients and target of row `index`."""
     r, a = active.row[index], active.joint[index]
     normal = active.normal[index]
     N = len(level.start)
@@ -66,7 +67,8 @@ def normal_of(level: LevelQP, active: ActiveSet, index: int, bounds: LevelBounds
 
 @inline_kernel
 def lengths(level: LevelQP, active: ActiveSet, k: int, bounds: LevelBounds, budget: Array) -> None:
-    """Writes the lengths of the scaled coefficients of all rows into `bounds.length`; row k is scratch."""
+    """Writes the lengths of the scaled coefficients of all rows to `bounds.length`; row k of `active` is
+    scratch."""
     N, n = level.fixed.shape
     d, D, share = level.cost.d, level.cost.D, level.cost.share
     length, plain = bounds.length, bounds.plain
@@ -128,8 +130,8 @@ def most_violated(value: Array, low: Array, high: Array) -> tuple[float, int, in
 def farthest(
     value: Array, low: Array, high: Array, length: Array, least: float
 ) -> tuple[float, int, int, int]:
-    """Returns the row with the largest distance among those that are violated by more than `least`; the
-    result is that of `most_violated`."""
+    """Returns the row whose bound is farthest from the point, among the rows that are violated by more than
+    `least`. The result has the form of `most_violated`."""
     most, excess, row, joint, side = 0.0, 0.0, -1, -1, 0
     for r in range(len(value)):
         for a in range(value.shape[1]):

@@ -37,8 +37,8 @@ class LevelBounds(NamedTuple):
 
 @inline_kernel
 def viable_speed(room: float, v_limit: float, a_max: float, reaction: float) -> float:
-    """The speed from which a joint can still stop within `room`, see `limits.viability`; past the limit the
-    speed of return, negative."""
+    """Returns the speed from which a joint can still stop within `room`, see `limits.viability`. Beyond the
+    limit, it returns the negative speed at which the joint must return."""
     inside = max(room, 0.0)
     reach = min(v_limit, a_max * (math.sqrt(reaction * reaction + (2.0 / a_max) * inside) - reaction))
     return reach + max(RETURN_RATE * min(room, 0.0), -v_limit)
@@ -61,20 +61,22 @@ def bounds(
     upper: Array,
     stopping: Array,
 ) -> None:
-    """Bounds on L U in N·m, the first rows of (b, n): torque (32f), velocity (32e) scaled by M̄/T_s and, as
-    printed, position (32d) by M̄/T_s²; see `limits.build_rows`. Bounds of other constraints are given.
+    """Computes the bounds on L U in N·m, the first rows of (b, n): torque (32f), velocity (32e) scaled by
+    M̄/T_s and, for PAPER, position (32d) scaled by M̄/T_s²; see `limits.build_rows`. Bounds of other
+    constraints are input.
 
     Args:
         q, v, v_was: measured state, and the velocity one `period` ago, (n,).
         tau_0: torque that acts now, (n,) N·m.
         M_bar: diagonal of M̄, (n,).
-        limits: (8, n) torque, velocity limit, positions (stops but for PAPER), and deceleration first.
-        approach: share of the distance to a velocity bound that may be gone at knots 1 … N.
+        limits: (8, n), of which the first six rows are read: torques, velocity limit, positions (of the
+            limits for PAPER, otherwise of the stops), and deceleration.
+        approach: share of the distance to a velocity bound that may be used up at knots 1 … N.
         mode: VIABILITY, PAPER or OFF.
         reaction: s, see `viable_speed`.
-        period, T_s: s since the last tick, and of this one.
+        period, T_s: duration of the previous and of this period, s.
         lower, upper: the result.
-        stopping: (2, n), 1 where a velocity row is the position limit's, see `Rows`.
+        stopping: (2, n), 1 where a velocity row imposes the position limit, see `Rows`.
     """
     N = approach.size
     for a in range(q.size):
@@ -100,8 +102,8 @@ def bounds(
 
 @inline_kernel
 def constraint_values(U: Array, bounds: LevelBounds) -> None:
-    """Writes L U Dᵀ to `bounds.value`: torque rows are the running sums of the increments, velocity rows
-    those of the torque rows, and position rows those of the velocity rows, one knot later. The rows of
+    """Writes L U Dᵀ to `bounds.value`. Torque rows are the running sums of the increments, velocity rows the
+    running sums of torque rows, and position rows the running sums of velocity rows, one knot later. Rows of
     constraints with directions of their own follow."""
     N, n = U.shape
     value, plain = bounds.value, bounds.plain

@@ -1,4 +1,4 @@
-"""From Problem 1 to Problem r: each level uses the directions that (33) leaves free."""
+"""Prepares Problem 1 to Problem r: each level uses the directions that (33) leaves free."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ from himpc.tick.kernel.level import LevelQP
 from himpc.tick.kernel.linear import copy_rows, dot
 
 FIRST, LAST, KNOTS, AFRESH, ALONE, OWN_FIRST, OWN_LAST, OWN_KNOTS = range(8)
-"""Columns of the table of levels: its rows; how many knots it counts; whether its efforts are measured unlike
-those of the level above, so that directions must be found anew; whether (33) does not bind it; and the rows
-and knots that its evidence is about, which are its own also where priorities are left out."""
+"""Columns of the table of levels: range of its rows; number of knots in its residual; whether its `metric`
+differs from that of the level above, so that directions must be computed again; whether (33) is not imposed
+on it; range of the rows and number of knots of its evidence, which belong to this level alone also without
+priorities."""
 SOFTENED = 1.0
 """The last of `FALLBACKS` that applies an optimum."""
 
@@ -29,8 +30,8 @@ def own_directions(
     count: Whole,
     start: Whole,
 ) -> None:
-    """Finds the directions Q[j] of a level at every knot j: the first start[j] are those of the levels
-    above, the next ones, up to count[j], are the level's own."""
+    """Computes the directions Q[j] of a level at every knot j. The first start[j] directions belong to the
+    levels above; the next ones, up to count[j], belong to the level."""
     N, _, n = B.shape
     above = 0 if levels[index, ALONE] else index
     afresh = above == 0 or levels[index, AFRESH]
@@ -65,8 +66,8 @@ def own_directions(
 
 @inline_kernel
 def keep_above(level: LevelQP, U_above: Array, knots: int) -> None:
-    """The part of U_{i−1}, (N, n), that (33) fixes: its components along the directions of the levels above,
-    and all of it beyond the level's own horizon (Remark 8)."""
+    """Computes the part of U_{i−1}, (N, n), that (33) fixes: its components along the directions of the
+    levels above, and all of U_{i−1} beyond the level's own horizon (Remark 8)."""
     N, n = U_above.shape
     fixed, Q, metric = level.fixed, level.Q, level.metric
     for j in range(N):
@@ -82,8 +83,8 @@ def keep_above(level: LevelQP, U_above: Array, knots: int) -> None:
 
 @inline_kernel
 def count_coordinates(knots: int, n: int, count: Whole, start: Whole, offset: Whole, rest: Whole) -> int:
-    """Writes the indices of the level's own coordinates and of those beyond, see `LevelQP`; returns their
-    number."""
+    """Writes the indices of the level's own coordinates and of the others, see `LevelQP`; returns the number
+    of both together."""
     N = len(start)
     offset[0] = 0
     for j in range(N):
@@ -105,15 +106,15 @@ def widen(
     U: Array,
     room: float,
 ) -> bool:
-    """The bounds of Problem i, and what (33) fixes of its increments, into U[i] if it leaves nothing: False
-    then.
+    """Computes the bounds of Problem i and the part of its increments that (33) fixes. If (33) fixes all of
+    them, it writes the increments to U[i] and returns False.
 
     Args:
         index, levels: i and the table of levels.
         level, bounds: the results.
         lower, upper: all bounds, (b, n) N·m.
-        U: (r, N, n) increments of all levels, those above known.
-        room: N·m, how far bounds give way around U_{i−1}.
+        U: (r, N, n) increments of all levels; those of the levels above are known.
+        room: N·m by which bounds are widened around U_{i−1}.
     """
     if index == 0 or levels[index, ALONE] == 1:
         level.fixed[:] = 0.0
@@ -138,7 +139,7 @@ def widen(
 def predict(
     q: Array, v: Array, v_was: Array, U: Array, M_bar: Array, period: float, T_s: float, path: Array
 ) -> None:
-    """q at knots 0 … N under the increments, (N+1, n), by (18), see `prediction.joint`."""
+    """Computes q at knots 0 … N under the increments, (N+1, n), by (18), see `prediction.joint`."""
     for a in range(q.size):
         position, speed, acceleration = q[a], v[a], (v[a] - v_was[a]) / period
         path[0, a] = position

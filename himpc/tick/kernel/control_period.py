@@ -1,4 +1,4 @@
-"""A control period, or parts of it: what Python and an exported controller run."""
+"""A control period, or parts of it. Python and an exported controller run the same functions."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from himpc.tick.kernel.solve_level import solve_level
 LINEARIZE, LEVELS, ONE_LEVEL, FINISH, REMEMBER = 1, 2, 4, 8, 16
 """The parts of a period. The argument `parts` is the sum of the parts to perform."""
 ALL_PARTS = LINEARIZE + LEVELS + FINISH + REMEMBER
-"""All parts of a period whose levels are solved once."""
+"""All parts of a period in which the levels are solved once."""
 ITERATION = LINEARIZE + LEVELS + FINISH
 """All parts of an iteration of a controller that solves its levels several times in a period."""
 NOT_FINITE = -1
@@ -55,14 +55,14 @@ def perform_parts(
 
     Args:
         data, where, whole, whole_where: the arena.
-        parts: what is to be done, a sum of LINEARIZE … REMEMBER. REMEMBER has an effect only with FINISH.
-        i: LEVELS: the first level to solve; ONE_LEVEL: the level to solve.
-        room: of ONE_LEVEL, N·m, see `solve_level`.
+        parts: the parts to perform, a sum of LINEARIZE … REMEMBER. REMEMBER has an effect only with FINISH.
+        i: with LEVELS the first level to solve, with ONE_LEVEL the level to solve.
+        room: N·m, used with ONE_LEVEL only, see `solve_level`.
 
     Returns:
-        the number of levels if all went well; NOT_FINITE if the problems or the torque are not finite;
-        otherwise the level for which no optimum was found. The caller must then apply the level's fallback
-        and perform the remaining parts.
+        the number of levels if all levels are solved; NOT_FINITE if the problems or the torque are not
+        finite; otherwise the level for which no optimum was found. The caller must then apply the level's
+        fallback and perform the remaining parts.
     """
     t = arrays_of(data, where, whole, whole_where)
     if parts & LINEARIZE and not linearize(data, where, whole, whole_where):

@@ -22,7 +22,7 @@ def place_joints(data: Any, where: Whole, whole: Whole, whole_where: Whole) -> N
 
 @inline_kernel
 def least_rate(distance: float, d_safe: float, margin: float, reaction: float, deceleration: float) -> float:
-    """The least rate of a distance, m/s, see `limits.distance.least_rates`."""
+    """Returns the least rate of a distance, m/s, see `limits.distance.least_rates`."""
     room = distance - d_safe - margin
     if room <= 0.0:
         return -max(RETURN_RATE * min(distance - d_safe, 0.0), -RETREAT)
@@ -32,9 +32,9 @@ def least_rate(distance: float, d_safe: float, margin: float, reaction: float, d
 
 
 ROOM, FASTEST, CHANGED = range(3)
-"""Numbers about the pairs. ROOM: the least distance of a pair minus what the pair must keep, m. FASTEST: the
-largest speed at which an object of a chosen pair moves towards or away from the link, m/s. CHANGED: 1 if
-other pairs are chosen than before."""
+"""Numbers about the pairs. ROOM: the smallest difference between a pair's distance and the distance that the
+pair must keep, m. FASTEST: the largest speed at which an object of a chosen pair moves towards or away from
+the link, m/s. CHANGED: 1 if other pairs are chosen than before."""
 
 
 @inline_kernel
@@ -42,10 +42,10 @@ def approach(pair: int, other: int, normal: Array, velocity: Array) -> float:
     """Returns the speed at which the motion of a pair's object reduces the pair's distance, m/s.
 
     Args:
-        pair: which one.
+        pair: index of the pair.
         other: index of the pair's second shape; only the first b shapes are objects.
-        normal: of all pairs, see `near`.
-        velocity: (b, 3) m/s, of the objects.
+        normal: unit vectors of all pairs, see `near`.
+        velocity: (b, 3) m/s, velocities of the objects.
     """
     moving = 0.0
     if other < len(velocity):
@@ -97,17 +97,17 @@ def nearest(
     about: Array,
 ) -> int:
     """Chooses those of `count` pairs that can soonest reach the distance that they must keep, see `soonest`.
-    Chooses at most as many as `chosen` has room for, sorts them by distance, and returns their
-    number. A near pair whose distance hardly changes is not chosen if farther pairs can approach faster.
+    It chooses at most as many as `chosen` can contain, sorts them by distance, and returns their number. A
+    near pair whose distance hardly changes is not chosen if farther pairs can approach faster.
 
     Args:
         count, distance, sphere, shape, normal, slopes: of all pairs, see `near`.
         shares: (B, S) share of d_safe and the margin that each pair keeps.
-        velocity: (b, 3) m/s, of the first b shapes, which are objects.
+        velocity: (b, 3) m/s, velocities of the first b shapes, which are objects.
         fastest: (n,) rad/s, how fast joints may be.
         d_safe: m.
         time: scratch, one per pair.
-        chosen: which ones; the result.
+        chosen: indices of the chosen pairs; the result.
         links, others: `sphere` and `shape` of each chosen pair, −1 where there is none; updated.
         share, moving: of each chosen pair, see `distance_rows`; the result.
         about: numbers about the pairs, see ROOM; the result.
@@ -163,11 +163,11 @@ def distance_rows(
 
     Args:
         data, where, whole, whole_where: the arena.
-        block: which set of directions is that of distances.
-        count: number of pairs that have rows. chosen: which ones.
+        block: index of the set of directions for distances.
+        count: number of pairs that have rows. chosen: indices of these pairs.
         distance, slopes: of all pairs, see `near`.
-        moving: what the object's motion takes from the distance of each chosen pair, m/s.
-        share: of d_safe and the margin that each chosen pair keeps.
+        moving: speed at which the object's motion reduces the distance of each chosen pair, m/s.
+        share: share of d_safe and the margin that each chosen pair keeps.
         numbers: d_safe and margin, m, reaction, s, and deceleration, m/s².
     """
     t = arrays_of(data, where, whole, whole_where)

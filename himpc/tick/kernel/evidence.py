@@ -13,7 +13,7 @@ from himpc.tick.kernel.kinematics import ORIENTATION
 
 @inline_kernel
 def cost_of(e: Array, U: Array, R: Array, first: int, last: int, row_knots: Whole, knots: int) -> float:
-    """The value of (32a) or (34a): Σ ‖Q^½ e‖² + ‖U‖²_R over a level's own knots."""
+    """Returns the value of (32a) or (34a): Σ ‖Q^½ e‖² + ‖U‖²_R over a level's own knots."""
     total = 0.0
     for i in range(first, last):
         for k in range(row_knots[i]):
@@ -26,7 +26,8 @@ def cost_of(e: Array, U: Array, R: Array, first: int, last: int, row_knots: Whol
 
 @inline_kernel
 def leak_of(index: int, levels: Whole, effect: Array) -> float:
-    """‖J_p M̄⁻¹(Δτ_i − Δτ_p)‖∞ over knots and levels p above level i; effect (r, N, m) is J M̄⁻¹ Δτ."""
+    """Returns ‖J_p M̄⁻¹(Δτ_i − Δτ_p)‖∞ over knots and levels p above level i; effect: J M̄⁻¹ Δτ, (r, N,
+    m)."""
     most = 0.0
     N = effect.shape[1]
     for p in range(index):
@@ -53,8 +54,8 @@ def bounds_met(
     Args:
         count, row, column, multiplier: the active rows.
         stopping: (2, n), see `bounds`.
-        bits: of every row.
-        direction, plain: see `LevelBounds`; such a row is told of all joints that it bounds.
+        bits: the bit of every row.
+        direction, plain: see `LevelBounds`; a row with a direction sets the bit of all joints that it bounds.
         at_bound: the result.
     """
     N = (len(bits) - plain) // len(direction)
@@ -73,7 +74,7 @@ def bounds_met(
 
 @inline_kernel
 def quaternions(task: Whole, R: Array, out: Array) -> None:
-    """Unit quaternions x y z w, w ≥ 0, of rotations (T, 3, 3), for tasks about orientation."""
+    """Computes unit quaternions x y z w, w ≥ 0, of rotations (T, 3, 3), for orientation tasks."""
     for t in range(len(task)):
         if task[t, 0] == ORIENTATION:
             quaternion(R[t], out[t])
@@ -81,7 +82,7 @@ def quaternions(task: Whole, R: Array, out: Array) -> None:
 
 @inline_kernel
 def quaternion(R: Array, out: Array) -> None:
-    """Returns the quaternion x y z w of a rotation, w ≥ 0. Its largest component is computed by a square
+    """Computes the quaternion x y z w of a rotation, w ≥ 0. Its largest component is computed by a square
     root."""
     xx, yy, zz = R[0, 0], R[1, 1], R[2, 2]
     w, x, y, z = 1.0 + xx + yy + zz, R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]

@@ -1,4 +1,4 @@
-"""Evidence, torque and prediction."""
+"""Computes the evidence, the torque and the prediction of a tick."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from himpc.tick.kernel.residual import add_effects, effects
 
 @always_inline_kernel
 def remember(t: TickArrays, r: int) -> None:
-    """Stores the measured state and the results for the next tick; r levels were solved."""
+    """Stores the measured state and the results of r solved levels for the next tick."""
     copy(t.q, t.q_was, t.q.size)
     copy(t.v, t.v_was, t.v.size)
     copy(t.x_dot, t.x_dot_was, t.x_dot.size)
@@ -45,7 +45,7 @@ def remember(t: TickArrays, r: int) -> None:
 @inline_kernel
 def finish_tick(data: Any, where: Whole, whole: Whole, whole_where: Whole, keep: int) -> bool:
     """Computes the evidence of all levels, the torque τ₀ + Δτ within its bounds, and the prediction (18).
-    Returns False if the torque is not finite. keep: whether the tick is stored for the next one."""
+    Returns False if the torque is not finite. keep: whether the results are stored for the next tick."""
     t = arrays_of(data, where, whole, whole_where)
     r, m = t.sizes[4], t.sizes[3]
     N, n = t.fixed.shape

@@ -1,4 +1,4 @@
-"""The dual active-set method of Goldfarb and Idnani (1983): its steps, which HIMPC's levels and HTMPC's QPs
+"""The steps of the dual active-set method of Goldfarb and Idnani (1983), which HIMPC's levels and HTMPC's QPs
 share.
 
 The method keeps a point that is optimal under the active rows, which hold as equalities with multipliers of
@@ -16,23 +16,22 @@ from himpc.tick.kernel.arrays import Array
 from himpc.tick.kernel.linear import backward, subtract
 
 TOLERANCE = 1e-9
-"""A row with a smaller violation counts as satisfied. The unit, also of the next constant, is N·m in HIMPC
-and that of the row in HTMPC."""
+"""A row with a smaller violation counts as satisfied. The unit of this constant and the next one is N·m in
+HIMPC, and the unit of the row in HTMPC."""
 ROUNDED = 1e-7
-"""A row that no free direction can change counts as satisfied if its violation is smaller, which is
-rounding."""
+"""A row that no free direction can change counts as satisfied if its violation is smaller: it is rounding."""
 _NOISE = 1e-12
 """A multiplier counts as constant if its change is below this share of the largest change of a multiplier."""
 _HARD = 0.5
 """Rows whose multiplier has the wrong sign are removed together if their multipliers exceed this share of the
-largest one."""
+largest such multiplier."""
 
 
 @inline_kernel
 def release(active: ActiveSet, cost: Quadratic, k: int, budget: Array) -> int:
     """Removes rows until all multipliers have the right sign; returns the number of remaining rows. The rows
-    with the largest multipliers of the wrong sign are removed first: after that, multipliers of neighbouring
-    rows often change their sign. If all such rows were removed at once, many would have to be added again.
+    with the largest multipliers of the wrong sign are removed first; then multipliers of neighbouring rows
+    often change their sign. If all such rows were removed at once, many would have to be added again.
     """
     while True:
         wrong = -1.0
@@ -53,9 +52,9 @@ def release(active: ActiveSet, cost: Quadratic, k: int, budget: Array) -> int:
 
 @inline_kernel
 def take(active: ActiveSet, k: int, excess: float, z: Array, D: int, budget: Array) -> tuple[bool, int]:
-    """Adds the row at index k, whose violation is `excess`, to the active rows: the dual step, which moves
-    the point z (D,), in scaled coordinates. Returns whether a point satisfies this row and the others within
-    the budget, and the number of active rows."""
+    """Adds the row at index k, whose violation is `excess`, to the active rows. This is the dual step; it
+    moves the point z (D,), in scaled coordinates. Returns whether a point that satisfies all these rows was
+    found within the budget, and the number of active rows."""
     side = float(active.side[k])
     active.multiplier[k] = 0.0
     length = resolve(active, k, D, budget)
@@ -91,7 +90,7 @@ def take(active: ActiveSet, k: int, excess: float, z: Array, D: int, budget: Arr
         excess -= step * length * length
         active.multiplier[first] = 0.0
         if length > 0.0:
-            # The rotations that close the gap are also applied to this row: it need not be resolved again.
+            # The rotations that close the gap are also applied to this row. `resolve` is not needed again.
             without(active, first, k + 1, D, budget)
             k -= 1
             length = active.cholesky_factor[k, k]

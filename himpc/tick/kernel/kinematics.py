@@ -1,4 +1,4 @@
-"""Kinematics of a tree of revolute and prismatic joints: places of frames, rows of the Jacobian (3)."""
+"""Kinematics of a tree of revolute and prismatic joints: placements of frames, rows of the Jacobian (3)."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ def forward_kinematics(
     placed: Array,
     z: Array,
 ) -> None:
-    """Computes the placements of all joints at q: `placed` (n+1, 12), the rotation row by row, then the
-    origin, world axes; index 0 is the world. z (n+1, 3) are the joints' axes in the world.
+    """Computes the placements of all joints at q in world axes: `placed` (n+1, 12) contains the rotation row
+    by row, then the origin; index 0 is the world. z (n+1, 3) contains the joints' axes in the world.
 
     Args:
         q: (n,) rad or m.
-        parent: the place each one is fixed to; it always comes before.
+        parent: index of each joint's parent, which is always smaller.
         is_revolute: whether the joint is revolute, not prismatic.
         rotation, translation: from the parent to the joint at q = 0.
-        axis: of the joint, in its own axes.
+        axis: axis of the joint, in the joint's own axes.
         placed, z: the result.
     """
     for a in range(12):
@@ -57,7 +57,7 @@ def forward_kinematics(
 
 @inline_kernel
 def points(placed: Array, frame_joint: Whole, frame_translation: Array, point: Array) -> None:
-    """Origins of the frames in the world, (F, 3) m."""
+    """Computes the origins of the frames in the world, (F, 3) m."""
     for f in range(frame_joint.size):
         on, r = placed[frame_joint[f]], frame_translation[f]
         for a in range(3):
@@ -81,10 +81,10 @@ def jacobian(
 
     Args:
         task: (T, 4) kind, frame, first row and number of rows of each task.
-        part: (M,) which axis, joint or given row a row is about.
+        part: (M,) for each row, the index of its axis, of its joint, or of its row in `given`.
         parent, is_revolute, placed, z: as in `forward_kinematics`.
         frame_joint, point: the joint that carries each frame, and its origin.
-        given: rows that are handed in, (G, n).
+        given: rows of the tasks that Python computes, (G, n).
         J: the result.
     """
     J[:] = 0.0
@@ -113,7 +113,8 @@ def jacobian(
 
 @inline_kernel
 def rotation_of_frame(on: Array, rotation: Array, R: Array) -> None:
-    """Computes R of a frame in the world, (3, 3); `on` is the index of the joint that carries the frame."""
+    """Computes R of a frame in the world, (3, 3); `on` is the placement of the joint that carries the
+    frame."""
     for a in range(3):
         for b in range(3):
             R[a, b] = (
@@ -136,13 +137,14 @@ def about_one_axis(
     w: Array,
     J: Array,
 ) -> None:
-    """The row of every orientation task on a single axis a: aᵀ J_l⁻¹(log₃(R R_dᵀ)) times the Jacobian of ω,
-    see `OrientationTask`; `jacobian` has written aᵀ times it.
+    """Computes the row of every orientation task on a single axis a: aᵀ J_l⁻¹(log₃(R R_dᵀ)) times the
+    Jacobian of ω, see `OrientationTask`. Before the call, the row is aᵀ times the Jacobian of ω, written by
+    `jacobian`.
 
     Args:
         task, part, parent, is_revolute, placed, z, frame_joint, J: as in `jacobian`.
-        frame_rotation, R_d: of each frame, of each task.
-        R_now, w: room for a rotation per task, and for three numbers.
+        frame_rotation: rotation of each frame. R_d: reference of each task.
+        R_now, w: scratch for a rotation per task, and for three numbers.
     """
     for t in range(len(task)):
         if task[t, 0] != ORIENTATION or task[t, 3] != 1:
@@ -169,7 +171,8 @@ def about_one_axis(
 
 @inline_kernel
 def leans(R: Array, D: Array, f: int, out: Array) -> None:
-    """φ (f × p)/‖f × p‖ of p = R Dᵀ f, (3,) rad: the residual of an orientation task with axis f free."""
+    """Computes φ (f × p)/‖f × p‖ of p = R Dᵀ f, (3,) rad: the residual of an orientation task with axis f
+    free."""
     g, h = (f + 1) % 3, (f + 2) % 3
     ahead, first, second = dot3(R[f], D[f]), dot3(R[g], D[f]), dot3(R[h], D[f])
     aside = math.sqrt(first * first + second * second)
@@ -185,10 +188,10 @@ def leans(R: Array, D: Array, f: int, out: Array) -> None:
 
 @inline_kernel
 def turned_away(R: Array, D: Array, out: Array) -> None:
-    """log₃(R Dᵀ), (3,) rad: the residual of an orientation task.
+    """Computes log₃(R Dᵀ), (3,) rad: the residual of an orientation task.
 
-    It uses a quaternion whose largest component is computed by a square root, and is accurate at every angle
-    up to π.
+    It uses a quaternion whose largest component is computed by a square root. The result is accurate at every
+    angle up to π.
     """
     E = (
         (dot3(R[0], D[0]), dot3(R[0], D[1]), dot3(R[0], D[2])),
@@ -214,5 +217,5 @@ def turned_away(R: Array, D: Array, out: Array) -> None:
 
 @inline_kernel
 def dot3(a: Array, b: Array) -> float:
-    """aᵀb of three numbers."""
+    """Returns aᵀb of vectors of three numbers."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

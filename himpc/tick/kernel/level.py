@@ -13,28 +13,28 @@ from himpc.tick.kernel.residual import add_effects, effects, gather, gather_effe
 
 
 class LevelQP(NamedTuple):
-    """min ½ρ‖x‖² + ½ρ‖x'‖² + ½‖e₀ + G x‖², where U_j = fixed_j + metric ∘ Q_j (0, x_j, x'_j).
+    """The problem min ½ρ‖x‖² + ½ρ‖x'‖² + ½‖e₀ + G x‖², where U_j = fixed_j + metric ∘ Q_j (0, x_j, x'_j).
 
-    The order of the coordinates of a knot is: those of the levels above, which (33) fixes; the level's own x,
-    which change its residual; and the others, x', which do not change its residual but may be needed for
-    bounds. In the arrays all own coordinates come first, knot by knot, followed by all others.
+    A knot has three groups of coordinates, in this order: those of the levels above, which (33) fixes; the
+    level's own x, which change its residual; and the others, x', which do not change its residual but may be
+    needed for bounds. In the arrays, the own coordinates of all knots come before the others of all knots.
 
     Attributes:
-        first, last: its rows among all.
+        first, last: range of the level's rows among the rows of all levels.
         rho: ρ, the weight of the increments.
-        accuracy: the gradient that its point may have.
+        accuracy: the largest gradient that the point may have.
         C, S, row_knots: see `residual`.
         B, free, root_Q: Ĵ M̄⁻¹ (N, m, n), e for Δτ = 0 (N, m) and √Q (m,) of all rows.
-        projected_jacobian: B in coordinates, (N, m, n).
+        projected_jacobian: B in the coordinates of each knot, (N, m, n).
         e_0, e_1: √Q e for x = 0, and at the point, (N, m).
         pushed: scratch, (N, m).
-        start: (N,) its first own coordinate of a knot.
-        offset: (N+1,) where its own coordinates of a knot stand in x.
-        rest: (N+1,) where those beyond stand; they end all coordinates.
-        fixed: (N, n) what the levels above keep, N·m.
-        Q, metric: directions (N, n, n), and the joints' units of effort, (n,).
-        cost: the quadratic above, F the Cholesky factor of ρ + GᵀG.
-        x: the point, own coordinates and those beyond.
+        start: (N,) index of the first own coordinate of a knot among the knot's coordinates.
+        offset: (N+1,) index in x of the first own coordinate of a knot.
+        rest: (N+1,) index in x of the first other coordinate of a knot; all others come last.
+        fixed: (N, n) the part of the increments that (33) fixes, N·m.
+        Q, metric: directions (N, n, n), and √(ρ/R) of the joints, (n,).
+        cost: the quadratic cost above; F is the Cholesky factor of ρ + GᵀG.
+        x: the point: own coordinates, then the others.
         z: scratch.
         slope: the gradient.
         size: ‖G‖, ‖e₀‖: two numbers.
@@ -69,8 +69,8 @@ class LevelQP(NamedTuple):
 
 @inline_kernel
 def prepare(level: LevelQP) -> bool:
-    """Computes e₀, and F and `ideal` of the cost. Returns False if the Hessian is not positive definite,
-    which happens if numbers are not finite."""
+    """Computes e₀, and the fields F and `ideal` of the cost. Returns False if the Hessian is not positive
+    definite, which happens if numbers are not finite."""
     first, last = level.first, level.last
     N = len(level.start)
     total = 0.0
@@ -98,7 +98,7 @@ def prepare(level: LevelQP) -> bool:
 
 @inline_kernel
 def increments(level: LevelQP, U: Array) -> None:
-    """U_j = fixed_j + metric ∘ Q_j (0, x_j, x'_j), (N, n) N·m."""
+    """Computes U_j = fixed_j + metric ∘ Q_j (0, x_j, x'_j), (N, n) N·m."""
     N, n = U.shape
     for j in range(N):
         mine, others = level.offset[j + 1] - level.offset[j], level.rest[j + 1] - level.rest[j]

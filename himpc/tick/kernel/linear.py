@@ -1,4 +1,5 @@
-"""The linear algebra of small dense matrices, compiled: at these sizes a call costs more than the work.
+"""Compiled linear algebra of small dense matrices. At these sizes a call of a library costs more than the
+work.
 
 The active rows are stored as cholesky_factor · orthonormal_basis, a lower triangular matrix times orthonormal
 rows. Rows are added and removed one by one.
@@ -12,12 +13,12 @@ from himpc.compilation.compiled import inline_kernel
 from himpc.tick.kernel.arrays import Array
 
 _ENOUGH = 0.5
-"""`split` has a second round against rounding errors, unless more than this share of ‖row‖² is left."""
+"""`split` does a second round against rounding errors if at most this share of ‖row‖² is left."""
 
 
 @inline_kernel
 def dot(a: Array, b: Array, n: int) -> float:
-    """aᵀb over the first n."""
+    """Returns aᵀb over the first n elements."""
     total = 0.0
     for i in range(n):
         total += a[i] * b[i]
@@ -26,31 +27,33 @@ def dot(a: Array, b: Array, n: int) -> float:
 
 @inline_kernel
 def subtract(share: float, x: Array, y: Array, n: int) -> None:
-    """y ← y − share · x over the first n."""
+    """Computes y ← y − share · x over the first n elements."""
     for i in range(n):
         y[i] -= share * x[i]
 
 
 @inline_kernel
 def copy(x: Array, y: Array, n: int) -> None:
-    """y ← x over the first n. (`y[:] = x` would also be compiled with code for error messages.)"""
+    """Copies the first n elements, y ← x. (`y[:] = x` would also be compiled with code for error
+    messages.)"""
     for i in range(n):
         y[i] = x[i]
 
 
 @inline_kernel
 def copy_rows(X: Array, Y: Array) -> None:
-    """Y ← X, as many rows as Y has."""
+    """Copies as many rows as Y has, Y ← X."""
     for i in range(len(Y)):
         copy(X[i], Y[i], Y.shape[1])
 
 
 @inline_kernel
 def factorise(H: Array, d: int) -> bool:
-    """The lower Cholesky factor F of H = F Fᵀ in place of its lower triangle; False if H is not positive.
+    """Writes the Cholesky factor F of H = F Fᵀ to the lower triangle of H; returns False if H is not
+    positive.
 
-    H (d, d) is given by its upper triangle. Row by row F is what solves F_j F_iᵀ = H_ij, four rows i at once:
-    each row j above is then read once for four.
+    H (d, d) is read from its upper triangle. F is computed row by row from F_j F_iᵀ = H_ij, for four rows i
+    at a time. Each row j above is then read once for four rows.
     """
     for i in range(d):
         for j in range(i):
@@ -83,7 +86,7 @@ def factorise(H: Array, d: int) -> bool:
 
 @inline_kernel
 def forward(F: Array, x: Array, d: int) -> None:
-    """x ← F⁻¹ x, F lower triangular; leading zeros stay zero."""
+    """Computes x ← F⁻¹ x, F lower triangular. Leading zeros of x stay zero."""
     first = 0
     while first < d and x[first] == 0.0:
         first += 1
@@ -93,7 +96,7 @@ def forward(F: Array, x: Array, d: int) -> None:
 
 @inline_kernel
 def backward(F: Array, x: Array, d: int) -> None:
-    """x ← F⁻ᵀ x, F lower triangular."""
+    """Computes x ← F⁻ᵀ x, F lower triangular."""
     for a in range(d - 1, -1, -1):
         x[a] /= F[a, a]
         subtract(x[a], F[a], x, a)
@@ -101,10 +104,10 @@ def backward(F: Array, x: Array, d: int) -> None:
 
 @inline_kernel
 def split(row: Array, orthonormal_basis: Array, count: int, n: int, share: Array, rest: Array) -> float:
-    """A row (n,) as a combination of the first `count` orthonormal ones of `orthonormal_basis`, and a rest.
+    """Splits a row (n,) into a combination of the first `count` rows of `orthonormal_basis`, and a rest.
 
     Args:
-        row, orthonormal_basis, count, n: see there.
+        row, orthonormal_basis, count, n: see above.
         share: the coefficients, (count,).
         rest: the remainder, (n,).
 

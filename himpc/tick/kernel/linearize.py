@@ -1,4 +1,4 @@
-"""From the measured state and the references to the data of all QPs."""
+"""Computes the data of all QPs from the measured state and the references."""
 
 from __future__ import annotations
 
@@ -33,7 +33,8 @@ _MODE = 9
 
 @always_inline_kernel
 def jacobian_at(t: TickArrays, q: Array, given: Array, J: Array) -> None:
-    """J_i of (3) of all tasks at q into J (M, n), with the rows that are `given`, (G, n)."""
+    """Writes J_i of (3) of all tasks at q to J (M, n); `given` (G, n) contains the rows that Python
+    computes."""
     forward_kinematics(q, t.parent, t.is_revolute, t.rotation, t.translation, t.axis, t.placed, t.axis_now)
     points(t.placed, t.frame_joint, t.frame_translation, t.point)
     jacobian(
@@ -48,7 +49,7 @@ def jacobian_at(t: TickArrays, q: Array, given: Array, J: Array) -> None:
 
 @always_inline_kernel
 def errors(t: TickArrays) -> None:
-    """x, x̃ and ẋ of all tasks in the measured state."""
+    """Computes x, x̃ and ẋ of all tasks in the measured state."""
     for task in range(len(t.task)):
         kind, frame, first, size = t.task[task, 0], t.task[task, 1], t.task[task, 2], t.task[task, 3]
         R, R_d, turned = t.R_now[task], t.R_d[task], t.slope
@@ -72,8 +73,8 @@ def errors(t: TickArrays) -> None:
 @inline_kernel
 def linearize(data: Any, where: Whole, whole: Whole, whole_where: Whole) -> bool:
     """Computes the data of all QPs from the measured state and the references: kinematics along the last
-    prediction (30), residuals, free motion (15) and bounds (32d)–(32f). Returns False if they are not finite.
-    The knots q*_{k+j|k−1} are the last prediction, shifted to begin at the measured q.
+    prediction (30), residuals, free motion (15) and bounds (32d)–(32f). Returns False if these data are not
+    finite. The knots q*_{k+j|k−1} are the last prediction, shifted to begin at the measured q.
     """
     t = arrays_of(data, where, whole, whole_where)
     M, m = t.sizes[2], t.sizes[3]

@@ -28,7 +28,7 @@ Vector3 = tuple[float, float, float]
 
 _GOLDEN = 0.6180339887498949
 _NARROWER = 40
-"""Steps of the golden section: the share of a segment that is left is 4e-9."""
+"""Number of steps of the golden-section search. They reduce the segment to a share of 4e-9."""
 _PARALLEL = 1e-9
 """Square of the sine of the angle below which segments count as parallel."""
 
@@ -51,7 +51,7 @@ def from_ball(x: float, y: float, h: float, radius: float, u: Array) -> float:
 
 @inline_kernel
 def from_segment(x: float, y: float, h: float, e: Array, radius: float, u: Array) -> float:
-    """The same for a capsule about the segment 0 … e."""
+    """Returns the distance of a point from a capsule about the segment 0 … e, with u as in `from_ball`."""
     ee = e[0] * e[0] + e[1] * e[1] + e[2] * e[2]
     s = _clipped((e[0] * x + e[1] * y + e[2] * h) / ee) if ee > 0.0 else 0.0
     return from_ball(x - s * e[0], y - s * e[1], h - s * e[2], radius, u)
@@ -59,8 +59,8 @@ def from_segment(x: float, y: float, h: float, e: Array, radius: float, u: Array
 
 @inline_kernel
 def from_box(x: float, y: float, h: float, rotation: Array, half: Array, u: Array) -> float:
-    """The same for a box: the distance from its nearest point; inside, minus the distance to the nearest
-    face."""
+    """Returns the distance of a point from the nearest point of a box, with u as in `from_ball`. Inside the
+    box, it returns minus the distance to the nearest face."""
     nearest, face, squares = -math.inf, 0, 0.0
     for a in range(3):
         out = abs(rotation[0, a] * x + rotation[1, a] * y + rotation[2, a] * h) - half[a]
@@ -81,7 +81,7 @@ def from_box(x: float, y: float, h: float, rotation: Array, half: Array, u: Arra
 
 @inline_kernel
 def _outside_box(x: float, y: float, h: float, rotation: Array, half: Array) -> float:
-    """The signed distance of a point from a box, see `from_box`."""
+    """Returns the signed distance of a point from a box, see `from_box`."""
     nearest, squares = -math.inf, 0.0
     for a in range(3):
         out = abs(rotation[0, a] * x + rotation[1, a] * y + rotation[2, a] * h) - half[a]
@@ -92,8 +92,8 @@ def _outside_box(x: float, y: float, h: float, rotation: Array, half: Array) -> 
 
 @inline_kernel
 def _along_box(p: Vector3, d: Vector3, rotation: Array, half: Array) -> float:
-    """Share of the segment p … p + d at which it is nearest to a box: the signed distance from a convex set
-    is convex along a line."""
+    """Returns the share of the segment p … p + d at which it is nearest to a box. The search uses that the
+    signed distance from a convex set is convex along a line."""
     low, high = 0.0, 1.0
     left, right = 1.0 - _GOLDEN, _GOLDEN
     f_left = _outside_box(p[0] + left * d[0], p[1] + left * d[1], p[2] + left * d[2], rotation, half)
@@ -114,8 +114,8 @@ def _along_box(p: Vector3, d: Vector3, rotation: Array, half: Array) -> float:
 
 @inline_kernel
 def _along_segment(p: Vector3, d: Vector3, e: Array) -> float:
-    """Share of the segment p … p + d at which it is nearest to the segment 0 … e. For parallel segments it
-    is the middle of the part where they are side by side."""
+    """Returns the share of the segment p … p + d at which it is nearest to the segment 0 … e. For parallel
+    segments this is the middle of the part where they are side by side."""
     dd = d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
     ee = e[0] * e[0] + e[1] * e[1] + e[2] * e[2]
     dp = d[0] * p[0] + d[1] * p[1] + d[2] * p[2]
@@ -125,7 +125,7 @@ def _along_segment(p: Vector3, d: Vector3, e: Array) -> float:
     de = d[0] * e[0] + d[1] * e[1] + d[2] * e[2]
     square = dd * ee - de * de
     if square <= _PARALLEL * dd * ee:
-        # The shares at which the ends of the other segment lie beside this one.
+        # The shares of this segment that lie beside the ends of the other segment.
         at_start, at_end = _clipped(-dp / dd), _clipped((de - dp) / dd)
         return 0.5 * (at_start + at_end)
     t = _clipped((de * ep - ee * dp) / square)
@@ -135,8 +135,8 @@ def _along_segment(p: Vector3, d: Vector3, e: Array) -> float:
 
 @inline_kernel
 def share_of(kind: int, p: Vector3, d: Vector3, rotation: Array, half: Array) -> float:
-    """Share of the segment p … p + d, in the axes of a shape's carrier about its middle, at which it is
-    nearest to the shape; 0 for a segment of length 0."""
+    """Returns the share of the segment p … p + d at which it is nearest to a shape; 0 for a segment of length
+    0. p and d are relative to the shape's middle, in the axes of the shape's carrier."""
     if d[0] == 0.0 and d[1] == 0.0 and d[2] == 0.0:
         return 0.0
     if kind == FLOOR:
@@ -190,10 +190,10 @@ def near(
         joint, centre, span, radius, kind, carrier, rotation, middle, half, thickness, meets: see
             `Surroundings`.
         centres, spans: scratch, (K, S, 3).
-        knot, sphere, shape: indices of each pair, space for all; the result.
+        knot, sphere, shape: indices of each pair, with space for all pairs; the result.
         share, distance, normal: share of the capsule's segment, m, and the unit vector, world axes; the
             result.
-        slopes: the gradients, space for all or for none.
+        slopes: the gradients, with space for all pairs or for none; the result.
     """
     K, n, S, B = len(placed), moves.shape[1], len(radius), len(kind)
     placed, z, centres, normal = borrowed(placed), borrowed(z), borrowed(centres), borrowed(normal)
@@ -255,7 +255,7 @@ def near(
         u, C, along, t = normal[r], centres[k, s], spans[k, s], share[r]
         for j in range(1, n + 1):
             slopes[r, j - 1] = 0.0
-            # A joint that moves both does not change their distance.
+            # A joint that moves both the capsule and the shape does not change their distance.
             sign = moves[joint[s], j - 1] - moves[c, j - 1]
             if sign == 0.0:
                 continue

@@ -1,5 +1,5 @@
-"""The optimum of one level under its bounds, from the rows of the tick before, by the steps of
-`goldfarb_idnani`."""
+"""Computes the optimum of one level under its bounds by the steps of `goldfarb_idnani`, starting from the
+active rows of the previous tick."""
 
 from __future__ import annotations
 
@@ -25,7 +25,8 @@ from himpc.tick.kernel.linear import dot, subtract
 from himpc.tick.kernel.residual import add_effects, apply, gather, gather_effects
 
 _ROUNDS = 4
-"""The normal equations lose digits on long horizons; refinement brings them back."""
+"""Largest number of steps of refinement. Refinement corrects rounding errors of the normal equations on long
+horizons."""
 _ROUNDING = 2e-14
 """A gradient below this share of ‖G‖‖e‖ is rounding error: a better point cannot be distinguished."""
 _MET = 1e-11
@@ -124,7 +125,7 @@ def optimum(
     larger budget would not help.
 
     Args:
-        level: prepared.
+        level: the level, for which `prepare` has been called.
         active: the k rows to begin with, from `warm_start`. Afterwards it contains the active rows and their
             multipliers.
         bounds: the bounds. A bound that cannot be met because of rounding is widened by its violation.

@@ -1,5 +1,5 @@
-"""Entry: the distances of tasks from their targets, and the velocities of the targets. A robot without
-progress is stalled."""
+"""Entry point: computes the distances of tasks from their targets, and the velocities of the targets. A robot
+without progress is stalled."""
 
 from __future__ import annotations
 

@@ -12,13 +12,13 @@ from himpc.tick.kernel.kinematics import POSITION
 
 @inline_kernel
 def bounded_pull(task: Whole, error: Array, pull: float, K_p: Array, m: int, free: Array) -> None:
-    """Takes from `free_motion` the part of the errors beyond `pull`, see `StackForm.pulling`.
+    """Removes from the free motion the part of the errors beyond `pull`, see `StackForm.pulling`.
 
     Args:
         task: see `jacobian`. error: x̃_k, (M,). K_p: (M,).
-        pull: the largest error on which a task of a position acts, m; the others act on up to TURN_PULL
-            times as much.
-        m: number of rows that are solved for.
+        pull: the largest error on which a position task acts, m; other tasks act on errors up to TURN_PULL
+            times as large.
+        m: number of rows of the solved tasks.
         free: (N, M), updated.
     """
     for p in range(len(task)):

@@ -25,7 +25,8 @@ def curves(
     velocity_d: Array,
     acceleration_d: Array,
 ) -> None:
-    """x_d = c + a cos φ + b sin φ + d sin 2φ of every task that follows a curve, at t, t + T_s, … (s).
+    """Computes x_d = c + a cos φ + b sin φ + d sin 2φ of every task that follows a curve, at t, t + T_s, …
+    (s).
 
     Args:
         t, T_s: s.

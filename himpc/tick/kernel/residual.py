@@ -23,15 +23,15 @@ def free_motion(
     m: int,
     free: Array,
 ) -> float:
-    """e at knots 1 … N for Δτ = 0, (N, m), by (15) and (28); ẍ_k is the backward difference of ẋ. Returns
-    their sum, which is finite if they are.
+    """Computes e at knots 1 … N for Δτ = 0, (N, m), by (15) and (28); ẍ_k is the backward difference of ẋ.
+    Returns the sum of all e, which is finite if all of them are finite.
 
     Args:
         error, x_dot, x_dot_was: x̃_k, ẋ_k and ẋ one `period` (s) ago, (m,).
-        K_p, K_v: (m,) of (4).
+        K_p, K_v: gains of (4), (m,).
         on_velocity, on_acceleration: (N, m), see `ResidualModel`.
         displacement, velocity_d, acceleration_d: the references at k … k+N, (N+1, m).
-        m: how many rows count.
+        m: number of rows of the solved tasks.
         free: the result.
     """
     total = 0.0
@@ -49,7 +49,7 @@ def free_motion(
 
 @inline_kernel
 def effects(B: Array, U: Array, first: int, last: int, pushed: Array) -> None:
-    """B_j U_j of some rows, (N, m): the change of ẍ by the increments of one knot."""
+    """Computes B_j U_j of some rows, (N, m): the change of ẍ by the increments of one knot."""
     N, _, n = B.shape
     for j in range(N):
         for i in range(first, last):
@@ -58,13 +58,13 @@ def effects(B: Array, U: Array, first: int, last: int, pushed: Array) -> None:
 
 @inline_kernel
 def add_effects(C: Array, pushed: Array, first: int, last: int, row_knots: Whole, e: Array) -> None:
-    """e_{k+1} += Σ_{j≤k} √Q c_{k−j} pushed_j over the knots that a row counts.
+    """Computes e_{k+1} += Σ_{j≤k} √Q c_{k−j} pushed_j over the knots that a row counts.
 
     Args:
         C: √Q c_l of `ResidualModel`, (m, N): the effect depends on the distance l of two knots only.
         pushed: (N, m).
         first, last: the rows.
-        row_knots: how many knots a row counts (Remark 8).
+        row_knots: number of knots that a row counts (Remark 8).
         e: (N, m), changed.
     """
     for i in range(first, last):
@@ -77,7 +77,7 @@ def add_effects(C: Array, pushed: Array, first: int, last: int, row_knots: Whole
 
 @inline_kernel
 def gather_effects(C: Array, e: Array, first: int, last: int, row_knots: Whole, pulled: Array) -> None:
-    """The transpose of `add_effects`: pulled_j = Σ_{k≥j} √Q c_{k−j} e_{k+1}."""
+    """Computes the transpose of `add_effects`: pulled_j = Σ_{k≥j} √Q c_{k−j} e_{k+1}."""
     N = len(e)
     for i in range(first, last):
         for j in range(N):
@@ -107,7 +107,7 @@ def hessian(
         projected_jacobian: b, the rows of B in the level's coordinates, (N, m, n).
         first, last: the level's rows.
         start: index of the level's first own coordinate of a knot among all coordinates of the knot, (N,).
-        offset: the same among the level's own coordinates of all knots, (N + 1,).
+        offset: index of the same coordinate among the level's own coordinates of all knots, (N + 1,).
         rho: ρ, the weight R of the increments.
         H: the result.
     """
@@ -133,7 +133,7 @@ def hessian(
 def apply(
     projected_jacobian: Array, x: Array, first: int, last: int, start: Whole, offset: Whole, pushed: Array
 ) -> None:
-    """B_j of own coordinates x, (N, m)."""
+    """Computes the product of B_j and the own coordinates x, (N, m)."""
     for j in range(len(start)):
         begin = start[j] - offset[j]
         for i in range(first, last):
@@ -147,7 +147,7 @@ def apply(
 def gather(
     projected_jacobian: Array, pulled: Array, first: int, last: int, start: Whole, offset: Whole, slope: Array
 ) -> None:
-    """The transpose of `apply`: slope = Σ_i b_ji pulled_ji."""
+    """Computes the transpose of `apply`: slope = Σ_i b_ji pulled_ji."""
     for j in range(len(start)):
         begin = start[j] - offset[j]
         for a in range(offset[j], offset[j + 1]):

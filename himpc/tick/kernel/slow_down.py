@@ -1,5 +1,5 @@
-"""Entry: the velocity limits of a controller that keeps distances, see `limits.load`, `limits.overrun` and
-`limits.stall`."""
+"""Entry point: computes the velocity limits of a controller that keeps distances, see `limits.load`,
+`limits.overrun` and `limits.stall`."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from himpc.constants import (
 from himpc.tick.kernel.arrays import Array
 
 STALL_SHARE, STALL_LEAST = range(2)
-"""Numbers about the stall, see `limits.stall.Stall`."""
+"""Indices of the numbers about the stall, see `limits.stall.Stall`."""
 
 
 @inline_kernel
@@ -78,7 +78,7 @@ def slow_down(
     limits.
 
     Args:
-        v_limit: (n,) rad/s, without slowing. largest_torque: (n,) N·m.
+        v_limit: (n,) rad/s, the limits without reductions. largest_torque: (n,) N·m.
         tau: torque that acts, (n,) N·m. v: measured, (n,) rad/s.
         carried: (n, n), entry [k, j]: whether the motor of joint j carries joint k.
         room, moves, T_s, errors: see `limits.stall.stalled`. The stall is not updated if `errors` is empty.

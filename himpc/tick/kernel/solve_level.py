@@ -1,4 +1,4 @@
-"""One level of the cascade."""
+"""Solves one level of the cascade."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def active_set_of(t: TickArrays) -> ActiveSet:
 
 @always_inline_kernel
 def level_of(t: TickArrays, i: int) -> LevelQP:
-    """Level i with its scratch, after `count_coordinates`."""
+    """Returns level i with its scratch arrays; `count_coordinates` must have been called."""
     cost = Quadratic(t.H, t.ideal, 1.0 / math.sqrt(t.rho[i]), t.offset[-1], t.rest[-1])
     return LevelQP(
         *(t.level[i, FIRST], t.level[i, LAST], t.rho[i], t.accuracy[i], t.C, t.S, t.row_knots),

@@ -1,4 +1,4 @@
-"""Entry: the filter of a dragged target, see `references.target`. `references.filter` contains the same
+"""Entry point: the filter of a dragged target, see `references.target`. `references.filter` contains the same
 formulas in Python."""
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from himpc.tick.kernel.linear import copy, dot
 
 @inline_kernel
 def shorten(x: Array, cap: float, m: int) -> None:
-    """x, shortened to `cap` if it is longer."""
+    """Shortens x to the length `cap` if it is longer."""
     length = math.sqrt(dot(x, x, m))
     if length > cap:
         for a in range(m):
@@ -24,7 +24,7 @@ def shorten(x: Array, cap: float, m: int) -> None:
 
 @inline_kernel
 def rotate(w: Array, now: Array, then: Array) -> None:
-    """exp(w) R of a rotation R, row by row, by Rodrigues' formula."""
+    """Computes exp(w) R of a rotation R by Rodrigues' formula; rotations are stored row by row."""
     angle = math.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
     half = math.sin(0.5 * angle)
     first = math.sin(angle) / angle if angle > 1e-9 else 1.0
@@ -48,10 +48,10 @@ def jerked(
     m: int,
     change: Array,
 ) -> None:
-    """Returns the change of the acceleration in one period towards the wanted one, within the jerk cap. The
-    speed must not exceed its cap: along the motion the acceleration stays below √(jerk · speed left). A
-    straight line would allow twice that, but in a curve the speed also grows by itself. If the acceleration
-    is above this limit, the jerk is used for its decrease first.
+    """Computes the change of the acceleration in one period towards the desired acceleration, within the jerk
+    cap. The speed must not exceed its cap: the acceleration along the motion stays below √(jerk · speed
+    left). A straight line would allow twice this acceleration, but in a curve the speed also grows by itself.
+    If the acceleration is above this limit, the jerk is first used to reduce it.
     """
     budget = caps[2] * T_s
     if speed == 0.0:
@@ -77,7 +77,7 @@ def jerked(
 
 @inline_kernel
 def following(now: Array, then: Array, raw: Array, caps: Array, T_s: float, m: int, width: int) -> None:
-    """Returns the next sample: one period of constant acceleration within the caps."""
+    """Computes the next sample: one period of constant acceleration within the caps."""
     velocity, acceleration = now[width : width + m], now[width + m : width + 2 * m]
     away, change, along = caps[3 : 3 + m], caps[3 + m : 3 + 2 * m], caps[3 + 2 * m : 3 + 3 * m]
     rests = now[width + 3 * m] > 0.0
@@ -121,11 +121,11 @@ def roll(samples: Array, known: int, raw: Array, caps: Array, T_s: float, out: A
     """Advances the filter with a constant raw target, and collects its preview.
 
     Args:
-        samples: (…, w + 3m + 1) value, velocity, acceleration, way from the sample before, and whether it
-            rests at the raw target; a value has w = 9 numbers for a rotation, else m.
-        known: how many of them are there; more are made as far as `out` reaches.
-        raw: where the hand is, (w,).
-        caps: speed, acceleration and jerk; and room for 3m more numbers.
+        samples: (…, w + 3m + 1) value, velocity, acceleration, displacement from the previous sample, and 1
+            if the target rests at the raw target. A value has w = 9 numbers for a rotation, else m.
+        known: number of samples that exist; the other samples for `out` are computed.
+        raw: the raw target, (w,).
+        caps: speed, acceleration and jerk; then scratch for 3m numbers.
         T_s: s.
         out: (3, N+1, m) displacement, velocity and acceleration at t … t + N·T_s.
     """
