@@ -1,8 +1,8 @@
 """The private names of viser that this program uses; each is checked before the server starts.
 
 viser documents no names of its page. The selectors and objects that our scripts and styles use are constants
-of this module. viser's package contains the sources of its page, and the check searches them for the text
-that each constant depends on.
+of this module. viser's package contains the sources of its page, and the check searches these sources for the
+text that each constant depends on.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ PAGE = "window.__viserMutable"
 CHART, CHART_TITLE = ".uplot", ".u-title"
 NUMBER_BOX, SLIDER_LABEL = ".mantine-NumberInput-root", ".mantine-Slider-label"
 SHEET = 'div[style*="width: 20em"]'
-"""The sheet at the bottom of a phone."""
+"""The sheet of controls at the bottom of a phone's screen."""
 ROW = ".mantine-Flex-root"
 """A control with its label."""
 ICON_BUTTON, CLOSES_NOTICE = ".mantine-ActionIcon-root", ".mantine-Notification-closeButton"

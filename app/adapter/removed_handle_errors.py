@@ -1,5 +1,5 @@
-"""Exceptions of callbacks. A callback may still run while its page is rebuilt, and write to a removed
-control."""
+"""Treatment of the exceptions of callbacks. A callback may still run while its page is rebuilt, and may then
+write to a removed control."""
 
 from __future__ import annotations
 
