@@ -41,7 +41,7 @@ class Cadence:
             return True
         if now < self._next_plots:
             return False
-        # The page checks slightly too early or too late. The average rate stays the same.
+        # The page checks slightly too early or too late; this limit keeps the average rate.
         late = now - 1 / (self._share * POSES)
         self._next_plots = max(self._next_plots, late) + 1 / (self._share * PLOTS)
         return True

@@ -16,7 +16,7 @@ from app.link.messages import Play
 from app.page import accessible
 from app.panels.run.narration import Narration, facts_of
 
-if TYPE_CHECKING:  # the server listens before anything that computes is loaded
+if TYPE_CHECKING:  # for types only: the server listens before it loads modules that compute
     from app.panels.widgets.snapshot import SessionSnapshot
     from lessons.settings.settings import SceneSettings
 
@@ -82,7 +82,7 @@ class Comfort:
         switch = gui.add_checkbox(
             "Say what happens",
             self.says,
-            hint="A line below the robot, which a screen reader says: at most one sentence in two seconds",
+            hint="A line below the robot, which a screen reader reads aloud: at most one sentence in two seconds",
         )
 
         @switch.on_update

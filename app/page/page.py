@@ -140,7 +140,7 @@ class Page:
             self._trouble = trouble
             stage.show_trouble(trouble)
         if private.waiting(self._client) > 0:
-            learner.look()  # the connection is slow: data are stored, and the next picture is newer
+            learner.look()  # the connection is slow: data are stored, and the next picture shows newer data
             return
         try:
             stage.follow(plots=self._cadence.plots_due(now), texts=self._cadence.texts_due(now))
@@ -156,8 +156,7 @@ class Page:
         return self._stage is None or private.waiting(self._client) == 0
 
     def _show(self, ready: Ready, same: bool) -> None:
-        """Builds a scene. same: whether it is the run that is shown already, which continues with another
-        stack."""
+        """Builds a scene. same: whether the scene continues the run that is shown, with another stack."""
         if same and self._stage is not None:
             with self._client.atomic():
                 self._stage.recompose(ready)
