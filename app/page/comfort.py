@@ -82,7 +82,7 @@ class Comfort:
         switch = gui.add_checkbox(
             "Say what happens",
             self.says,
-            hint="A line below the robot, which a screen reader reads aloud: at most one sentence in two seconds",
+            hint="A line below the robot, for screen readers: at most one sentence in two seconds",
         )
 
         @switch.on_update

@@ -240,7 +240,7 @@ class Page:
                 aim(self._client.camera, ready.robot, self._phone, ready.room, ways)
                 self._seen = seen
         for sentence in ready.left_out:
-            self._client.add_notification("Opened without a task of yours", sentence, color="orange")
+            self._client.add_notification("Opened without one of your tasks", sentence, color="orange")
         self._trouble = None
 
     def _drop_stage(self) -> None:

@@ -40,7 +40,7 @@ from lessons.settings.torque import TorqueSettings
 
 
 class TorqueFace:
-    """See `app.page.scene_ui.Face`."""
+    """The user interface of a torque-level scene; `app.page.scene_ui.Face` describes its methods."""
 
     fastest: ClassVar[float] = 1.0
 

@@ -45,7 +45,7 @@ _AHEAD, _RADIUS = 0.7, 0.2
 
 
 class VelocityFace:
-    """See `app.page.scene_ui.Face`."""
+    """The user interface of a velocity-level scene; `app.page.scene_ui.Face` describes its methods."""
 
     fastest: ClassVar[float] = 10.0
 

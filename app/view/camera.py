@@ -9,7 +9,7 @@ import numpy as np
 import viser
 
 _SHARE = 0.74
-"""Share of the picture's width and height that the points may take; the rest is room for dragging a
+"""Share of the picture's width and height that the points may fill; the rest is room for dragging a
 target."""
 _NARROW = 0.75
 """Usual ratio of width to height of the scene on a desktop, with the panels docked beside it."""
@@ -53,8 +53,8 @@ def fit(
 
 
 def look(camera: viser.CameraHandle, points: np.ndarray, phone: bool, direction: np.ndarray | None) -> None:
-    """Turns the camera to all points (k, 3), m; direction: from the points to the camera, None: the present
-    one."""
+    """Moves the camera so that all points (k, 3), m, are visible. direction: from the points to the camera;
+    None for the present direction."""
     if direction is None:
         here = np.asarray(camera.position, float) - np.asarray(camera.look_at, float)
         level = float(np.linalg.norm(here[:2]))

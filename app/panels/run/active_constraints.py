@@ -11,7 +11,8 @@ from himpc.limits import CONSTRAINTS
 from lessons.settings.settings import SceneSettings
 
 _ALWAYS = 3
-"""Constraints that every robot has: torque, velocity and position. Others have a column once they bind."""
+"""Constraints that every robot has: torque, velocity and position. Other constraints get a column once they
+bind."""
 _HEAD = '<tr style="text-align:left">{}</tr>'
 
 
@@ -57,7 +58,7 @@ class BindingPanel:
 
 
 def readable(pair: str) -> str:
-    """The names of a pair as words, "link 5 – table" for "link_5 – table"; a joint's name as it is."""
+    """The names of a pair as words: "link 5 – table" for "link_5 – table". A joint's name is not changed."""
     return pair.replace("_", " ") if " – " in pair else pair
 
 

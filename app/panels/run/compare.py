@@ -25,8 +25,8 @@ _ROWS = 3
 
 
 class ComparePanel:
-    """The panel of the ghost. Callbacks only start and end ghosts; the state comes from the learner, so that
-    a ghost that a lesson started is shown as well."""
+    """The panel of the ghost. Callbacks only start and end ghosts; the state is read from the learner, so
+    that a ghost that a lesson started is also shown."""
 
     def __init__(
         self,
@@ -45,7 +45,7 @@ class ComparePanel:
         self._settings = [self._row(gui, place) for place in range(1, _ROWS + 1)]
         self._start = gui.add_button("Start the ghost", color=button(GHOST))
         self._swap = gui.add_button(
-            "Swap robot and ghost", hint="Each gets the other's settings; both start again", visible=False
+            "Swap robot and ghost", hint="Both swap their settings and start again", visible=False
         )
         self._end = gui.add_button("Remove the ghost", visible=False)
         self._table = gui.add_html("", visible=False)
@@ -115,7 +115,7 @@ class ComparePanel:
         learner.start_ghost(Ghost(", ".join(own), own))
 
     def update(self, now: SessionSnapshot[SceneSettings]) -> None:
-        """Shows the present state."""
+        """Shows the state of the ghost, and the results of both runs."""
         ghost = self._learner.ghost
         on = ghost is not None
         if self._end.visible != on:
@@ -145,7 +145,7 @@ class ComparePanel:
         ]
         if math.isfinite(mine.torque_share):
             rows.append(
-                _line("largest torque asked for, of its bound", mine.torque_share, its.torque_share, _percent)
+                _line("largest requested torque / bound", mine.torque_share, its.torque_share, _percent)
             )
         rows += [
             _line("unsolved QPs", mine.unsolved, its.unsolved, str),
@@ -194,8 +194,8 @@ def _milliseconds(value: float) -> str:
 
 
 _INTRO = block(
-    "<b>A second robot does the same with other settings.</b> Choose the settings in which it differs. Both "
-    "start together, get the same targets and pushes, and share one clock. If you change another setting "
-    "during the run, it changes for both.",
+    "<b>A second robot does the same with other settings.</b> Choose the settings in which this ghost "
+    "differs. Both robots start together, get the same targets and pushes, and share one clock. If you "
+    "change another setting during the run, it changes for both robots.",
     "padding-top:0.5em",
 )

@@ -36,8 +36,8 @@ def add_hand_in(gui: viser.GuiApi, learner: SimulationClient, notebook: Notebook
 
 
 _WHAT = (
-    "The lessons whose steps you ran, the best scores of their challenges, and the code of the setting that "
-    "is on the page now. Copy the text and send it; <code>himpc-lab grade FILE.txt</code> reads it."
+    "The text lists the lessons whose steps you ran, the best scores of their challenges, and the code of "
+    "the present setting. Copy the text and send it; <code>himpc-lab grade FILE.txt</code> reads it."
 )
-_SIGNED = f"{_WHAT} This lab signs it with its instructor's key."
-_NOT_SIGNED = f"{_WHAT} This lab has no instructor's key, so anybody could have written it."
+_SIGNED = f"{_WHAT} This lab signs the text with its instructor's key."
+_NOT_SIGNED = f"{_WHAT} This lab has no instructor's key, so anybody could have written the text."

@@ -32,7 +32,7 @@ _PICK_UP, _DROP = f"Pick up {_LOAD:g} kg", "Drop the payload"
 
 
 class StartPanel:
-    """A guide that depends on what the learner has already done."""
+    """The controls of the first tab, and a guide that depends on what the learner has already done."""
 
     def __init__(
         self,
@@ -43,7 +43,7 @@ class StartPanel:
         colours: Mapping[str, RGB],
         dark: bool,
     ) -> None:
-        """settings: the present ones; colours: per level."""
+        """settings: the present settings; colours: the colour of each level."""
         self.on_theme: Callable[[bool], None] = lambda _: None
         self.on_recall: Callable[[], None] = lambda: None
         self._dragged = False
@@ -56,7 +56,7 @@ class StartPanel:
                 "Keep within reach",
                 True,
                 hint="On: the controller gets the nearest point that the robot can reach. "
-                "Off: it gets your point unchanged, and you can see how a singular arm moves.",
+                "Off: the controller gets your point unchanged, and you see how a singular arm moves.",
             )
             recall = gui.add_button("Bring the target to the hand")
         with gui.add_folder("Push the robot", visible=not ready.arm):
@@ -80,8 +80,9 @@ class StartPanel:
             self.ellipsoids = gui.add_checkbox(
                 "Manipulability ellipsoids",
                 False,
-                hint="The speed at which each level can move its frame with joints of unit speed, within the "
-                "freedom that the levels above leave. The ellipsoid is flat in directions without motion",
+                hint="The speed at which each level can move its frame if the joints have unit speed. "
+                "A level uses only the freedom that the levels above leave. The ellipsoid is flat in directions "
+                "without motion",
             )
             self.cover = gui.add_checkbox(
                 "Cover that distances use",
@@ -114,7 +115,7 @@ class StartPanel:
         self.pull.value = not self.pull.value
 
     def dragged(self) -> None:
-        """Called at the first drag: the guide continues with the next step."""
+        """Called when a target is dragged: the guide then shows the next step."""
         self._dragged = True
 
     def show_verdict(self, verdict: Reachability | None, clamped: bool) -> None:
