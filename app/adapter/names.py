@@ -65,7 +65,7 @@ OF_THE_PAGE = (
     ("components/Slider.tsx", "id={uuid}"),
     ("ControlPanel/BottomPanel.tsx", 'width: "20em"'),
 )
-"""(file below viser's `client/src`, text that it must contain)."""
+"""Pairs: a file below viser's `client/src`, and a text that this file must contain."""
 
 
 def check_names() -> None:

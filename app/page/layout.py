@@ -133,7 +133,7 @@ class Stage:
         with tabs.add_tab("Help"):
             self._comfort.add_switch(gui)
             self._help = HelpPanel(gui)
-        for place, key in enumerate(_HOTKEYS):  # also for levels that may be added later
+        for place, key in enumerate(_HOTKEYS):  # hotkeys also for levels that may be added later
             add_command(gui, f"Level {place + 1} on or off", key, partial(self._toggle, place))
         self._face.add_plots(gui, plots)
         with plots.add_tab("Who binds"):

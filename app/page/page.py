@@ -231,7 +231,7 @@ class Page:
                 self._comfort,
                 self._narrow,
             )
-            add_command(self._client.gui, "Camera: all of the robot", "F", self._frame)
+            add_command(self._client.gui, "Camera: show the whole robot", "F", self._frame)
             self._comfort.opened(self.learner)
             run = ready.choice.run
             seen = (run.scene, run.urdf, run.tip, ready.choice.urdf_text, ready.robot.name)

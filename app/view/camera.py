@@ -64,7 +64,7 @@ def look(camera: viser.CameraHandle, points: np.ndarray, phone: bool, direction:
         direction = here if level > 0.02 * abs(float(here[2])) else here - below
     if not np.linalg.norm(direction) > 0.0:
         direction = _ASIDE
-    # The canvas of a folded page, or of one without a layout, has zero height or width.
+    # The canvas of a folded page, or of a page without a layout, has zero height or width.
     aspect = max(max(camera.image_width, 1) / max(camera.image_height, 1), _SLIM)
     eye, at = fit(points, np.asarray(direction), camera.fov, aspect if phone else min(aspect, _NARROW), phone)
     camera.up_direction = (0.0, 0.0, 1.0)

@@ -50,8 +50,8 @@ def _drawn(scene: viser.SceneApi, name: str, thing: Thing) -> viser.SceneNodeHan
 
 
 class ContactView:
-    """An arrow per point of contact, in the direction of the force on the robot, 1 mm per newton up to 35
-    cm; the strongest one has a label."""
+    """An arrow for each point of contact, in the direction of the force on the robot. Its length is 1 mm per
+    newton, at most 35 cm. The strongest force has a label."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
         self._shown: tuple[ContactPoint, ...] = ()

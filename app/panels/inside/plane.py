@@ -63,7 +63,7 @@ class PlanePanel:
                 hint="The joint of the horizontal axis, then the joint of the vertical axis",
             )
             self._through = gui.add_dropdown(
-                "Others held at",
+                "Other Δτ held at",
                 (_APPLIED, *levels),
                 hint="The Δτ of other joints and of later knots have the values of this level's solution",
             )

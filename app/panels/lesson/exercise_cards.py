@@ -49,7 +49,7 @@ def _judged_by(exercise: Exercise) -> str:
 
 
 def _hints(hints: Sequence[str], number: int = 1) -> str:
-    """The first hint as a folded element, which contains the next one."""
+    """The first hint as a folded element, which contains the next hint."""
     if not hints:
         return ""
     first = rendered_line(hints[0])

@@ -126,7 +126,7 @@ class ComparePanel:
         mine = None if self._learner.score is None else self._learner.score.result()
         its = None if ghost.score is None else ghost.score.result()
         if its is None or mine is None or ghost.status is None:
-            self._table.content = block(f"{badge('GHOST', GHOST)} is getting ready …")
+            self._table.content = block(f"{badge('GHOST', GHOST)} is starting …")
             return
         self._table.content = _legend(ghost.words, now) + self._results(now, mine, its)
 
@@ -158,7 +158,7 @@ class ComparePanel:
         )
         return block(
             f'<table style="width:100%;border-spacing:0 0.25em">{head}{"".join(rows)}</table>'
-            f"over {mine.seconds:.1f} s since both began together; the better figure is bold"
+            f"over {mine.seconds:.1f} s since both robots started together; the better value is bold"
         )
 
 
@@ -166,11 +166,11 @@ def _legend(words: str, now: SessionSnapshot[SceneSettings]) -> str:
     slow = ""
     if now.status.capped:
         slow = (
-            f'<br><span style="color:{ink(BAD)}">This computer cannot run both in real time: the clock of '
-            "both is slowed down.</span>"
+            f'<br><span style="color:{ink(BAD)}">This computer cannot run both robots in real time: '
+            "their clock is slowed down.</span>"
         )
     return block(
-        f"{badge('GHOST', GHOST)} {esc(words)}<br>translucent in the scene, dashed in the plots; same "
+        f"{badge('GHOST', GHOST)} {esc(words)}<br>translucent in the scene, dashed in the plots; has the same "
         f"targets, pushes and clock{slow}",
         "padding-top:0.6em",
     )

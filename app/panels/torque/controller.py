@@ -42,7 +42,7 @@ class ControllerPanel:
         with gui.add_folder("Horizon"):
             controls.add("horizon", "T_s")
         self._deadline = DeadlineFolder(gui, controls)
-        with gui.add_folder("Inertia guess M̄"):
+        with gui.add_folder("Inertia estimate M̄"):
             self._gauge = gui.add_html("")
             controls.add("M_bar_scale", "M_bar_adapt")
             self.spectrum = SpectrumPicture(client, in_view)

@@ -32,7 +32,7 @@ def guide(
 def _first(position: TaskView, places: Mapping[str, int], colours: Mapping[str, RGB]) -> tuple[str, str]:
     ball = f"The arrows are at the {swatch(colours.get(position.level, BOUND))}ball"
     if position.level not in places:
-        return _DRAG, f"{ball}. Its level is switched off: switch it on in <b>Tasks</b>."
+        return _DRAG, f"{ball}. The ball's level is switched off: switch it on in <b>Tasks</b>."
     own = places[position.level]
     axes = " and ".join(position.axes) if position.axes != "xyz" else ""
     told = [
@@ -94,7 +94,7 @@ def _paragraph(head: str, rest: str) -> str:
 
 AT_AN_ARM = _paragraph(
     "Run, then drag the target by its arrows.",
-    "The robot is the arm as measured. The ghost is the simulation, which gets the same targets; its errors "
+    "The robot shows the measured arm. The ghost is the simulation, which gets the same targets; its errors "
     "are dashed. If you press Stop gently or close this page, the arm brakes. The settings are those with "
     "which <code>himpc-lab arm</code> was started.",
 )

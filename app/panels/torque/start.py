@@ -69,7 +69,7 @@ class StartPanel:
             self.pull = gui.add_checkbox(
                 "Pull by hand",
                 False,
-                hint="Drag any link with the mouse: the force grows with the distance, like that of a rubber "
+                hint="Drag any link with the mouse: the force grows with the distance, as with a rubber "
                 "band. Key G. While this is on, you cannot drag the target through a link in front of it.",
             )
             self._load = gui.add_button(_PICK_UP, hint="The controller does not know about the payload")
@@ -81,11 +81,11 @@ class StartPanel:
                 "Manipulability ellipsoids",
                 False,
                 hint="The speed at which each level can move its frame if the joints have unit speed. "
-                "A level uses only the freedom that the levels above leave. The ellipsoid is flat in directions "
-                "without motion",
+                "A level uses only the freedom that the levels above leave. The ellipsoid is flat in "
+                "directions without motion",
             )
             self.cover = gui.add_checkbox(
-                "Cover that distances use",
+                "Capsules for distances",
                 False,
                 hint="The capsules that contain the links. A controller that keeps distances measures them "
                 "between these capsules",

@@ -100,7 +100,7 @@ class HtmpcPanel:
             self._what.content = block(esc(VELOCITY_CONTROLLERS[self._shown]), lines=2)
         htmpc = settings.htmpc
         self._ahead.content = block(
-            f"Predicts <b>{htmpc.horizon * htmpc.dt:.2g} s</b>, every {1e3 * htmpc.period:.3g} ms."
+            f"Predicts the next <b>{htmpc.horizon * htmpc.dt:.2g} s</b>, every {1e3 * htmpc.period:.3g} ms."
         )
         step_ms, lag = 1e-3 * now.number("step_us"), settings.plant.latency_ms
         self._lag.content = block(

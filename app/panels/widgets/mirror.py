@@ -35,8 +35,8 @@ class _Mirror(Generic[S]):
 
 class Bindings(Generic[S]):
     """Bindings between controls and settings in both directions: a control posts an event, and settings that
-    changed otherwise (a reset, a hotkey, a refused event) update the control. Callbacks only post events and
-    never touch the simulation.
+    change in another way (a reset, a hotkey, a refused event) update the control. Callbacks only post events
+    and never touch the simulation.
 
     Controls are written on the server's event loop only. There, nothing can run between the arrival of a
     value from the browser and the callback that posts it. Another thread could reset a control between these
