@@ -78,7 +78,7 @@ def _html(view: Mapping[str, Any]) -> str:
 def _coming(before: int | None) -> str:
     if not before:
         return "" if before is None else "Your robot will be at this step soon."
-    return f"Your robot will be at this step soon; {before} robots come first."
+    return f"Your robot will be at this step soon. Robots before it: {before}."
 
 
 def _bars(rounds: list[list[Mapping[str, Any]]]) -> str:

@@ -170,8 +170,8 @@ def _legend(words: str, now: SessionSnapshot[SceneSettings]) -> str:
             "their clock is slowed down.</span>"
         )
     return block(
-        f"{badge('GHOST', GHOST)} {esc(words)}<br>translucent in the scene, dashed in the plots; has the same "
-        f"targets, pushes and clock{slow}",
+        f"{badge('GHOST', GHOST)} {esc(words)}<br>translucent in the scene, dashed in the plots; it has the "
+        f"same targets, pushes and clock{slow}",
         "padding-top:0.6em",
     )
 

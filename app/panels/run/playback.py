@@ -141,7 +141,7 @@ class PlaybackPanel:
 def _of_arm(status: Status, arm: ArmView) -> str:
     """The status line of an arm."""
     if not arm.begun:
-        return f"{badge('ARM', LEVELS[1])} &nbsp;at rest: Run starts its control, and it holds its position"
+        return f"{badge('ARM', LEVELS[1])} &nbsp;at rest: Run starts the control; the arm holds its position"
     state = badge("ARM STOPPED", BAD) if arm.ended else badge("ARM RUNNING", GOOD)
     line = f"{state} &nbsp;t = {status.t:.2f} s<br>{arm.missed} of {status.ticks + arm.missed} periods missed"
     if arm.behind > _LATE and not arm.ended:

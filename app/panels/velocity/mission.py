@@ -157,7 +157,7 @@ def _listed(rows: tuple[MissionRow, ...], colours: dict[str, RGB], done: bool) -
     over = max(0, sum(row.state == "done" for row in rows) - _DONE_SHOWN)
     lines = "".join(_line(row, colours, first is row) for row in rows[over:])
     if over:
-        lines = f"<tr><td>✓</td><td colspan='3' style='opacity:0.55'>{over} earlier tasks</td></tr>{lines}"
+        lines = f"<tr><td>✓</td><td colspan='3' style='opacity:0.55'>earlier tasks: {over}</td></tr>{lines}"
     head = (
         badge("MISSION DONE", GOOD) if done else f"{sum(r.state == 'done' for r in rows)} of {len(rows)} done"
     )
