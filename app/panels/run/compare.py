@@ -158,7 +158,7 @@ class ComparePanel:
         )
         return block(
             f'<table style="width:100%;border-spacing:0 0.25em">{head}{"".join(rows)}</table>'
-            f"over {mine.seconds:.1f} s since both robots started together; the better value is bold"
+            f"over {mine.seconds:.1f} s from their common start; the better value is bold"
         )
 
 
