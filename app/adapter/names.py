@@ -1,4 +1,4 @@
-"""The private names of viser that this program uses; each is checked before the server starts.
+"""The private names of viser that this program uses; each name is checked before the server starts.
 
 viser documents no names of its page. The selectors and objects that our scripts and styles use are constants
 of this module. viser's package contains the sources of its page, and the check searches these sources for the
@@ -69,7 +69,8 @@ OF_THE_PAGE = (
 
 
 def check_names() -> None:
-    """Checks the names that exist before a server is made. Raises InputError if viser lacks one of them."""
+    """Checks the names that exist before a server is made. Raises InputError if viser lacks one of these
+    names."""
     for place, names in OF_VISER.items():
         for name in names:
             require(reaches(viser, f"{place}.{name}"), name)

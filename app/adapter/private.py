@@ -150,7 +150,7 @@ def _keep_awake(server: viser.ViserServer) -> None:
 
 
 def senders(server: viser.ViserServer) -> list[asyncio.Event]:
-    """The wake-up events of the senders: first the one for all clients, then one per client."""
+    """The wake-up events of the sender for all clients, and then of each client's sender."""
     websockets = server._websock_server
     each = [one.message_buffer for one in list(websockets._client_state_from_id.values())]
     return [buffer.message_event for buffer in (websockets._broadcast_buffer, *each)]
@@ -165,7 +165,7 @@ def connection_of(server: viser.ViserServer, client: viser.ClientHandle) -> Serv
 
 
 def give_workers(client: viser.ClientHandle, workers: ThreadPoolExecutor) -> None:
-    """Runs this client's callbacks on `workers` from now on, so that they do not block other clients."""
+    """Runs this client's callbacks on `workers` from now on, without blocking other clients."""
     client.gui._thread_executor = workers
     client.scene._thread_executor = workers
 

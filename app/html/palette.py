@@ -87,7 +87,7 @@ def button(colour: RGB) -> RGB:
 
 
 def ink(colour: RGB) -> str:
-    """The CSS colour of text in this colour, darker on a light page and lighter on a dark one."""
+    """The CSS colour of text in this colour, darker on a light page and lighter on a dark page."""
     light, dark = readable_on(colour, LIGHT_PAGE), readable_on(colour, DARK_PAGE)
     return f"light-dark({css(light)},{css(dark)})"
 

@@ -90,7 +90,7 @@ class Stage:
             )
         )
         self.shown: tuple[object, ...] | None = None
-        """Identifies the instant that was shown last; None before the first one."""
+        """Identifies the instant that was shown last; None before the first instant."""
         self._resets: int | None = None
         self._ghost: GhostView | None = None
         self._shown_ghost: GhostClient | None = None

@@ -16,7 +16,7 @@ from app.html.palette import RGB
 from robots.collision import Ball, Box, Floor, Obstacle
 
 _COLOUR: RGB = (180, 120, 110)
-_ARROWS = 0.35  # m beyond the obstacle's own size
+_ARROWS = 0.35  # m: how far the arrows extend beyond the obstacle
 
 Moved = Callable[[str, tuple[float, float, float]], None]
 

@@ -1,4 +1,4 @@
-"""Cards of exercises: the task, the commands that begin and judge it, the criteria, and hints."""
+"""Cards of exercises: the task, the commands that begin and judge the exercise, the criteria, and hints."""
 
 from __future__ import annotations
 

@@ -89,7 +89,8 @@ class Asking:
 
     @property
     def suggested(self) -> Answer | None:
-        """The prediction that counts if the learner enters none: a slider counts with its initial value."""
+        """The prediction that counts if the learner enters no prediction: a slider counts with its initial
+        value."""
         match self._prediction:
             case Choice():
                 return None
@@ -106,7 +107,7 @@ class Asking:
     # ---------------------------------------------------------------- showing
 
     def show(self, lecture: Lecture) -> None:
-        """Updates the input during the run, and shows the measured value after it."""
+        """Updates the input during the run, and shows the measured value after the run."""
         if self._mine is None and lecture.answer is not None:
             self._recall(lecture.answer)
         before = lecture.phase in ("waiting", "preparing") and lecture.grade is None

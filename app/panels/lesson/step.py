@@ -212,7 +212,7 @@ class LessonPanel:
         seen = lecture.attempt > 0
         over = lecture.phase == "done"
         challenge = isinstance(self._part, Challenge)
-        # After a missed goal the button offers another attempt; Skip continues without it.
+        # After a missed goal, the button offers another attempt; Skip continues without an attempt.
         passed = lecture.result is not None and lecture.result.passed
         if self._asking is not None:
             self._asking.show(lecture)

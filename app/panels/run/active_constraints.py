@@ -23,7 +23,7 @@ class BindingPanel:
         self._colours = colours
         gui.add_html(
             block("A bound <b>binds</b> (is active) when the plan stops at it. The multiplier is the rate at "
-                  "which the level's cost would fall if the bound were moved outwards; for costs without the "
+                  "which the level's cost would fall if the bound were moved outwards. For costs without the "
                   "factor ½, such as (31), the rate is twice the multiplier. The slack is the distance by "
                   "which the bound was softened.")
         )  # fmt: skip

@@ -62,7 +62,7 @@ class ExportPanel:
         record = simulation.record
         if record is None:
             return None
-        # The page's loop appends rows meanwhile.
+        # The page's loop may append rows at the same time.
         rows = simulation.read(lambda *_: record.recent() if self._span.value == _MINUTE else record.whole())
         return None if rows is None or len(rows) < 2 else Recorded(record.layout, rows)
 

@@ -29,7 +29,7 @@ def add_hand_in(gui: viser.GuiApi, learner: SimulationClient, notebook: Notebook
         try:
             code = "" if told is None else code_of(told)
         except InputError:
-            code = ""  # e.g. for an uploaded robot; the text still contains the progress
+            code = ""  # an uploaded robot has no code; the text still contains the progress
         text.visible = False
         text.value = notebook.to_hand_in(str(name.value).strip()[:LONGEST_NAME], code)
         text.visible = True

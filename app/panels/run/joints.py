@@ -96,7 +96,8 @@ class JointPlots:
     def _curves(
         self, at_bound: np.ndarray, kind: int, joint: int | None, own: _Quantity, other: _Quantity | None
     ) -> list[np.ndarray]:
-        """Values, upper and lower bound, the marks at the bottom, and the ghost's values."""
+        """The curves of a chart: values, upper and lower bound, marks at the bottom, and the ghost's
+        values."""
         if joint is None:
             edge = np.where(np.isfinite(own.values[:, 0]), 100.0, np.nan)
             low, high = -_SHARE, _SHARE

@@ -82,7 +82,7 @@ class MovePanel:
             chosen.turn(side * np.radians(_ANGLE) * np.eye(3)[place])
 
     def update(self) -> None:
-        """Shows the present targets and the position of the chosen one; called on viser's loop."""
+        """Shows the present targets and the position of the chosen target; called on viser's loop."""
         names = tuple(each.name for each in self._movables()) or _NONE
         if self._which.options != names:
             self._which.options = names

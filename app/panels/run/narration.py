@@ -102,7 +102,7 @@ class Narration:
         return [f"{kind} limit of {joint} is met" for kind, joint in new]
 
     def _arrived(self, before: Facts, now: Facts) -> list[str]:
-        """Steady errors that differ from the last announced ones."""
+        """Steady errors that differ from the last announced errors."""
         found = []
         for name, (error, unit) in now.errors.items():
             was, least = before.errors.get(name, (math.nan, unit))[0], _SMALL.get(unit, 0.0)

@@ -105,5 +105,7 @@ def _rank(found: tuple[int, int] | None) -> str:
     if found is None:
         return ""
     rank, rows = found
-    short = "" if rank == rows else ": the levels above use the others, or the arm cannot move in them"
+    short = (
+        "" if rank == rows else ": the levels above use the other directions, or the arm cannot move in them"
+    )
     return f"<br>gets {rank} of {rows} directions{short}"

@@ -122,7 +122,7 @@ class TasksPanel:
         return not self._in_lesson and self._add.picking
 
     def choose(self, frame: str) -> None:
-        """Chooses the link of this frame, which was clicked."""
+        """Chooses the link of this frame after a click on the link."""
         self._add.choose(frame)
 
     def toggle(self, place: int) -> Set | None:

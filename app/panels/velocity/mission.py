@@ -147,7 +147,7 @@ def _options(*names: str) -> tuple[str, ...]:
 
 
 def _waiting(rows: tuple[MissionRow, ...]) -> MissionRow | None:
-    """The first open task, if it lasts until it is released; else None."""
+    """The first open task, if it lasts until it is released; otherwise None."""
     first = next((row for row in rows if row.state != "done"), None)
     return first if first is not None and first.hold is None else None
 

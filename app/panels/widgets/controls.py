@@ -1,4 +1,4 @@
-"""Controls for settings, generated from the table of settings: a slider, switch or menu for each."""
+"""Controls for settings, generated from the table of settings: a slider, switch or menu for each setting."""
 
 from __future__ import annotations
 

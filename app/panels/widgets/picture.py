@@ -57,7 +57,7 @@ class SvgPicture:
         """Whether the browser has reported that it shows the picture."""
         seen = self._in_view.told and self._in_view.sees(self.title)
         if not seen:
-            self._painted = []  # a browser that shows the picture again gets all of it
+            self._painted = []  # a browser that shows the picture again gets the whole picture
         return seen
 
     def paint(self, parts: Sequence[str]) -> None:
