@@ -9,9 +9,9 @@ from typing import Any
 
 @cache
 def fast(kind: type[Any]) -> type[Any]:
-    """Returns a subclass of a message class whose fields hold only Python numbers, strings and tuples of
-    them. A moving robot sends about a hundred such messages per second. viser identifies a message by its
-    class name."""
+    """Returns a subclass of a message class, for messages that contain only Python numbers, strings and
+    tuples of these. A moving robot sends about a hundred such messages per second. The subclass keeps the
+    class name, by which viser identifies a message."""
     names = tuple(field.name for field in fields(kind))
 
     def as_serializable_dict(self: Any, _: object = None) -> dict[str, Any]:

@@ -1,8 +1,8 @@
-"""The private names of viser that this program uses; each is checked before the server starts.
+"""The private names of viser that this program uses; each name is checked before the server starts.
 
 viser documents no names of its page. The selectors and objects that our scripts and styles use are constants
-of this module. viser's package contains the sources of its page, and the check searches them for the text
-that each constant depends on.
+of this module. viser's package contains the sources of its page, and the check searches these sources for the
+text that each constant depends on.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ PAGE = "window.__viserMutable"
 CHART, CHART_TITLE = ".uplot", ".u-title"
 NUMBER_BOX, SLIDER_LABEL = ".mantine-NumberInput-root", ".mantine-Slider-label"
 SHEET = 'div[style*="width: 20em"]'
-"""The sheet at the bottom of a phone."""
+"""The sheet of controls at the bottom of a phone's screen."""
 ROW = ".mantine-Flex-root"
 """A control with its label."""
 ICON_BUTTON, CLOSES_NOTICE = ".mantine-ActionIcon-root", ".mantine-Notification-closeButton"
@@ -65,11 +65,12 @@ OF_THE_PAGE = (
     ("components/Slider.tsx", "id={uuid}"),
     ("ControlPanel/BottomPanel.tsx", 'width: "20em"'),
 )
-"""(file below viser's `client/src`, text that it must contain)."""
+"""Pairs: a file below viser's `client/src`, and a text that this file must contain."""
 
 
 def check_names() -> None:
-    """Checks the names that exist before a server is made. Raises InputError if viser lacks one of them."""
+    """Checks the names that exist before a server is made. Raises InputError if viser lacks one of these
+    names."""
     for place, names in OF_VISER.items():
         for name in names:
             require(reaches(viser, f"{place}.{name}"), name)

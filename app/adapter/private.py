@@ -1,6 +1,7 @@
-"""All uses of viser's private names; `names` lists them. `self_test` checks each before the server starts.
+"""All uses of viser's private names, which `names` lists. `self_test` checks each name before the server
+starts.
 
-If one of them is missing, the server does not start and prints one clear sentence.
+If a name is missing, the server does not start and prints one clear sentence.
 """
 
 from __future__ import annotations
@@ -44,13 +45,13 @@ _SERVING = threading.Lock()
 _NEEDED = ("process_request", "max_size")
 
 _UNSENT = 32_000
-"""Size of the socket's send buffer, B. The usual size, megabytes, can contain pictures that are seconds
-old."""
+"""Size of the socket's send buffer, bytes. A buffer of the usual size, some megabytes, can contain pictures
+that are seconds old."""
 
 
 def open_server(host: str, port: int, guard: Guard) -> viser.ViserServer:
-    """Starts a viser server that checks every connection with `guard`, opens no public tunnel, and whose
-    senders always wake up. Raises InputError, without listening, if `guard` cannot be installed."""
+    """Starts a viser server that checks every connection with `guard` and opens no public tunnel. Its senders
+    always wake up. If `guard` cannot be installed, the server does not listen, and InputError is raised."""
     self_test(guard)
     # Malformed requests of unknown clients are not logged on the terminal.
     warnings.filterwarnings("ignore", r"\[viser\]", UserWarning)
@@ -58,12 +59,12 @@ def open_server(host: str, port: int, guard: Guard) -> viser.ViserServer:
     with _silent(), _guarded(guard) as served:
         server = viser.ViserServer(host=host, port=port, label="himpc-lab", verbose=False)
     try:
-        require(bool(served) and all(served), "how it serves")  # several if viser tried further ports
+        require(bool(served) and all(served), "how it serves")  # several entries if viser tried more ports
         for path in OF_A_SERVER:
             require(reaches(server, path), path)
         handlers = server._websock_server
-        # Without this, any client could request a public tunnel to this machine, even where viser's button
-        # for it is not shown.
+        # These handlers would let any client request a public tunnel to this machine, even if viser does not
+        # show the button for it.
         for tunnel in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
             handlers.unregister_handler(tunnel)
         _keep_awake(server)
@@ -93,7 +94,8 @@ def _silent() -> Iterator[None]:
 
 def self_test(guard: Guard) -> None:
     """Checks that viser has all private names used here, and that a guard which is not yet open refuses
-    requests. It uses a temporary server on this machine that serves no page. Raises InputError."""
+    requests. The test uses a temporary server on this machine that serves no page. Raises InputError if a
+    check fails."""
     check_names()
     with _silent(), _guarded(guard) as served:
         bare = infra.WebsockServer("127.0.0.1", 0, message_class=_messages.Message, verbose=False)
@@ -108,13 +110,13 @@ def self_test(guard: Guard) -> None:
 @contextlib.contextmanager
 def _guarded(guard: Guard) -> Iterator[list[bool]]:
     """Within this context viser starts servers that check every connection with `guard`. Yields a list with
-    one entry per server and port that it tries: False if `guard` could not be installed, so that the server
-    refuses every request."""
+    one entry for each server and port that viser tries. An entry is False if `guard` could not be installed;
+    that server refuses every request."""
     served: list[bool] = []
     plain = web.serve
 
     def serve(*given: Any, **keywords: Any) -> Any:
-        # After an exception here viser would wait for its server forever.
+        # An exception here would make viser wait for its server forever.
         try:
             if missing := [name for name in _NEEDED if name not in keywords]:
                 raise KeyError(*missing)
@@ -135,8 +137,8 @@ def _guarded(guard: Guard) -> Iterator[list[bool]]:
 
 
 def _keep_awake(server: viser.ViserServer) -> None:
-    """Replaces the wake-up events of viser's senders before they first wait. One sender serves all clients,
-    and each client also has a sender. A client's sender then sends a whole picture at once."""
+    """Replaces the wake-up events of viser's senders before the senders first wait. One sender serves all
+    clients, and each client also has its own sender, which then sends a whole picture at once."""
     websockets, loop = server._websock_server, server.get_event_loop()
     websockets._broadcast_buffer.message_event = ThreadSafeEvent(loop)
 
@@ -148,7 +150,7 @@ def _keep_awake(server: viser.ViserServer) -> None:
 
 
 def senders(server: viser.ViserServer) -> list[asyncio.Event]:
-    """The wake-up events of the senders: first the one for all clients, then one per client."""
+    """The wake-up events of the sender for all clients, and then of each client's sender."""
     websockets = server._websock_server
     each = [one.message_buffer for one in list(websockets._client_state_from_id.values())]
     return [buffer.message_event for buffer in (websockets._broadcast_buffer, *each)]
@@ -163,7 +165,7 @@ def connection_of(server: viser.ViserServer, client: viser.ClientHandle) -> Serv
 
 
 def give_workers(client: viser.ClientHandle, workers: ThreadPoolExecutor) -> None:
-    """Runs this client's callbacks on `workers` from now on, so that they do not block other clients."""
+    """Runs this client's callbacks on `workers` from now on, without blocking other clients."""
     client.gui._thread_executor = workers
     client.scene._thread_executor = workers
 
@@ -181,9 +183,9 @@ def forget_upload(client: viser.ClientHandle, transfer: str) -> None:
 async def read_storage(
     client: viser.ClientHandle, keys: Sequence[str], timeout: float
 ) -> tuple[str | None, ...]:
-    """The value that the browser stores under each key; None if there is no value, if the browser blocks
-    access to its storage, or if it does not answer within `timeout` seconds. Does not block the event
-    loop."""
+    """Returns the value that the browser stores under each key. It is None if there is no value, if the
+    browser blocks access to its storage, or if the browser does not answer within `timeout` seconds. The
+    event loop is not blocked."""
     connection = client._websock_connection
     loop = asyncio.get_running_loop()
     asked: dict[str, asyncio.Future[str | None]] = {uuid.uuid4().hex: loop.create_future() for _ in keys}
@@ -215,7 +217,7 @@ def waiting(client: viser.ClientHandle) -> int:
 
 
 def keep_short(server: viser.ViserServer, client: viser.ClientHandle) -> None:
-    """Limits the socket's send buffer, so that messages which still wait can be replaced by newer ones."""
+    """Limits the socket's send buffer, so that newer messages can replace messages that still wait."""
     live = connection_of(server, client)
     if live is None or not hasattr(socket, "TCP_NOTSENT_LOWAT"):
         return
@@ -231,8 +233,8 @@ Inlet = Callable[[Any, Callable[[Any], Awaitable[None]]], Awaitable[None]]
 
 
 def intercept(client: viser.ClientHandle, take: Inlet) -> None:
-    """Passes every message of this browser to `take` first. `take` also gets the exceptions of callbacks, of
-    which viser would only print those of the 3D view."""
+    """Passes every message of this browser to `take` first. `take` also receives the exceptions of callbacks;
+    viser would only print those of callbacks of the 3D view."""
     connection, scene = client._websock_connection, client.scene
     plain = connection._handle_incoming_message
 
@@ -247,8 +249,8 @@ Kind = Literal["write", "upload", "other"]
 
 
 def kind_of(message: Any) -> Kind:
-    """The kind of a message: one that writes to a control (`uuid`, `updates`), one that begins an upload (for
-    the control `source_component_uuid`), or another one."""
+    """The kind of a message. A "write" changes a control (fields `uuid`, `updates`), an "upload" begins an
+    upload for the control `source_component_uuid`, and all other messages are "other"."""
     match message:
         case _messages.GuiUpdateMessage():
             return "write"
@@ -273,25 +275,26 @@ def dom_id(handle: viser.GuiInputHandle[Any] | viser.GuiUploadButtonHandle) -> s
 
 
 def send_again(handle: viser.GuiInputHandle[Any]) -> None:
-    """Sends the control's present value again. An assignment would send nothing, as viser knows this
-    value."""
+    """Sends the control's present value again. An assignment would send nothing, since viser sends only
+    changed values."""
     control = handle._impl
     update = _messages.GuiUpdateMessage(control.uuid, {"value": control.value})
     control.gui_api._websock_interface.queue_message(update)
 
 
 def send_curves(chart: viser.GuiUplotHandle, arrays: Sequence[np.ndarray]) -> None:
-    """Sends new curves to a chart, abscissas first, without conversion; an assignment would send float64."""
+    """Sends new curves to a chart, abscissas first, with the type that they have; an assignment would send
+    float64."""
     chart._queue_update("data", tuple(np.ascontiguousarray(each) for each in arrays))
 
 
 def shift(node: viser.SceneNodeHandle, at: np.ndarray) -> None:
-    """Moves a node to `at`, (3,) m, without the slow comparison with its old position that viser makes."""
+    """Moves a node to `at`, (3,) m, without viser's slow comparison with the old position."""
     node._impl.position[:] = at
     node._impl.api._queue_scene_message(fast(_messages.SetPositionMessage)(node.name, tuple(at.tolist())))
 
 
 def turn(node: viser.FrameHandle, to: np.ndarray) -> None:
-    """Sets the orientation of a node, a quaternion wxyz."""
+    """Sets the orientation of a node to `to`, a quaternion wxyz."""
     node._impl.wxyz[:] = to
     node._impl.api._queue_scene_message(fast(_messages.SetOrientationMessage)(node.name, tuple(to.tolist())))

@@ -25,7 +25,7 @@ def refuse(connection: ServerConnection, _: Request) -> Response:
 
 
 def reaches(start: object, path: str) -> bool:
-    """Whether an object has the attribute at a dotted path, or a dataclass the field."""
+    """Whether an object has the attribute, or a dataclass has the field, at a dotted path."""
     for name in path.split("."):
         if name in getattr(start, "__dataclass_fields__", ()):
             return True

@@ -1,5 +1,5 @@
-"""Exceptions of callbacks. A callback may still run while its page is rebuilt, and write to a removed
-control."""
+"""Treatment of the exceptions of callbacks. A callback may still run while its page is rebuilt, and may then
+write to a removed control."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ _LATE = " on a removed "
 
 
 def is_removed_handle_error(error: BaseException) -> bool:
-    """Whether an exception is viser's refusal to write to a removed control or node. It can be ignored, as
-    the page does not show that control or node any more."""
+    """Whether an exception is viser's refusal to write to a removed control or node. Such an exception can be
+    ignored, as the page does not show that control or node any more."""
     return isinstance(error, RuntimeError) and _LATE in str(error)
 
 

@@ -1,1 +1,1 @@
-"""Text, numbers and colours as HTML; everything that a user or a file named is escaped here."""
+"""Text, numbers and colours as HTML. All names that come from a user or a file are escaped here."""

@@ -1,4 +1,4 @@
-"""The glossary of the lab, and the explanation of its words within a text."""
+"""The glossary of the lab, and the functions that explain its words within a text."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ STYLE = (
     "<style>abbr.word{text-decoration:underline dotted;text-underline-offset:0.2em;cursor:help}"
     "abbr.word:focus::after{content:' (' attr(title) ') ';font-style:italic;opacity:0.8}</style>"
 )
-"""A hint appears under the mouse pointer. On devices without a pointer, a tap or the Tab key inserts it into
-the text."""
+"""A hint appears under the mouse pointer. On devices without a pointer, a tap or the Tab key inserts the hint
+into the text."""
 
 _TAG = re.compile(r"(<[^>]*>)")
 _CLOSED = ("math", "code", "pre", "abbr", "svg", "style")
@@ -21,7 +21,7 @@ _CLOSED = ("math", "code", "pre", "abbr", "svg", "style")
 
 @cache
 def words() -> dict[str, str]:
-    """Every word of the glossary with the sentence that explains it."""
+    """Every word of the glossary with its explanation."""
     return {word: str(entry["means"]) for word, entry in _entries().items()}
 
 
@@ -32,7 +32,7 @@ def _entries() -> dict[str, dict[str, object]]:
 
 @cache
 def _forms() -> tuple[re.Pattern[str], dict[str, str]]:
-    """A pattern that matches all spellings, and the word that each spelling means."""
+    """Returns a pattern that matches all spellings, and the word of the glossary for each spelling."""
     of: dict[str, str] = {}
     for word, entry in _entries().items():
         forms = entry.get("forms", [word])
@@ -43,7 +43,7 @@ def _forms() -> tuple[re.Pattern[str], dict[str, str]]:
 
 
 def explained(html: str) -> str:
-    """HTML in which the first use of every known word has its explanation."""
+    """Returns the HTML with an explanation at the first use of every word of the glossary."""
     pattern, of = _forms()
     seen: set[str] = set()
 

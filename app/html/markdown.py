@@ -1,4 +1,5 @@
-"""Lesson texts as HTML: Markdown with equations in $…$ and $$…$$, and with explained words."""
+"""Lesson texts as HTML: Markdown with equations in $…$ and $$…$$, and with explanations of the glossary's
+words."""
 
 from __future__ import annotations
 

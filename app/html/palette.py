@@ -9,7 +9,8 @@ RGB = tuple[int, int, int]
 WHITE: RGB = (255, 255, 255)
 BLACK: RGB = (0, 0, 0)
 LIGHT_PAGE, DARK_PAGE = WHITE, (36, 36, 36)
-"""Backgrounds of lists and plots; the 3D view is white, or darker than the page."""
+"""Backgrounds of lists and plots. The 3D view is white in the light theme, and darker than the page in the
+dark theme."""
 
 BAD: RGB = (215, 38, 38)
 GOOD: RGB = (22, 158, 100)
@@ -17,8 +18,8 @@ BOUND: RGB = (139, 149, 161)
 GHOST: RGB = (124, 92, 230)
 DAMPING: RGB = BOUND
 
-# Each pair of these and of BOUND differs by a CIEDE2000 of at least 10 for normal sight, deuteranopia and
-# protanopia, and each has a contrast of at least 3 on both pages; tests/app/test_app_palette.py computes it.
+# Any two of these colours and BOUND differ by a CIEDE2000 of at least 10 for normal sight, deuteranopia and
+# protanopia. Each has a contrast of at least 3 on both pages. tests/app/test_app_palette.py checks this.
 _ORANGE: RGB = (226, 112, 0)  # the first level: texts of lessons call it orange
 _BLUE: RGB = (48, 121, 240)  # the second level: texts of lessons call it blue
 _GREEN: RGB = (37, 137, 100)
@@ -28,8 +29,8 @@ _TEAL: RGB = (2, 125, 153)
 LEVELS: tuple[RGB, ...] = (_ORANGE, _BLUE, _GREEN, _MAGENTA, _ROSE, _TEAL)
 JOINTS: tuple[RGB, ...] = (BAD, _ORANGE, _GREEN, _TEAL, _BLUE, _MAGENTA, _ROSE)
 _DASHES: tuple[tuple[float, ...], ...] = ((), (12.0, 3.0), (12.0, 3.0, 2.0, 3.0))
-"""The pattern of the first seven joints (solid), of the next seven, and so on: joints that share a colour
-differ in the pattern."""
+"""Dashes and gaps of the curves of the first seven joints (solid), of the next seven, and so on. Joints that
+share a colour have different patterns."""
 
 
 def css(colour: RGB, alpha: float = 1.0) -> str:
@@ -45,8 +46,8 @@ def level_colours(names: Sequence[str]) -> dict[str, RGB]:
 
 
 def recoloured(names: Sequence[str], before: dict[str, RGB]) -> dict[str, RGB]:
-    """The colours of another stack: an existing level keeps its colour, and so does a level that shares a
-    task with it; the others get unused colours."""
+    """The colours of another stack. An existing level keeps its colour, and a new level takes the colour of a
+    level with which it shares a task. The other levels get unused colours."""
     found: dict[str, RGB] = {}
     for name in names:
         tasks = set(name.split("+"))
@@ -65,7 +66,7 @@ def joint_colour(index: int) -> RGB:
 
 
 def joint_dash(index: int) -> tuple[float, ...]:
-    """Lengths of dashes and gaps in px of the curve of a joint; empty for a solid curve."""
+    """Lengths, px, of the dashes and gaps in the curve of a joint; empty for a solid curve."""
     return _DASHES[index // len(JOINTS) % len(_DASHES)]
 
 
@@ -81,24 +82,24 @@ def on(colour: RGB) -> RGB:
 
 
 def button(colour: RGB) -> RGB:
-    """The colour, as dark as a button must be on which the page writes in white."""
+    """The colour, darkened until white text on a button of this colour is readable."""
     return next(found for found in _mixed(colour, BLACK) if contrast(found, WHITE) >= 4.6)
 
 
 def ink(colour: RGB) -> str:
-    """The CSS colour of text in this colour, darker on a light page and lighter on a dark one."""
+    """The CSS colour of text in this colour, darker on a light page and lighter on a dark page."""
     light, dark = readable_on(colour, LIGHT_PAGE), readable_on(colour, DARK_PAGE)
     return f"light-dark({css(light)},{css(dark)})"
 
 
 def readable_on(colour: RGB, page: RGB) -> RGB:
-    """The colour, mixed with black or white until its contrast with the page is at least 7.5: enough for
-    4.5 on pale areas and in paler paragraphs."""
+    """The colour, mixed with black or white until its contrast with the page is at least 7.5. On pale areas
+    and in paler paragraphs, the contrast is then at least 4.5."""
     return next(found for found in _mixed(colour, on(page)) if contrast(found, page) >= _TEXT)
 
 
 def _mixed(colour: RGB, end: RGB) -> Iterator[RGB]:
-    """From the colour to `end` in steps of a twentieth."""
+    """The mixtures from the colour to `end`, in steps of a twentieth."""
     for share in range(21):
         r, g, b = (round(own + share / 20 * (to - own)) for own, to in zip(colour, end, strict=True))
         yield r, g, b

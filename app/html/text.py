@@ -1,4 +1,4 @@
-"""Numbers and short pieces of HTML. Everything that a user or a file named passes through `esc`."""
+"""Numbers and short pieces of HTML. All names that come from a user or a file pass through `esc`."""
 
 from __future__ import annotations
 
@@ -53,8 +53,8 @@ def badge(text: str, colour: RGB) -> str:
 
 
 def block(inner: str, style: str = "", lines: int = 0) -> str:
-    """A paragraph in the font size of the panel, with room for a number of lines. The controls below it stay
-    in place when the text changes, as long as the text needs no more lines."""
+    """A paragraph in the font size of the panel, with room for `lines` lines. The controls below the
+    paragraph stay in place as long as its text fits into this room."""
     room = f"min-height:{1.45 * lines + 0.3:g}em;" if lines else ""
     return f'<div style="font-size:0.85em;line-height:1.45;padding:0.15em 0.75em;{room}{style}">{inner}</div>'
 
@@ -69,7 +69,8 @@ def in_trouble(state: str, sentence: str) -> str:
 
 
 def bar(share: float, colour: RGB, mark: float | None = None) -> str:
-    """A horizontal gauge; `mark` draws a line across it. Both are shares of its width."""
+    """A horizontal gauge that is filled up to `share` and has a line at `mark`. Both are shares of the
+    gauge's width."""
     width = 100 * min(max(share, 0.0), 1.0)
     line = (
         ""
@@ -119,6 +120,6 @@ def _power(value: float) -> str:
 
 
 def free_name(wanted: str, taken: Sequence[str]) -> str:
-    """The requested name, with a number appended if it is taken."""
+    """The requested name, with a number appended if this name is taken."""
     numbered = (wanted if k == 1 else f"{wanted} {k}" for k in itertools.count(1))
     return next(name for name in numbered if name not in taken)

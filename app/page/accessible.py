@@ -21,8 +21,8 @@ STYLE = """
 }
 """
 
-# A slider has a number beside it, and both belong to one label; viser names at most one of them. Controls
-# come and go with tabs, so that the script looks regularly.
+# A slider and the number box beside it share one label, but viser names at most one of the two. Controls
+# appear and disappear with tabs; therefore the script checks regularly.
 _NAMES = """
 const row = %s, icon = %s, closes = %s, scrolls = %s, chart = %s, key = "__himpcLabNames";
 window[key]?.();

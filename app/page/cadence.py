@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from typing import final
 
-POSES, PLOTS, TEXTS = 30.0, 12.0, 3.75  # Hz, while simulated time is real time
-CALM = 6.0  # Hz, the rate of all three when the robot has stood still for STILL
+POSES, PLOTS, TEXTS = 30.0, 12.0, 3.75  # Hz, while simulated time is as fast as real time
+CALM = 6.0  # Hz, the rate of poses, plots and texts when the robot has stood still for STILL
 STILL = 1.0  # s
 LEAST = 1 / 3
-"""Share of these rates while simulated time is slowed down by more than this."""
+"""The smallest share of these rates, used when simulated time runs at this share of real time or slower."""
 
 
 @final
@@ -26,9 +26,9 @@ class Cadence:
         """Returns the time until the page should check for changes again, s.
 
         Args:
-            instant: identifies what is shown; None while nothing is.
-            pace: simulated over real seconds if simulated time is slowed down, else 1.
-            now: s.
+            instant: identifies the instant that is shown; None while no instant is shown.
+            pace: simulated seconds per real second if simulated time is slowed down, otherwise 1.
+            now: the present time, s.
         """
         if instant is None or instant != self._shown:
             self._shown, self._moved = instant, now
@@ -41,13 +41,13 @@ class Cadence:
             return True
         if now < self._next_plots:
             return False
-        # The page checks slightly early or late; this keeps the average rate.
+        # The page checks slightly too early or too late; this limit keeps the average rate.
         late = now - 1 / (self._share * POSES)
         self._next_plots = max(self._next_plots, late) + 1 / (self._share * PLOTS)
         return True
 
     def texts_due(self, now: float) -> bool:
-        """Whether the texts should be written now; their rate is not reduced in slowed time."""
+        """Whether the texts should be written now. Slowed simulated time does not reduce their rate."""
         if now < self._next_texts and not self._calm(now):
             return False
         self._next_texts = now + 1 / TEXTS

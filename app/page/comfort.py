@@ -1,4 +1,4 @@
-"""Help for people who use a screen reader, or whom motion on the screen disturbs."""
+"""Help for people who use a screen reader or are disturbed by motion on the screen."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from app.link.messages import Play
 from app.page import accessible
 from app.panels.run.narration import Narration, facts_of
 
-if TYPE_CHECKING:  # the server listens before anything that computes is loaded
+if TYPE_CHECKING:  # for types only: the server listens before it loads modules that compute
     from app.panels.widgets.snapshot import SessionSnapshot
     from lessons.settings.settings import SceneSettings
 
 MOTION = "himpc-lab-motion"
 REDUCED = "reduced"
 LINE = "himpc-lab-says"
-"""Identifier of the line in the browser's document."""
+"""Identifier, in the browser's document, of the line that says what happens."""
 
 ASK_MOTION = """try {
   const reduced = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
@@ -33,11 +33,11 @@ ASK_MOTION = """try {
 ASK_WINDOW = """try {
   localStorage.setItem("%s%s", `${window.innerWidth}x${window.innerHeight}`);
 } catch {}"""
-"""Stores the size of the window under a key: the scene of a page that connects again is narrower, as its
-panels are docked."""
+"""Stores the size of the window under a key. When a page connects again, its panels are docked, and the size
+of its scene is smaller than that of the window."""
 
-# A screen reader announces changes of a region that existed before. The region therefore stays when a scene
-# is replaced.
+# A screen reader announces only changes of a region that already exists. Therefore the region stays when a
+# scene is replaced.
 _BEGIN = """(() => {
   const line = document.getElementById(%(line)s) ?? document.createElement("div");
   line.id = %(line)s;
@@ -56,20 +56,21 @@ _SAY = """(() => {
 
 
 class Comfort:
-    """The line that says what just happened, and the pause in which a page begins."""
+    """The line that says what happens. If the user wants less motion, a page also begins paused."""
 
     def __init__(
         self, client: viser.ClientHandle, reduced: bool, window: tuple[int, int] | None = None
     ) -> None:
-        """reduced: whether the user asked the browser for less motion; window: its width and height, pixels,
-        if the browser said them."""
+        """reduced: whether the user asked the browser for less motion; window: width and height of the
+        browser's window, pixels, if known."""
         self._client, self._reduced, self.window = client, reduced, window
         self.says = True
         """Whether the line is shown."""
         self._narration = Narration(time.monotonic)
 
     def opened(self, learner: SimulationClient) -> None:
-        """Called when a scene was built."""
+        """Adds the line and the names for screen readers to a new scene, and pauses if the user wants less
+        motion."""
         self._narration = Narration(time.monotonic)
         private.run_script(self._client, _BEGIN % {"line": json.dumps(LINE)})
         private.run_script(self._client, accessible.script())
@@ -81,7 +82,7 @@ class Comfort:
         switch = gui.add_checkbox(
             "Say what happens",
             self.says,
-            hint="A line below the robot, which a screen reader says: at most one sentence in two seconds",
+            hint="A line below the robot, for screen readers: at most one sentence in two seconds",
         )
 
         @switch.on_update
@@ -91,7 +92,7 @@ class Comfort:
                 self._show("")
 
     def follow(self, now: SessionSnapshot[SceneSettings]) -> None:
-        """Says what happened since the last call."""
+        """Shows a sentence about the events since the last call."""
         sentence = self._narration.look(facts_of(now))
         if sentence and self.says:
             self._show(sentence)
@@ -101,6 +102,7 @@ class Comfort:
 
 
 def window_size(told: str | None) -> tuple[int, int] | None:
-    """Width and height, pixels, as a browser told them; None if it did not."""
+    """Width and height of a window, pixels, from the text that a browser stored; None if the text is not
+    valid."""
     found = re.fullmatch(r"(\d{1,5})x(\d{1,5})", told or "")
     return None if found is None else (int(found[1]), int(found[2]))

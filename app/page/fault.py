@@ -1,5 +1,5 @@
-"""A notification about an error in the user's own code. It is visible however far the panel is scrolled, and
-above the sheet of a phone."""
+"""A notification about an error in the user's own code. It stays visible when the panel is scrolled, and
+appears above the sheet on a phone."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ import viser
 
 
 class FaultNotice:
-    """A notification at the top of the page until the code is corrected or the learner closes it."""
+    """A notification at the top of the page. It stays until the code is corrected or the learner closes the
+    notification."""
 
     def __init__(self, client: viser.ClientHandle) -> None:
         self._client = client
@@ -19,8 +20,8 @@ class FaultNotice:
         if sentence == self._said:
             return
         self._said = sentence
-        # Replaced, not updated: a notification that the learner closed would stay closed and hide the new
-        # fault.
+        # The notification is replaced, not updated. A closed notification would stay closed, and the new
+        # fault would not be shown.
         if self._shown is not None:
             self._shown.remove()
         self._shown = None

@@ -1,4 +1,4 @@
-"""Checks every message of a page, as described in `app.server.words`, before viser applies it."""
+"""Checks every message of a page, as described in `app.server.words`, before viser applies the message."""
 
 from __future__ import annotations
 
@@ -19,8 +19,9 @@ _GONE = "The page was rebuilt before your click or change arrived: if the contro
 
 
 class Inlet:
-    """The inlet of one page. It refuses a value that a control cannot have with a notice, and resets the
-    control. It also shows a notice for a press on a removed control and for an exception in a callback."""
+    """Checks the messages of one page. If a control cannot have a value, the inlet refuses the value, shows a
+    notice and resets the control. It also shows a notice for a press on a removed control and for an
+    exception in a callback."""
 
     def __init__(self, client: viser.ClientHandle) -> None:
         self._client = client
@@ -61,7 +62,7 @@ class Inlet:
             private.send_again(handle)
 
     def say(self, title: str, sentence: str) -> None:
-        """Shows a notice; if there are many, only one every few seconds."""
+        """Shows a notice, but at most one every few seconds."""
         now = time.monotonic()
         if now >= self._next_notice:
             self._next_notice = now + _OFTEN

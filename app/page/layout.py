@@ -45,8 +45,8 @@ from lessons.own.folder import Folder
 from lessons.settings.settings import SceneSettings
 
 _PHONE = f"<style>@media (max-width: 36em) {{ {SHEET} {{ width: 100vw !important }} }}</style>"
-"""Makes viser's bottom sheet on a phone as wide as the screen; by default it is narrower, with an empty strip
-beside it. It applies while an HTML element with it is shown."""
+"""Makes viser's bottom sheet on a phone as wide as the screen; by default the sheet is narrower, with an
+empty strip beside it. The style applies while an HTML element that contains it is shown."""
 _HOTKEYS = ("1", "2", "3", "4", "5", "6", "7", "8", "9")
 
 
@@ -69,8 +69,8 @@ class Stage:
         comfort: Comfort,
         narrow: bool,
     ) -> None:
-        """narrow: whether there is no room for a panel at the left, as on a phone: the plots are then
-        tabs of the other panel."""
+        """narrow: whether the page, for example on a phone, has no room for a panel at the left. The plots
+        are then tabs of the right panel."""
         self._client, self._learner, self._ready = client, learner, ready
         self._theme, self._comfort = theme, comfort
         self._colours = level_colours([task.level for task in in_order(ready)])
@@ -90,7 +90,7 @@ class Stage:
             )
         )
         self.shown: tuple[object, ...] | None = None
-        """Identifies the instant that was shown last; None before the first one."""
+        """Identifies the instant that was shown last; None before the first instant."""
         self._resets: int | None = None
         self._ghost: GhostView | None = None
         self._shown_ghost: GhostClient | None = None
@@ -133,7 +133,7 @@ class Stage:
         with tabs.add_tab("Help"):
             self._comfort.add_switch(gui)
             self._help = HelpPanel(gui)
-        for place, key in enumerate(_HOTKEYS):  # also for levels that may be added later
+        for place, key in enumerate(_HOTKEYS):  # hotkeys also for levels that may be added later
             add_command(gui, f"Level {place + 1} on or off", key, partial(self._toggle, place))
         self._face.add_plots(gui, plots)
         with plots.add_tab("Who binds"):
@@ -160,7 +160,8 @@ class Stage:
         self._paint_floor(dark)
 
     def _paint_floor(self, dark: bool) -> None:
-        """Draws the grid lines of the floor, which stay behind the robot on every background."""
+        """Sets the colours of the floor's grid lines, which are less conspicuous than the robot on every
+        background."""
         cell, section = (70, 105) if dark else (215, 175)
         self._floor.cell_color = (cell, cell, cell)
         self._floor.section_color = (section, section, section)
@@ -184,23 +185,23 @@ class Stage:
     # ---------------------------------------------------------------- following
 
     def refuse(self, sentence: str) -> bool:
-        """Shows a refusal in the panel that asked; returns whether there was one."""
+        """Shows a refusal in the panel that made the request; returns whether there was such a panel."""
         return self._robot_panel.refuse(sentence)
 
     def show_trouble(self, trouble: Trouble | None) -> None:
         self._playback.show_trouble(trouble)
 
     def follow(self, plots: bool, texts: bool) -> None:
-        """Shows the newest poses, and, if `plots` or `texts` is set, these too. A page in a hidden tab gets
-        only texts. A browser that has not received the last messages yet gets no messages now, and newer data
-        later."""
+        """Shows the newest poses. If `plots` or `texts` is true, it also updates the plots or the texts. A
+        page in a hidden tab gets only texts. While a browser has not received the last messages, this method
+        is not called."""
         learner = self._learner
         if learner.status is not None:
             self._time_line.update(learner.status.running)
         due, plots = plots, plots and not self._in_view.asleep
         moment = moment_of(learner, self._time_line.past, curves=due)
         if moment is None or learner.ready is not self._ready:
-            return  # no report yet, or already a report of another scene, which the page will build
+            return  # there is no report yet, or it belongs to another scene, which the page will build
         self.shown = moment.t, moment.live, learner.status.running if learner.status else None, learner.ghost
         if not self._in_view.asleep:
             self._draw(moment, plots)
@@ -268,7 +269,7 @@ class Stage:
 
 
 def _floor(scene: viser.SceneApi, room: np.ndarray) -> viser.GridHandle:
-    """Draws a floor below the robot and the points (k, 3) that it will reach, m."""
+    """Draws a floor below the robot and the points (k, 3), m, that the robot will reach."""
     far = float(np.abs(room[:, :2]).max(initial=0.0))
     if far == 0.0:
         return scene.add_grid("/floor", width=4.0, height=4.0, cell_size=0.1, section_size=0.5)

@@ -33,15 +33,15 @@ if TYPE_CHECKING:
 
 NARROW = 1000  # px: a narrower window, as in the cell of a notebook, has no room for panels at both sides
 _BROKEN = (
-    "This page cannot be shown: {}. Start again loads the scene anew; if that does not help, reload the page "
-    "and choose another scene."
+    "This page cannot be shown: {}. Press Start again to load the scene again. If this does not help, reload "
+    "the page and choose another scene."
 )
 
 _NOT_ITS_FILE = "This page may not open files of the machine that himpc-lab runs on."
 
 
 class Page:
-    """A thread that follows a learner. It builds a `Stage` whenever the learner has another scene."""
+    """A thread that shows a learner's session. It builds a `Stage` whenever the learner has another scene."""
 
     def __init__(
         self,
@@ -55,9 +55,9 @@ class Page:
         on_dark: Callable[[bool], None],
         greet: Callable[[viser.GuiApi], None],
     ) -> None:
-        """own_files: folder of the files that this page may name; None: it may name none; loop: viser's event
-        loop; on_dark: called with True when the dark theme is chosen, and with False otherwise; greet: adds
-        elements at the top of the panel whenever the panel is built."""
+        """own_files: the folder whose files this page may name; None if it may name no files; loop: viser's
+        event loop; on_dark: called with True for the dark theme and with False for the light theme; greet:
+        adds elements at the top of the panel whenever the panel is built."""
         self.learner = learner
         self._on_dark = on_dark
         self._greet = greet
@@ -140,7 +140,7 @@ class Page:
             self._trouble = trouble
             stage.show_trouble(trouble)
         if private.waiting(self._client) > 0:
-            learner.look()  # the connection is slow: data are stored, and the next picture is newer
+            learner.look()  # the connection is slow: data are stored, and the next picture shows newer data
             return
         try:
             stage.follow(plots=self._cadence.plots_due(now), texts=self._cadence.texts_due(now))
@@ -150,12 +150,13 @@ class Page:
                 raise
 
     def _delivered(self) -> bool:
-        """Whether the browser has received the scene that was built last. The next scene is built only then:
-        otherwise the messages of all scenes that a learner opens would collect on a slow connection."""
+        """Whether the browser has received the scene that was built last. The next scene is built only after
+        that. Otherwise, on a slow connection, the messages of all scenes that a learner opens would
+        accumulate."""
         return self._stage is None or private.waiting(self._client) == 0
 
     def _show(self, ready: Ready, same: bool) -> None:
-        """Builds a scene; same: it is the run that is shown, with another stack."""
+        """Builds a scene. same: whether the scene continues the run that is shown, with another stack."""
         if same and self._stage is not None:
             with self._client.atomic():
                 self._stage.recompose(ready)
@@ -163,8 +164,8 @@ class Page:
             self._build(ready)
 
     def _own_trouble(self) -> Trouble | None:
-        """The fault of the learner's own code, if there is one; also shows a notice when saved code took
-        effect."""
+        """Returns the fault of the learner's own code, if there is one. Also shows a notice when saved code
+        takes effect."""
         status = self.learner.status
         own = None if status is None else status.own
         fault = None if own is None or own.fault is None else self.learner.choice.without_places(own.fault)
@@ -174,8 +175,8 @@ class Page:
         if own.saves > self._saves:
             self._client.add_notification(
                 "Saved code is running",
-                f"{Path(own.file).name} took over at t = {own.at:.2f} s. It is read from the disk of the "
-                "machine that runs the lab.",
+                f"{Path(own.file).name} took over at t = {own.at:.2f} s. The file is read from the disk of "
+                "the machine that runs the lab.",
                 color="green",
                 auto_close_seconds=4.0,
             )
@@ -199,7 +200,7 @@ class Page:
         self._again.visible = trouble is not None and trouble.offer is not None
 
     def _load(self, choice: SceneChoice) -> None:
-        """Loads another scene for any panel. Refuses files that this page may not name."""
+        """Loads the scene that a panel requests. Refuses files that this page may not name."""
         asked = choice.asked - self.learner.choice.paths
         if asked and (self._own_files is None or not all(map(self._own_files.holds, asked))):
             self._client.add_notification("Not loaded", _NOT_ITS_FILE, color="red")
@@ -207,7 +208,7 @@ class Page:
         self.learner.load(choice)
 
     def _build(self, ready: Ready) -> None:
-        # Imported here, so that the page can open and show a waiting message before all of this is loaded.
+        # Imported here, so that the page can open and show a waiting message before these modules are loaded.
         from app.page.layout import Stage
         from app.view.robot import aim
 
@@ -230,7 +231,7 @@ class Page:
                 self._comfort,
                 self._narrow,
             )
-            add_command(self._client.gui, "Camera: all of the robot", "F", self._frame)
+            add_command(self._client.gui, "Camera: show the whole robot", "F", self._frame)
             self._comfort.opened(self.learner)
             run = ready.choice.run
             seen = (run.scene, run.urdf, run.tip, ready.choice.urdf_text, ready.robot.name)
@@ -239,7 +240,7 @@ class Page:
                 aim(self._client.camera, ready.robot, self._phone, ready.room, ways)
                 self._seen = seen
         for sentence in ready.left_out:
-            self._client.add_notification("Opened without a task of yours", sentence, color="orange")
+            self._client.add_notification("Opened without one of your tasks", sentence, color="orange")
         self._trouble = None
 
     def _drop_stage(self) -> None:
@@ -248,20 +249,21 @@ class Page:
             before.close()
 
     def _frame(self) -> None:
-        """Moves the robot into the middle of the picture, seen from the present direction."""
+        """Moves the camera so that the robot is in the middle of the picture, seen from the present
+        direction."""
         from app.view.camera import look
 
         poses, ready = self.learner.read(lambda block, _: block.poses()), self._built
         if poses is None or ready is None or not np.isfinite(poses).all():
             return
-        base = np.zeros((0 if len(ready.room) else 1, 3))  # a mobile robot has left its initial place
+        base = np.zeros((0 if len(ready.room) else 1, 3))  # a mobile robot may be far from the origin
         look(self._client.camera, np.vstack([base, poses[:, :3]]), self._phone, None)
 
     def _break(self, error: Exception) -> None:
         """Shows an error of the page with a sentence and a button to continue, in place of the broken
         view."""
         if self._closed.is_set():
-            return  # the tab was closed, and its panels with it
+            return  # the tab was closed, and its panels no longer exist
         traceback.print_exc()
         before, self._stage = self._stage, None
         self._waiting = self._again = None
@@ -275,7 +277,7 @@ class Page:
                 before.close()
 
     def _pass_on(self) -> None:
-        """Shows the session's refusals and notices: refusals in the panel that made the request."""
+        """Shows the session's notices, and its refusals, each in the panel that made the request."""
         refusals, notices = self.learner.take_messages()
         for sentence in map(self.learner.choice.without_places, refusals):
             if self._stage is None or not self._stage.refuse(sentence):

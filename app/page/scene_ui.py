@@ -23,8 +23,9 @@ from lessons.events import Event
 
 @dataclass(frozen=True, eq=False)
 class Context:
-    """The data of a page that its user interface needs. in_view: what the browser shows; bindings: for the
-    settings of this kind; theme: called with each new theme, True for dark."""
+    """The data of a page that its user interface needs. in_view: the charts that the browser shows; bindings:
+    for the settings of this kind of scene; theme: called with True for the dark theme and with False for the
+    light theme."""
 
     client: viser.ClientHandle
     in_view: InView
@@ -42,17 +43,18 @@ class Context:
 
     @property
     def settings(self) -> Any:
-        """The present settings, of this kind of scene."""
+        """The present settings. Their type depends on the kind of scene."""
         return self.learner.settings_of(self.ready)
 
     def poses(self) -> np.ndarray | None:
-        """Poses of joints 1 … n and the tip, (n + 1, 7); None if another scene was loaded meanwhile, whose
-        robot may have another number of joints."""
+        """Poses of joints 1 … n and the tip, (n + 1, 7); None if another scene was loaded meanwhile, since
+        its robot may have another number of joints."""
         learner = self.learner
         return learner.read(lambda block, _: block.poses() if learner.ready is self.ready else None)
 
     def poses_or_still(self) -> np.ndarray:
-        """As `poses`, for objects that are built now and updated later; identity poses if none are known."""
+        """Returns `poses`, or identity poses if no poses are known, for objects that are built now and
+        updated later."""
         poses = self.poses()
         still = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
         return np.tile(still, (self.ready.robot.n + 1, 1)) if poses is None else poses
@@ -70,7 +72,8 @@ class Face(Protocol):
         ...
 
     def open_plots(self, plots: viser.PanelHandle | viser.GuiTabGroupHandle) -> None:
-        """Adds the tab of the left panel that precedes the lesson's, if there is one."""
+        """Adds the tab that precedes the lesson's tab in the left panel, if this kind of scene has such a
+        tab."""
         ...
 
     def add_plots(self, gui: viser.GuiApi, plots: viser.PanelHandle | viser.GuiTabGroupHandle) -> None:
@@ -78,7 +81,7 @@ class Face(Protocol):
         ...
 
     def add_scene(self, scene: viser.SceneApi, robot: RobotView) -> None:
-        """Adds to the 3D view what it shows besides robot and floor."""
+        """Adds all objects except the robot and the floor to the 3D view."""
         ...
 
     def recompose(self, ready: Ready) -> None:
@@ -95,7 +98,7 @@ class Face(Protocol):
         ...
 
     def after_reset(self, status: Status) -> None:
-        """Called when the robot was reset to its start."""
+        """Updates the interface after the robot was reset to its start."""
         ...
 
     def draw(self, moment: Moment) -> None:
@@ -107,5 +110,5 @@ class Face(Protocol):
         ...
 
     def close(self) -> None:
-        """Called before the scene is removed."""
+        """Stops all updates, before the scene is removed."""
         ...

@@ -40,7 +40,7 @@ from lessons.settings.torque import TorqueSettings
 
 
 class TorqueFace:
-    """See `app.page.scene_ui.Face`."""
+    """The user interface of a torque-level scene; `app.page.scene_ui.Face` describes its methods."""
 
     fastest: ClassVar[float] = 1.0
 
@@ -48,7 +48,7 @@ class TorqueFace:
         self._context = context
         self._inside_tab: viser.GuiTabHandle | None = None
         self._stale: Status | None = None
-        """Last report under the previous stack."""
+        """The last report of the previous stack."""
 
     # ---------------------------------------------------------------- building
 
@@ -79,7 +79,7 @@ class TorqueFace:
         self._start.on_recall = self._recall
 
     def open_plots(self, plots: viser.PanelHandle | viser.GuiTabGroupHandle) -> None:
-        # The QP of one knot is small enough for a beginning; its tab comes first.
+        # The QP of one knot is small enough for beginners; in this case its tab comes first.
         if self._context.settings.horizon == 1:
             self._inside_tab = plots.add_tab("Inside")
 
@@ -221,7 +221,7 @@ class TorqueFace:
     def write(self, now: SessionSnapshot[TorqueSettings]) -> None:
         if now.status.gauge is not None:
             fields = now.ready.layout.fields
-            # The row in the snapshot is a copy.
+            # The snapshot's row is a copy, which may be changed.
             now.latest[fields["gauge_norm"]], now.latest[fields["gauge_radius"]] = now.status.gauge
         self._start.show_verdict(self._hand.verdict, bool(self._start.clamp.value))
         self._start.update(now, self._context.colours)

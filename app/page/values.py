@@ -17,8 +17,8 @@ class NotAllowed(Exception):
 
 
 def allowed(handle: viser.GuiInputHandle[Any], updates: Any) -> Any:
-    """The value of an update, limited to a slider's range if a larger one was typed. Raises NotAllowed if the
-    update changes anything but the value, or if the control cannot have the value."""
+    """Returns the value of an update; a slider's value is limited to its range. Raises NotAllowed if the
+    update changes more than the value, or if the control cannot have this value."""
     label = str(getattr(handle, "label", "") or "A control")
     if not isinstance(updates, dict) or list(updates) != ["value"]:
         raise NotAllowed(f"{label}: a page may only change its value.")
@@ -38,7 +38,7 @@ def allowed(handle: viser.GuiInputHandle[Any], updates: Any) -> Any:
 
 
 def _like(present: Any, value: Any, label: str) -> Any:
-    """The value, if it has the type of the present one."""
+    """Returns the value if it has the type of the present value; raises NotAllowed otherwise."""
     match present:
         case bool():
             if isinstance(value, bool):

@@ -45,7 +45,7 @@ _AHEAD, _RADIUS = 0.7, 0.2
 
 
 class VelocityFace:
-    """See `app.page.scene_ui.Face`."""
+    """The user interface of a velocity-level scene; `app.page.scene_ui.Face` describes its methods."""
 
     fastest: ClassVar[float] = 10.0
 
@@ -132,7 +132,7 @@ class VelocityFace:
             self._circle = ReachCircle(scene, first, horizontal_reach(ready.robot, first))
 
     def recompose(self, ready: Ready) -> None:
-        """Does nothing: the stack of a velocity-level scene is given by its mission and never changes."""
+        """Does nothing: the mission of a velocity-level scene defines its stack, which never changes."""
 
     # ---------------------------------------------------------------- events out
 
@@ -167,8 +167,8 @@ class VelocityFace:
         self._put(name, (x, y, z))
 
     def _add_obstacle(self) -> None:
-        """Adds a ball in front of the hand, as seen from the base. It is close enough to have an effect, but
-        it does not block the hand."""
+        """Adds a ball in front of the hand, as seen from the base. The ball is close enough to have an
+        effect, but does not block the hand."""
         poses = self._context.poses()
         if poses is None:
             return

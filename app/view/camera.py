@@ -9,12 +9,12 @@ import numpy as np
 import viser
 
 _SHARE = 0.74
-"""Share of the picture's width and height that the points may take; the rest is room for dragging a
+"""Share of the picture's width and height that the points may fill; the rest is room for dragging a
 target."""
 _NARROW = 0.75
 """Usual ratio of width to height of the scene on a desktop, with the panels docked beside it."""
 _SLIM = 0.2
-"""Smallest ratio of width to height that is used: with a smaller one the camera would be too far away."""
+"""Smallest ratio of width to height that is used: with a smaller ratio the camera would be too far away."""
 _ASIDE = np.array([1.0, 0.75, 0.55])
 """Default direction from the points to the camera."""
 _THICK = 0.07
@@ -53,8 +53,8 @@ def fit(
 
 
 def look(camera: viser.CameraHandle, points: np.ndarray, phone: bool, direction: np.ndarray | None) -> None:
-    """Turns the camera to all points (k, 3), m; direction: from the points to the camera, None: the present
-    one."""
+    """Moves the camera so that all points (k, 3), m, are visible. direction: from the points to the camera;
+    None for the present direction."""
     if direction is None:
         here = np.asarray(camera.position, float) - np.asarray(camera.look_at, float)
         level = float(np.linalg.norm(here[:2]))
@@ -64,7 +64,7 @@ def look(camera: viser.CameraHandle, points: np.ndarray, phone: bool, direction:
         direction = here if level > 0.02 * abs(float(here[2])) else here - below
     if not np.linalg.norm(direction) > 0.0:
         direction = _ASIDE
-    # The canvas of a folded page, or of one without a layout, has zero height or width.
+    # The canvas of a folded page, or of a page without a layout, has zero height or width.
     aspect = max(max(camera.image_width, 1) / max(camera.image_height, 1), _SLIM)
     eye, at = fit(points, np.asarray(direction), camera.fov, aspect if phone else min(aspect, _NARROW), phone)
     camera.up_direction = (0.0, 0.0, 1.0)

@@ -32,8 +32,8 @@ def raw(task: TaskView) -> np.ndarray:
 
 
 def full(task: TaskView, values: np.ndarray | None, else_: np.ndarray) -> np.ndarray:
-    """A point in space from the controlled coordinates. Values with another number of coordinates, from
-    before the task's axes were changed, are ignored."""
+    """Returns the point `else_` with `values` as its controlled coordinates. Values from before a change of
+    the task's axes have another number of coordinates and are ignored."""
     point = np.array(else_, float)
     if values is not None and values.shape == (len(task.axes),):
         point[["xyz".index(axis) for axis in task.axes]] = values
@@ -41,8 +41,8 @@ def full(task: TaskView, values: np.ndarray | None, else_: np.ndarray) -> np.nda
 
 
 def of_task(task: TaskView, targets: Mapping[str, np.ndarray]) -> np.ndarray | None:
-    """The position or rotation of a draggable task's target; None if there is no target, or if it has other
-    coordinates because the task's axes, its kind or the stack were changed."""
+    """The position or rotation of a draggable task's target; None if there is no target. None also if the
+    target has other coordinates, after a change of the task's axes, its kind or the stack."""
     found = targets.get(task.name)
     return None if found is None or found.shape != raw(task).shape else found
 

@@ -1,4 +1,4 @@
-"""The capsules that distances use, drawn on request."""
+"""The capsules between which distances are measured, drawn on request."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ _OPACITY = 0.35
 
 
 class CoverView:
-    """One translucent mesh per body, below the body's frame: it moves with the links of `RobotView`. The
-    meshes are created when they are first shown."""
+    """One translucent mesh per body. A mesh is a child of the body's frame and moves with the links of
+    `RobotView`. Meshes are created when they are first shown."""
 
     def __init__(self, scene: viser.SceneApi, robot: Robot, root: str = "/robot") -> None:
         """root: name of the robot's node."""
@@ -22,7 +22,7 @@ class CoverView:
         self._on = False
 
     def draw(self, on: bool) -> None:
-        """on: whether it is shown."""
+        """on: whether the meshes are shown."""
         if on == self._on:
             return
         self._on = on

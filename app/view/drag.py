@@ -34,10 +34,10 @@ Later = Callable[[float, Callable[[], None]], object]
 class Hand:
     """Gives the controller the position and orientation of the dragged target together.
 
-    With the option to keep targets within reach, both wait for the reachability check, so that the controller
-    gets both at the same time. After `_PATIENCE` the orientation is sent with the position that the
-    controller already has, which was accepted before; the checked position follows when it is known. Without
-    the option, nothing waits.
+    If targets are kept within reach, both values wait for the reachability check, so that the controller gets
+    them at the same time. If the check takes longer than `_PATIENCE`, the orientation is sent with the last
+    accepted position, and the newly checked position follows when it is known. If targets are not kept within
+    reach, nothing waits.
 
     If a scene has no draggable position target, there is no gizmo, and all methods do nothing.
     """
@@ -55,9 +55,10 @@ class Hand:
         dragged: Callable[[], None],
         later: Later,
     ) -> None:
-        """targets: raw targets by task of the session; tip (7,): pose of the robot's hand, position (m) and
-        quaternion wxyz; size: of the gizmo, m; clamp: whether the controller gets only reachable targets;
-        dragged: called at every move; later: schedules a call on viser's loop, on which drags arrive."""
+        """targets: the session's raw targets by task; tip (7,): pose of the robot's hand, position (m) and
+        quaternion wxyz; size: of the gizmo, m; clamp: returns whether the controller gets only reachable
+        targets; dragged: called at every move; later: schedules a call on viser's loop, on which drags
+        arrive."""
         self.verdict: Reachability | None = None
         self._post, self._clamp, self._dragged = post, clamp, dragged
         self._targets = targets
@@ -105,8 +106,8 @@ class Hand:
             self._later(_PATIENCE, partial(self._wait_no_longer, question))
 
     def _give(self, gizmo: TargetGizmo, question: Question, place: np.ndarray) -> None:
-        """Posts a position (3,), m, and the orientation at the same moment of the drag, unless a later one
-        was already posted."""
+        """Posts a position (3,), m, and the orientation at the same moment of the drag. The orientation is
+        omitted if a later one was already posted."""
         self._given, self._place = max(self._given, question.number), place
         axes = ["xyz".index(axis) for axis in gizmo.position.axes]
         self._post(MoveTarget(gizmo.position.name, tuple(float(place[axis]) for axis in axes)))
@@ -121,7 +122,7 @@ class Hand:
             if gizmo is not None and question.number > self._turned and question.rotation is not None:
                 before = self._given
                 self._give(gizmo, question, self._place)
-                self._given = before  # the answer of the check is still used
+                self._given = before  # the result of the check will still be used
 
     def _placed(self, question: Question, accepted: np.ndarray) -> None:
         with self._lock:
@@ -134,7 +135,7 @@ class Hand:
             self.verdict = verdict
 
     def movables(self) -> list[Movable]:
-        """The target as it can be moved without a mouse; [] if there is none."""
+        """The target, which can be moved without a mouse; [] if there is no target."""
         gizmo = self._gizmo
         if gizmo is None:
             return []
@@ -213,7 +214,7 @@ class Hand:
 
     def look_back(self, targets: dict[str, np.ndarray] | None) -> None:
         """Shows the dragged target as a ball at its place in the past, from the raw targets of that moment;
-        None: now."""
+        None for the present."""
         gizmo = self._gizmo
         if gizmo is not None:
             then = None if targets is None else of_task(gizmo.position, targets)

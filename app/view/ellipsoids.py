@@ -28,7 +28,7 @@ class EllipsoidView:
         self._shown: dict[str, np.ndarray] = {}
 
     def draw(self, on: bool, q: np.ndarray, stack: Stack) -> None:
-        """on: whether they are shown; q: joint positions of the instant, (n,)."""
+        """on: whether the ellipsoids are shown; q: joint positions of the instant, (n,)."""
         found: list[Ellipsoid] = []
         if on and np.isfinite(q).all():
             found = ellipsoids(Configuration(self._robot, self._data, q, np.zeros_like(q)), stack)

@@ -16,10 +16,10 @@ _REST = 30
 class FollowBase:
     """Moves a page's camera along with the base; the viewing direction remains the learner's choice.
 
-    A browser's camera message is late: while the base moves, it is some pictures old, and a motion that is
-    added to it would lose the motion since then. While the base moves, only the direction and distance of the
-    camera, which following does not change, are taken from the message; the point that it looks at is taken
-    only while the base is at rest.
+    A browser's camera message is late: while the base moves, the message is some pictures old, and its
+    position lacks the motion since then. Therefore only the direction and distance of the camera are taken
+    from the message while the base moves; following does not change them. The point that the camera looks at
+    is taken from the message only while the base is at rest.
     """
 
     def __init__(self, camera: viser.CameraHandle) -> None:
@@ -29,8 +29,8 @@ class FollowBase:
         self._rests = 0
 
     def follow(self, base: np.ndarray, on: bool) -> None:
-        """base: its position, (3,) m; on: whether the camera follows the base, beginning with its position at
-        that time."""
+        """base: the base's position, (3,) m; on: whether the camera follows the base, from its position at
+        that time on."""
         if not on:
             self._at = None
             return

@@ -35,8 +35,8 @@ class Goal:
         size: float,
         moved: Callable[[np.ndarray], None] | None,
     ) -> None:
-        """start (3,): m; size: of the arrows, m; moved: called with the goal (3,), m, after each move; None:
-        the goal cannot be dragged."""
+        """start (3,): initial position, m; size: of the arrows, m; moved: called with the goal (3,), m, after
+        each move; None if the goal cannot be dragged."""
         floor = "z" not in axes
         self._lift = np.array([0.0, 0.0, _LIFT if floor else 0.0])
         self._touched, self._axes, self._moved = -float("inf"), axes, moved
@@ -66,7 +66,7 @@ class Goal:
         return hear
 
     def put(self, place: np.ndarray) -> None:
-        """Moves the goal as its arrows do, along the directions that it has arrows for."""
+        """Moves the goal like its arrows do, only along the directions of its arrows."""
         if self._moved is not None:
             active = ["xyz".index(axis) for axis in self._axes]
             at = self.place
@@ -81,12 +81,12 @@ class Goal:
         return np.array(self._node.position, float) - self._lift
 
     def where(self) -> np.ndarray:
-        """As `place`."""
+        """Returns `place`."""
         return self.place
 
     def follow(self, goal: np.ndarray | None, text: str) -> None:
-        """Updates the goal and its label. goal: the session's goal, (3,) m; None if the session has none: the
-        goal then stays where it was dragged to."""
+        """Updates the goal and its label. goal: the session's goal, (3,) m; None if the session has no goal;
+        the goal then stays at the position to which it was dragged."""
         if self._label.text != text:
             self._label.text = text
         if goal is None or time.monotonic() - self._touched < HOLD:

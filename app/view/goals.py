@@ -33,8 +33,8 @@ def open_row(rows: Sequence[MissionRow], role: str) -> MissionRow | None:
 
 
 class Goals:
-    """One goal per position role, and rings at the robot's hand per orientation role. A goal on a trajectory
-    that is given from the start cannot be dragged: it shows the present reference of its point."""
+    """One goal for each position role, and rings at the robot's hand for each orientation role. A goal on a
+    predefined trajectory cannot be dragged and shows the present reference of its point."""
 
     def __init__(
         self,
@@ -69,8 +69,8 @@ class Goals:
         self._rings = Targets(scene, replace(ready, tasks=turning), colours, poses, 0.75 * size, self._turned)
 
     def _moved(self, task: TaskView, place: np.ndarray) -> None:
-        """Moves the goal of the role's first open task; if there is none, adds a task that holds the point
-        there."""
+        """Moves the goal of the role's first open task; if there is no open task, adds a task that holds the
+        point there."""
         status = self._status()
         if status is None or status.mission is None:
             return
@@ -121,7 +121,7 @@ class Goals:
             goal.follow(None if target is None else point(target), text)
 
     def movables(self) -> list[Movable]:
-        """The goals as they can be moved without a mouse: positions first, then orientations."""
+        """The goals, which can be moved without a mouse: positions first, then orientations."""
         free = {name: task for name, task in self._roles.items() if task.raw is not None}
         return [
             *(Movable(name, goal.where, goal.put) for name, goal in self._goals.items() if name in free),

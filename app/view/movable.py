@@ -11,11 +11,11 @@ import viser.transforms as vtf
 
 @dataclass(frozen=True)
 class Movable:
-    """A target, moved on viser's loop with the same effect as by its arrows or rings.
+    """A target that is moved on viser's loop, with the same effect as by its arrows or rings.
 
     Attributes:
-        name: of its task or role.
-        place: its present position (3,), m; None while it has none.
+        name: the name of its task or role.
+        place: returns its present position (3,), m; None while it has no position.
         move: moves it to a position (3,), m; None: it can only be turned.
         turn: turns it about the world's axes by a rotation vector (3,), rad; None: it can only be moved.
     """
@@ -27,5 +27,5 @@ class Movable:
 
 
 def turned(rotation: np.ndarray, by: np.ndarray) -> np.ndarray:
-    """A rotation (3, 3) after a further one about the world's axes, by (3,), rad."""
+    """The rotation (3, 3) followed by a rotation about the world's axes, by the rotation vector (3,), rad."""
     return vtf.SO3.exp(by).as_matrix() @ rotation

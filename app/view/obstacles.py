@@ -16,14 +16,14 @@ from app.html.palette import RGB
 from robots.collision import Ball, Box, Floor, Obstacle
 
 _COLOUR: RGB = (180, 120, 110)
-_ARROWS = 0.35  # m beyond the obstacle's own size
+_ARROWS = 0.35  # m: how far the arrows extend beyond the obstacle
 
 Moved = Callable[[str, tuple[float, float, float]], None]
 
 
 class Obstacles:
-    """Boxes and balls; the floor is always there. They are redrawn when the set of obstacles changes, and
-    otherwise only moved."""
+    """Boxes and balls; the page always shows the floor. Boxes and balls are redrawn when the set of obstacles
+    changes; otherwise they are only moved."""
 
     def __init__(self, scene: viser.SceneApi, moved: Moved) -> None:
         """moved: called with an obstacle's name and the new position of its centre, m."""
@@ -32,7 +32,7 @@ class Obstacles:
         self._solids: list[_Solid] = []
 
     def show(self, obstacles: tuple[Obstacle, ...], arrows: bool) -> None:
-        """Shows the obstacles of the session. arrows: whether they can be moved."""
+        """Shows the obstacles of the session. arrows: whether the obstacles have arrows and can be moved."""
         now = tuple(sorted((each for each in obstacles if not isinstance(each, Floor)), key=_name))
         if _shapes(now) != _shapes(self._shown):
             for solid in self._solids:

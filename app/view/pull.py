@@ -1,4 +1,4 @@
-"""Pulling a link with the mouse: a spring between the point of the link that was grabbed and the pointer."""
+"""Pulling a link with the mouse: a spring between the grabbed point of the link and the pointer."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Pull:
         self._on = False
 
     def _switch(self, on: bool) -> None:
-        # A draggable link hides objects behind it from the mouse, also the target's arrows.
+        # A draggable link hides objects behind it from the mouse, including the target's arrows.
         self._on = on
         for joint, mesh in self._links:
             if on:
@@ -80,8 +80,8 @@ class Pull:
             self._grip = Grip(joint, at, hand)
 
     def follow(self, poses: np.ndarray, plant: PlantSettings, running: bool, on: bool) -> None:
-        """poses (n + 1, 7): the present ones; plant: gives the link's mass; on: whether links can be pulled.
-        While paused no force is posted."""
+        """poses (n + 1, 7): the present poses; plant: contains the link's mass; on: whether links can be
+        pulled. While paused no force is posted."""
         self._poses = poses
         if on != self._on:
             self._switch(on)
@@ -103,8 +103,8 @@ class Pull:
 
 
 def pulled(grip: Grip, poses: np.ndarray, mass: float) -> tuple[np.ndarray, np.ndarray]:
-    """(attachment point of the spring (3,), m, its force (3,), N), in world axes, for a robot of a given
-    mass, kg."""
+    """Returns the attachment point of the spring (3,), m, and the spring's force (3,), N, in world axes.
+    mass: of the robot, kg."""
     pose = poses[grip.joint - 1]
     point = pose[:3] + vtf.SO3(pose[3:]).as_matrix() @ grip.at
     force = _STIFF * mass * (grip.hand - point)
@@ -119,11 +119,11 @@ def push_at(
 
     Args:
         robot: the robot.
-        plant: its true masses.
-        joint: 1 … n, that moves the link.
-        pose: (7,) of the joint's frame.
-        point: (3,), world.
-        force: (3,), world axes.
+        plant: contains the robot's true masses.
+        joint: the number, 1 … n, of the joint that moves the link.
+        pose: the pose (7,) of the joint's frame.
+        point: the point (3,) in the world, m.
+        force: the force (3,) in world axes, N.
     """
     lever = true_model(robot, plant).inertias[joint].lever
     centre = pose[:3] + vtf.SO3(pose[3:]).as_matrix() @ lever

@@ -28,9 +28,9 @@ class Question:
 
 @dataclass(frozen=True, eq=False)
 class Reachability:
-    """accepted: the position itself, or the nearest reachable one that was found; missing: distance between
-    them, m; turned_away: orientation error at the accepted position, rad (0 if no orientation was
-    requested)."""
+    """accepted: the target's position, or the nearest reachable position that was found; missing: distance
+    between the two positions, m; turned_away: orientation error at the accepted position, rad (0 if no
+    orientation was requested)."""
 
     question: Question
     accepted: np.ndarray

@@ -14,7 +14,7 @@ from robots.collision import Ball, Box, Floor, Obstacle
 _COLOUR: RGB = (150, 40, 30)
 _FILL = 0.12
 _LINE = 3.0  # pixels
-_ABOVE = 0.08  # m, of a name above its obstacle
+_ABOVE = 0.08  # m: height of a name above its obstacle
 
 Pair = tuple[Ball | Box, Ball | Box]
 
@@ -28,7 +28,8 @@ class ReportedObstacles:
         self._nodes: list[viser.SceneNodeHandle] = []
 
     def show(self, obstacles: tuple[Obstacle, ...], reported: tuple[Obstacle, ...]) -> None:
-        """obstacles: the true ones; reported: those that the controller gets, under the same names."""
+        """obstacles: the true obstacles; reported: the obstacles that the controller gets, with the same
+        names."""
         true = {each.name: each for each in obstacles if not isinstance(each, Floor)}
         told = [each for each in reported if not isinstance(each, Floor) and each.name in true]
         pairs = [(true[each.name], each) for each in told if true[each.name] != each]
@@ -62,7 +63,8 @@ class ReportedObstacles:
                 wireframe=True,
                 cast_shadow=False,
             )
-        # The reported one is named at its foot, the true one at its top, and they do not hide each other.
+        # The reported obstacle is named at its foot and the true obstacle at its top. The names do not hide
+        # each other.
         names = [
             scene.add_label(
                 f"{node}_name/told", f"{told.name}, as reported", position=_end(told, -1), anchor="top-center"
@@ -80,7 +82,8 @@ def _edges(box: Box) -> np.ndarray:
 
 
 def _end(obstacle: Ball | Box, side: int) -> tuple[float, float, float]:
-    """A point of the vertical through the centre, m: the lowest one (side −1), or one above the top (1)."""
+    """A point on the vertical line through the centre, m: the obstacle's lowest point (side −1), or a point
+    above its top (side 1)."""
     x, y, z = obstacle.centre
     half = 0.5 * obstacle.size[2] if isinstance(obstacle, Box) else obstacle.radius
     return x, y, z + side * half + max(side, 0) * _ABOVE

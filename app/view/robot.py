@@ -15,8 +15,8 @@ from robots import Robot
 from robots.shapes.link_shapes import link_shapes
 
 _STILL = 1e-4
-"""Smaller changes of a link's pose are not sent to the page; m, and the same number for each component of the
-quaternion. They move a link by about a tenth of a pixel."""
+"""Smaller changes of a link's pose are not sent to the page; they move a link by about a tenth of a pixel.
+The number applies to the position, m, and to each component of the quaternion."""
 _ARROW = 1.2
 """Length of an arrow with its head, as a multiple of the gizmo's size."""
 
@@ -35,8 +35,8 @@ class RobotView:
         colour: RGB | None = None,
         opacity: float | None = None,
     ) -> None:
-        """root: name of the parent node; colour, opacity: for the whole robot; None: its own colours,
-        opaque."""
+        """root: name of the parent node; colour, opacity: of the whole robot; None: the robot is opaque and
+        has its own colours."""
         shapes = link_shapes(robot)
         self._frames = [
             scene.add_frame(f"{root}/{joint}", show_axes=False) for joint in range(1, robot.n + 1)
@@ -107,9 +107,9 @@ def _home(robot: Robot) -> tuple[np.ndarray, np.ndarray, float]:
 def aim(
     camera: viser.CameraHandle, robot: Robot, phone: bool, room: np.ndarray, ways: Sequence[np.ndarray] = ()
 ) -> None:
-    """Turns the camera to a robot and the points (k, 3) that it will reach, m; ways: (k, 3) each, m, paths
-    that its hand follows. phone: viser's sheet covers the lower part of the scene, so the robot is shown
-    smaller, in the upper part."""
+    """Turns the camera to a robot. room: the points (k, 3), m, that the robot will reach; ways: the paths of
+    its hand, (k, 3) each, m; phone: whether viser's sheet covers the lower part of the scene. The robot is
+    then shown smaller, in the upper part."""
     if not len(room):
         points, direction, _ = _home(robot)
         look(camera, np.vstack([points, *ways]), phone, direction)

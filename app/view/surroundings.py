@@ -74,7 +74,7 @@ class Carried:
         )
 
     def follow(self, tip: np.ndarray, carried: bool) -> None:
-        """tip (3,): m."""
+        """tip (3,): the position of the hand, m."""
         if self._ball.visible != carried:
             self._ball.visible = carried
         if carried and not np.allclose(tip, self._ball.position, rtol=0.0, atol=1e-4):
@@ -82,11 +82,12 @@ class Carried:
 
 
 class ReachCircle:
-    """The arm's reach as a circle on the floor around the base. A goal of the hand outside it makes the base
-    move."""
+    """The arm's reach as a circle on the floor around the base. If a goal of the hand is outside the circle,
+    the base must move."""
 
     def __init__(self, scene: viser.SceneApi, joint: int, radius: float) -> None:
-        """joint: number of the base's last joint, 1 … n, whose frame the circle moves with; radius: m."""
+        """joint: number, 1 … n, of the base's last joint; the circle moves with the frame of this joint;
+        radius: m."""
         angles = np.linspace(0.0, 2 * np.pi, _POINTS + 1)
         circle = np.stack([radius * np.cos(angles), radius * np.sin(angles), np.zeros_like(angles)], axis=1)
         segments = np.stack([circle[:-1], circle[1:]], axis=1).astype(np.float32)

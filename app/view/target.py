@@ -16,7 +16,7 @@ Moved = Callable[[np.ndarray, np.ndarray | None], None]
 
 _BALL = 0.07  # m: the transparent ball is larger than most wrists and encloses them
 _FRAME = 0.09  # m
-_STILL = 1e-4  # m, and about as many rad: a tenth of a pixel
+_STILL = 1e-4  # m, and the same number of rad: about a tenth of a pixel
 _INVITATION = "drag an arrow"
 
 
@@ -24,8 +24,9 @@ class TargetGizmo:
     """The control of a target: arrows along the world's axes for a position task, rings for an orientation
     task of the same frame. The rings rotate with the target.
 
-    The ball is at the dragged position. If that is out of reach, the ball becomes a transparent red one, and
-    a ball in the task's colour with a line to it marks the position that the controller gets instead.
+    The ball is at the dragged position. If this position is out of reach, the ball becomes transparent and
+    red. A second ball in the task's colour, with a line to it, marks the position that the controller gets
+    instead.
     """
 
     def __init__(
@@ -112,7 +113,7 @@ class TargetGizmo:
             self._turn.visible = on
 
     def put(self, position: np.ndarray, rotation: np.ndarray | None) -> None:
-        """Moves the gizmo itself, e.g. after a reset."""
+        """Moves the gizmo to a position and rotation, for example after a reset."""
         self._gizmo.position = position
         if rotation is not None:
             self._turn.wxyz = _wxyz(rotation)
@@ -132,7 +133,7 @@ class TargetGizmo:
         self._say()
 
     def pause(self, words: str) -> None:
-        """words: says how to continue a paused simulation; empty while the simulation runs."""
+        """words: a text that says how to continue a paused simulation; empty while the simulation runs."""
         if words != self._paused:
             self._paused = words
             self._say()

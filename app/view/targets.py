@@ -19,7 +19,7 @@ from robots import Robot
 
 _BALL = 0.035  # m
 _DISC = 0.09  # m
-_STILL = 1e-4  # m, and about as many rad
+_STILL = 1e-4  # m, and the same number of rad
 _TURNING = ("orientation", "relative_orientation")
 _POINTS = ("position", "com", "pointing", "relative_position")
 _SHOWN = (*_TURNING, *_POINTS, "plane_distance")
@@ -52,7 +52,7 @@ class Targets:
             target.follow(poses, of_task(target.task, raw), live)
 
     def movables(self) -> list[Movable]:
-        """The targets as they can be moved without a mouse."""
+        """The targets, which can be moved without a mouse."""
         return [target.movable() for target in self._targets]
 
     def remove(self) -> None:
@@ -116,7 +116,7 @@ class _Target:
         self._post(MoveTarget(self.name, self._value()))
 
     def movable(self) -> Movable:
-        """The target as it can be moved without a mouse."""
+        """The target, which can be moved without a mouse."""
         if self.task.kind in _TURNING:
             return Movable(self.name, self._at, turn=self._turn_by)
         return Movable(self.name, self._at, move=self._put)
@@ -195,8 +195,8 @@ def frame_pose(robot: Robot, poses: np.ndarray, frame: str) -> pin.SE3:
 
 
 def _put(node: viser.SceneNodeHandle, position: np.ndarray, rotation: np.ndarray) -> None:
-    """Sets a node's position and rotation, each only if it has changed; otherwise the browser would redraw
-    for nothing."""
+    """Sets a node's position and rotation, each only if it has changed. An unchanged value would make the
+    browser redraw without need."""
     wxyz = vtf.SO3.from_matrix(rotation).wxyz
     if np.abs(np.array(node.position) - position).max() > _STILL:
         node.position = position

@@ -10,8 +10,8 @@ from app.client.decimate import decimate
 from app.html.palette import LEVELS, RGB
 
 EXAGGERATION = 100
-"""Magnification of the prediction at torque level, where it covers only some milliseconds and would look like
-a dot."""
+"""Magnification of the prediction at torque level. Without it, the prediction of some milliseconds would look
+like a dot."""
 
 
 def segments(points: np.ndarray) -> np.ndarray:
@@ -20,7 +20,7 @@ def segments(points: np.ndarray) -> np.ndarray:
 
 
 def trace(tips: np.ndarray) -> np.ndarray:
-    """The path (k, 3) of a hand, m, as segments, without points on straight parts."""
+    """The path (k, 3) of a hand, m, as segments, without the inner points of straight parts."""
     return segments(tips[decimate(tips.T, _FINE)]) if len(tips) > 1 else NOTHING
 
 

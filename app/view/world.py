@@ -11,7 +11,7 @@ from robots.world import Ball, Box, Floor, Post, Thing, World
 
 _STATIC: RGB = (160, 150, 140)
 _FREE: RGB = (70, 150, 190)
-_PER_NEWTON = 1e-3  # m of an arrow
+_PER_NEWTON = 1e-3  # m: length of an arrow per newton
 _LONGEST, _SHORTEST = 0.35, 0.02  # m
 _HIDDEN = np.zeros((1, 2, 3), np.float32)
 
@@ -50,8 +50,8 @@ def _drawn(scene: viser.SceneApi, name: str, thing: Thing) -> viser.SceneNodeHan
 
 
 class ContactView:
-    """An arrow per point of contact, in the direction of the force on the robot, 1 mm per newton up to 35
-    cm; the strongest one has a label."""
+    """An arrow for each point of contact, in the direction of the force on the robot. Its length is 1 mm per
+    newton, at most 35 cm. The strongest force has a label."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
         self._shown: tuple[ContactPoint, ...] = ()
@@ -61,7 +61,7 @@ class ContactView:
         self._label = scene.add_label("/contact_label", "", visible=False)
 
     def show(self, contacts: tuple[ContactPoint, ...]) -> None:
-        """Draws these contacts."""
+        """Draws the arrows of the present contacts."""
         if contacts == self._shown:
             return
         self._shown = contacts
@@ -81,7 +81,7 @@ def _strength(contact: ContactPoint) -> float:
 
 
 def _arrow(contact: ContactPoint) -> np.ndarray:
-    """Start and end (2, 3), m."""
+    """Start and end of a contact's arrow, (2, 3) m."""
     force, at = np.array(contact.force), np.array(contact.position)
     strength = _strength(contact)
     length = float(np.clip(_PER_NEWTON * strength, _SHORTEST, _LONGEST))

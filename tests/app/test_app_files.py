@@ -94,7 +94,7 @@ def test_files_of_ones_own_are_opened_by_path(server: PageServer, tmp_path: Path
         press(wire, "Load robot")
         assert eventually(lambda: wire.shows("LEFT OUT"), LONG)
         assert learner.ready is not None and learner.ready.robot.name == "panda"
-        assert eventually(lambda: "Opened without a task of yours" in dict(wire.notices), LONG)
+        assert eventually(lambda: "Opened without one of your tasks" in dict(wire.notices), LONG)
 
 
 def test_a_scene_and_a_lesson_are_opened_instead(tmp_path: Path) -> None:

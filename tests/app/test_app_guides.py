@@ -63,14 +63,14 @@ def test_levels_are_named_where_they_are(scene: str, change: str) -> None:
     if "position.enabled" not in change:
         assert told(first) == enabled(levels)
         own = next(level for level in levels if any(task.name == position.name for task in level.tasks))
-        assert f"that is <b>{spoken(own.name)}</b>" in first and css(colours[own.name]) in first
+        assert f"the task of <b>{spoken(own.name)}</b>" in first and css(colours[own.name]) in first
     else:
         assert "switched off" in first
     then = told(guide(tasks, levels, colours, dragged=True))
     assert then.items() <= enabled(levels).items() and len(then) == 2
     # The guide names no level of another scene, and no other numbers than those of levels.
     rest = re.sub(r"<b>[^<]+</b> \(level \d+\)|<[^>]+>", "", first)
-    assert "level" not in rest.replace("Its level", "")
+    assert "level" not in rest.replace("The ball's level", "")
     assert scene != "planar3-plane" or told(first) == {"reach": 1, "pose": 2, "wrist": 3}
 
 

@@ -26,7 +26,7 @@ LIGHT = ("plant.mass_scale=[1,1,1,1,0.3,0.3,0.3]", "plant.inertia_scale=[1,1,1,1
 DOCUMENT_ROWS = (
     # ---------------------------------------- glossary
     Intervention(
-        "glossary", "With the true inertia it changes that a little, and this change is the leak.",
+        "glossary", "If the result is computed with the true inertia, lower levels change it a little.",
         of("dynamic_leak", "m/s²"), (1e-3, 1e3), ("controller=osf", "nominal.armature=[0.05,0.05,0.03]"),
         (0, 1e-4),
         on="inside-the-qp/3",

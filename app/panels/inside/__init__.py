@@ -1,1 +1,2 @@
-"""Panels that show the inside of one tick. The simulation computes their data only while they are visible."""
+"""Panels that show the inside of one tick. The simulation computes the data of a panel only while it is
+visible."""

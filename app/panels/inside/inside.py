@@ -1,4 +1,4 @@
-"""The tab about one tick: its pictures, and the data that it requests from the simulation."""
+"""The tab that shows one tick: its pictures, and its requests for data from the simulation."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from lessons.settings.torque import TorqueSettings
 
 
 class InsidePanel:
-    """A tab of the left panel. It requests only the data that the browser shows."""
+    """A tab of the left panel. It requests only the data of pictures that the browser shows."""
 
     def __init__(
         self,
@@ -41,7 +41,7 @@ class InsidePanel:
         if ready.robot.n > 1:
             self._plane = PlanePanel(client, in_view, ready.robot, levels, colours, post)
         else:
-            client.gui.add_html(block("One joint has one Δτ: there is no plane to draw it in."))
+            client.gui.add_html(block("This robot has one joint with one Δτ; the plane needs two."))
         with client.gui.add_folder("The Hessian of one level", expand_by_default=False):
             self._matrix = MatrixPanel(client, in_view, ready.robot, levels)
         self._spectrum = spectrum

@@ -21,11 +21,11 @@ TITLE = "Hessian and active bounds"
 SIZE = (400, 400)
 _LEFT, _TOP, _SIDE = 62.0, 8.0, 330.0
 _SHADES = 6
-"""Number of shades per sign: one per power of ten that is distinguished."""
+"""Number of shades for each sign, one for each power of ten."""
 
 
 class MatrixPanel:
-    """The heat map; it requests the Hessian while the browser shows it."""
+    """The heat map. It requests the Hessian while the browser shows the map."""
 
     def __init__(
         self, client: viser.ClientHandle, in_view: InView, robot: Robot, levels: Sequence[str]
@@ -34,7 +34,7 @@ class MatrixPanel:
         self._names = robot.joint_names
         self._level = client.gui.add_dropdown("Level", tuple(levels), initial_value=levels[0])
         self._picture = SvgPicture(
-            client, in_view, TITLE, SIZE, "Run (Space), or take one tick (T), to see it."
+            client, in_view, TITLE, SIZE, "Run (Space), or take one tick (T), to see H."
         )
         self._words = client.gui.add_html("")
 
@@ -102,7 +102,7 @@ def _step(shade: int) -> int:
 
 
 def _labels(matrix: Matrix, names: Sequence[str], cell: float) -> str:
-    """Labels: joints if there is enough room, otherwise knots."""
+    """Labels of the rows and columns: the joints if only one knot is shown, otherwise the knots."""
     parts = []
     if matrix.shown == 1:
         for joint, name in enumerate(names):
@@ -119,7 +119,7 @@ def _labels(matrix: Matrix, names: Sequence[str], cell: float) -> str:
                 f'<text x="{_LEFT - 12}" y="{_TOP + at + 4:.1f}" text-anchor="end">Δτ, {knot}</text>'
                 f'<text x="{_LEFT + at:.1f}" y="{_TOP + _SIDE + 21}" text-anchor="middle">{knot}</text>'
             )
-    words = "joint by joint" if matrix.shown == 1 else "knot by knot, joint by joint in each"
+    words = "joint by joint" if matrix.shown == 1 else "knot by knot, and for each knot joint by joint"
     parts.append(
         f'<text x="{_LEFT + 0.5 * _SIDE}" y="{_TOP + _SIDE + 37}" text-anchor="middle">Δτ, {words}</text>'
     )
@@ -128,7 +128,7 @@ def _labels(matrix: Matrix, names: Sequence[str], cell: float) -> str:
 
 def _legend(matrix: Matrix, names: Sequence[str]) -> str:
     held = "".join(
-        f"<br><b>{esc(names[each.joint])}</b>: {esc(each.kind)}, {'upper' if each.upper else 'lower'} end, "
+        f"<br><b>{esc(names[each.joint])}</b>: {esc(each.kind)}, {'upper' if each.upper else 'lower'} bound, "
         f"from increment {each.knot} on; multiplier {figure(each.multiplier)}"
         for each in sorted(matrix.active, key=lambda each: -each.multiplier)[:8]
     )
@@ -137,8 +137,8 @@ def _legend(matrix: Matrix, names: Sequence[str]) -> str:
     return block(
         f"H = GᵀQG + R of level <b>{esc(matrix.level)}</b>, {size} × {size}"
         + (f" (the first {matrix.shown} of {matrix.knots} knots)" if matrix.shown < matrix.knots else "")
-        + f". Blue positive, orange negative; the shade is the size, six powers of ten below "
-        f"{figure(matrix.largest)}. Largest over smallest eigenvalue: {figure(matrix.condition)}.<br>"
+        + f". Blue: positive; orange: negative. The shade shows the size, over six powers of ten below "
+        f"{figure(matrix.largest)}. Largest eigenvalue / smallest: {figure(matrix.condition)}.<br>"
         + (f'<b style="color:{ink(BAD)}">Red: active bounds</b>{held}' if held else "No bound is active.")
         + (f"<br>… and {more} more." if more > 0 else "")
     )

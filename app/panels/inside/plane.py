@@ -24,13 +24,13 @@ if TYPE_CHECKING:
     from lessons.geometry.plane import Plane
 
 TITLE = "The QPs of this tick"
-_APPLIED = "what is applied"
+_APPLIED = "the applied Δτ"
 _EMPTY = "No QP was solved yet: run (Space), or take one tick (T)."
 _SHIFT = 1.0  # N·m
 
 
 class PlanePanel:
-    """The picture of the plane; it requests its data while the browser shows it."""
+    """The picture of the plane. It requests its data while the browser shows the picture."""
 
     def __init__(
         self,
@@ -41,7 +41,7 @@ class PlanePanel:
         colours: dict[str, RGB],
         post: Send,
     ) -> None:
-        """levels: names, highest priority first; post: an event for the session."""
+        """levels: names, highest priority first; post: posts an event to the session."""
         gui = client.gui
         self._robot, self._colours = robot, colours
         self._half: float | None = None
@@ -54,24 +54,26 @@ class PlanePanel:
         self._fewer = gui.add_button(
             "Look one knot ahead (N = 1)",
             visible=False,
-            hint="There are no later knots then, and the plane of two joints shows more of the QP",
+            hint="Without later knots, the plane of two joints shows more of the QP",
         )
-        with gui.add_folder("Which cut", expand_by_default=False):
+        with gui.add_folder("Choice of the plane", expand_by_default=False):
             self._pair = gui.add_dropdown(
-                "Joints", tuple(self._pairs), hint="The axis to the right, then the one upwards"
+                "Joints",
+                tuple(self._pairs),
+                hint="The joint of the horizontal axis, then the joint of the vertical axis",
             )
             self._through = gui.add_dropdown(
-                "Others held at",
+                "Other Δτ held at",
                 (_APPLIED, *levels),
-                hint="The level at whose solution the other joints' Δτ, and later knots, are held",
+                hint="The Δτ of other joints and of later knots have the values of this level's solution",
             )
             self._shift = gui.add_slider(
-                "Shifted by [N·m]",
+                "Offset [N·m]",
                 min=-_SHIFT,
                 max=_SHIFT,
                 step=0.01,
                 initial_value=0.0,
-                hint="Offset of the other joints' Δτ from that solution",
+                hint="Offset of the other joints' Δτ from this solution",
             )
 
         on_click(self._fewer, lambda: post(Set("horizon", 1)))
@@ -99,7 +101,7 @@ class PlanePanel:
         self._picture.paint(parts(plane, self._half, self._colours, names))
 
     def write(self, inside: Inside | None, settings: TorqueSettings) -> None:
-        """Updates the legend, and says how closely geometry and solver agree."""
+        """Updates the legend, which also says how closely the geometry and the solver agree."""
         if inside is None or not self._picture.in_view:
             return
         several = settings.horizon > 1 and settings.controller != "hiqp"
@@ -119,12 +121,14 @@ class PlanePanel:
             )
             lines.append(
                 f"{swatch(self._colours.get(level.name, BOUND))}<b>{place + 1} {esc(level.name)}</b>: "
-                f"contours of its cost; the disc is its optimum; (33) leaves {left}"
+                f"contours of its cost, and a disc at its optimum; (33) leaves {left}"
             )
         lines.append(
-            f'<span style="color:{ink(BAD)}">▭</span> the box of bounds; the red area violates a bound'
+            f'<span style="color:{ink(BAD)}">▭</span> the box of the bounds; the red area violates a bound'
         )
-        lines.append(f'<span style="color:{ink(GHOST)}">◆</span> one weighted cost of all; no priorities')
+        lines.append(
+            f'<span style="color:{ink(GHOST)}">◆</span> optimum of one weighted cost, without priorities'
+        )
         if plane.osf is not None:
             outside = "outside the box" if not plane.box.inside(plane.osf) else "inside the box in this tick"
             lines.append(f'<span style="color:{ink(BAD)}">▲</span> the increment of OSF: {outside}')

@@ -21,8 +21,8 @@ _FAR = 6.0
 distances."""
 _SMALLEST = 0.12  # N·m: half the width at the largest magnification
 _NEAR = 8.0
-"""Sides of the box that are farther away than this multiple of the points' distance are outside the
-picture."""
+"""Sides of the box that are farther away than this multiple of the farthest point's distance do not enlarge
+the picture."""
 _LOOSE = 0.55
 """The picture shrinks only if it can shrink by this factor, so that small changes do not rescale it."""
 _RINGS = (1.0, 2.0, 3.0)
@@ -74,8 +74,8 @@ def _bounded(value: float, half: float) -> float:
 
 
 def parts(plane: Plane, half: float, colours: Mapping[str, RGB], joints: Sequence[str]) -> list[str]:
-    """SVG layers that change at different times, from back to front. joints: names of the two joints, first
-    the one of the horizontal axis."""
+    """SVG layers that change at different times, from back to front. joints: names of the joint of the
+    horizontal axis and of the joint of the vertical axis."""
     paper = _Paper(half)
     clip = f'<clipPath id="plane"><rect x="{_LEFT}" y="{_TOP}" width="{_SIDE}" height="{_SIDE}"/></clipPath>'
     inner = [_box(plane, paper)]
@@ -161,12 +161,12 @@ def _sides(plane: Plane, paper: _Paper) -> str:
 
 
 def _contours(level: LevelCut, place: int, paper: _Paper, colours: Mapping[str, RGB]) -> str:
-    """Contours of the cost: one through the solution, where it touches the feasible set, and others to show
-    its shape."""
+    """Contours of the cost. One passes through the solution, where it touches the feasible set; the others
+    show the shape of the cost."""
     colour = colours.get(level.name, BOUND)
     long, short, angle = level.ellipse(level.solved)
     touches = paper.scale * short > 4.0
-    if not touches:  # the solution minimises the cost
+    if not touches:  # the solution is the unconstrained minimum of the cost
         values, axes = np.linalg.eigh(level.P)
         short = 0.045 * paper.half
         long = short * math.sqrt(values[1] / values[0])
@@ -186,7 +186,7 @@ def _contours(level: LevelCut, place: int, paper: _Paper, colours: Mapping[str, 
 
 
 def _left(level: LevelCut, plane: Plane, place: int, paper: _Paper, colours: Mapping[str, RGB]) -> str:
-    """The set that a level leaves to the levels below: a line, drawn thick within the box, or a point."""
+    """The set that a level leaves to the levels below: a point, or a line that is thick within the box."""
     left, colour = level.leaves, css(colours.get(level.name, BOUND))
     if left.at is None or left.span.shape[1] == 2:
         return ""

@@ -16,15 +16,15 @@ from app.panels.widgets.picture import SvgPicture
 TITLE = "Eigenvalues of I − M⁻¹M̄"
 SIZE = (360, 208)
 _MIDDLE, _RADIUS = (180.0, 92.0), 78.0
-_EDGE = 2.2  # radius of the picture
+_EDGE = 2.2  # half the width of the picture, in radii of the unit circle
 
 
 class SpectrumPicture:
-    """The picture; it requests the eigenvalues while the browser shows it."""
+    """The picture of the eigenvalues. It requests them while the browser shows the picture."""
 
     def __init__(self, client: viser.ClientHandle, in_view: InView) -> None:
         self._picture = SvgPicture(
-            client, in_view, TITLE, SIZE, "Run (Space), or take one tick (T), to see them."
+            client, in_view, TITLE, SIZE, "Run (Space), or take one tick (T), to see the eigenvalues."
         )
 
     @property
@@ -38,8 +38,8 @@ class SpectrumPicture:
 
 
 def markup(values: np.ndarray | Sequence[float]) -> str:
-    """SVG with a mark per eigenvalue; all are real. Eigenvalues outside the picture are at its edge, with
-    their value."""
+    """SVG with a mark for each eigenvalue; all eigenvalues are real. Marks outside the picture are drawn at
+    its edge. The attribute data-at has the value."""
     x0, y0 = _MIDDLE
     ring = f'<circle cx="{x0}" cy="{y0}" r="{_RADIUS}" fill="{css(GOOD, 0.08)}" stroke="{css(BOUND)}"/>'
     far, high = _EDGE * _RADIUS, _RADIUS + 8
@@ -75,7 +75,7 @@ def _verdict(worst: float) -> str:
     if math.isnan(worst):
         return "not finite"
     if worst < -1.0:
-        return f"{figure}: the error grows and changes sign at every step"
+        return f"{figure}: the error grows and changes sign at every tick"
     if worst >= 1.0:
         return f"{figure}: the error does not decay"
-    return f"largest {figure}: " + ("slow" if worst > 0 else "the sign changes at every step")
+    return f"largest {figure}: " + ("slow" if worst > 0 else "the sign changes at every tick")

@@ -33,7 +33,7 @@ def add_cards(gui: viser.GuiApi, notebook: Notebook, choose: Choose) -> None:
     gui.add_html(
         block(
             f"<b>{len(COURSE)} lessons</b>, each with a question, a robot and a measurement: predict, run, "
-            f"compare. {done} of them begun. Your progress is stored in this browser."
+            f"compare. You have begun {done} of them. Your progress is stored in this browser."
         )
     )
     for number, name in enumerate(COURSE, start=1):
@@ -120,7 +120,7 @@ def _framed(picture: str, words: str) -> str:
 
 @cache
 def glyph(name: str) -> str:
-    """The icon of a lesson: SVG that takes the colour of the text."""
+    """The icon of a lesson: SVG in the colour of the surrounding text."""
     folder = files("app.panels.lesson") / "glyphs"
     found = folder / f"{name}.svg"
     return (found if found.is_file() else folder / "lesson.svg").read_text(encoding="utf-8")

@@ -167,9 +167,7 @@ def pictures(part: Part, lecture: Lecture) -> str:
     legend = "measured"
     if lecture.ghosts:
         legend += ", dashed grey: the ghost"
-    return block(
-        f'{drawn}<div style="opacity:0.7">Blue: {legend}; green dots: a bound that is claimed.</div>'
-    )
+    return block(f'{drawn}<div style="opacity:0.7">Blue: {legend}; green dots: the bound of a claim.</div>')
 
 
 def _whole(curve: SignalCurve | None) -> SignalCurve | None:
@@ -181,7 +179,7 @@ def _unit(signal: Signal) -> str:
 
 
 def _bounds(claims: tuple[Claim, ...], signal: Signal) -> list[Bound]:
-    """The bounds that claims set for the largest or the last value of a signal itself."""
+    """The bounds in claims about the largest or the last value of the signal itself."""
     return [
         Bound(claim.bound, claim.text)
         for claim in claims

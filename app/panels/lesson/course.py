@@ -20,7 +20,7 @@ from lessons.settings.settings import SceneSettings
 
 class Course:
     """The lessons of a page, built anew for every scene. The tab of a lesson comes first, since the learner
-    opened the page for it."""
+    opened the page for this lesson."""
 
     def __init__(
         self,
@@ -33,7 +33,7 @@ class Course:
         loop: asyncio.AbstractEventLoop,
         offered: bool = True,
     ) -> None:
-        """exercise: the active one, if there is one; offered: whether this page can begin lessons."""
+        """exercise: the active step, if there is one; offered: whether this page can begin lessons."""
         self._gui, self._learner, self._notebook = gui, learner, notebook
         self._exercise = exercise
         self._choose, self._settings, self._loop = choose, settings, loop
@@ -86,7 +86,7 @@ class Course:
             self._panel.follow(lecture, settings)
 
     def close(self) -> None:
-        """Called before the panels are removed."""
+        """Closes the list and the panel before the page removes them."""
         self._list.close()
         if self._panel is not None:
             self._panel.close()

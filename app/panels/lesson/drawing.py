@@ -13,7 +13,7 @@ from app.html.palette import BOUND, GOOD, LEVELS, RGB, css, ink
 from app.html.text import esc, figure
 from app.link.exercise import SignalCurve
 
-_W = 360  # units of every picture's width; it scales with the panel
+_W = 360  # width of every picture in its own units; a picture is scaled to the panel
 GUESS, TRUTH = LEVELS[0], LEVELS[1]
 
 
@@ -44,7 +44,7 @@ def scale(low: float, high: float, guess: float | None, truth: float | None, fac
 
 @dataclass(frozen=True)
 class Bound:
-    """A reference level for a curve, in the curve's unit."""
+    """A horizontal reference line for a curve, in the curve's unit."""
 
     value: float
     words: str
@@ -58,7 +58,7 @@ def chart(
     bounds: Sequence[Bound],
     until: float,
 ) -> str:
-    """A signal over the run, with the ghost's curve (dashed) and its reference levels (dotted)."""
+    """A signal over the run, with the ghost's curve (dashed) and reference lines (dotted)."""
     shown = [curve.values, *([ghost.values] if ghost is not None else [])]
     values = np.concatenate([each[np.isfinite(each)] for each in shown])
     if not values.size:
@@ -90,7 +90,7 @@ def sketch(
     truth: SignalCurve | None,
     unit: str,
 ) -> str:
-    """The curve that the learner draws, with the measured one over it."""
+    """The curve that the learner draws, with the measured curve over it."""
     frame = _Frame((low, high, False), until, height=130, top=16, left=40)
     times, values = (np.array(column, float) for column in zip(*points, strict=True))
     parts = [
@@ -115,7 +115,7 @@ Axis = tuple[float, float, bool]  # low, high, logarithmic
 
 
 class _Frame(NamedTuple):
-    """The axes of a picture over time, 0 … until s, and the elements in them."""
+    """A picture with a time axis, 0 … `until` s, and the elements in the picture."""
 
     axis: Axis
     until: float

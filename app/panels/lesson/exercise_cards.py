@@ -1,4 +1,4 @@
-"""Cards of exercises: the task, the commands that begin and judge it, the criteria, and hints."""
+"""Cards of exercises: the task, the commands that begin and judge the exercise, the criteria, and hints."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from lessons.exercises.exercise import Exercise
 def exercise_cards() -> str:
     """The cards of all exercises, in order."""
     said = (
-        f"<b>{len(EXERCISES)} exercises</b>: write the missing lines of a controller in a file of your own; "
-        "this page runs the file whenever you save it, and the last command judges the robot's motion."
+        f"<b>{len(EXERCISES)} exercises</b>: write the missing lines of a controller in a file of your own. "
+        "This page runs the file whenever you save it. The last command judges the robot's motion."
     )
     return block(said) + "".join(card(load_exercise(name)) for name in EXERCISES)
 
@@ -27,7 +27,7 @@ def belonging_to(lesson: str) -> str:
 
 
 def card(exercise: Exercise) -> str:
-    """One exercise."""
+    """The card of one exercise."""
     lesson = load_lesson(exercise.lesson).card.title
     lines = "<br>".join(f"<code>{esc(each)}</code>" for each in exercise.commands())
     return block(
@@ -49,7 +49,7 @@ def _judged_by(exercise: Exercise) -> str:
 
 
 def _hints(hints: Sequence[str], number: int = 1) -> str:
-    """The first hint as a folded element, which contains the next one."""
+    """The first hint as a folded element, which contains the next hint."""
     if not hints:
         return ""
     first = rendered_line(hints[0])

@@ -1,4 +1,4 @@
-"""The prediction of a step: entered before the run, compared with the measured value after it."""
+"""The prediction of a step: entered before the run and compared with the measured value after the run."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _POINTS = 5
 
 
 class Asking:
-    """The input of a prediction. It is sent at once and may be changed until the run begins."""
+    """The input of a prediction. A prediction is sent at once and may be changed until the run begins."""
 
     def __init__(self, gui: viser.GuiApi, prediction: Prediction, predict: Callable[[Answer], None]) -> None:
         self._prediction, self._predict = prediction, predict
@@ -57,7 +57,7 @@ class Asking:
             step=1,
             initial_value=STEPS // 2,
             marks=((0, figure(value.low)), (STEPS, figure(value.high))),
-            hint="Logarithmic; the arrow keys move it as well",
+            hint="A logarithmic slider; the arrow keys also move it",
         )
         self._style = gui.add_html(only_track(slider))
         self._inputs.append(slider)
@@ -77,7 +77,7 @@ class Asking:
                     max=wanted.high,
                     step=(wanted.high - wanted.low) / 60,
                     initial_value=wanted.low,
-                    hint="Lifts the curve at this moment",
+                    hint="The value of the curve at this moment",
                 )
             )
         self._inputs += sliders
@@ -89,7 +89,8 @@ class Asking:
 
     @property
     def suggested(self) -> Answer | None:
-        """The prediction that counts if the learner enters none: a slider counts with its initial value."""
+        """The prediction that counts if the learner enters no prediction: a slider counts with its initial
+        value."""
         match self._prediction:
             case Choice():
                 return None
@@ -106,7 +107,7 @@ class Asking:
     # ---------------------------------------------------------------- showing
 
     def show(self, lecture: Lecture) -> None:
-        """Updates the input during the run, and shows the measured value after it."""
+        """Updates the input during the run, and shows the measured value after the run."""
         if self._mine is None and lecture.answer is not None:
             self._recall(lecture.answer)
         before = lecture.phase in ("waiting", "preparing") and lecture.grade is None
@@ -149,7 +150,7 @@ class Asking:
     def _pictured(self, lecture: Lecture | None) -> str:
         """Returns the picture of the prediction.
 
-        lecture: the graded run; None before it is graded. An answer that came too late is not in it.
+        lecture: the graded run, which contains no answer that came too late; None before the run is graded.
         """
         truth, mine = (math.nan, self._mine) if lecture is None else (lecture.truth, lecture.answer)
         match self._prediction:

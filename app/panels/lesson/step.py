@@ -87,7 +87,7 @@ class LessonPanel:
                     add_control(gui, self._bindings, knob, self._settings())
         self._run = gui.add_button("Run this step", color=button(LEVELS[1]), hint="Key P")
         self._hurry = gui.add_checkbox(
-            "As fast as possible", self._fast, hint="Instead of real time: if you have seen the run before"
+            "As fast as possible", self._fast, hint="Faster than real time, if you have seen the run before"
         )
         self._state = gui.add_html("")
         self._after = gui.add_html("")
@@ -102,7 +102,7 @@ class LessonPanel:
             "Ghost in the scene",
             self._beside,
             visible=isinstance(part, Step) and part.ghost is not None,
-            hint="The second robot, translucent, in the same scene. Both start again together.",
+            hint="Shows the second robot, translucent, in the same scene. Both robots start again together.",
         )
         self._where = gui.add_button_group("Lesson", (_BACK, _SKIP, _ALL), hint="Keys B, N and L")
         self._listen()
@@ -134,7 +134,8 @@ class LessonPanel:
         )
 
     def _show_ghost(self) -> None:
-        """Starts the ghost of this step in the scene, if it needs one."""
+        """Starts the ghost of this step in the scene if the learner has chosen it; otherwise stops the
+        ghost."""
         ghost = self._part.ghost if isinstance(self._part, Step) else None
         if ghost is not None and self._beside:
             self._learner.start_ghost(ghost)
@@ -211,7 +212,7 @@ class LessonPanel:
         seen = lecture.attempt > 0
         over = lecture.phase == "done"
         challenge = isinstance(self._part, Challenge)
-        # After a missed goal the button offers another attempt; Skip continues without it.
+        # After a missed goal, the button offers another attempt; Skip continues without an attempt.
         passed = lecture.result is not None and lecture.result.passed
         if self._asking is not None:
             self._asking.show(lecture)
@@ -244,5 +245,5 @@ class LessonPanel:
             handle.content = html
 
     def close(self) -> None:
-        """Called before the controls are removed."""
+        """Stops all updates before the controls are removed."""
         self._bindings.close()

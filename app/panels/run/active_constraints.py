@@ -11,7 +11,8 @@ from himpc.limits import CONSTRAINTS
 from lessons.settings.settings import SceneSettings
 
 _ALWAYS = 3
-"""Constraints that every robot has: torque, velocity and position. Others have a column once they bind."""
+"""Constraints that every robot has: torque, velocity and position. Other constraints get a column once they
+bind."""
 _HEAD = '<tr style="text-align:left">{}</tr>'
 
 
@@ -22,7 +23,7 @@ class BindingPanel:
         self._colours = colours
         gui.add_html(
             block("A bound <b>binds</b> (is active) when the plan stops at it. The multiplier is the rate at "
-                  "which the level's cost would fall if the bound were moved outwards; for costs without the "
+                  "which the level's cost would fall if the bound were moved outwards. For costs without the "
                   "factor ½, such as (31), the rate is twice the multiplier. The slack is the distance by "
                   "which the bound was softened.")
         )  # fmt: skip
@@ -57,7 +58,7 @@ class BindingPanel:
 
 
 def readable(pair: str) -> str:
-    """The names of a pair as words, "link 5 – table" for "link_5 – table"; a joint's name as it is."""
+    """The names of a pair as words: "link 5 – table" for "link_5 – table". A joint's name is not changed."""
     return pair.replace("_", " ") if " – " in pair else pair
 
 

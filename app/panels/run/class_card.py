@@ -14,43 +14,43 @@ from app.panels.widgets.command import on_click
 _SAYS = {
     "waiting": "The vote is not open yet.",
     "open": "<b>Vote:</b> enter below what you expect; you can change it until the vote is closed.",
-    "again": "<b>Second vote:</b> talk about it; your prediction below counts again, and you can change it.",
+    "again": "<b>Second vote:</b> discuss the question. Your prediction below counts; you can change it.",
     "closed": "The vote is closed.",
     "running": "The step runs.",
     "decided": "",
 }
 _NAME = "Your name"
 _CUT_OFF = (
-    "<b>Class.</b> The link to your teacher's computer is interrupted. Go on: what you do is told to your "
-    "teacher when the link is back."
+    "<b>Class.</b> The connection to your teacher's computer is interrupted. Go on: your teacher gets "
+    "your results when the connection is back."
 )
 
 
 class ClassCard:
-    """The card. The server shows it a view of the class whenever that changes."""
+    """The card. The server calls `show` whenever the view of the class changes."""
 
     def __init__(
         self, gui: viser.GuiApi, name: str, call: Callable[[str], object] | None, fetch: Callable[[], object]
     ) -> None:
-        """name: with which the learner signed in, or what they typed before; call: takes a new name, None if
-        nobody is asked; fetch: brings this page to the step of the class."""
+        """name: the name with which the learner signed in, or the name typed before; call: receives a new
+        name; None if no name is requested; fetch: opens the step of the class on this page."""
         self._text = gui.add_html(block("<b>Class.</b> Wait for your teacher."))
         self._back = gui.add_button("Go to the class's step", visible=False)
         on_click(self._back, fetch)
         if call is None and name:
             gui.add_html(block(f"Your teacher sees your account, <b>{esc(name)}</b>."))
         elif call is not None:
-            typed = gui.add_text(_NAME, name, hint="Only your teacher sees it; you can leave it out.")
+            typed = gui.add_text(_NAME, name, hint="Only your teacher sees your name. It may be empty.")
 
             @typed.on_update
             async def _(_: object) -> None:
                 call(str(typed.value))
 
     def show(self, view: Mapping[str, Any]) -> None:
-        """view: what `app.classes.views.for_all` gives; `away`: whether this page is at another step;
-        `vote`: a page to vote on, for pages without a robot of their own; `before`: how many others get their
-        robot at the class's step first, None if this page has its robot; `cut_off`: whether the server of
-        the class cannot be reached."""
+        """Shows a view of the class: the result of `app.classes.views.for_all` with more fields. `away`:
+        whether this page is at another step; `vote`: address of a page for voting, for pages without their
+        own robot; `before`: number of learners who get their robot earlier, None if this page has its robot;
+        `cut_off`: whether the server of the class cannot be reached."""
         self._text.content = (block(_CUT_OFF) if view["cut_off"] else "") + _html(view)
         if self._back.visible != view["away"]:
             self._back.visible = view["away"]
@@ -77,8 +77,8 @@ def _html(view: Mapping[str, Any]) -> str:
 
 def _coming(before: int | None) -> str:
     if not before:
-        return "" if before is None else "Your robot comes to this step."
-    return f"Your robot comes to this step: {before} before you."
+        return "" if before is None else "Your robot will be at this step soon."
+    return f"Your robot will be at this step soon. Robots before it: {before}."
 
 
 def _bars(rounds: list[list[Mapping[str, Any]]]) -> str:

@@ -14,8 +14,8 @@ BETWEEN = 1.0
 
 
 class Guesses:
-    """The attempts of one page. At most one every BETWEEN s is checked; of several attempts within this time
-    only the last one counts."""
+    """The attempts of one page to enter the token. At most one attempt every BETWEEN s is checked; of several
+    attempts within this time, only the last one counts."""
 
     def __init__(self, give: Callable[[str], bool]) -> None:
         self._give = give
@@ -24,8 +24,8 @@ class Guesses:
         self._waiting = False
 
     async def offer(self, token: str) -> bool | None:
-        """Whether the token was right; None if it was not checked, because a later attempt replaced it or an
-        earlier one is waiting and checks it instead."""
+        """Returns whether the latest token is right. Returns None if an earlier attempt is still waiting;
+        that attempt then checks the latest token."""
         self._latest = token
         if self._waiting:
             return None
@@ -44,7 +44,7 @@ def add_watching(gui: viser.GuiApi, give: Callable[[str], bool]) -> None:
 
     Args:
         gui: the page's controls.
-        give: takes a token and returns whether it was the right one.
+        give: receives a token and returns whether it is right.
     """
     gui.add_html(
         block(
@@ -52,7 +52,7 @@ def add_watching(gui: viser.GuiApi, give: Callable[[str], bool]) -> None:
             "the view, the tabs and the plots of your page."
         )
     )
-    token = gui.add_text("Instructor's token", "", hint="Printed where himpc-lab was started.")
+    token = gui.add_text("Instructor's token", "", hint="himpc-lab printed the token in its terminal.")
     wrong = gui.add_html("", visible=False)
     guesses = Guesses(give)
 

@@ -25,8 +25,8 @@ _ROWS = 3
 
 
 class ComparePanel:
-    """The panel of the ghost. Callbacks only start and end ghosts; the state comes from the learner, so that
-    a ghost that a lesson started is shown as well."""
+    """The panel of the ghost. Callbacks only start and end ghosts; the state is read from the learner, so
+    that a ghost that a lesson started is also shown."""
 
     def __init__(
         self,
@@ -45,7 +45,7 @@ class ComparePanel:
         self._settings = [self._row(gui, place) for place in range(1, _ROWS + 1)]
         self._start = gui.add_button("Start the ghost", color=button(GHOST))
         self._swap = gui.add_button(
-            "Swap robot and ghost", hint="Each gets the other's settings; both start again", visible=False
+            "Swap robot and ghost", hint="Both swap their settings and start again", visible=False
         )
         self._end = gui.add_button("Remove the ghost", visible=False)
         self._table = gui.add_html("", visible=False)
@@ -115,7 +115,7 @@ class ComparePanel:
         learner.start_ghost(Ghost(", ".join(own), own))
 
     def update(self, now: SessionSnapshot[SceneSettings]) -> None:
-        """Shows the present state."""
+        """Shows the state of the ghost, and the results of both runs."""
         ghost = self._learner.ghost
         on = ghost is not None
         if self._end.visible != on:
@@ -126,7 +126,7 @@ class ComparePanel:
         mine = None if self._learner.score is None else self._learner.score.result()
         its = None if ghost.score is None else ghost.score.result()
         if its is None or mine is None or ghost.status is None:
-            self._table.content = block(f"{badge('GHOST', GHOST)} is getting ready …")
+            self._table.content = block(f"{badge('GHOST', GHOST)} is starting …")
             return
         self._table.content = _legend(ghost.words, now) + self._results(now, mine, its)
 
@@ -145,7 +145,7 @@ class ComparePanel:
         ]
         if math.isfinite(mine.torque_share):
             rows.append(
-                _line("largest torque asked for, of its bound", mine.torque_share, its.torque_share, _percent)
+                _line("largest requested torque / bound", mine.torque_share, its.torque_share, _percent)
             )
         rows += [
             _line("unsolved QPs", mine.unsolved, its.unsolved, str),
@@ -158,7 +158,7 @@ class ComparePanel:
         )
         return block(
             f'<table style="width:100%;border-spacing:0 0.25em">{head}{"".join(rows)}</table>'
-            f"over {mine.seconds:.1f} s since both began together; the better figure is bold"
+            f"over {mine.seconds:.1f} s from their common start; the better value is bold"
         )
 
 
@@ -166,12 +166,12 @@ def _legend(words: str, now: SessionSnapshot[SceneSettings]) -> str:
     slow = ""
     if now.status.capped:
         slow = (
-            f'<br><span style="color:{ink(BAD)}">This computer cannot run both in real time: the clock of '
-            "both is slowed down.</span>"
+            f'<br><span style="color:{ink(BAD)}">This computer cannot run both robots in real time: '
+            "their clock is slowed down.</span>"
         )
     return block(
-        f"{badge('GHOST', GHOST)} {esc(words)}<br>translucent in the scene, dashed in the plots; same "
-        f"targets, pushes and clock{slow}",
+        f"{badge('GHOST', GHOST)} {esc(words)}<br>translucent in the scene, dashed in the plots; it has the "
+        f"same targets, pushes and clock{slow}",
         "padding-top:0.6em",
     )
 
@@ -194,8 +194,8 @@ def _milliseconds(value: float) -> str:
 
 
 _INTRO = block(
-    "<b>A second robot does the same with other settings.</b> Choose the settings in which it differs. Both "
-    "start together, get the same targets and pushes, and share one clock. If you change another setting "
-    "during the run, it changes for both.",
+    "<b>A second robot does the same with other settings.</b> Choose the settings in which this ghost "
+    "differs. Both robots start together, get the same targets and pushes, and share one clock. If you "
+    "change another setting during the run, it changes for both robots.",
     "padding-top:0.5em",
 )

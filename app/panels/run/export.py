@@ -22,7 +22,7 @@ _MINUTE, _WHOLE = "the last minute", "all since the last reset"
 
 
 class ExportPanel:
-    """The panel of downloads. Files are made on viser's threads from the recorded data, without the
+    """The panel of downloads. Files are made from the recorded data, on viser's threads and without the
     simulation."""
 
     def __init__(
@@ -32,12 +32,12 @@ class ExportPanel:
         gui.add_html(_INTRO)
         self._span = gui.add_dropdown("Of", (_MINUTE, _WHOLE), initial_value=_MINUTE)
         for label, make, hint in (
-            ("Rows as .npz", self._npz, "NumPy arrays with the names of himpc-lab run --npz"),
+            ("Rows as .npz", self._npz, "NumPy arrays with the same names as from himpc-lab run --npz"),
             ("Rows as .csv", self._csv, "One line per row, for a spreadsheet; SI units"),
             (
                 "Plots as .png",
                 self._png,
-                "Errors, joints with their bounds, computing time; the ghost dashed",
+                "Errors, joints with their bounds, and computing time; curves of the ghost are dashed",
             ),
         ):
             self._button(gui, label, make, hint)
@@ -62,7 +62,7 @@ class ExportPanel:
         record = simulation.record
         if record is None:
             return None
-        # The page's loop appends rows meanwhile.
+        # The page's loop may append rows at the same time.
         rows = simulation.read(lambda *_: record.recent() if self._span.value == _MINUTE else record.whole())
         return None if rows is None or len(rows) < 2 else Recorded(record.layout, rows)
 
@@ -102,7 +102,7 @@ class ExportPanel:
 
 
 _INTRO = block(
-    f"<b>Download the run.</b> The page keeps up to {RATE:g} rows per second, each exactly as the simulation "
-    "wrote it; of a long run it keeps every second, fourth, … of these rows.",
+    f"<b>Download the run.</b> The page stores up to {RATE:g} rows per second, each exactly as the "
+    "simulation wrote it. Of a long run, the page stores every second, fourth, … of these rows.",
     "padding-top:0.5em",
 )

@@ -29,15 +29,15 @@ def add_hand_in(gui: viser.GuiApi, learner: SimulationClient, notebook: Notebook
         try:
             code = "" if told is None else code_of(told)
         except InputError:
-            code = ""  # e.g. for an uploaded robot; the text still contains the progress
+            code = ""  # an uploaded robot has no code; the text still contains the progress
         text.visible = False
         text.value = notebook.to_hand_in(str(name.value).strip()[:LONGEST_NAME], code)
         text.visible = True
 
 
 _WHAT = (
-    "The lessons whose steps you ran, the best scores of their challenges, and the code of the setting that "
-    "is on the page now. Copy the text and send it; <code>himpc-lab grade FILE.txt</code> reads it."
+    "The text lists the lessons whose steps you ran, the best scores of their challenges, and the code of "
+    "the present setting. Copy the text and send it; <code>himpc-lab grade FILE.txt</code> reads it."
 )
-_SIGNED = f"{_WHAT} This lab signs it with its instructor's key."
-_NOT_SIGNED = f"{_WHAT} This lab has no instructor's key, so anybody could have written it."
+_SIGNED = f"{_WHAT} This lab signs the text with its instructor's key."
+_NOT_SIGNED = f"{_WHAT} This lab has no instructor's key, so anybody could have written the text."

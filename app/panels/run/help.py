@@ -11,21 +11,21 @@ from app.panels.widgets.window import PopupWindow
 _KEYS = (
     ("Space", "run or pause"),
     ("T", "a single control tick (pauses first)"),
-    ("R", "robot back to its start, settings kept"),
+    ("R", "reset the robot to its start; settings stay"),
     ("J, K", "while paused: look back and forward, with Shift in larger steps"),
-    ("G", "switch pulling by hand on or off: drag any link, the red arrow is the force"),
+    ("G", "switch pulling by hand on or off: drag any link; the red arrow shows the force"),
     ("F", "turn the camera to the whole robot"),
     ("L", "all lessons"),
     ("P, N, B", "in a lesson: play the step's script, next step, previous step"),
     ("?", "this help"),
-    ("1 … 9", "switch the level at that place on or off"),
+    ("1 … 9", "switch the level with this number on or off"),
     ("Ctrl K", "every command, searchable"),
     (
         "↑ ↓ in a field",
-        "one step: Start, Move a target by keys moves and turns targets, goals and obstacles",
+        "one step of a target, goal or obstacle: in the tab Start, see Move a target by keys",
     ),
     ("W A S D Q E", "the camera goes forward, left, back, right, down, up; the arrow keys turn it"),
-    ("", "after you have used a field or a checkbox, click beside it first: it receives all keys until then"),
+    ("", "a field or checkbox that you have used receives all keys until you click beside it"),
 )
 _MARKS = (
     ("Q, R", "weights of the residual and of the changes of torque"),
@@ -35,22 +35,22 @@ _MARKS = (
     ),
     (
         "rung",
-        "the fallback that was applied when a QP had no valid solution; all but 'solved' are shown in red",
+        "the fallback that was applied when a QP had no valid solution; all values except 'solved' are red",
     ),
     (
         "δ",
-        "HTMPC: the amount by which lower levels may enlarge a higher level's error; its bound is |e*| + δ",
+        "HTMPC: the amount by which lower levels may enlarge a higher level's error, up to |e*| + δ",
     ),
-    ("window", "HTMPC: the tasks of the mission that the controller has now, highest priority first"),
+    ("window", "HTMPC: the mission's tasks that the controller performs now, highest priority first"),
     ("CAPPED", "this computer cannot keep up: simulated time runs slower, no tick is skipped"),
 )
 _DRAWN = (
     (
         "ball with arrows",
-        "the target that you can drag: the arrows move it along the world's axes, the rings turn it while "
+        "the target that you can drag: its arrows move it along the world's axes; its rings turn it while "
         "the orientation level is on",
     ),
-    ("small frame with a ball", "the filtered target for the controller (limited speed, acceleration)"),
+    ("small frame with a ball", "the filtered target for the controller (limited speed and acceleration)"),
     ("large thin frame", "the actual pose of the hand"),
     ("line behind the hand", "the path of the hand in the last seconds"),
     ("pink line", "the predicted path of the hand, enlarged by the factor in its label"),

@@ -25,8 +25,8 @@ _RUG = 0.035  # height of the mark "at its bound", as a share of the axis
 
 @dataclass(frozen=True, eq=False)
 class _Quantity:
-    """values, lower, upper: (rows, n), NaN or infinite where unknown; fallback: (2, n), the bounds of the
-    data sheet."""
+    """values, lower, upper: (rows, n), NaN where unknown. Where a bound is off, lower and upper contain the
+    bound of the data sheet."""
 
     title: str
     values: np.ndarray
@@ -34,15 +34,16 @@ class _Quantity:
     upper: np.ndarray
 
     def shares(self) -> np.ndarray:
-        """(rows, n) distance from the middle of the bounds, % of half their distance."""
+        """Returns (rows, n): how far the values are from the middle between their bounds, % of half the
+        distance between the bounds."""
         middle, half = 0.5 * (self.upper + self.lower), 0.5 * (self.upper - self.lower)
         return 100.0 * (self.values - middle) / np.where(half > 0, half, np.inf)
 
 
 @dataclass(frozen=True)
 class Input:
-    """The input of the joints: fields of the telemetry (value, lower and upper bound; without a lower field
-    it is −upper), and the units for revolute and for prismatic joints."""
+    """The input of the joints: fields of the telemetry (value, lower bound, upper bound), and the units for
+    revolute and for prismatic joints. If `lower` is None, the lower bound is −upper."""
 
     title: str
     value: str
@@ -71,7 +72,7 @@ class JointPlots:
         self._place = gui.add_folder(None)
         gui.add_html(
             block(
-                "Shaded: inside the bounds in force (the data sheet's where a bound is off). "
+                "The range within the bounds is shaded. If a bound is off, the data sheet's bound is used. "
                 f'A <b style="color:{ink(BAD)}">red mark</b> at the bottom: a shown joint is at its bound.'
             )
         )
@@ -95,7 +96,8 @@ class JointPlots:
     def _curves(
         self, at_bound: np.ndarray, kind: int, joint: int | None, own: _Quantity, other: _Quantity | None
     ) -> list[np.ndarray]:
-        """Values, upper and lower bound, the marks at the bottom, and the ghost's values."""
+        """The curves of a chart: values, upper and lower bound, marks at the bottom, and the ghost's
+        values."""
         if joint is None:
             edge = np.where(np.isfinite(own.values[:, 0]), 100.0, np.nan)
             low, high = -_SHARE, _SHARE
@@ -134,7 +136,7 @@ class JointPlots:
         return quantities
 
     def _unit(self, kind: int, joint: int) -> tuple[str, float]:
-        """(unit on the axis, factor from SI)."""
+        """Returns the unit on the axis and the factor from the SI unit."""
         turning, sliding = self._input.units
         if self._prismatic[joint]:
             return ((sliding, 1.0), ("m/s", 1.0), ("m", 1.0))[kind]
@@ -173,7 +175,8 @@ class JointPlots:
             (-_SHARE, _SHARE),
             height=170,
             bands=((n, n + 1, GOOD),),
-            # One legend is enough for the three charts; it would otherwise contain the ghost's curves twice.
+            # One legend is enough for the three charts. With a ghost there is no legend: it would name each
+            # joint twice.
             legend=last and not ghost,
         )
 
@@ -198,7 +201,7 @@ class JointPlots:
 
 
 def _sheet(robot: Robot, driven: Input) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
-    """The robot's own bounds; ± one turn where a joint has none."""
+    """The bounds of the robot's data sheet; ± one turn for a joint without position bounds."""
     own = robot.tau_limit if driven is TORQUE else robot.a_max
     u = np.where(np.isfinite(own), own, 1e3)
     v = np.where(np.isfinite(robot.v_limit), robot.v_limit, 1e2)

@@ -1,4 +1,5 @@
-"""Moves targets with the keyboard: fields whose arrow keys make a step, and buttons that turn."""
+"""Moves targets with the keyboard: in its fields the arrow keys make a step, and its buttons turn a
+target."""
 
 from __future__ import annotations
 
@@ -14,7 +15,7 @@ from app.view.movable import Movable
 
 _STEPS = {"1 mm": 1e-3, "1 cm": 1e-2, "5 cm": 5e-2}
 _FIRST = "1 cm"
-_DIGITS = 3  # after the decimal point of m
+_DIGITS = 3  # digits after the decimal point of a length in m
 _ANGLE = 5.0  # degrees
 _TURNS = {
     f"{sign}{axis}": (place, side) for place, axis in enumerate("xyz") for sign, side in (("−", -1), ("+", 1))
@@ -23,11 +24,11 @@ _NONE: tuple[str, ...] = ("–",)
 
 
 class MovePanel:
-    """A folder with a field for each coordinate of a target. The arrow keys up and down change the field by
-    the chosen step; a typed number moves the target there."""
+    """A folder with a field for each coordinate of a target. The arrow keys up and down change a field by the
+    chosen step. If a number is typed, the target moves to this coordinate."""
 
     def __init__(self, gui: viser.GuiApi, movables: Callable[[], Sequence[Movable]]) -> None:
-        """movables: the present targets; called once they are drawn."""
+        """movables: returns the present targets; it is first called after the targets are drawn."""
         self._movables = movables
         self._touched = -float("inf")
         with gui.add_folder("Move a target by keys", expand_by_default=False):
@@ -36,14 +37,14 @@ class MovePanel:
                 "Step",
                 tuple(_STEPS),
                 initial_value=_FIRST,
-                hint="What the arrow keys up and down change in the field of a coordinate",
+                hint="The change of a coordinate when you press an arrow key, up or down",
             )
             self._fields = [
                 gui.add_number(
                     f"Target {axis} [m]",
                     0.0,
                     step=_STEPS[_FIRST],
-                    hint="World axis. Arrow keys up and down: one step",
+                    hint="Along a world axis. Arrow keys up and down: one step",
                 )
                 for axis in "xyz"
             ]
@@ -81,7 +82,7 @@ class MovePanel:
             chosen.turn(side * np.radians(_ANGLE) * np.eye(3)[place])
 
     def update(self) -> None:
-        """Shows the present targets and the position of the chosen one; called on viser's loop."""
+        """Shows the present targets and the position of the chosen target; called on viser's loop."""
         names = tuple(each.name for each in self._movables()) or _NONE
         if self._which.options != names:
             self._which.options = names

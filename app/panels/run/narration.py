@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from app.html.text import quantity
 
-if TYPE_CHECKING:  # the server listens before anything that computes is loaded
+if TYPE_CHECKING:  # for types only: the server listens before it loads modules that compute
     from app.panels.widgets.snapshot import SessionSnapshot
     from lessons.settings.settings import SceneSettings
 
@@ -33,7 +33,7 @@ class Facts:
         running: whether simulated time passes.
         resets: number of resets so far.
         levels: (name, whether it is on), highest priority first.
-        errors: by task, its error and unit, m or rad.
+        errors: for each task its error and the unit, m or rad.
         limits: active limits, as (kind, joint).
         rest: the word that is shown while no simulated time passes.
     """
@@ -68,7 +68,7 @@ class Narration:
     """Compares each check with the previous one, and collects sentences until the next announcement."""
 
     def __init__(self, clock: Callable[[], float]) -> None:
-        """clock: time, s."""
+        """clock: returns the time, s."""
         self._clock = clock
         self._before: Facts | None = None
         self._told: dict[str, float] = {}
@@ -77,7 +77,8 @@ class Narration:
         self._next = -math.inf
 
     def look(self, now: Facts) -> str:
-        """The sentence that is due, with all events since the last one; "" if none is due."""
+        """Returns the sentence that is due, with all events since the last sentence; "" if no sentence is
+        due."""
         before, self._before = self._before, now
         if before is None:
             self._told = {name: error for name, (error, _) in now.errors.items() if math.isfinite(error)}
@@ -101,7 +102,7 @@ class Narration:
         return [f"{kind} limit of {joint} is met" for kind, joint in new]
 
     def _arrived(self, before: Facts, now: Facts) -> list[str]:
-        """Steady errors that differ from the last announced ones."""
+        """Steady errors that differ from the last announced errors."""
         found = []
         for name, (error, unit) in now.errors.items():
             was, least = before.errors.get(name, (math.nan, unit))[0], _SMALL.get(unit, 0.0)

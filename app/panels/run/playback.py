@@ -1,4 +1,5 @@
-"""Run, pause, step, speed and reset, and the real-time factor. Always visible above the tabs."""
+"""Controls for run, pause, step, speed and reset, and the real-time factor. They are always visible above the
+tabs."""
 
 from __future__ import annotations
 
@@ -24,7 +25,7 @@ from lessons.settings.settings import SceneSettings
 
 _PAUSE, _RUN, _STEP, _RESET, _RESET_ALL = "Pause", "Run", "Step", "Reset", "Reset all"
 _STOP = "Stop gently"
-_LATE = 0.5  # s: a delay of an arm's ghost is shown only above this
+_LATE = 0.5  # s: a delay of an arm's ghost is shown only if it is longer
 
 
 class PlaybackPanel:
@@ -101,7 +102,7 @@ class PlaybackPanel:
         self._closed = True
 
     def _show_speed(self, speed: float) -> None:
-        # On the event loop, for the reason given in `Bindings`.
+        # This method runs on the event loop, for the reason that `Bindings` explains.
         if not self._closed and time.monotonic() - self._touched > HOLD and self._speed.value != speed:
             self._speed.value = speed
 
@@ -140,7 +141,7 @@ class PlaybackPanel:
 def _of_arm(status: Status, arm: ArmView) -> str:
     """The status line of an arm."""
     if not arm.begun:
-        return f"{badge('ARM', LEVELS[1])} &nbsp;at rest: Run takes it over, and it holds where it is"
+        return f"{badge('ARM', LEVELS[1])} &nbsp;at rest: Run starts the control; the arm holds its position"
     state = badge("ARM STOPPED", BAD) if arm.ended else badge("ARM RUNNING", GOOD)
     line = f"{state} &nbsp;t = {status.t:.2f} s<br>{arm.missed} of {status.ticks + arm.missed} periods missed"
     if arm.behind > _LATE and not arm.ended:

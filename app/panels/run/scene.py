@@ -17,12 +17,12 @@ from lessons.scenes.run_spec import RunSpec
 from robots import CATALOG, InputError
 
 _KINDS = {"repaired": LEVELS[0], "filled": LEVELS[1], "fixed": LEVELS[3], "refused": BAD, "note": DAMPING}
-MAX_UPLOAD = 10_000_000  # bytes, what the importer reads
+MAX_UPLOAD = 10_000_000  # bytes: the largest file that the importer reads
 
 
 class RobotPanel:
     """The panel of robot and scene. A choice becomes a `SceneChoice`; the simulation answers with the new
-    scene or with a sentence."""
+    scene or with the reason of a refusal."""
 
     def __init__(
         self,
@@ -32,7 +32,7 @@ class RobotPanel:
         choose: Callable[[SceneChoice], None],
         own_files: Folder | None,
     ) -> None:
-        """own_files: folder of the files that this page may name by path; None: it may name none."""
+        """own_files: the folder whose files this page may name by path; None if it may name no files."""
         robot = ready.robot
         self._choose = choose
         gui.add_html(
@@ -42,7 +42,9 @@ class RobotPanel:
             )
         )
         for sentence in ready.left_out:
-            words = f"{badge('LEFT OUT', LEVELS[1])} This robot cannot have a task of yours. {esc(sentence)}"
+            words = (
+                f"{badge('LEFT OUT', LEVELS[1])} One of your tasks does not fit this robot. {esc(sentence)}"
+            )
             gui.add_html(block(words))
         self._answer: viser.GuiHtmlHandle | None = None
         self._waits = False
@@ -60,7 +62,9 @@ class RobotPanel:
             of_robot = _answer(gui)
             load_robot = gui.add_button("Load robot")
         with gui.add_folder("Your own URDF"):
-            tip = gui.add_text("Hand frame", "", hint="A link's name; empty: the end of the longest chain")
+            tip = gui.add_text(
+                "Hand frame", "", hint="Name of a link; if empty, the end of the longest chain"
+            )
             of_urdf = _answer(gui)
             if own_files is not None:
                 path = gui.add_text("File", "", hint="Path of a URDF on the machine that runs this page")
@@ -72,7 +76,7 @@ class RobotPanel:
                 )
 
             upload = gui.add_upload_button("Upload a URDF", mime_type=".urdf,.xml,application/xml,text/xml")
-            gui.add_html(block("Without its mesh files an uploaded robot is drawn as capsules."))
+            gui.add_html(block("An uploaded robot is drawn as capsules, without its mesh files."))
         if own_files is not None:
             self._add_file(gui, ready.choice, own_files)
         self._report(gui, ready)
@@ -106,11 +110,12 @@ class RobotPanel:
 
         @load.on_click
         def _(_: object) -> None:
-            """Runs on a thread: the file is first loaded in a process of its own, which takes a second."""
+            """Opens the file on a thread: the file is first loaded in a separate process, which takes a
+            second."""
             name = path.value.strip()
             self._wait(answer)
             if not is_file(name):
-                self.refuse("There is no path of a Python file: first write the path, which ends with .py.")
+                self.refuse("First enter the path of a Python file. The path must end with .py.")
                 return
             try:
                 choice = current.with_file(own_files.admits(name))
@@ -123,7 +128,7 @@ class RobotPanel:
     def _ask_file(self, answer: viser.GuiHtmlHandle, own_files: Folder, path: str, tip: str | None) -> None:
         self._wait(answer)
         if not path:
-            self.refuse("There is no path of a file: first write the path of a URDF file.")
+            self.refuse("First enter the path of a URDF file.")
             return
         try:
             run = RunSpec("hold", own_files.admits(path), tip)
@@ -139,7 +144,7 @@ class RobotPanel:
     def _uploaded(self, answer: viser.GuiHtmlHandle, content: bytes, tip: str | None) -> None:
         self._wait(answer)
         if len(content) > MAX_UPLOAD:
-            self.refuse(f"The file has more than {MAX_UPLOAD // 1_000_000} MB; give a smaller URDF.")
+            self.refuse(f"The file has more than {MAX_UPLOAD // 1_000_000} MB; choose a smaller URDF.")
             return
         try:
             text = content.decode("utf-8")
@@ -158,8 +163,8 @@ class RobotPanel:
         answer.visible = True
 
     def refuse(self, sentence: str) -> bool:
-        """Shows why a scene or robot was not loaded; the previous one continues. Returns whether the request
-        came from this panel."""
+        """Shows why a scene or robot was not loaded; the previous scene continues. Returns whether the
+        request came from this panel."""
         waited, self._waits = self._waits, False
         if waited and self._answer is not None:
             self._answer.content = block(
@@ -184,8 +189,8 @@ def _answer(gui: viser.GuiApi) -> viser.GuiHtmlHandle:
 
 
 _FILES = (
-    "The content of the file decides whether it is a controller, scene, lesson or task. It is read on this "
-    "machine, in or below the folder in which himpc-lab was started (or --own-files DIR), and never "
-    "uploaded. Only the page of the first address that himpc-lab printed offers this. "
-    "<code>himpc-lab new</code> writes a template."
+    "The content of the file decides whether it is a controller, scene, lesson or task. The file "
+    "must be in or below the folder in which himpc-lab was started (or --own-files DIR). The file is read on "
+    "this machine and never uploaded. Only the page of the first address that himpc-lab printed has this "
+    "form. <code>himpc-lab new</code> writes a template."
 )

@@ -29,9 +29,9 @@ class SharePanel:
             self._line = gui.add_text("Command line", "", multiline=True, visible=False)
             self._code = gui.add_text("Code", "", multiline=True, visible=False)
             save = gui.add_button(
-                "Script as .py", hint="Repeats the run since the last reset, events included, to the last bit"
+                "Script as .py", hint="Repeats the run since the last reset with its events, to the last bit"
             )
-            given = gui.add_text("Somebody's code", "", hint="Or himpc-lab --state CODE")
+            given = gui.add_text("Somebody's code", "", hint="Same as himpc-lab --state CODE")
             take = gui.add_button("Open it")
 
         @make.on_click

@@ -1,5 +1,5 @@
-"""A slider over the last minute, for looking back while paused. It is above the tabs, visible whenever it can
-be used."""
+"""A slider over the last minute, for looking back while paused. The slider is above the tabs and visible
+whenever it can be used."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from app.panels.widgets.command import add_command, on_click
 
 _STEP = 0.05  # s
 _SHORT, _LONG = 0.1, 1.0  # s per key press
-_LEAST = 0.2  # s: the slider is shown for a longer history only
+_LEAST = 0.2  # s: the slider is shown only if the history is longer
 
 
 class TimeLine:
-    """The time line. `past` is the moment that is shown; None: the present. When simulated time continues, by
-    running, a step or a reset, the view returns to now."""
+    """The time line. `past` is the past moment that is shown, or None for the present. When simulated time
+    continues (run, step or reset), the view returns to the present."""
 
     def __init__(self, gui: viser.GuiApi, learner: SimulationClient, loop: asyncio.AbstractEventLoop) -> None:
         self.past: float | None = None
@@ -66,12 +66,12 @@ class TimeLine:
             self._look(float(self._slider.value))
 
     def _look(self, ago: float) -> None:
-        """ago: s, ≤ 0."""
+        """Chooses the moment that is shown. ago: its time relative to the pause, s, ≤ 0."""
         at = self._paused_at
         self.past = None if at is None or ago > -0.5 * _STEP else at + ago
 
     def update(self, running: bool) -> None:
-        """Called with every frame, before the moment is chosen."""
+        """Shows or hides the slider; called for every frame, before the page reads `past`."""
         first, last = self._learner.tape.span
         if running or last - first < _LEAST:
             if self._paused_at is not None:

@@ -1,4 +1,4 @@
-"""The form for one more task: its kind, frame, axes and level."""
+"""The form that adds a task: its kind, frame, axes and level."""
 
 from __future__ import annotations
 
@@ -39,13 +39,13 @@ class AddTask:
                     "Of frame",
                     tuple(robot.frames),
                     initial_value=robot.tip,
-                    hint="Or click a link, see below",
+                    hint="You can also click a link, see below",
                 )
             with gui.add_folder(None):
                 self._pick = gui.add_checkbox(
                     "Click a link",
                     False,
-                    hint="While on, a click on a link of the robot chooses it",
+                    hint="While this is on, a click on a link of the robot chooses the link",
                 )
             with gui.add_folder(None):
                 self._root = gui.add_dropdown("As seen from", tuple(robot.frames))
@@ -60,7 +60,7 @@ class AddTask:
             with gui.add_folder(None):
                 self._level = gui.add_dropdown("On level", _places(stack), initial_value=_places(stack)[1])
             with gui.add_folder(None):
-                self._name = gui.add_text("Its name", "", hint="Empty: the kind's")
+                self._name = gui.add_text("Its name", "", hint="If empty, the name of the kind")
             self._add = gui.add_button("Add")
         self._add.on_click(lambda _: self._post(Set("stack.add", self._wish())))
         self._kind.on_update(lambda _: self._show())

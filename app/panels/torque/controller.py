@@ -22,7 +22,7 @@ _LIMITS = ("torque", "velocity", "position", "torque_scale", "velocity_scale", "
 class ControllerPanel:
     """All settings of the controller that can be changed while it runs.
 
-    spectrum: the picture beside M̄.
+    spectrum: the picture of the eigenvalues, beside the controls of M̄.
     """
 
     def __init__(
@@ -42,7 +42,7 @@ class ControllerPanel:
         with gui.add_folder("Horizon"):
             controls.add("horizon", "T_s")
         self._deadline = DeadlineFolder(gui, controls)
-        with gui.add_folder("Inertia guess M̄"):
+        with gui.add_folder("Inertia estimate M̄"):
             self._gauge = gui.add_html("")
             controls.add("M_bar_scale", "M_bar_adapt")
             self.spectrum = SpectrumPicture(client, in_view)
@@ -74,7 +74,7 @@ class ControllerPanel:
             f"norm ‖I − M⁻¹M̄‖₂: <b>{norm:.3f}</b>{_verdict(norm)}"
             f"{bar(norm / 2, GOOD if norm < 1 else BAD, 0.5)}"
             "The line marks 1. The estimation error decays to zero if the radius is below 1; a norm below 1 "
-            "implies this."
+            "implies a radius below 1."
         )
 
 

@@ -12,11 +12,11 @@ from app.panels.widgets.snapshot import SessionSnapshot
 from lessons.settings.torque import TorqueSettings
 
 _LOOKS = 9
-"""Number of updates over which the share of late ticks is taken: about two seconds."""
+"""Number of updates over which the share of late ticks is computed: about two seconds."""
 
 
 class DeadlineFolder:
-    """Two sliders and one line."""
+    """Two sliders, and a line with the share of late ticks."""
 
     def __init__(self, gui: viser.GuiApi, controls: Controls[TorqueSettings]) -> None:
         with gui.add_folder("Deadline"):

@@ -17,9 +17,9 @@ def guide(
     """HTML that suggests what to try next, with the present names and places of the levels.
 
     Args:
-        tasks: of the stack.
-        levels: the stack, disabled ones included: they keep their places.
-        colours: per level.
+        tasks: the tasks of the stack.
+        levels: all levels of the stack; disabled levels keep their places.
+        colours: the colour of each level.
         dragged: whether the target has been dragged, so that the next suggestion is shown.
     """
     places = {level.name: place for place, level in enumerate(levels, start=1) if level.enabled}
@@ -32,11 +32,12 @@ def guide(
 def _first(position: TaskView, places: Mapping[str, int], colours: Mapping[str, RGB]) -> tuple[str, str]:
     ball = f"The arrows are at the {swatch(colours.get(position.level, BOUND))}ball"
     if position.level not in places:
-        return _DRAG, f"{ball}. Its level is switched off: switch it on in <b>Tasks</b>."
+        return _DRAG, f"{ball}. The ball's level is switched off: switch it on in <b>Tasks</b>."
     own = places[position.level]
     axes = " and ".join(position.axes) if position.axes != "xyz" else ""
     told = [
-        f"{ball}, and the robot follows{f' in {axes}' if axes else ''}: that is {_name(position.level, own)}."
+        f"{ball}, and the robot follows{f' in {axes}' if axes else ''}: this is "
+        f"the task of {_name(position.level, own)}."
     ]
     above = {name: place for name, place in places.items() if place < own}
     below = {name: place for name, place in places.items() if place > own}
@@ -54,7 +55,7 @@ def _following(tasks: tuple[TaskView, ...], places: Mapping[str, int]) -> tuple[
         "Then switch a level off in the tab <b>Tasks</b>" if places else "Add a level in the tab <b>Tasks</b>"
     )
     rest = f"{off}, or push the robot below, and see which errors grow."
-    if any(task.kind == "position" for task in tasks):  # and cannot be dragged
+    if any(task.kind == "position" for task in tasks):  # its target follows a curve and cannot be dragged
         return "Watch the hand follow the curve.", rest
     return "Push the robot below.", f"{off}, and see which errors grow."
 
@@ -93,8 +94,8 @@ def _paragraph(head: str, rest: str) -> str:
 
 AT_AN_ARM = _paragraph(
     "Run, then drag the target by its arrows.",
-    "The robot is the arm as measured. The ghost is the simulation, which gets the same targets; its errors "
-    "are dashed. Stop gently, or closing this page, brakes the arm. The settings are those with which "
-    "<code>himpc-lab arm</code> was started.",
+    "The robot shows the measured arm. The ghost is the simulation, which gets the same targets; its errors "
+    "are dashed. If you press Stop gently or close this page, the arm brakes. The settings are those with "
+    "which <code>himpc-lab arm</code> was started.",
 )
 """The guide of a page that shows an arm."""

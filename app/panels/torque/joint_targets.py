@@ -30,8 +30,8 @@ def add_joint_targets(
     robot: Robot,
     targets: Callable[[], Targets],
 ) -> None:
-    """Adds a folder with a slider per joint for every joint-space task whose target can be moved, if there is
-    one.
+    """Adds a folder with a slider for each joint of every joint-space task whose target can be moved. If
+    there is no such task, no folder is added.
 
     targets: returns the present targets. A target is sent as a whole: if several sliders move at once, each
     change includes the changes that the other sliders have already requested.
@@ -86,7 +86,7 @@ def _add_slider(
         return MoveTarget(task, wish.ask(tuple(wanted)))
 
     def read(now: Targets) -> float:
-        # After a change of the stack the targets differ, until the sliders are rebuilt.
+        # After a change of the stack, the targets may not contain this task until the sliders are rebuilt.
         value = shown(now) if task in now else slider.value
         return min(max(value, slider.min), slider.max)
 
@@ -94,5 +94,5 @@ def _add_slider(
 
 
 def _inside(low: float, factor: float, digits: int) -> float:
-    """The smallest number that can be displayed and is not below a limit."""
+    """The smallest number with `digits` decimals that is not below a limit."""
     return float(np.ceil(low * factor * 10**digits - 1e-6) / 10**digits)

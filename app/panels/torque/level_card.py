@@ -25,7 +25,7 @@ LINES = 3
 
 
 class LevelCard:
-    """One level."""
+    """The folder of one level."""
 
     def __init__(
         self,
@@ -41,8 +41,8 @@ class LevelCard:
         shift: Callable[[str, int], None],
         unfolded: bool,
     ) -> None:
-        """targets: the present ones, which `moves` mirrors; shift: moves the level with a name by a number of
-        places; unfolded: whether the controls that edit the tasks are unfolded."""
+        """targets: returns the present targets, which `moves` shows; shift: moves the level with this name by
+        a number of places; unfolded: whether the controls that edit the tasks are unfolded."""
         name = self.name = level.name
         self._colour = colours.get(name, BOUND)
         self._folder = gui.add_folder(_title(place, name), order=float(place))
@@ -105,5 +105,7 @@ def _rank(found: tuple[int, int] | None) -> str:
     if found is None:
         return ""
     rank, rows = found
-    short = "" if rank == rows else ": the levels above use the others, or the arm cannot move in them"
+    short = (
+        "" if rank == rows else ": the levels above use the other directions, or the arm cannot move in them"
+    )
     return f"<br>gets {rank} of {rows} directions{short}"

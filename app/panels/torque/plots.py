@@ -68,7 +68,7 @@ class LevelPlots:
         )
         leaks = leaks[2:] if self._only_simulated(ghost) else leaks
         kept = ChartLine("bound: no closer", BAD, dashed=True, fill=0.12)
-        # An area over the whole height: the time in which the robot touches something.
+        # An area over the whole height marks the time in which the robot touches something.
         errors += [ChartLine("contact", BAD, fill=0.12, width=0.0)] if contacts else []
         budget = ChartLine("budget", GOOD, dashed=True, fill=0.12)
         with self._place:
@@ -84,8 +84,8 @@ class LevelPlots:
             ]
 
     def draw(self, window: PlotWindow, ghost: PlotWindow | None, settings: TorqueSettings) -> None:
-        """ghost: the ghost's data over the same interval; settings: say whether the plant has contacts, which
-        the plot of errors marks, and whether distances are kept."""
+        """ghost: the ghost's data over the same interval; settings: contain whether the plant has contacts,
+        which are marked in the plot of errors, and whether distances are kept."""
         self._settings = settings
         if self._wanted(ghost is not None) != self._shown:
             self._build(ghost is not None)
@@ -99,7 +99,8 @@ class LevelPlots:
             near.show(window, lambda: _distances(window, windows))
 
     def _only_simulated(self, ghost: bool) -> bool:
-        """Whether the chart shows only the leaks of the simulation: those of a measured arm are unknown."""
+        """Whether the chart shows only the leaks of the simulation: the leaks of a measured arm are
+        unknown."""
         return self._measured and ghost
 
     def _errors_and_contacts(self, window: PlotWindow, windows: list[PlotWindow]) -> list[np.ndarray]:
@@ -118,7 +119,8 @@ class LevelPlots:
         ]
 
     def _leaks(self, window: PlotWindow, first: PlotWindow) -> list[np.ndarray]:
-        """Returns the leaks of a simulated robot or ghost; those of a measured arm (first window) are NaN."""
+        """Returns the leaks of a simulated robot or ghost; the leaks of a measured arm (first window) are
+        NaN."""
         if self._measured and window is first:
             return [np.full(2 * BUCKETS, np.nan)] * 2
         return _leaks(window)
@@ -143,6 +145,6 @@ def _distances(window: PlotWindow, windows: list[PlotWindow]) -> list[np.ndarray
 
 
 def touching(window: PlotWindow) -> np.ndarray:
-    """The top of the axis of errors while the robot touches something, else its bottom."""
+    """The top of the axis of errors while the robot touches something, otherwise the bottom of the axis."""
     force = window.columns(window.layout.fields["contact_force"])[:, 0]
     return np.where(np.nan_to_num(force) > 0.0, _ERROR[1], 0.0)

@@ -32,7 +32,7 @@ _PICK_UP, _DROP = f"Pick up {_LOAD:g} kg", "Drop the payload"
 
 
 class StartPanel:
-    """A guide that depends on what the learner has already done."""
+    """The controls of the first tab, and a guide that depends on what the learner has already done."""
 
     def __init__(
         self,
@@ -43,7 +43,7 @@ class StartPanel:
         colours: Mapping[str, RGB],
         dark: bool,
     ) -> None:
-        """settings: the present ones; colours: per level."""
+        """settings: the present settings; colours: the colour of each level."""
         self.on_theme: Callable[[bool], None] = lambda _: None
         self.on_recall: Callable[[], None] = lambda: None
         self._dragged = False
@@ -56,7 +56,7 @@ class StartPanel:
                 "Keep within reach",
                 True,
                 hint="On: the controller gets the nearest point that the robot can reach. "
-                "Off: it gets your point unchanged, and you can see how a singular arm moves.",
+                "Off: the controller gets your point unchanged, and you see how a singular arm moves.",
             )
             recall = gui.add_button("Bring the target to the hand")
         with gui.add_folder("Push the robot", visible=not ready.arm):
@@ -69,7 +69,7 @@ class StartPanel:
             self.pull = gui.add_checkbox(
                 "Pull by hand",
                 False,
-                hint="Drag any link with the mouse: the force grows with the distance, like that of a rubber "
+                hint="Drag any link with the mouse: the force grows with the distance, as with a rubber "
                 "band. Key G. While this is on, you cannot drag the target through a link in front of it.",
             )
             self._load = gui.add_button(_PICK_UP, hint="The controller does not know about the payload")
@@ -80,11 +80,12 @@ class StartPanel:
             self.ellipsoids = gui.add_checkbox(
                 "Manipulability ellipsoids",
                 False,
-                hint="The speed at which each level can move its frame with joints of unit speed, within the "
-                "freedom that the levels above leave. The ellipsoid is flat in directions without motion",
+                hint="The speed at which each level can move its frame if the joints have unit speed. "
+                "A level uses only the freedom that the levels above leave. The ellipsoid is flat in "
+                "directions without motion",
             )
             self.cover = gui.add_checkbox(
-                "Cover that distances use",
+                "Capsules for distances",
                 False,
                 hint="The capsules that contain the links. A controller that keeps distances measures them "
                 "between these capsules",
@@ -114,7 +115,7 @@ class StartPanel:
         self.pull.value = not self.pull.value
 
     def dragged(self) -> None:
-        """Called at the first drag: the guide continues with the next step."""
+        """Called when a target is dragged: the guide then shows the next step."""
         self._dragged = True
 
     def show_verdict(self, verdict: Reachability | None, clamped: bool) -> None:

@@ -34,8 +34,8 @@ class TasksPanel:
         targets: Callable[[], Targets],
         in_lesson: bool,
     ) -> None:
-        """bindings: for controls that exist in every stack; loop: viser's; current, targets: the present
-        ones; in_lesson: whether the stack may not be changed."""
+        """bindings: for controls that exist in every stack; loop: viser's event loop; current, targets:
+        return the present settings and targets; in_lesson: true if the stack may not be changed."""
         self._gui, self._loop, self._colours = gui, loop, colours
         self._current, self._targets = current, targets
         self._robot, self._in_lesson = robot, in_lesson
@@ -54,7 +54,7 @@ class TasksPanel:
                 "Damp what no level controls",
                 current().damping,
                 hint="R weighs changes of torque only, so a direction without a task keeps its torque and "
-                "does not stop when pushed. This last level brings it to rest. Switch it off and push.",
+                "does not stop when pushed. This last level stops the motion. Switch the level off and push.",
             )
             self._damping = gui.add_html("")
         bindings.bind(damping, lambda s: s.damping, lambda on: Set("damping", bool(on)))
@@ -63,8 +63,8 @@ class TasksPanel:
             gui.add_html(formula(r"\sum_j Q \lVert e_{k+j} \rVert^2 + R \lVert \Delta\tau_{k+j} \rVert^2"))
             gui.add_html(
                 block(
-                    "subject to every bound, and without changing any <i>e</i> of the levels above. This "
-                    "condition makes the priority strict."
+                    "subject to every bound, and to the condition that no <i>e</i> of the levels above "
+                    "changes. This condition makes the priority strict."
                 )
             )
 
@@ -98,7 +98,7 @@ class TasksPanel:
                 )
 
     def _ask(self, event: Event) -> None:
-        """Posts an edit. The folder that is edited stays unfolded in the resulting stack."""
+        """Posts an edit. The folder of the edited task stays unfolded in the resulting stack."""
         match event:
             case (
                 Set("stack.edit", {"name": str(name)})
@@ -122,7 +122,7 @@ class TasksPanel:
         return not self._in_lesson and self._add.picking
 
     def choose(self, frame: str) -> None:
-        """Chooses the link of this frame, which was clicked."""
+        """Chooses the link of this frame after a click on the link."""
         self._add.choose(frame)
 
     def toggle(self, place: int) -> Set | None:
@@ -166,6 +166,6 @@ class TasksPanel:
         )
 
     def close(self) -> None:
-        """Called before the controls are removed."""
+        """Stops all updates before the controls are removed."""
         self._bindings.close()
         self._moves.close()

@@ -74,7 +74,7 @@ class HtmpcPanel:
                 self._controls.add("gains.1", "gains.2")
 
     def _effort(self, path: str, symbol: str, part: str) -> None:
-        """One slider for the weights of a group of joints."""
+        """Adds one slider for the weights of a group of joints."""
         robot = self._robot
         base = list(base_joints(robot))
         arm = [joint for joint in range(robot.n) if joint not in base]
@@ -100,13 +100,13 @@ class HtmpcPanel:
             self._what.content = block(esc(VELOCITY_CONTROLLERS[self._shown]), lines=2)
         htmpc = settings.htmpc
         self._ahead.content = block(
-            f"Looks <b>{htmpc.horizon * htmpc.dt:.2g} s</b> ahead, every {1e3 * htmpc.period:.3g} ms."
+            f"Predicts the next <b>{htmpc.horizon * htmpc.dt:.2g} s</b>, every {1e3 * htmpc.period:.3g} ms."
         )
         step_ms, lag = 1e-3 * now.number("step_us"), settings.plant.latency_ms
         self._lag.content = block(
             f"Lag of the plant: <b>{lag:g} ms</b>{_compensated(settings)}. The last control step took "
             f"{step_ms:.1f} ms of {1e3 * htmpc.period:.3g} ms; "
-            + ("the robot has this delay, too." if settings.delay_measured else "simulated time waits."),
+            + ("this time delays the robot." if settings.delay_measured else "simulated time waits."),
             lines=3,
         )
 

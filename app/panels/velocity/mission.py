@@ -26,7 +26,7 @@ _DONE_SHOWN = 3
 
 
 class MissionPanel:
-    """The list, Release, and buttons that insert, remove and reorder tasks."""
+    """The list of tasks, the button Release, and controls that insert, remove and reorder tasks."""
 
     def __init__(
         self,
@@ -39,8 +39,9 @@ class MissionPanel:
         controls: Controls[VelocitySettings],
         options: MissionOptions,
     ) -> None:
-        """points: the points that can get a target; colours: by role; status: the newest one; places:
-        position at which each role's goal is drawn, (3,) m; options: of the scene."""
+        """points: the points that can get a target; colours: by role; status: returns the newest status;
+        places: returns the position at which each role's goal is drawn, (3,) m; options: the scene's
+        options."""
         self._points = {task.name: task for task in points}
         self._colours, self._post, self._status, self._places = colours, post, status, places
         self._filled = False
@@ -48,20 +49,22 @@ class MissionPanel:
         self._swap = gui.add_button("Swap which comes first", hint="The first two tasks change places")
         self._release = gui.add_button("Release", visible=False, color=button(GOOD))
         if isinstance(options, PerceptionOptions):
-            with gui.add_folder("What the controller is told of the crate"):
+            with gui.add_folder("Reported position of the crate"):
                 controls.add("false_report", "report_start", "report_end")
                 controls.add_elements(
                     "report_offset", ("x [m]", "y [m]", "z [m]"), "Reported minus true position"
                 )
         if isinstance(options, ArchitectureOptions):
-            with gui.add_folder("How it is carried out, from the next Reset", expand_by_default=False):
+            with gui.add_folder("Execution of the mission, from the next Reset", expand_by_default=False):
                 controls.add("architecture", "base_tolerance", "base_at_rest")
         with gui.add_folder("Change a task"):
             self._task = gui.add_dropdown("Task", _options())
             self._change = gui.add_button_group("Change", (_EARLIER, _LATER, _REMOVE))
         with gui.add_folder("Add a task", expand_by_default=False):
             self._role = gui.add_dropdown("Point", tuple(self._points))
-            self._goal = gui.add_vector3("Goal [m]", (0.0, 0.0, 0.0), step=0.05, hint="A base goes to x, y")
+            self._goal = gui.add_vector3(
+                "Goal [m]", (0.0, 0.0, 0.0), step=0.05, hint="A base uses only x and y"
+            )
             self._before = gui.add_dropdown("Before", _options(_END))
             hold = gui.add_checkbox("Hold until released", False)
             add = gui.add_button("Add")
@@ -87,7 +90,8 @@ class MissionPanel:
         return () if status is None or status.mission is None else status.mission.rows
 
     def _start(self) -> tuple[float, float, float]:
-        """The position at which the role's goal is drawn now: the initial guess for another goal."""
+        """Returns the position at which the role's goal is drawn now. It is the initial value of another
+        goal."""
         x, y, z = self._places().get(str(self._role.value), np.zeros(3))
         return round(float(x), 2), round(float(y), 2), round(float(z), 2)
 
@@ -143,7 +147,7 @@ def _options(*names: str) -> tuple[str, ...]:
 
 
 def _waiting(rows: tuple[MissionRow, ...]) -> MissionRow | None:
-    """The first open task, if it lasts until it is released; else None."""
+    """The first open task, if it lasts until it is released; otherwise None."""
     first = next((row for row in rows if row.state != "done"), None)
     return first if first is not None and first.hold is None else None
 
@@ -153,7 +157,7 @@ def _listed(rows: tuple[MissionRow, ...], colours: dict[str, RGB], done: bool) -
     over = max(0, sum(row.state == "done" for row in rows) - _DONE_SHOWN)
     lines = "".join(_line(row, colours, first is row) for row in rows[over:])
     if over:
-        lines = f"<tr><td>✓</td><td colspan='3' style='opacity:0.55'>{over} more before</td></tr>{lines}"
+        lines = f"<tr><td>✓</td><td colspan='3' style='opacity:0.55'>earlier tasks: {over}</td></tr>{lines}"
     head = (
         badge("MISSION DONE", GOOD) if done else f"{sum(r.state == 'done' for r in rows)} of {len(rows)} done"
     )

@@ -30,8 +30,8 @@ class TrackingPlots:
         self._charts: list[Chart] = []
         self._build(ghost=False)
         gui.add_html(
-            block("Dashed: the upper bound that the levels below must respect for a task's error, one knot "
-                  "ahead; the last level has no bound.")
+            block("Dashed: the upper bound of a task's error one knot ahead, which the levels below must "
+                  "respect. The last level has no such bound.")
         )  # fmt: skip
 
     def _build(self, ghost: bool) -> None:

@@ -16,11 +16,12 @@ from robots.collision import Ball
 _STILL = 0.02
 """Speed, m/s and rad/s, below which a joint is at rest."""
 _FAR = 0.05
-"""Distance to its goal, m, above which a point has not reached it."""
+"""Distance between a point and its goal, m, above which the point has not reached the goal."""
 
 
 class BeginPanel:
-    """A guide that depends on what the learner has already done. The face sets the callbacks."""
+    """The controls of the first tab, and a guide that depends on what the learner has already done.
+    `VelocityFace` sets the callbacks."""
 
     def __init__(
         self,
@@ -31,7 +32,8 @@ class BeginPanel:
         drives: bool,
         dark: bool,
     ) -> None:
-        """scene: its name; roles: in their order; drives: whether the robot has a mobile base."""
+        """scene: the name of the scene; roles: names, in their order; drives: whether the robot has a mobile
+        base."""
         self.on_theme: Callable[[bool], None] = lambda _: None
         self.on_swap: Callable[[], None] = lambda: None
         self.on_look: Callable[[], None] = lambda: None
@@ -44,7 +46,7 @@ class BeginPanel:
         self._guide = gui.add_html(guide(scene, drives, places, dragged=False))
         self._live = gui.add_html("")
         swap = gui.add_button("Swap which comes first", hint="The first two tasks change places")
-        look = gui.add_button("Look at the robot", hint="Turns the camera to where it is now")
+        look = gui.add_button("Look at the robot", hint="Turns the camera to the robot's present place")
         obstacle = gui.add_button(
             "Put an obstacle in the way", hint="A ball in front of the hand; drag it by its arrows"
         )
@@ -56,7 +58,7 @@ class BeginPanel:
             self.prediction = gui.add_checkbox("Predicted paths", True)
             self.reach = gui.add_checkbox("Reach of the arm", True, visible=drives)
             self.along = gui.add_checkbox(
-                "Camera follows the base", False, visible=drives, hint="Turn and zoom as before"
+                "Camera follows the base", False, visible=drives, hint="You can still turn and zoom"
             )
             self.arrows = gui.add_checkbox("Arrows of obstacles", True)
             self.frames = gui.add_checkbox("Target and actual frames", True)
@@ -74,7 +76,7 @@ class BeginPanel:
                 self.on_theme(bool(self.dark.value))
 
     def dragged(self) -> None:
-        """Called at the first drag: the guide continues with the next step."""
+        """Called when a target is dragged: the guide then shows the next step."""
         self._dragged = True
 
     def update(self, now: SessionSnapshot[VelocitySettings]) -> None:
@@ -111,9 +113,9 @@ def guide(scene: str, drives: bool, places: Mapping[str, float], dragged: bool) 
     """HTML that suggests what to try next.
 
     Args:
-        scene: its name.
-        drives: whether there is a mobile base.
-        places: the level that each role is now, 1 the highest; NaN: it has no task.
+        scene: the name of the scene.
+        drives: whether the robot has a mobile base.
+        places: the present level of each role, 1 being the highest; NaN if the role has no task.
         dragged: whether a target has been dragged, so that the next suggestion is shown.
     """
     first = _FIRST.get(scene, _WATCH if drives else _FIRST_ARM)
@@ -136,34 +138,34 @@ _FIRST = {
     ),
     "ridgeback-ur10-square": (
         "Watch the base stop where the arm is stretched.",
-        "The hand has to stay ({ee}); the base is sent out of reach for 8 s, then home ({base}). "
-        "Reset and swap which comes first, or set N to 1 in <b>Control</b>.",
+        "The hand has to stay ({ee}). The base is sent out of reach for 8 s, and then home ({base}). Press "
+        "Reset, and swap which task comes first, or set N to 1 in <b>Control</b>.",
     ),
     "ridgeback-ur10-perception": (
-        "Watch the robot make way for a crate that is not there.",
-        "For a while the controller is told that the crate stands where the outline is. The hand ({ee}) and "
-        "the base ({base}) move along straight paths. What is told, and when, is set in the tab "
-        "<b>Mission</b>.",
+        "Watch the robot avoid a crate that is not there.",
+        "For a while the controller gets a wrong report: the outline shows the reported place of the crate. "
+        "The hand ({ee}) and the base ({base}) move along straight paths. You set the report and its time in "
+        "the tab <b>Mission</b>.",
     ),
 }
 _WATCH = (
-    "Watch the robot do the next task while it finishes this one.",
-    "The tab <b>Mission</b> lists the tasks; those in the window (▶ first, ▷ second) are the levels. Drag "
-    "the ball or the disc: the current task of hand or base goes elsewhere at the next control step.",
+    "Watch the robot begin the next task while it finishes the present task.",
+    "The tab <b>Mission</b> lists the tasks. The tasks in the window (▶ first, ▷ second) are the levels. "
+    "Drag the ball or the disc: the present task of hand or base gets this goal at the next control step.",
 )
 _NEXT_DRAG = (
     "Now swap which comes first.",
-    "As long as the hand comes first, the base stops where the arm is stretched. Swap, and the base reaches "
-    "its target and takes the hand along. Then change δ and N in <b>Control</b>.",
+    "As long as the hand comes first, the base stops where the arm is stretched. After a swap, the base "
+    "reaches its target and moves the hand with it. Then change δ and N in <b>Control</b>.",
 )
 _NEXT_MISSION = (
     "Now change the mission.",
-    "In the tab <b>Mission</b> you can move tasks, put them earlier or later, remove and add them. There "
-    "<b>Release</b> also ends a hold that lasts until somebody releases it.",
+    "In the tab <b>Mission</b> you can change the order of the tasks, and remove or add tasks. The button "
+    "<b>Release</b> ends a task that lasts until it is released.",
 )
 _FIRST_ARM = (
     "Drag the target by its arrows, turn it by its rings.",
-    "The position of the hand: {position}. Its orientation: {orientation}. Level 2 gets only the freedom "
+    "The position of the hand is {position}, its orientation is {orientation}. Level 2 gets only the freedom "
     "that level 1 leaves.",
 )
 _NEXT_ARM = (

@@ -1,4 +1,5 @@
-"""The levels of a velocity-level controller: the point that each moves, its switch, Q, error and bound."""
+"""The levels of a velocity-level controller: the point that each level moves, and the level's switch, Q,
+error and bound."""
 
 from __future__ import annotations
 

@@ -18,13 +18,14 @@ from app.html.text import block
 from app.panels.widgets.in_view import InView
 
 _NUDGE = 10
-"""Number of updates after which the curves are sent even if they have not changed, with an invisible change
-of the time axis. Without it, a chart that was laid out while its panel had no width would never get ticks."""
+"""Number of updates after which the curves are sent even if they have not changed; the time axis is then
+changed invisibly. Without this change, a chart that was laid out while its panel had no width would never get
+ticks."""
 _AROUND = 60  # px: height of the title and the time axis
-_FINE = 0.35  # px: a point that is closer to a curve counts as a point of the curve
+_FINE = 0.35  # px: a point that is closer to a curve than this counts as a point of the curve
 _TOP = 30_000.0
-"""The largest value of every axis as it is sent, in two bytes per value; the smallest is 0. No screen has
-more pixels."""
+"""Values are sent in two bytes each, as numbers from 0 (lower end of the axis) to this number (upper end). No
+screen has more pixels."""
 _TICKS = 5
 _SECONDS = tuple(range(-round(WINDOW), 1, 2))
 _TIMES: uplot.Axis = {
@@ -40,8 +41,8 @@ _NOTHING = block("No tick has run yet: run (Space), or take single ticks (T), to
 
 @dataclass(frozen=True)
 class ChartLine:
-    """label: name in the legend; fill: opacity of the area below the curve; dashed: for bounds; dash: lengths
-    of dashes and gaps, px, for curves that share a colour; a ghost's curve has a finer pattern."""
+    """label: name in the legend; fill: opacity of the area below the curve; dashed: true for bounds; dash:
+    lengths, px, of the dashes and gaps of curves that share a colour. A ghost's curve has a finer pattern."""
 
     label: str
     colour: RGB
@@ -51,7 +52,7 @@ class ChartLine:
     dash: tuple[float, ...] = ()
 
     def of_ghost(self) -> ChartLine:
-        """The same curve of the ghost."""
+        """The line of the ghost for the same quantity."""
         finer = tuple(0.5 * length for length in self.dash) or _GHOST_DASH
         return replace(self, label=f"{self.label}, ghost", width=1.3, dash=finer)
 
@@ -76,8 +77,9 @@ class Chart:
         bands: Sequence[tuple[int, int, RGB]] = (),
         legend: bool = True,
     ) -> None:
-        """span: range of the axis in the chart's unit; log: its ends are powers of ten; bands: (upper line,
-        lower line, colour) of areas between two lines, by index."""
+        """span: range of the axis in the chart's unit; log: whether the axis is logarithmic; the ends of
+        `span` are then powers of ten; bands: areas between two lines, as (index of the upper line, index of
+        the lower line, colour)."""
         self._log = log
         if log:
             # The logarithmic scale of uPlot would draw nine grid lines per decade.
@@ -109,15 +111,16 @@ class Chart:
 
     @property
     def in_view(self) -> bool:
-        """Whether the browser shows it."""
+        """Whether the browser shows the chart."""
         return self._in_view.sees(self._title)
 
     def show(self, window: PlotWindow, curves: Callable[[], Sequence[np.ndarray]]) -> None:
-        """curves: (2 · BUCKETS,) values of each line; it is called only while the chart is visible.
+        """Shows the window. curves: returns the (2 · BUCKETS,) values of each line; called only while the
+        chart is visible.
 
-        Values beyond the axis are drawn at its edge. uPlot cannot omit the time before the first known value:
-        there a linear curve is constant, since a jump would look like a motion, and a logarithmic curve lies
-        on the axis.
+        Values beyond the axis are drawn at its edge. uPlot cannot omit the time before the first known value.
+        There, a linear curve is constant, since a jump would look like a motion; a logarithmic curve lies on
+        the axis.
         """
         if not self.in_view:
             return
@@ -140,7 +143,7 @@ class Chart:
         self._send(kept, values[:, kept], window.ages()[kept])
 
     def _send(self, kept: np.ndarray, values: np.ndarray, ages: np.ndarray) -> None:
-        """kept: numbers of the points that are sent."""
+        """kept: indices of the points that are sent."""
         self._shows += 1
         due = self._shows % _NUDGE == 0
         if not due and self._looks_the_same(kept, values):
@@ -167,8 +170,8 @@ class Chart:
 
 
 def _axis(span: tuple[float, float], log: bool) -> uplot.Axis:
-    """About five ticks: at powers of ten (the range of a logarithmic axis consists of exponents), or at round
-    numbers."""
+    """An axis with about five ticks, at powers of ten or at round numbers. The `span` of a logarithmic axis
+    consists of exponents."""
     low, high = span
     every = max(1.0, round((high - low) / _TICKS)) if log else _round((high - low) / _TICKS)
     places = [every * k for k in range(math.ceil(low / every - 1e-9), math.floor(high / every + 1e-9) + 1)]

@@ -13,7 +13,8 @@ CAMERA_KEYS = frozenset({"W", "A", "S", "D", "Q", "E", "ArrowUp", "ArrowDown", "
 def add_command(
     gui: viser.GuiApi, label: str, key: str, does: Callable[[], object], shift: bool = False
 ) -> None:
-    """Adds a command that calls `does` on viser's event loop; shift: the key is used together with Shift."""
+    """Adds a command that calls `does` on viser's event loop; shift: whether the key is used together with
+    Shift."""
     command = gui.add_command(
         label,
         hotkey=key,  # pyright: ignore[reportArgumentType]

@@ -1,4 +1,4 @@
-"""Controls for settings, generated from the table of settings: a slider, switch or menu for each."""
+"""Controls for settings, generated from the table of settings: a slider, switch or menu for each setting."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ class Controls(Generic[S]):
     """Adds controls and binds each to the path of a setting: a control shows the setting and posts its
     changes.
 
-    Each control is in an unnamed folder: viser loses one of two inputs of the same container that change at
-    once.
+    Each control is in an unnamed folder: if two inputs of the same container change at once, viser loses one
+    of the changes.
     """
 
     def __init__(self, gui: viser.GuiApi, bindings: Bindings[S], settings: S) -> None:
-        """settings: the present ones when the page is built."""
+        """settings: the settings at the time when the page is built."""
         self._gui, self._bindings, self._settings = gui, bindings, settings
 
     def add(self, *paths: str) -> None:
@@ -44,13 +44,12 @@ class Controls(Generic[S]):
         read: Callable[[S], Any] | None = None,
         make: Callable[[float], Any] | None = None,
     ) -> None:
-        """Adds a control as an entry describes it. The entry may differ from the setting's entry in the
-        table.
+        """Adds a control that an entry describes. The entry may differ from the setting's entry in the table.
 
         Args:
-            entry: its path must be a setting's.
-            read: the value shown, instead of the setting's own.
-            make: returns the setting's value for a slider's number; None: the value is the number.
+            entry: its path must be the path of a setting.
+            read: returns the value to show; None: the setting's value is shown.
+            make: converts a slider's number to the setting's value; None: the number is the value.
         """
         place = self._settings.place(entry.path)
         read = place.read if read is None else read
@@ -177,7 +176,7 @@ def _add_choices(
     menu = gui.add_dropdown(control.words, tuple(of), initial_value=shown(settings, next(iter(of))))
     bindings.bind(
         menu,
-        # A value that is not among its options cannot be shown in a menu.
+        # A menu cannot show a value that is not among its options.
         lambda s: shown(s, str(menu.value)),
         lambda value: Set(control.path, of[str(value)]),
     )
@@ -191,12 +190,12 @@ def _words(value: Any) -> str:
 
 
 def _step(low: float, high: float) -> float:
-    """About a hundredth of the range, rounded to 1 or 5 times a power of ten."""
+    """At most a two-hundredth of the range: 1 or 5 times a power of ten."""
     rough = (high - low) / 200
     power = 10.0 ** math.floor(math.log10(rough))
     return float(f"{(5 if rough >= 5 * power else 1) * power:.3g}")
 
 
 def _tenth(value: float) -> float:
-    """A tenth of the value's decade: one click then makes a visible change to values of any size."""
+    """A tenth of the value's decade. One click then visibly changes a value of any size."""
     return 10.0 ** (len(f"{1 / max(value, 1e-6):.0f}") * -1.0) if value < 1 else 0.1

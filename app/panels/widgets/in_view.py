@@ -1,4 +1,4 @@
-"""Finds out which charts the browser shows, so that no data are sent for the others."""
+"""Finds out which charts the browser shows, so that no data are sent for other charts."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ LABEL = "Charts in view"
 AWAKE, ASLEEP = "(awake)", "(asleep)"
 _LONGEST = 4000  # number of characters that are read
 
-# Charts are identified by their titles. An observer notices tabs, folded panels and scrolling alike; a page
-# in a hidden tab shows nothing. Charts appear and disappear with viser's tabs, so the script checks
-# regularly.
+# Charts are identified by their titles. An observer notices if a tab, a folded panel or scrolling hides a
+# chart. A page in a hidden tab shows no charts. Charts appear and disappear with viser's tabs, so the script
+# checks regularly.
 _SCRIPT = """
 const control = %s, awake = %s, asleep = %s, charts = %s, title = %s;
 const viser = () => %s, key = "__himpcLabInView";

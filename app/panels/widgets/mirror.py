@@ -17,10 +17,10 @@ from lessons.events import Event
 
 REMIND = 2.0
 """Period, s, after which the values of all controls are sent again. viser sends at most one change per 50 ms
-and tab and drops all but the latest: if two controls change at once (or while the browser is busy), one
-change may be lost, and the control would go on showing a wrong value. A value that is on its way to the
-browser at the moment of an edit replaces the edit on the screen; therefore a control sends its value again
-after each edit, too: a switch or a menu at once, a slider or a number when it has not changed for HOLD s."""
+and tab, the latest one. If two controls change at once, or while the browser is busy, one change may be lost,
+and a control would continue to show a wrong value. Also, a value that is on its way to the browser during an
+edit replaces the edit on the screen. Therefore a control also sends its value again after each edit: a switch
+or a menu at once, a slider or a number when it has not changed for HOLD s."""
 
 S = TypeVar("S")
 
@@ -35,12 +35,12 @@ class _Mirror(Generic[S]):
 
 class Bindings(Generic[S]):
     """Bindings between controls and settings in both directions: a control posts an event, and settings that
-    changed otherwise (a reset, a hotkey, a refused event) update the control. Callbacks only post events and
-    never touch the simulation.
+    change in another way (a reset, a hotkey, a refused event) update the control. Callbacks only post events
+    and never touch the simulation.
 
     Controls are written on the server's event loop only. There, nothing can run between the arrival of a
-    value from the browser and the callback that posts it. From another thread, a control could be reset
-    between the two, and the callback would post the old value, which would discard the learner's edit.
+    value from the browser and the callback that posts it. Another thread could reset a control between these
+    two moments. The callback would then post the old value, and the learner's edit would be lost.
     """
 
     def __init__(self, post: Send, loop: asyncio.AbstractEventLoop) -> None:
@@ -58,8 +58,8 @@ class Bindings(Generic[S]):
         read: Callable[[S], Any],
         event: Callable[[Any], Event],
     ) -> None:
-        """Binds a control: `read` gives its value for a state of the session, `event` the event for a new
-        value."""
+        """Binds a control. `read` returns the control's value for a state of the session, and `event` returns
+        the event for a new value."""
         mirror = _Mirror(handle, read)
         self._mirrors.append(mirror)
         self._written = None
@@ -79,7 +79,7 @@ class Bindings(Generic[S]):
         self._loop.call_soon_threadsafe(unless_removed, self._write, present)
 
     def close(self) -> None:
-        """Called before the controls are removed; from then on no value is written to them."""
+        """Stops all writes to the controls; called before the controls are removed."""
         self._closed = True
 
     def _write(self, present: S) -> None:
@@ -91,7 +91,7 @@ class Bindings(Generic[S]):
             self._reminded = now
         touched = max((mirror.touched for mirror in self._mirrors), default=0.0)
         if present is self._written and not remind and self._wrote - touched > HOLD:
-            return  # no setting has changed since then
+            return  # no setting has changed since the last write
         self._written, self._wrote = present, now
         for mirror in self._mirrors:
             if now - mirror.touched > HOLD:
@@ -105,7 +105,7 @@ class Bindings(Generic[S]):
 
 
 def on_scale(handle: viser.GuiInputHandle[Any]) -> Any:
-    """The control's value, limited to the range if the control is a slider, as its number box accepts any
+    """The control's value. A slider's value is limited to its range, since its number box accepts any
     number."""
     value, low, high = handle.value, getattr(handle, "min", None), getattr(handle, "max", None)
     if not isinstance(handle, viser.GuiSliderHandle) or low is None or high is None:
@@ -115,7 +115,7 @@ def on_scale(handle: viser.GuiInputHandle[Any]) -> Any:
 
 
 def scalar(value: object) -> float:
-    """A number for a slider whose setting may have one value per coordinate: their mean."""
+    """The number that a slider shows. If the setting has one value per coordinate, it is their mean."""
     if isinstance(value, (tuple, list)):
         return float(sum(value) / len(value))
     return float(value)  # pyright: ignore[reportArgumentType]

@@ -12,9 +12,10 @@ from app.adapter import private
 from app.html.text import esc
 from app.panels.widgets.in_view import InView
 
-_EVERY = 0.15  # s between two updates: a picture in motion has several kilobytes per second
+_EVERY = 0.15  # s between two updates: a moving picture needs several kilobytes per second
 _AGAIN = 15
-"""Number of updates after which the whole picture is sent again: a tab that was closed no longer has it."""
+"""Number of updates after which the whole picture is sent again: a tab that was closed has lost its
+picture."""
 
 # If the panel is folded or its tab is hidden, the element does not exist, and the script does nothing.
 _PAINT = """
@@ -56,7 +57,7 @@ class SvgPicture:
         """Whether the browser has reported that it shows the picture."""
         seen = self._in_view.told and self._in_view.sees(self.title)
         if not seen:
-            self._painted = []  # a browser that shows the picture again gets all of it
+            self._painted = []  # a browser that shows the picture again gets the whole picture
         return seen
 
     def paint(self, parts: Sequence[str]) -> None:

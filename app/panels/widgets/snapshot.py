@@ -15,8 +15,8 @@ S_co = TypeVar("S_co", bound=SceneSettings, covariant=True)
 
 @dataclass(frozen=True, eq=False)
 class SessionSnapshot(Generic[S_co]):
-    """latest: the last telemetry row; bound_seconds: (n, number of constraints), time that each joint spent
-    at the bound of each of himpc's `CONSTRAINTS` since the last reset, s."""
+    """latest: the last telemetry row; bound_seconds: (n, number of constraints), the time, s, that each joint
+    has spent at the bound of each of himpc's `CONSTRAINTS` since the last reset."""
 
     ready: Ready
     settings: S_co
@@ -29,7 +29,7 @@ class SessionSnapshot(Generic[S_co]):
         return self.latest[self.ready.layout.fields[name]]
 
     def number(self, name: str) -> float:
-        """A scalar field of the last row; NaN if the layout has none of that name."""
+        """A scalar field of the last row; NaN if the layout has no field of this name."""
         where = self.ready.layout.fields.get(name)
         return float("nan") if where is None else float(self.latest[where][0])
 

@@ -16,7 +16,7 @@ class PopupWindow:
     def __init__(
         self, gui: viser.GuiApi, title: str, hotkey: str, fill: Callable[[], None], shift: bool = False
     ) -> None:
-        """hotkey: opens and closes the window; shift: the key is used together with Shift."""
+        """hotkey: opens and closes the window; shift: whether the key is used together with Shift."""
         self._gui, self._title, self._fill = gui, title, fill
         self._modal: Any = None  # viser's type has no public name
         add_command(gui, title, hotkey, self._switch, shift)

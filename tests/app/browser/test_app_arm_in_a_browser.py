@@ -38,7 +38,7 @@ def test_an_arm_and_its_simulation_on_a_page(browser: Browser, program: subproce
     moves both. The status line shows the missed periods. Only the leaks of the simulation are drawn. When the
     page is closed, the arm is stopped gently and the program ends."""
     page = open_page(browser, said(program, "ready at").split()[-1])
-    expect(page.get_by_text("at rest: Run takes it over")).to_be_visible()
+    expect(page.get_by_text("at rest: Run starts the control")).to_be_visible()
     expect(page.get_by_text("Start lesson 1")).to_have_count(0)
     press(page, "Run")
     expect(page.get_by_text("ARM RUNNING")).to_be_visible()
