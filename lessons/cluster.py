@@ -20,7 +20,7 @@ U = TypeVar("U")
 PATIENCE = 60.0
 """Time, s, that a scheduler may be without workers before the work is given up. A worker that died is usually
 replaced sooner."""
-_ASK = 1.0  # s between two checks whether there are workers
+_ASK = 1.0  # time between two checks for workers, s
 
 
 @contextmanager
@@ -29,8 +29,8 @@ def on_cluster(address: str) -> Iterator[Spread]:
     must be installed.
 
     Raises:
-        InputError: dask.distributed is not installed, or no scheduler answers at the address; while work is
-            spread: the connection to the scheduler was lost, or it had no worker for `PATIENCE` s.
+        InputError: dask.distributed is not installed, or no scheduler answers at the address. Later: the
+            connection to the scheduler is lost, or the scheduler has no worker for `PATIENCE` s.
     """
     try:
         from distributed import Client
@@ -41,7 +41,7 @@ def on_cluster(address: str) -> Iterator[Spread]:
             '--scheduler needs dask.distributed: pip install "himpc-lab[cluster]", or leave it out '
             "to use this machine's cores"
         ) from None
-    # A plain socket tries the address first: a Client that finds no scheduler would go on trying in the
+    # A plain socket tries the address first: a Client that finds no scheduler would continue trying in the
     # background.
     try:
         parts = urlsplit(address)

@@ -23,7 +23,7 @@ from lessons.session.velocity import VelocitySession
 Array = NDArray[np.float64]
 
 TIMING_KEYS = ("step_ms", "real_time_factor")
-"""Keys of a summary that differ from run to run; all others are the same to the bit."""
+"""Keys of a summary whose values differ from run to run; all other values are equal to the last bit."""
 
 _KEPT = ("t", "q", "v", "tau", "v_limit", "at_bound", "tau_demand", "step_us", "x", "x_d", "error", "cost")
 _KEPT_BY: Mapping[type[Session], tuple[str, ...]] = {
@@ -39,7 +39,7 @@ class Work(ABC):
 
     Attributes:
         spec: the run.
-        timed: whether its purpose is to measure step times; no other work runs at the same time then.
+        timed: whether the run measures step times; then no other work runs at the same time.
     """
 
     spec: RunSpec
@@ -53,7 +53,7 @@ class Work(ABC):
 @final
 @dataclass(frozen=True)
 class Job(Work):
-    """One run, as `himpc-lab run` does it."""
+    """One run, as `himpc-lab run` performs it."""
 
     def do(self) -> JobResult:
         recording = run(self.spec.prepared(), None, self.spec.seed)
@@ -144,7 +144,7 @@ def perform_all(jobs: Iterable[Work], progress: Callable[[float], None] | None =
     Returns:
         the runs by job. A job that cannot be done is a run with an error sentence.
     """
-    # Long ones first: a core is not left idle at the end.
+    # Long jobs run first: no core is left idle at the end.
     unique = sorted(dict.fromkeys(jobs), key=_work, reverse=True)
     shared = [job for job in unique if not job.timed]
     timed = [job for job in unique if job.timed]
@@ -165,7 +165,7 @@ def perform_all(jobs: Iterable[Work], progress: Callable[[float], None] | None =
 
 
 def _work(job: Work) -> float:
-    """A guess of a job's cost, to order jobs and to show progress."""
+    """Returns an estimate of a job's cost, for the order of the jobs and for the progress."""
     spec = job.spec
     horizons = [float(each.partition("=")[2]) for each in spec.set if each.startswith("horizon=")]
     horizon = horizons[-1] if horizons else 5.0

@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class TickProblems:
-    """The problems and solutions of the strict hierarchy at one tick, whatever controller ran.
+    """The problems and solutions of the strict hierarchy at one tick, whichever controller ran.
 
     Attributes:
         plan: the plan that was applied.
@@ -68,7 +68,8 @@ def plane_of(session: TorqueSession, joints: tuple[int, int], through: str, shif
     Args:
         session: the session.
         joints: the two joints, counted from 0.
-        through: name of the level through whose solution the cut goes; any other word: the applied solution.
+        through: name of the level whose solution lies in the cut; any other word: the applied solution lies
+            in the cut.
         shift: offset of the other joints' first increments from that solution, N·m.
 
     Raises:

@@ -21,7 +21,7 @@ class TooLong(BaseException):
 
 
 def within(seconds: float, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
-    """function(…), ended by TooLong when it takes longer."""
+    """Returns function(…). Raises TooLong if the call takes longer than `seconds`."""
     return CallDeadline(seconds).call(function, *args, **kwargs)
 
 
@@ -39,7 +39,7 @@ class CallDeadline:
         self._heard = False
 
     def call(self, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
-        """function(…). Raises TooLong."""
+        """Returns function(…). Raises TooLong if the call takes too long."""
         if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "setitimer"):
             return function(*args, **kwargs)
         self._begin()

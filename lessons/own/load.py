@@ -25,7 +25,7 @@ LONGEST = 10.0
 _REFUSED = ("os.fork", "os.forkpty", "os.kill", "os.killpg", "os.exec", "os.posix_spawn", "os.system",
             "os.spawn", "pty.spawn", "signal.pthread_kill")  # fmt: skip
 _BY_ITSELF = ("subprocess.Popen",)
-"""Calls that an installed package may make during its import, and a user's file may not."""
+"""Calls that an installed package may make during its import, but that a user's file may not make."""
 _SHARED = ("builtins", "math", "numpy", "scipy", "pinocchio", "os", "time", "himpc", "robots", "lessons")
 _running: ContextVar[str] = ContextVar("_running", default="")
 
@@ -43,7 +43,7 @@ def alone(path: str) -> Iterator[None]:
 
 @cache
 def _watched() -> None:
-    """Installs one audit hook, which cannot be removed; it does nothing while no such code runs."""
+    """Installs one audit hook, which cannot be removed; it does nothing while no code runs within `alone`."""
     sys.addaudithook(_hook)
 
 
@@ -56,7 +56,7 @@ def _hook(event: str, _: Sequence[Any]) -> None:
 
 
 def _caller() -> str:
-    """The file whose code starts a program."""
+    """Returns the path of the file whose code starts a process."""
     frame = sys._getframe(2)
     while frame.f_back is not None and frame.f_code.co_filename == sys.modules["subprocess"].__file__:
         frame = frame.f_back
