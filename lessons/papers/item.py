@@ -11,11 +11,11 @@ from lessons.experiments.jobs import Results, Work
 from lessons.plots.panels import Picture
 
 CLOSE = 0.10
-"""Ours and the paper's number agree if their ratio differs from 1 by at most this. The papers print neither
+"""Our number and the paper's agree if their ratio differs from 1 by at most this. The papers print neither
 plant nor model error, so that a closer agreement cannot be expected."""
 
 TIE = 0.02
-"""An effect that is closer to its turning point than this share counts as no effect."""
+"""An effect whose relative distance from its turning point is smaller than this counts as no effect."""
 
 Verdict = Literal["agrees", "differs", "opposite", "no number", ""]
 Side = Literal["below", "above", "about"]
@@ -90,8 +90,8 @@ class Row:
 
     @property
     def remark(self) -> str:
-        """How well ours agrees with the paper's number; `why` if it does not agree, or if the paper states
-        only a direction."""
+        """How well the two numbers agree; `why` if they do not agree, or if the paper states only a
+        direction."""
         if self.verdict == "agrees" and self.says is None:
             return (
                 f"agrees within {self.within:.4g}"
@@ -154,8 +154,8 @@ class Item:
         name: e.g. "himpc-table-2".
         title: one line.
         source: paper and section.
-        jobs: returns the runs that it needs; the argument says whether it is the quick version.
-        report: returns the section with their results. The figures of a failed run are NaN.
+        jobs: returns the runs of the item; the argument is true for the quick version.
+        report: returns the section with the results of these runs. The figures of a failed run are NaN.
     """
 
     name: str

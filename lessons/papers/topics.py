@@ -25,8 +25,8 @@ class Quoted:
     Attributes:
         item, row: name of an item, and the quantity of one of its rows.
         ratio: whether the text has ours over the paper's number instead of ours.
-        less: number that is subtracted from it: 1 turns a ratio into a change.
-        scale: factor for the unit of the text, applied after that.
+        less: number to subtract, e.g. 1, which turns a ratio into a change.
+        scale: factor for the unit of the text, applied after the subtraction.
         form: a Python format.
     """
 

@@ -19,7 +19,7 @@ def number(value: float | None) -> str:
 
 
 def tally(rows: Sequence[Row]) -> str:
-    """The numbers of rows that agree, differ and are opposite, in words; "–" if there are none."""
+    """Says how many rows agree, differ and are opposite; "–" if there are none."""
     found = [row.verdict for row in rows]
     counted = [f"{found.count(each)} {words}" for each, words in _VERDICTS.items() if each in found]
     return ", ".join(counted) or "–"

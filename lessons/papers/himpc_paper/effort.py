@@ -28,8 +28,8 @@ _LOST = 0.5
 class EffortJob(Work):
     """A run with all tasks of a scene in one cost, one step ahead, without bounds and priorities.
 
-    min ‖e_{k+1}‖² + R‖Δτ‖² or min ‖e_{k+1}‖² + R‖τ₀ + Δτ‖², with e of (28) by the incremental system and
-    N = 1. In the paper's weights R stands for R_i/Q_i, 0.05.
+    The problem is min ‖e_{k+1}‖² + R‖Δτ‖² or min ‖e_{k+1}‖² + R‖τ₀ + Δτ‖², with e of (28) by the incremental
+    system and N = 1. R is the ratio R_i/Q_i of the paper's weights, which is 0.05 there.
 
     Attributes:
         effort: the quantity that R weighs: the "increment" Δτ or the whole "torque" τ.
@@ -80,7 +80,7 @@ class EffortJob(Work):
 
     @property
     def words(self) -> str:
-        """The run in words, because no single command repeats it."""
+        """The run in words, because no single command repeats the run."""
         what = "still" if self.hold_deg else "moving"
         return f"{self.spec.scene}, {what}, R = {self.R:g} on the {self.effort}"
 

@@ -68,10 +68,10 @@ def _table_5(results: Results, quick: bool) -> Section:
     rows += _share_rows(results)
     return Section(
         notes=(
-            f"RMSE over the whole run, which starts on the reference, N = 5. {OPEN} Some 300 readings were "
-            "tried; none gives all seven numbers. Disturbed, the paper says 'each diagonal element of the "
-            "inertia matrix': read as links with 20 % more or less rotational inertia, or density, and "
-            "literally as diag M(q) altered in the dynamics, which no mechanism does.",
+            f"RMSE over the whole run, which starts on the reference, N = 5. {OPEN} About 300 readings were "
+            "tried; none gives all seven numbers. The paper disturbs 'each diagonal element of the inertia "
+            "matrix'. We read this as links with 20 % more or less rotational inertia or density, and "
+            "literally as diag M(q) altered in the dynamics, a property that no mechanism has.",
         ),
         rows=tuple(rows),
         tables=(
@@ -87,7 +87,7 @@ def _why_table_5(task: str, reading: str) -> str:
     if task == "q1":
         return "the start or the limits of the paper's joint 1 differ from our reading"
     if reading == "diag M(q) scaled":
-        return "our errors scale with diag M(q): estimation errors do, and the printed ones do not"
+        return "our errors scale with diag M(q), as estimation errors do; the printed errors do not"
     if task == "orientation":
         return "depends on the wrist's unprinted inertias: see the lighter wrist below"
     return "depends on the unprinted inertias and M̄, but not on a common factor: see the other plants below"
@@ -137,7 +137,7 @@ def _share_rows(results: Results) -> list[Row]:
         for label, share in _shares(results, _LIGHT_WRIST).items()
         if label in ("o_X", "o_Y", "o_Z", "q₁")
     ]
-    return [Row(text, "1", None, share, "no number of the paper's") for text, share in rows]
+    return [Row(text, "1", None, share, "the paper prints no such number") for text, share in rows]
 
 
 def _others(results: Results) -> Table:

@@ -93,7 +93,7 @@ def _table_6(results: Results, quick: bool) -> Section:
             "and only where joints meet their limits, which it predicts earlier. With R on M̄⁻¹Δτ, the "
             "accelerations, the result shows the paper's trend; the position limits are then those before "
             "which a joint can stop.",
-            *(("Quick: 2 s of the 4, without N = 30 and most of NHIMPC.",) if quick else ()),
+            *(("Quick version: 2 s of 4 s, without N = 30 and most of NHIMPC.",) if quick else ()),
         ),
         rows=tuple(rows),
         checks=tuple(checks),

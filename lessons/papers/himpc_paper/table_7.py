@@ -77,7 +77,7 @@ def _table_7(results: Results, quick: bool) -> Section:
         ),
     )
     return Section(
-        notes=("Step times with nothing else of ours running, state in to torque out, N = 5.",),
+        notes=("Step times from state in to torque out, N = 5, while no other job of ours runs.",),
         rows=tuple(rows),
         tables=(table,),
         checks=(

@@ -57,8 +57,8 @@ def _section(results: Results, quick: bool) -> Section:
     worst = max(abs(row.ratio - 1) if row.ratio else math.inf for row in rows)
     return Section(
         notes=(
-            "q̇ is the backward difference of the quantised q, and position limits are off besides velocity "
-            f"limits: no state bound clips the chatter. The benchmark has {paper['benchmark']:g}e-3°.",
+            "q̇ is the backward difference of the quantised q. Position and velocity limits are off: no "
+            f"state bound clips the chatter. The benchmark has {paper['benchmark']:g}e-3°.",
         ),
         rows=rows,
         checks=(

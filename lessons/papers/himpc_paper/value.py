@@ -59,14 +59,15 @@ def _section(results: Results, quick: bool) -> Section:
         ),
     )
     caption = (
-        "Value functions of the three levels from rest on RT4, and level 1's from tick to tick. Level 3 "
-        "climbs: joint 1 may not turn as fast as asked, and (39) promises nothing for lower levels."
+        "Value functions of the three levels from rest on RT4, and that of level 1 from tick to tick. That "
+        "of level 3 rises: joint 1 may not turn as fast as its reference, and (39) guarantees nothing for "
+        "lower levels."
     )
     return Section(
         notes=(
-            "V_N(k) is the optimal cost of each level, from the telemetry. Level 1 must decrease as long as "
-            "it is far above the bound ε_N that the estimation error leaves (39); lower levels only as far "
-            f"as level 1 lets them. ε_N = {number(epsilon)}. {trouble(run)}",
+            "V_N(k) is the optimal cost of each level, from the telemetry. By (39), that of level 1 must "
+            "decrease as long as it is far above the bound ε_N that the estimation error leaves. That of a "
+            f"lower level decreases only as far as level 1 permits. ε_N = {number(epsilon)}. {trouble(run)}",
         ),
         checks=(
             PaperCheck(
