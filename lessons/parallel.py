@@ -84,7 +84,8 @@ def _until_one_dies(
     with _pool(workers) as pool, suppress(BrokenProcessPool):
         while not orphans and (waiting or under_way):
             with _born_deaf():
-                # One item per process at most: if a process dies, the items that wait are not lost.
+                # At most one item per process is submitted: if a process dies, the items that wait are not
+                # lost.
                 while waiting and len(under_way) < workers:
                     future = pool.submit(guarded, function, items[waiting[0]])
                     under_way[future] = waiting.popleft()
@@ -106,7 +107,7 @@ def one_by_one(
 
 
 def guarded(function: Callable[[T], U], item: T) -> U | FailedJob:
-    """The result of the function, or its failure if it raised."""
+    """The result of the function, or a failure if the function raised an exception."""
     try:
         return function(item)
     except Exception as error:

@@ -41,7 +41,7 @@ def draw_map(
     Args:
         path: the PNG file.
         title, metric: the headline, and the quantity that colour or curve shows, with its unit.
-        labels, values, log: per axis: the path, its values, whether they have equal ratios.
+        labels, values, log: per axis: the path, its values, and whether the values have equal ratios.
         z: metric, (n,) or (n_1, n_2); NaN for a cell without a value.
         diverged, failed: cells that lost control, and cells that could not be run; same shape as z.
     """

@@ -18,7 +18,7 @@ from robots import InputError, Plant, Robot, VelocityPlant
 Array = NDArray[np.float64]
 
 LOST_SPEED = 20.0
-"""A joint faster than this many times its limit counts as divergence."""
+"""A joint whose speed is more than this many times its limit counts as divergence."""
 
 
 class Session(ABC):
@@ -34,7 +34,7 @@ class Session(ABC):
         plant: the simulation.
         diverged_at: simulated time at which control was lost, s; None if it was not.
         failure: one sentence if the user's code no longer controls the robot; None as long as it does.
-        notices: sentences for the learner (refused events, divergence); drain them.
+        notices: sentences for the learner (refused events, divergence); the reader removes them.
         log: (time, event) of every event that took effect.
     """
 
@@ -77,10 +77,11 @@ class Session(ABC):
 
     @abstractmethod
     def advance(self) -> Array | None:
-        """One step; the row of `tick` if a control period ended with it, else None."""
+        """Computes one step. Returns the row of `tick` if a control period ended with it, else None."""
 
     def tick(self) -> Array:
-        """One control period; returns the row of telemetry at its start (a buffer: copy it to keep it)."""
+        """Computes one control period. Returns the row of telemetry at its start (a buffer: copy it to keep
+        it)."""
         row = self.advance()
         while row is None:
             row = self.advance()

@@ -45,7 +45,7 @@ def kept(task: Task, reference: Reference | None, value: Array) -> Reference:
 
 
 def carried(old: Task, reference: Reference, task: Task, value: Array) -> Reference:
-    """The reference of a task that replaces an old task of its name, without a jump.
+    """Returns the reference, without a jump, of a task that replaces an old task of the same name.
 
     A task that controls the same coordinates keeps the reference. If the task controls other axes of the same
     frame, its target keeps its value along the axes that remain, and has the robot's present value along the

@@ -79,8 +79,8 @@ FALLBACKS = ("solve", "widened", "keep")
 def write_plan(row: Array, layout: Layout, plan: VelocityPlan, delta: float | None) -> None:
     """Writes the values of a plan into a row filled with NaN; a level without a role is left out.
 
-    delta: δ of (12), m (or rad), which gives `bound`: the bound that the levels below must respect for a
-    level's error at knot 1, ‖|e*| + δ‖ over its coordinates. None: (12) is not in force, and there is no such
+    delta: δ of (12), m (or rad), which gives `bound`: the bound on a level's error at knot 1 that the levels
+    below must respect, ‖|e*| + δ‖ over its coordinates. None: (12) is not in force, and there is no such
     bound.
     """
     fields = layout.fields
@@ -114,7 +114,7 @@ def write_truth(
 ) -> None:
     """Writes the true positions of the points, their present references, and the errors.
 
-    places: of the roles in the window, 1 the first; references: of the same roles.
+    places: the places of the roles in the window, from 1; references: those of the same roles.
     """
     fields = layout.fields
     t = float(row[fields["t"]][0])
