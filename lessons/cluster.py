@@ -68,8 +68,8 @@ def on_cluster(address: str) -> Iterator[Spread]:
                 worked = asked
             elif asked - worked >= PATIENCE:
                 raise InputError(
-                    f"--scheduler {address}: it has had no worker for {PATIENCE:.0f} s. Start one with "
-                    f'"dask worker {address}", then give the same command again'
+                    f"--scheduler {address}: no worker for {PATIENCE:.0f} s. Start a worker with "
+                    f'"dask worker {address}", then repeat the command'
                 )
 
     def spread(

@@ -55,7 +55,7 @@ def tick_of(session: TorqueSession) -> TickProblems:
         raise InputError("No QP was solved yet: let the robot run, or take a single tick (key T)")
     problems = controller.problems
     if len(problems) != len(plan.levels):
-        raise InputError("This tick held the torque and solved no QP: let the robot run on")
+        raise InputError("This tick held the torque and solved no QP: let the robot continue")
     strict: Sequence[LevelSolution] = plan.levels
     if isinstance(controller, Weighted):
         strict = solve_problems(problems, plan.rows, {})

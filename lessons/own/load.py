@@ -52,7 +52,7 @@ def _hook(event: str, _: Sequence[Any]) -> None:
         return
     path = _running.get()
     if path and (event in _REFUSED or _caller() == path):
-        raise PermissionError(f"a file of your own may start and signal no process ({event}): leave that out")
+        raise PermissionError(f"your own file must not start or signal a process ({event}): leave that out")
 
 
 def _caller() -> str:

@@ -138,7 +138,7 @@ def _body(code: str) -> str:
     found = _PREFIX.match(code)
     if found is None or not re.fullmatch(r"[\w-]+", code, re.ASCII):
         raise InputError(
-            f"this is not a state code: one begins with hl{VERSION}- and has only letters, digits, - and _"
+            f"this is not a state code: a code begins with hl{VERSION}- and has only letters, digits, - and _"
         )
     if int(found[1]) > VERSION:
         raise InputError(

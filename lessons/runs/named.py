@@ -85,8 +85,8 @@ def with_task(scene: Scene, name: str) -> TorqueScene:
 
 
 def with_tasks(scene: Scene, files: Iterable[str]) -> Scene:
-    """The scene with the tasks of files added to the kinds that its stack may name. Scenes at velocity level
-    cannot have such tasks.
+    """The scene with the tasks of files added to the kinds that its stack may name. A scene at velocity level
+    is returned unchanged.
 
     Raises:
         InputError: a file cannot be used, or the task's Jacobian is wrong.
@@ -96,7 +96,7 @@ def with_tasks(scene: Scene, files: Iterable[str]) -> Scene:
 
 def with_files(scene: Scene, controllers: Iterable[str], tasks: Iterable[str]) -> Scene:
     """The scene with users' files attached: files of controllers that it may use, and files of tasks that its
-    stack may name. A scene at velocity level cannot have files.
+    stack may name. A scene at velocity level is returned unchanged.
 
     Raises:
         InputError: the file of a task cannot be used, or the task's Jacobian is wrong.

@@ -72,10 +72,10 @@ class TorqueSettings(SceneSettings):
             everywhere. 0: the measured computing time, and then no two runs are the same.
         plant: the parameters of the simulated plant.
         options: the scene's own choices, if it has any.
-        files: users' Python files that may be its controller. They have no path: data from elsewhere (a
-            code, a page) must not choose which files are run.
-        own_tasks: (path, task) of users' Python files whose tasks the stack may name; they have no path
-            either.
+        files: users' Python files that may be the controller. They have no path: data from elsewhere (a code,
+            a page) must not choose which files are executed.
+        own_tasks: (path of the file, task) of users' Python files whose tasks the stack may name; no
+            setting's path changes them.
     """
 
     entries: ClassVar[tuple[Entry, ...]] = TORQUE_ENTRIES
@@ -105,7 +105,7 @@ class TorqueSettings(SceneSettings):
         return CONTROLLERS | dict.fromkeys(self.files, "a controller of your own, in a file of this machine")
 
     def for_controller(self) -> ControllerSettings:
-        """The controller's part. Raises InputError for invalid values."""
+        """The part of the settings for the controller. Raises InputError for invalid values."""
         if self.controller not in self.controllers:
             raise unknown_name("controller", self.controller, by_name(self.controllers))
         check_fields(self)
@@ -158,7 +158,8 @@ class TorqueSettings(SceneSettings):
         return len(self.M_bar) if per_joint else 0
 
     def place(self, path: str) -> Place:
-        """As in `Settings`; besides "stack.add" and the other `CHANGES`, which change the stack in part."""
+        """As in `Settings`, and also "stack.add" and the other `CHANGES`, which change a part of the
+        stack."""
         return _CHANGE_PLACES.get(path) or super().place(path)
 
     def recomposed(self, wanted: TorqueSettings) -> list[tuple[str, Any]]:

@@ -23,10 +23,10 @@ from robots.collision import Ball, Box, Floor, Obstacle
 from robots.errors import unknown_name
 
 STAGE_WEIGHT: dict[str, float] = {"proximal": 10.0, "paper": 1.0}
-"""Q of (8) with which each formulation was tuned; the choice of a formulation sets it."""
+"""Q of (8) with which each formulation was tuned; the choice of a formulation sets this Q."""
 
 _RATE_HZ = {"htidkc": 50.0}
-"""Control rate that goes with a controller, 10 Hz for all others; choosing a controller sets it."""
+"""Control rate of a controller, 10 Hz for all others; the choice of a controller sets this rate."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class VelocitySettings(SceneSettings):
             raise unknown_name("velocity-level controller", self.controller, VELOCITY_CONTROLLERS)
 
     def felt(self, solve_ms: float) -> VelocityPlantSettings:
-        """The plant that the commands of a plan act on, if the plan took this many ms to compute."""
+        """The plant on which the commands of a plan act if the computation of the plan took this many ms."""
         if not self.delay_measured:
             return self.plant
         return replace(self.plant, delay_ms=min(self.plant.delay_ms + solve_ms, LONGEST_DELAY))
@@ -250,7 +250,7 @@ def _obstacle(known: Mapping[str, Ball | Box], path: str, name: str, value: Any)
     if isinstance(numbers, tuple) and len(numbers) == 3 and name in known:
         x, y, z = numbers
         return replace(known[name], centre=(x, y, z))
-    movable = f", or move {', '.join(known)} to [x, y, z], or take one away by null" if known else ""
+    movable = f", or move {', '.join(known)} to [x, y, z], or remove one by null" if known else ""
     raise InputError(
         f"{path} is {value!r}: give a ball as [x, y, z, radius] in m, e.g. [2, 0, 1, 0.3]{movable}"
     )

@@ -49,7 +49,7 @@ def finished_cells(sweep: Sweep, folder: Path) -> dict[int, Cell]:
             different = ", ".join(key for key in wanted if held.get(key) != wanted[key])
             raise InputError(
                 f"--out {folder} holds another sweep ({different} differ): give another folder, or repeat "
-                "the command that began it"
+                "the command that began that sweep"
             )
         written = file.read_bytes()
         whole = written[: written.rfind(b"\n") + 1]
@@ -60,7 +60,7 @@ def finished_cells(sweep: Sweep, folder: Path) -> dict[int, Cell]:
     except OSError as error:
         raise InputError(f"--out {folder}: cannot be used ({error.strerror}); give another folder") from None
     except (json.JSONDecodeError, TypeError, AttributeError):
-        raise InputError(f"--out {folder}: its files are not a sweep's; give another folder") from None
+        raise InputError(f"--out {folder}: its files are not those of a sweep; give another folder") from None
     return {cell.index: cell for cell in cells}
 
 
