@@ -88,7 +88,7 @@ def on_cluster(address: str) -> Iterator[Spread]:
                 else:
                     yield places[future.key], future.result() if error is None else FailedJob(sentence(error))
             # A worker that dies also loses the items that waited for it. The items are therefore repeated one
-            # at a time, which shows which of them ends its worker.
+            # at a time, which shows which item ends its worker.
             for place in sorted(orphans):
                 alone = client.submit(guarded, function, items[place], pure=False)
                 futures.append(alone)

@@ -80,7 +80,7 @@ def bench(
                     session.tick()
                     if tick > 0 and session.plan is not None:
                         steps[key].append(session.plan.step_us / 1e3)
-                        # The kernel uses no external solver, and collecting its evidence is not part of a
+                        # The kernel uses no external solver. The collection of its evidence is not part of a
                         # step.
                         levels = () if key[0] == "compiled" else session.plan.levels
                         solves[key].append(sum(level.qp_us for level in levels) / 1e3)

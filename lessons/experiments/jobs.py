@@ -64,7 +64,7 @@ class Job(Work):
 class JobResult:
     """The result of a job: the summary of `himpc-lab run --json` and the rows that plots need.
 
-    A run that failed has an `error`, an empty summary and no arrays; figures of it are NaN.
+    A run that failed has an `error`, an empty summary and no arrays; its figures are NaN.
     """
 
     job: Work
@@ -134,8 +134,8 @@ def _arrays(recording: Recording) -> dict[str, Array]:
 
 
 def perform_all(jobs: Iterable[Work], progress: Callable[[float], None] | None = None) -> Results:
-    """Runs jobs, equal jobs only once: first on all cores, then the timed jobs one after the other in this
-    process.
+    """Runs jobs, equal jobs only once. The jobs that are not timed run first, on all cores; then the timed
+    jobs run one after the other in this process.
 
     Args:
         jobs: what to run.

@@ -25,7 +25,8 @@ class Trial:
         scale: factor on the scene's M̄.
         M_bar: the diagonal tried, kg·m².
         error: RMS of the level-1 error in the second half of the run, m or rad.
-        roughness: RMS over joints and ticks of the second half of Δτ over the joint's torque limit.
+        roughness: RMS of Δτ divided by the joint's torque limit, over the joints and the ticks of the second
+            half.
         gauge: largest spectral radius of I − M⁻¹M̄ during the run; it is unknown for a real robot.
         verdict: "go on", "too small", "satisfactory", "noisy" or "control lost".
     """
@@ -56,8 +57,8 @@ def tune(
         scene: the scene; its M̄ gives the proportions between the joints.
         start: first factor on the scene's M̄.
         factor: factor from one step to the next, > 1.
-        accuracy: a level-1 error below this, m or rad, is satisfactory.
-        noise: a roughness above this is noisy.
+        accuracy: a trial with a level-1 error below this, m or rad, is satisfactory.
+        noise: a trial with a roughness above this is noisy.
         seconds: simulated seconds per step.
         seed: seed of the runs.
 

@@ -14,7 +14,8 @@ from himpc.tasks import FrameOrientation, FramePosition
 Array = NDArray[np.float64]
 
 _GONE = 1e-6
-"""Directions in which joints of unit speed move by less than this, m/s or rad/s, count as lost."""
+"""Directions in which joints of unit speed move a frame more slowly than this, m/s or rad/s, count as
+lost."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -63,7 +63,7 @@ def tick_of(session: TorqueSession) -> TickProblems:
 
 
 def plane_of(session: TorqueSession, joints: tuple[int, int], through: str, shift: float = 0.0) -> Plane:
-    """The last tick cut along the first increments of two joints.
+    """The cut through the last tick along the first increments of two joints.
 
     Args:
         session: the session.
@@ -92,7 +92,7 @@ def plane_of(session: TorqueSession, joints: tuple[int, int], through: str, shif
 
 
 def matrix_of(session: TorqueSession, level: str) -> Matrix:
-    """The QP of a level at the last tick; of the first level if there is none of this name.
+    """The QP of a level at the last tick; the QP of the first level if no level has this name.
 
     Raises:
         InputError: there is no such tick, see `tick_of`.

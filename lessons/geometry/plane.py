@@ -36,7 +36,7 @@ class TorqueBox:
     kinds: tuple[tuple[str | None, str | None], tuple[str | None, str | None]]
 
     def inside(self, w: Array, room: float = 0.0) -> bool:
-        """Whether w is in the box, or no farther outside than `room`, N·m."""
+        """Whether w is in the box, or at most `room` outside it, N·m."""
         return bool((self.lower - room <= w).all() and (w <= self.upper + room).all())
 
 

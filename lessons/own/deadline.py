@@ -52,7 +52,7 @@ class CallDeadline:
             signal.signal(signal.SIGALRM, before)
 
     def _begin(self) -> None:
-        """Starts the time of a call."""
+        """Starts the measurement of a call's time."""
         self._computed = time.thread_time()
         self._since = (time.monotonic(), waited(os.getpid())) if self._heard else None
 

@@ -29,7 +29,7 @@ class Source:
     """A file as it was read.
 
     Attributes:
-        path: as it was given.
+        path: its path, as the user gave it.
         text: its content.
     """
 

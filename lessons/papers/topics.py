@@ -15,7 +15,7 @@ from lessons.replay.state import State
 from lessons.scenes.run_spec import RunSpec
 
 Measured = Mapping[tuple[str, str], tuple[float, float | None]]
-"""By item and quantity: ours, and its ratio to the paper's."""
+"""By item and quantity: our number, and its ratio to the paper's."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Quoted:
 
     Attributes:
         item, row: name of an item, and the quantity of one of its rows.
-        ratio: whether the text has ours over the paper's number instead of ours.
+        ratio: whether the text contains the ratio of our number to the paper's, instead of our number.
         less: number to subtract, e.g. 1, which turns a ratio into a change.
         scale: factor for the unit of the text, applied after the subtraction.
         form: a Python format.

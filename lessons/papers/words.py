@@ -51,7 +51,7 @@ def gain_rows(scene: str, table: dict[str, Any]) -> tuple[Row, ...]:
                     unit,
                     entry[gain],
                     ours,
-                    "the scene was given other gains",
+                    "the scene has other gains",
                     within=1e-9,
                     band=1e-9,
                     copied=True,

@@ -73,7 +73,7 @@ def _norm(z: Array) -> Normalize:
 
 
 def _edges(values: tuple[float, ...], log: bool) -> Array:
-    """Borders of the cells around the values, halfway (in ratio if log)."""
+    """Borders of the cells: halfway between two values, in ratio if `log`."""
     centres = np.log(values) if log else np.array(values)
     if len(centres) == 1:
         half = 0.5 * (abs(centres[0]) or 1.0)

@@ -1,4 +1,4 @@
-"""A run's rows as named arrays: those of `himpc-lab run --npz`, and of the page."""
+"""A run's rows as named arrays, for `himpc-lab run --npz` and for the page."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ def as_npz(data: dict[str, Any]) -> bytes:
 def as_csv(layout: Layout, rows: Array) -> bytes:
     """One line per row, one column per number, with the field's name as heading and, if the field has several
     numbers, the name of the number in brackets. SI units; orientations are quaternions x y z w. An empty cell
-    is a number that is not defined."""
+    stands for a number that is not defined."""
     heads: list[str] = []
     for name, where in layout.fields.items():
         width = where.stop - where.start

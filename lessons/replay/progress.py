@@ -52,7 +52,7 @@ class LearnerProgress:
         return replace(self, best={**self.best, lesson: max(points, self.best.get(lesson, 0.0))})
 
     def next_place(self, lesson: str, steps: int) -> int:
-        """The first step not seen yet; 0 if all were."""
+        """The first step that was not seen; 0 if all steps were seen."""
         seen = self.seen.get(lesson, frozenset())
         return next((place for place in range(steps) if place not in seen), 0)
 
@@ -135,7 +135,7 @@ class HandedIn:
 
 
 def written(handed: HandedIn, key: bytes | None) -> str:
-    """What a learner hands in, as a text of letters, digits, "-" and "_"."""
+    """The text that a learner hands in; it has only letters, digits, "-" and "_"."""
     given = {"n": handed.name[:LONGEST_NAME], "t": handed.at, "p": handed.progress.dumped(), "c": handed.code}
     given |= {"a": handed.account} if handed.account else {}
     body = base64.urlsafe_b64encode(zlib.compress(json.dumps(given, ensure_ascii=False).encode(), 9))

@@ -44,7 +44,7 @@ def scene_named(
 
 @lru_cache(maxsize=64)
 def _scene_of(source: Source) -> Scene:
-    """The scene of a file. Each content of a file is tested only once."""
+    """The scene of a file. A file is tested again only if its content has changed."""
     module = module_of(source)
     if kind_of(module) == "task":
         return with_task(load_scene(TASK_SCENE), source.path)

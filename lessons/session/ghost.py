@@ -69,7 +69,7 @@ class GhostDriver:
 
     @property
     def due(self) -> bool:
-        """Whether the leader is at least one of the ghost's control periods further."""
+        """Whether the leader is at least one of the ghost's control periods ahead."""
         return self.session.t + self.session.settings.T_s <= self._until + _SAME
 
     def take(self) -> None:

@@ -144,7 +144,7 @@ class Session(ABC):
 
     @property
     def settings_now(self) -> SceneSettings:
-        """The settings in force, including the state of the run that a scene can start with."""
+        """The settings in force, including the part of the run's state with which a scene can start."""
         return self.settings
 
     @abstractmethod

@@ -33,8 +33,8 @@ Array = NDArray[np.float64]
 
 @final
 class VelocitySession(Session):
-    """A run whose controller gives velocities. A control period is one or more commands to the servos, and
-    `advance` is one of them.
+    """A run whose controller gives velocities. A control period has one or more commands to the servos;
+    `advance` sends one of them.
 
     Attributes:
         bounds: the bounds in force.

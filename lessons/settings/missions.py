@@ -203,7 +203,7 @@ class WaypointOptions(ArchitectureOptions):
 
     Attributes:
         height: m, of the first EE waypoint.
-        hold_s: s at each EE waypoint.
+        hold_s: time at each EE waypoint, s.
     """
 
     height: float = 0.8
@@ -245,7 +245,7 @@ class DeliveryOptions(ArchitectureOptions):
         rounds: number of visits to each person.
         hold_s: time that the EE stays at a person's hand, s; null: until the person takes the ball (event
             Release).
-        cruise: m/s of the planned base paths.
+        cruise: speed along the planned base paths, m/s.
     """
 
     seats: tuple[float, ...] = (0, 2, 5)

@@ -60,7 +60,7 @@ class PerceptionOptions(OrderOptions):
         false_report: whether the report is ever wrong.
         report_offset: the reported position minus the true one while the report is wrong, m.
         report_start, report_end: times from which the report is wrong, and from which it is right again, s.
-        cruise: m/s of both paths.
+        cruise: speed along both paths, m/s.
     """
 
     false_report: bool = True

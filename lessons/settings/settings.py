@@ -27,8 +27,8 @@ class Place:
         read: returns the value in some settings.
         write: returns the settings with another value, which `fit` returned.
         form: the allowed values.
-        own_fit: returns, from settings, path and value, the value as it is stored, if the form is not enough
-            for this. Raises InputError, which names the path, for a value that is not allowed.
+        own_fit: used if the form is not enough. It returns the stored value for settings, path and value, and
+            raises InputError, which names the path, for a value that is not allowed.
         shorthand: whether the value also has another path, or the path stands for several values at once;
             `read` then returns the first value.
     """

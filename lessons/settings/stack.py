@@ -77,7 +77,8 @@ def _tasks(stack: Stack) -> dict[str, list[Task]]:
 
 
 def level_of(entry: Any, before: Stack, taken: list[str], own: Own) -> Level:
-    """A level from an entry; see `read_stack`. taken: names of tasks, to which its own are added."""
+    """A level from an entry; see `read_stack`. taken: names of tasks, to which the names of its tasks are
+    added."""
     given = (
         {"tasks": list(entry)}
         if isinstance(entry, (list, tuple))

@@ -34,10 +34,10 @@ class VelocitySettings(SceneSettings):
     """Settings of a velocity-level run.
 
     Attributes:
-        htmpc: the controller's settings; its stack has one level per role, and the mission's window orders
-            them.
+        htmpc: the controller's settings. Their stack has one level per role; the mission's window orders the
+            levels.
         controller: one of VELOCITY_CONTROLLERS.
-        compensate_delay: whether the measured state is predicted over the plant's lag before planning.
+        compensate_delay: whether the measured state is predicted forward by the plant's lag before planning.
         delay_measured: whether the commands of a plan are delayed by its measured computing time in addition
             to `plant.delay_ms`, as on a real robot, which does not wait; then no two runs are the same.
         plant: the parameters of the simulated plant.

@@ -1,4 +1,4 @@
-"""‖τ‖² in the cost instead of ‖Δτ‖², which section IV-C argues against."""
+"""The cost with ‖τ‖² instead of ‖Δτ‖²; section IV-C argues against ‖τ‖²."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ class EffortJob(Work):
 def _residual(
     form: StackForm, at: Configuration, previews: Mapping[str, Preview], before: Array, T_s: float
 ) -> tuple[Array, Array, Array, Array]:
-    """J, x̃, e_{k+1} for Δτ = 0, and ẋ."""
+    """Returns J, x̃, e_{k+1} for Δτ = 0, and ẋ."""
     J = form.jacobian(at)[0]
     error = measure(form.tasks, at, previews, {}, {})
     x_dot = J @ at.v

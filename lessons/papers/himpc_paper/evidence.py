@@ -22,7 +22,7 @@ from robots import Plant, convergence_gauge
 DEG = 180 / np.pi
 
 _LARGE = 5.0
-"""deg: an error of q₁ above this counts as large; in our run it grows from 1° to 5° in 0.2 s."""
+"""deg: an error of q₁ above this counts as large; in our run the error grows from 1° to 5° in 0.2 s."""
 _HALF_SWING = "q1_amplitude_deg=-60"
 _SOFT = "R=1e5"
 _BARE = "plant.friction=0"

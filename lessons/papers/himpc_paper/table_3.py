@@ -23,7 +23,7 @@ from lessons.papers.words import number, trouble
 from lessons.plots.style import name
 
 ACCURATE = 5e-4
-"""m: between the paper's 9e-5 (✓) and 3e-3 (✗)."""
+"""Largest RMSE that counts as accurate, m: between the paper's 9e-5 (✓) and 3e-3 (✗)."""
 LOST_LEVEL_1 = 0.03
 """m: a level-1 error above this means that level 1 was lost."""
 LOST_TORQUE = 4.0

@@ -102,7 +102,8 @@ def _topic(task: str, reading: str) -> str:
 def _change_row(
     results: Results, reading: str, extra: tuple[str, ...], label: str, task: str, k: int, unit: str
 ) -> Row:
-    """A row with the error of the disturbed plant over that of the nominal one, the subject of the table."""
+    """A row with the ratio of the disturbed plant's error to the nominal plant's, the subject of the
+    table."""
     paper = printed("himpc_table_5")
     nominal, disturbed = results[rt4()], results[rt4("himpc", *extra)]
     return Row(
@@ -117,7 +118,7 @@ def _change_row(
 
 
 def _shares(results: Results, words: str) -> dict[str, float]:
-    """Errors with another plant or setting over the nominal ones, by coordinate."""
+    """Ratios of the errors with another plant or setting to the nominal errors, by coordinate."""
     run, nominal = results[rt4("himpc", *_OTHERS[words])], results[rt4()]
     return {
         label: run.error_of(task, k, "rmse") / nominal.error_of(task, k, "rmse")

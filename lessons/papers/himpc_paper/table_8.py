@@ -29,7 +29,7 @@ def _jobs(quick: bool) -> tuple[Job, ...]:
 
 
 def smoothness(run: JobResult, benchmark: JobResult) -> float:
-    """S of section VI-D: the RMS of ‖τ − τ of the benchmark‖, N·m, over the time both ran."""
+    """S of section VI-D: the RMS of ‖τ − τ of the benchmark‖, N·m, over the time that both ran."""
     ticks = min(len(run.t), len(benchmark.t))
     if not ticks:
         return math.nan
