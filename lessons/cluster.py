@@ -25,8 +25,8 @@ _ASK = 1.0  # time between two checks for workers, s
 
 @contextmanager
 def on_cluster(address: str) -> Iterator[Spread]:
-    """Yields a function that spreads work over the workers of an existing Dask scheduler, on which himpc-lab
-    must be installed.
+    """Yields a function that spreads work over the workers of an existing Dask scheduler. himpc-lab must be
+    installed on the workers.
 
     Raises:
         InputError: dask.distributed is not installed, or no scheduler answers at the address. Later: the

@@ -43,7 +43,7 @@ class Source:
 
     @property
     def module(self) -> str:
-        """The name of its module in Python."""
+        """The name of the file's module in Python."""
         place = hashlib.sha256(os.fsencode(Path(self.path).absolute())).hexdigest()[:12]
         return f"himpc_lab_own_{place}"
 
@@ -81,7 +81,7 @@ def by_name(words: Iterable[str]) -> list[str]:
 
 
 def with_fingerprint(mark: str, files: Iterable[str], kind: str) -> str:
-    """Returns the one of several files that has a given fingerprint. kind: the kind of file, which is also
+    """Returns the file, among several, that has a given fingerprint. kind: the kind of file, which is also
     the name of its option. Raises InputError if no file has this fingerprint."""
     name = mark.partition("@")[0]
     alike = [each for each in files if is_file(each) and Path(each).name == name]

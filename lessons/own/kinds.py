@@ -1,4 +1,4 @@
-"""Finds out what a user's file defines."""
+"""Determines the kind of a user's file."""
 
 from __future__ import annotations
 

@@ -67,7 +67,7 @@ def load(source: Source, seconds: float = LONGEST) -> ModuleType:
     """The module that a file defines.
 
     Raises:
-        InputError: it cannot be executed (the message names the line), computes or sleeps for more than
+        InputError: the file cannot be executed (the message names the line), computes or sleeps for more than
             `seconds`, starts or signals a process, or replaces an object that the lab uses, too.
     """
     before, handlers = _shared(), _handlers()
@@ -121,7 +121,7 @@ def _in_time(source: Source, seconds: float) -> ModuleType:
 
 
 def _shared() -> dict[str, dict[str, Any]]:
-    """The functions, classes and modules that are attributes of the modules of the lab and its libraries."""
+    """The functions, classes and modules in the modules of the lab and of its libraries."""
     return {
         name: {key: value for key, value in vars(module).items() if _is_code(value)}
         for name, module in list(sys.modules.items())

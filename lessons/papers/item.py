@@ -30,13 +30,14 @@ class Row:
         unit: unit of both numbers.
         paper: the printed value; None: the paper prints none.
         ours: the measured value; NaN: there is none.
-        why: one sentence with the cause if the two differ, or if there is no printed number.
+        why: one sentence with the cause if the two numbers differ, or if there is no printed number.
         turns_at: for an effect, the value at which it turns into its opposite: 1 for a ratio, 0 for a
             difference.
-        says: the side of `turns_at` that the paper states, if it prints no number.
+        says: the side of `turns_at` that the paper states, if the paper prints no number.
         within: the two numbers agree if their ratio differs from 1 by at most this.
         band: largest deviation from the stored number, as a share; times need a wide band.
-        topic: the disagreement (`lessons.papers.topics`) that explains it, if the two do not agree.
+        topic: if the two do not agree, the disagreement of `lessons.papers.topics` that explains the
+            difference.
         copied: whether ours is a setting taken from the paper instead of a measurement.
     """
 
@@ -54,7 +55,7 @@ class Row:
 
     @property
     def ratio(self) -> float | None:
-        """Ours over the paper's."""
+        """The ratio of our number to the paper's."""
         if self.paper is None or not math.isfinite(self.ours) or self.paper == 0:
             return None
         return self.ours / self.paper

@@ -57,7 +57,7 @@ class Topic:
         evidence: text about our measurements; a {name} is replaced by that number of `numbers`.
         cause: text about the most likely cause; names are replaced here, too.
         look: text that says how to see the difference.
-        scene, set: the setting that shows it; "" for none.
+        scene, set: the setting that shows the disagreement; "" for none.
         numbers: the measured numbers, by name.
         given: the numbers in the texts that are not measured, but given by a paper or a setting.
     """
@@ -79,7 +79,7 @@ class Topic:
 
     @property
     def state(self) -> State | None:
-        """The setting that shows it."""
+        """The setting that shows the disagreement."""
         return State(RunSpec(self.scene, set=self.set)) if self.scene else None
 
 

@@ -180,7 +180,7 @@ def _mark_zeros(axes: Axes, panel: Bars, width: float) -> None:
 
 
 def _label_shared_x(picture: Picture, grid: np.ndarray) -> None:
-    """Removes a label that all panels of a column share from all of them but the last."""
+    """If all panels of a column have the same label, removes it from all panels except the last."""
     for column in grid.T:
         shown = [axes for axes in column if axes.axison]
         if len({axes.get_xlabel() for axes in shown}) == 1:

@@ -100,7 +100,7 @@ def _limits(recording: Recording) -> dict[str, dict[str, float | None]]:
 
 
 def _share(tau: Array, recording: Recording) -> Array:
-    """Torque over the bound on its side."""
+    """The ratio of a torque to the bound on its side."""
     return np.maximum(tau / _bounded(recording["tau_upper"]), tau / _bounded(recording["tau_lower"]))
 
 

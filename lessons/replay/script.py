@@ -116,7 +116,7 @@ def _tuple(name: str, items: Iterable[str]) -> str:
 
 
 def _call(event: Event) -> str:
-    """An event as the call that makes it, without arguments that have their default value."""
+    """The Python call that creates an event, without arguments that have their default value."""
     given = [
         f"{field.name}={_literal(value)}" if place > 1 else _literal(value)
         for place, field in enumerate(fields(event))

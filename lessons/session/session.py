@@ -26,7 +26,7 @@ class Session(ABC):
     wait in the mailbox until a period begins.
 
     Attributes:
-        scene: the scene that it started from.
+        scene: the scene from which the session started.
         seed: seed of the run; all randomness comes from it.
         robot: the scene's robot.
         settings: the settings in force.
@@ -131,14 +131,14 @@ class Session(ABC):
 
     @abstractmethod
     def _happen(self, event: Event) -> None:
-        """Carries out an event that changes no settings. Raises InputError for an event that this kind does
-        not have.
+        """Carries out an event that changes no settings. Raises InputError for an event that this kind of
+        session does not have.
         """
 
     @abstractmethod
     def adopt(self, settings: SceneSettings) -> None:
-        """Takes over settings of the scene's kind at once, as an event that changed them would. Raises
-        InputError if they do not fit."""
+        """Takes over settings of the scene's kind at once, like an event that changes them. Raises InputError
+        if they do not fit."""
 
     # ---------------------------------------------------------------- state for the page
 

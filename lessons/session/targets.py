@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 
 def target_at(task: Task, value: Array) -> Target:
-    """A draggable target of a task that starts at one of its `Task.target`s."""
+    """A draggable target of a task. It starts at one of the task's `Task.target`s."""
     if value.ndim == 2:
         return dragged_target(value, ROTATION_CAPS)
     in_space = task.unit == "m" or isinstance(task, Pointing)

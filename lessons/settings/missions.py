@@ -49,7 +49,8 @@ class MissionOptions(ABC):
 
     @property
     def decoupled(self) -> bool:
-        """Whether base and arm move in turns: one of them stands still while the other has its task."""
+        """Whether base and arm move in turns: one of them stands still while the other carries out its
+        task."""
         return False
 
     def person(self, task: str) -> int | None:
@@ -185,13 +186,13 @@ def random_peaks(seed: int, count: int, ee_home: Array) -> list[tuple[float, flo
 
 
 CRUISE = 0.5
-"""m/s, of the planned base and EE paths."""
+"""Speed of the planned base and EE paths, m/s."""
 HAND_TOLERANCE = 0.02
 """m: a task of the EE is completed within this distance of its goal, whatever the architecture."""
 REST = 0.02
 """m/s: a slower base counts as at rest."""
 _ANYWHERE = 100.0
-"""m: larger than any scene."""
+"""m: a distance larger than any scene."""
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ class Place:
 
     Attributes:
         read: returns the value in some settings.
-        write: returns the settings with another value, which `fit` returned.
+        write: returns the settings with another value, in the form that `fit` returns.
         form: the allowed values.
         own_fit: used if the form is not enough. It returns the stored value for settings, path and value, and
             raises InputError, which names the path, for a value that is not allowed.
@@ -120,8 +120,8 @@ class SceneSettings(ABC):
         return entry_at(self.entries, path)
 
     def special_differences(self, wanted: Any) -> list[tuple[str, Any]]:
-        """The differences between these settings and `wanted`, as paths and values that turn these into
-        `wanted`. Only paths that are not in `places` are considered."""
+        """Paths and values that turn these settings into `wanted`. Only paths that are not in `places` are
+        considered."""
         return []
 
     def recomposed(self, wanted: Any) -> list[tuple[str, Any]]:

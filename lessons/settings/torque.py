@@ -126,7 +126,8 @@ class TorqueSettings(SceneSettings):
     def is_late(self, measured_ms: float) -> bool:
         """Whether a torque with this computing time misses its deadline."""
         assumed = self.solve_ms_per_knot * self.horizon
-        # Rounding of N times a decimal fraction must not make a torque late that exactly meets its deadline.
+        # A torque that exactly meets its deadline must not be late by the rounding of N times a decimal
+        # fraction.
         return 0.0 < self.deadline_ms < (assumed or measured_ms) - 1e-9
 
     @property

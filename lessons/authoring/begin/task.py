@@ -2,8 +2,8 @@
 
     himpc-lab run FILE.py
 
-runs it on the iiwa, on a level of its own below the hand's position. Before the robot moves, finite
-differences of the value are compared with the Jacobian.
+runs the task on the iiwa, on a level of its own below that of the hand's position. Before the robot moves,
+finite differences of the value are compared with the Jacobian.
 """
 
 from dataclasses import dataclass

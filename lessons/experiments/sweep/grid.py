@@ -19,8 +19,8 @@ from robots import InputError
 
 MAX_CELLS = 100_000
 _DECADE = 10.0
-"""A range whose upper end is at least this many times its lower end is divided in equal ratios instead of
-equal steps."""
+"""A range is divided in equal ratios instead of equal steps if its upper end is at least this many times its
+lower end."""
 
 
 @dataclass(frozen=True)

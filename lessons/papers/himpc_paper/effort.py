@@ -29,7 +29,7 @@ class EffortJob(Work):
     """A run with all tasks of a scene in one cost, one step ahead, without bounds and priorities.
 
     The problem is min ‖e_{k+1}‖² + R‖Δτ‖² or min ‖e_{k+1}‖² + R‖τ₀ + Δτ‖², with e of (28) by the incremental
-    system and N = 1. R is the ratio R_i/Q_i of the paper's weights, which is 0.05 there.
+    system and N = 1. R stands for R_i/Q_i; the paper's weights give 0.05.
 
     Attributes:
         effort: the quantity that R weighs: the "increment" Δτ or the whole "torque" τ.

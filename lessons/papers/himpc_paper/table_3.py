@@ -47,7 +47,7 @@ class PropertyResult:
 
     @property
     def tick(self) -> str:
-        """✓, ✗ or –."""
+        """The result as ✓, ✗ or –."""
         return {True: "✓", False: "✗", None: "–"}[self.holds]
 
 

@@ -26,7 +26,7 @@ _N = 5
 
 
 def horizon_job(controller: str, N: int, extra: tuple[str, ...] = (), quick: bool = False) -> Job:
-    """RT4 with a horizon; the quick version is shorter."""
+    """The run of RT4 with a horizon; the quick version is shorter."""
     own = () if N == _N else (f"horizon={N}",)
     return rt4(controller, *own, *extra, seconds=2.0 if quick else None)
 
