@@ -22,7 +22,7 @@ printed position rows: with them the error of x is 5 mm at N = 5."""
 
 
 _N = 5
-"""The scene's own."""
+"""The horizon of the scene."""
 
 
 def horizon_job(controller: str, N: int, extra: tuple[str, ...] = (), quick: bool = False) -> Job:
