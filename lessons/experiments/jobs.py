@@ -92,7 +92,7 @@ class JobResult:
 
     @property
     def lost_at(self) -> float | None:
-        """When control was lost, s; None if it was not."""
+        """The time at which control was lost, s; None if it was not lost."""
         return self.summary.get("diverged_at_s")
 
     @property

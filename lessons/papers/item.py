@@ -38,7 +38,7 @@ class Row:
         band: largest deviation from the stored number, as a share; times need a wide band.
         topic: if the two do not agree, the disagreement of `lessons.papers.topics` that explains the
             difference.
-        copied: whether ours is a setting taken from the paper instead of a measurement.
+        copied: whether our number is a setting taken from the paper, and not a measurement.
     """
 
     quantity: str

@@ -53,8 +53,8 @@ def _contact(recording: Recording) -> dict[str, float]:
 
 
 def _levels(recording: Recording) -> list[dict[str, Any]]:
-    """Per enabled level, the number of its rows, and the number of directions that it can control at the
-    robot's final pose."""
+    """Per enabled level, the number of its rows, and the number of directions that the level can control at
+    the robot's final pose."""
     found = recording.session.ranks()
     return [{"name": name, "rank": rank, "rows": rows} for name, (rank, rows) in found.items()]
 

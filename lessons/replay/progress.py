@@ -144,8 +144,8 @@ def written(handed: HandedIn, key: bytes | None) -> str:
 
 
 def read_handed_in(text: str, key: bytes | None) -> tuple[HandedIn, Proof]:
-    """Reads a text that was handed in, and checks its seal. Without a key a signature cannot be checked, and
-    the text counts as not signed.
+    """Reads a text that was handed in, and checks its signature or checksum. Without a key a signature cannot
+    be checked, and the text counts as not signed.
 
     Raises:
         InputError: the text is of another kind, incomplete or damaged, or was written by a newer version.

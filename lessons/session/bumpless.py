@@ -76,5 +76,5 @@ class Handover:
 
 
 def settled(controller: Controller) -> Controller:
-    """Returns the controller itself, or the new controller if it is a finished hand-over."""
+    """Returns the controller itself or, for a finished hand-over, its new controller."""
     return controller.new if isinstance(controller, Handover) and controller.done else controller

@@ -22,7 +22,7 @@ def ghost_scene(scene: Scene, leader: SceneSettings, own: Sequence[str]) -> Scen
     """The scene that a ghost runs.
 
     Args:
-        scene: as the leader loaded it.
+        scene: the scene, as the leader loaded it.
         leader: the leader's settings at its last reset, at which both begin.
         own: assignments "PATH=VALUE" on top of them.
 

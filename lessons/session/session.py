@@ -73,7 +73,7 @@ class Session(ABC):
     @property
     @abstractmethod
     def over(self) -> bool:
-        """Whether the run is complete, which ends a headless run."""
+        """Whether the run is complete; a headless run then ends."""
 
     @abstractmethod
     def advance(self) -> Array | None:

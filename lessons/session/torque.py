@@ -287,7 +287,7 @@ class TorqueSession(Session):
         return path
 
     def ranks(self) -> dict[str, tuple[int, int]]:
-        """Per enabled level the number of directions it can control now, and its rows."""
+        """Per enabled level, the number of directions that it can control now, and of its rows."""
         q = np.asarray(self.plant.q)
         return ranks(self.settings.levels, Configuration(self.robot, self._data, q, q))
 

@@ -141,7 +141,7 @@ def manipulability(at: Configuration) -> float:
 
 
 def write_bounds(row: Array, layout: Layout) -> None:
-    """Writes which joints are at a bound: their command, its acceleration, or their position."""
+    """Writes which joints are at a bound of the command, of its acceleration, or of the position."""
     fields = layout.fields
     q, lower, upper = row[fields["q"]], row[fields["q_lower"]], row[fields["q_upper"]]
     near = 1.0 - _AT

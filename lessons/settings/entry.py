@@ -13,7 +13,7 @@ class Entry:
     `robots.ranges`; this row gives the usual values.
 
     Attributes:
-        path: as of `--set`; "*" stands for a name: "levels.*.Q".
+        path: as in `--set`; "*" stands for a name: "levels.*.Q".
         label: a few words or a symbol.
         help: one or two sentences; empty if the label is enough.
         unit: of the value.

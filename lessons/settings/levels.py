@@ -14,7 +14,7 @@ def ordered(stack: Stack, names: Any) -> Stack:
 
     Args:
         stack: the levels.
-        names: of all of them, highest priority first: "a,b,c" or a list.
+        names: the names of all levels, highest priority first: "a,b,c" or a list.
 
     Raises:
         InputError: a name is missing, unknown or given twice.

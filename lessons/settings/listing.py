@@ -17,7 +17,7 @@ class SettingLine:
     """One setting, as text.
 
     Attributes:
-        path: as of `--set`; in a list of several scenes, "*" stands for a name.
+        path: as in `--set`; in a list of several scenes, "*" stands for a name.
         now: its value, as the user types it.
         allowed: the allowed values.
         unit: of the value.

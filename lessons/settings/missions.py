@@ -197,7 +197,7 @@ _ANYWHERE = 100.0
 
 @dataclass(frozen=True)
 class WaypointOptions(ArchitectureOptions):
-    """Fig. 8: two EE waypoints; in between the base goes past the first one.
+    """Fig. 8: two EE waypoints; between the two, the base drives past the first one.
 
     The hierarchical architecture sends the base straight to its place for the second waypoint. The
     single-task architecture first sends the base to a place at a predefined distance from the first waypoint.

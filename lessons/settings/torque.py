@@ -62,7 +62,7 @@ class TorqueSettings(SceneSettings):
     Attributes:
         levels: the stack.
         M_bar: diagonal of M̄ before scaling.
-        M_bar_scale: factor on all of it.
+        M_bar_scale: factor on the whole diagonal.
         M_bar_adapt: whether the controller adapts M̄ to the payload, see `himpc.controllers.adaptation`.
         nominal: the plant as the nominal model of model-based controllers describes it.
         deadline_ms: a torque that is ready later than this after the beginning of its tick acts one tick
@@ -144,7 +144,7 @@ class TorqueSettings(SceneSettings):
 
     def places(self) -> Mapping[str, Place]:
         """Fields ("horizon", "M_bar", …) and those of the scene's options; "stack", a list of levels as
-        `lessons.settings.stack.read_stack` takes it; "order", the names of all levels,
+        `lessons.settings.stack.read_stack` reads it; "order", the names of all levels,
         highest priority first ("a,b,c" or a list); "Q" or "R" for all levels (one number, or one per level);
         "levels.NAME.KEY" with the level's name or its place 1 … r, KEY one of Q, R, horizon, enabled, K_p,
         K_v (gains of all its tasks); "tasks.NAME.K_p|K_v"; "limits.KEY"; "avoidance.KEY"; "nominal.KEY";

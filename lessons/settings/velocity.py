@@ -38,8 +38,9 @@ class VelocitySettings(SceneSettings):
             levels.
         controller: one of VELOCITY_CONTROLLERS.
         compensate_delay: whether the measured state is predicted forward by the plant's lag before planning.
-        delay_measured: whether the commands of a plan are delayed by its measured computing time in addition
-            to `plant.delay_ms`, as on a real robot, which does not wait; then no two runs are the same.
+        delay_measured: whether the commands of a plan are delayed by the plan's measured computing time in
+            addition to `plant.delay_ms`, as on a real robot, which does not wait; then no two runs are the
+            same.
         plant: the parameters of the simulated plant.
         options: the scene's own choices.
     """

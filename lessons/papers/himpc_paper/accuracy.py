@@ -116,7 +116,7 @@ def _section(results: Results, quick: bool) -> Section:
     panels = [_panel(r"$T_s$ (ms)", {ms: model_errors(run) for ms, run in periods.items()})]
     if scales:
         panels.append(_panel(r"factor on $\bar M$", {s: model_errors(run) for s, run in scales.items()}))
-    caption = "Errors of the nominal model (20 % light, friction unknown) and of the incremental one on RT1."
+    caption = "Errors of the nominal model (20 % too light, no friction) and of the incremental one on RT1."
     return Section(
         notes=(
             "The error of each model's next acceleration along HIMPC's own motion, from the definitions of "

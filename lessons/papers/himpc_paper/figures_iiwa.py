@@ -56,7 +56,7 @@ def _fig_18(results: Results, quick: bool) -> Section:
     )
     panel = Panel("$e_x$ (mm)", curves)
     return Section(
-        pictures=(Picture("himpc-fig-18", "Error of x on RT4 over the horizon, HIMPC.", (panel,)),)
+        pictures=(Picture("himpc-fig-18", "Error of x on RT4 against the horizon N, HIMPC.", (panel,)),)
     )
 
 

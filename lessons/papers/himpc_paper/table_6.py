@@ -1,4 +1,4 @@
-"""Table VI: RMSE over the horizon."""
+"""Table VI: RMSE against the horizon."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def horizon_job(controller: str, N: int, extra: tuple[str, ...] = (), quick: boo
 
 
 def horizons(controller: str, quick: bool) -> tuple[int, ...]:
-    """The horizons of the runs; the quick version leaves out those that take minutes."""
+    """The horizons of the runs; the quick version leaves out the runs that take minutes."""
     if controller == "nhimpc":
         return (10,) if quick else (10, 20, 30)
     return (5, 10, 20) if quick else (5, 10, 20, 30)
@@ -75,7 +75,7 @@ def _table_6(results: Results, quick: bool) -> Section:
                             "1",
                             printed_value / paper["himpc"]["5"] if printed_value else None,
                             errors[N] / base,
-                            trouble(run) or "what R weighs decides whether a horizon helps",
+                            trouble(run) or "the quantity that R weighs decides whether a horizon helps",
                             turns_at=1.0,
                             topic="horizon",
                         )

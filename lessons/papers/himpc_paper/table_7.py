@@ -23,7 +23,7 @@ def timed(controller: str, N: int, quick: bool) -> Job:
 
 
 def step_seconds(run: JobResult) -> dict[str, float]:
-    """Average, median and maximum step time, s; the first ten steps warm up. NaN for a failed run."""
+    """Average, median and maximum step time, s, without the first ten steps. NaN for a failed run."""
     times = 1e-6 * run.column("step_us")[10:]
     if not len(times):
         return dict.fromkeys(("average", "median", "maximum"), math.nan)

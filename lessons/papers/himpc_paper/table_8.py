@@ -1,4 +1,4 @@
-"""Table VIII: smoothness of the torque over the encoders' resolution."""
+"""Table VIII: smoothness of the torque against the encoders' resolution."""
 
 from __future__ import annotations
 
