@@ -118,7 +118,7 @@ def _over(
         tables=(Table(f"{title}: level-1 RMSE, worst axis (mm)", (what, *runs), rows),),
         pictures=(
             Picture(
-                f"himpc-{title.lower().replace(' ', '-')}", f"Level-1 RMSE by {what.lower()}.", (panel,)
+                f"himpc-{title.lower().replace(' ', '-')}", f"Level-1 RMSE by the {what.lower()}.", (panel,)
             ),
         ),
     )
