@@ -20,17 +20,17 @@ U = TypeVar("U")
 PATIENCE = 60.0
 """Time, s, that a scheduler may be without workers before the work is given up. A worker that died is usually
 replaced sooner."""
-_ASK = 1.0  # s between two checks whether there are workers
+_ASK = 1.0  # time between two checks for workers, s
 
 
 @contextmanager
 def on_cluster(address: str) -> Iterator[Spread]:
-    """Yields a function that spreads work over the workers of an existing Dask scheduler, on which himpc-lab
-    must be installed.
+    """Yields a function that spreads work over the workers of an existing Dask scheduler. himpc-lab must be
+    installed on the workers.
 
     Raises:
-        InputError: dask.distributed is not installed, or no scheduler answers at the address; while work is
-            spread: the connection to the scheduler was lost, or it had no worker for `PATIENCE` s.
+        InputError: dask.distributed is not installed, or no scheduler answers at the address. Later: the
+            connection to the scheduler is lost, or the scheduler has no worker for `PATIENCE` s.
     """
     try:
         from distributed import Client
@@ -41,7 +41,7 @@ def on_cluster(address: str) -> Iterator[Spread]:
             '--scheduler needs dask.distributed: pip install "himpc-lab[cluster]", or leave it out '
             "to use this machine's cores"
         ) from None
-    # A plain socket tries the address first: a Client that finds no scheduler would go on trying in the
+    # A plain socket tries the address first: a Client that finds no scheduler would continue trying in the
     # background.
     try:
         parts = urlsplit(address)
@@ -68,8 +68,8 @@ def on_cluster(address: str) -> Iterator[Spread]:
                 worked = asked
             elif asked - worked >= PATIENCE:
                 raise InputError(
-                    f"--scheduler {address}: it has had no worker for {PATIENCE:.0f} s. Start one with "
-                    f'"dask worker {address}", then give the same command again'
+                    f"--scheduler {address}: no worker for {PATIENCE:.0f} s. Start a worker with "
+                    f'"dask worker {address}", then repeat the command'
                 )
 
     def spread(
@@ -88,7 +88,7 @@ def on_cluster(address: str) -> Iterator[Spread]:
                 else:
                     yield places[future.key], future.result() if error is None else FailedJob(sentence(error))
             # A worker that dies also loses the items that waited for it. The items are therefore repeated one
-            # at a time, which shows which of them ends its worker.
+            # at a time, which shows which item ends its worker.
             for place in sorted(orphans):
                 alone = client.submit(guarded, function, items[place], pure=False)
                 futures.append(alone)

@@ -14,7 +14,7 @@ Vector = tuple[float, ...]
 
 @dataclass(frozen=True)
 class Set:
-    """A setting takes a new value; `path` as in `lessons.settings.settings`."""
+    """A setting gets a new value; see `lessons.settings.settings` for its `path`."""
 
     path: str
     value: Any
@@ -22,7 +22,7 @@ class Set:
 
 @dataclass(frozen=True)
 class MoveLevel:
-    """A level moves to another place in the stack, 0 being the highest priority."""
+    """A level moves to another place in the stack; place 0 has the highest priority."""
 
     level: str
     to: int
@@ -30,7 +30,7 @@ class MoveLevel:
 
 @dataclass(frozen=True)
 class MoveTarget:
-    """A task's target moves to a new place: position (m), quaternion (x y z w) or joints (rad)."""
+    """A task's target gets a new value: a position (m), a quaternion (x y z w) or joints (rad)."""
 
     task: str
     value: Vector
@@ -38,7 +38,7 @@ class MoveTarget:
 
 @dataclass(frozen=True)
 class Push:
-    """A force (N) and torque (N·m) in world axes on a moving body, for some simulated seconds."""
+    """A force (N) and a torque (N·m), in world axes, act on a moving body for some simulated seconds."""
 
     body: str
     force: Vector = (0.0, 0.0, 0.0)
@@ -60,7 +60,8 @@ class Release:
 
 @dataclass(frozen=True)
 class InsertTask:
-    """A new task towards a goal (m), before another one or at the end; see `himpc.missions.MissionTask`."""
+    """A mission gets a new task with a goal (m), before another task or at the end; see
+    `himpc.missions.MissionTask`."""
 
     name: str
     role: str
@@ -77,14 +78,14 @@ class InsertTask:
 
 @dataclass(frozen=True)
 class RemoveTask:
-    """A task that is not completed leaves the mission."""
+    """A task that is not completed is removed from the mission."""
 
     task: str
 
 
 @dataclass(frozen=True)
 class Appear:
-    """A ball (centre and radius, m) appears, or the obstacle of that name moves there."""
+    """A ball (centre and radius, m) is added, or replaces the obstacle of that name."""
 
     name: str
     centre: Vector

@@ -38,7 +38,7 @@ class FailedJob:
 
 class Spread(Protocol):
     """A function that spreads work over processes. It yields (index of the item, its outcome), in the order
-    in which they become ready. Closing the generator ends the work that still runs."""
+    in which the outcomes become ready. Closing the generator ends the work that still runs."""
 
     def __call__(
         self, function: Callable[[T], U], items: Sequence[T]
@@ -68,7 +68,7 @@ def on_cores(
     while waiting:
         orphans = yield from _until_one_dies(function, items, waiting)
         # A process that dies also ends the other work of its pool. The items are therefore repeated one at a
-        # time, which shows which of them ends its process.
+        # time, which shows which item ends its process.
         for place in sorted(orphans):
             yield place, _alone(function, items[place])
 
@@ -84,7 +84,8 @@ def _until_one_dies(
     with _pool(workers) as pool, suppress(BrokenProcessPool):
         while not orphans and (waiting or under_way):
             with _born_deaf():
-                # One item per process at most: if a process dies, the items that wait are not lost.
+                # At most one item per process is submitted: if a process dies, the items that wait are not
+                # lost.
                 while waiting and len(under_way) < workers:
                     future = pool.submit(guarded, function, items[waiting[0]])
                     under_way[future] = waiting.popleft()
@@ -106,7 +107,7 @@ def one_by_one(
 
 
 def guarded(function: Callable[[T], U], item: T) -> U | FailedJob:
-    """The result of the function, or its failure if it raised."""
+    """The result of the function, or a failure if the function raised an exception."""
     try:
         return function(item)
     except Exception as error:
@@ -114,7 +115,8 @@ def guarded(function: Callable[[T], U], item: T) -> U | FailedJob:
 
 
 def sentence(error: BaseException) -> str:
-    """An error in one line, with the name of its class, except for an InputError, which is a sentence."""
+    """An error in one line, with the name of its class. The name is omitted for an InputError, which is a
+    sentence."""
     text = " ".join(str(error).split()) or "no reason given"
     return text if isinstance(error, InputError) else f"{type(error).__name__}: {text}"
 
@@ -150,9 +152,9 @@ def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
 
 @contextmanager
 def _born_deaf() -> Iterator[None]:
-    """Blocks Ctrl-C while processes start. A child inherits the block: otherwise Ctrl-C would end it with a
-    traceback before our code runs in it. In the owner the block prevents a half-finished start; a signal that
-    arrives meanwhile, in any thread, is handled afterwards.
+    """Blocks Ctrl-C while processes start. A child inherits the block: otherwise Ctrl-C would end the child
+    with a traceback before our code runs in it. In the owner the block prevents a half-finished start; a
+    signal that arrives meanwhile, in any thread, is handled afterwards.
     """
     heard: list[int] = []
     handlers: dict[int, Callable[[int, FrameType | None], object] | int | None] = {}

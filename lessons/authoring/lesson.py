@@ -23,7 +23,7 @@ def lesson_named(name: str) -> Lesson:
 
 @lru_cache(maxsize=64)
 def _lesson_of(source: Source) -> Lesson:
-    """The lesson of a file. Each content of a file is tested only once."""
+    """The lesson of a file. A file is tested again only if its content has changed."""
     module = module_of(source)
     expected(module, "lesson")
     found = vars(module)["LESSON"]

@@ -26,9 +26,8 @@ TASKS: tuple[str, ...] = (
     "relative_orientation",
     "plane_distance",
 )
-"""Kinds of tasks that can be used as a template. Two kinds are left out: tasks on joints have little
-to change, and a task in a file needs a target that is a value of the task's coordinates, which the target
-of a pointing task is not.
+"""Kinds of tasks that can be used as a template. Two kinds are left out. Tasks on joints have little to
+change. The target of a pointing task is not a value of the task's coordinates, as a task in a file needs.
 """
 
 
@@ -111,6 +110,6 @@ from lessons import load_scene
 
 START = load_scene("{scene}")
 
-# Everything a scene has may be replaced: settings (any path of himpc-lab run --set), q_0, events, duration, …
+# Every field of a scene may be replaced: settings (any path of himpc-lab run --set), q_0, events, duration, …
 SCENE = replace(START, title="{scene}, changed", settings=START.settings.changed("horizon", 10))
 '''

@@ -23,9 +23,9 @@ CONTENDERS: tuple[tuple[Route, Solver], ...] = (
     ("explicit", "proxqp"),
     ("explicit", "qpoases"),
 )
-"""The last takes part if CasADi is installed."""
+"""The last contender takes part only if CasADi is installed."""
 _LONGEST_EXPLICIT = 20
-"""The explicit route is left out beyond this horizon: one step takes seconds there."""
+"""Longest horizon for which the explicit route takes part; a longer one takes seconds per step."""
 _TURN = 10
 """Number of timed ticks of a contender before the next contender runs. The contenders take turns, and the
 noise of the machine affects all of them equally. An untimed tick precedes each turn: at that tick the caches
@@ -34,7 +34,7 @@ still hold the data of the previous contender, which does not happen on a robot.
 _DRAG_TICKS = 100
 """Ticks from one drag to the next."""
 _BUDGET_S = 6.0
-"""A contender that has used this much wall time stops early; its number of ticks is reported."""
+"""Wall time, s, after which a contender stops early; the number of its ticks is reported."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ def bench(
                     session.tick()
                     if tick > 0 and session.plan is not None:
                         steps[key].append(session.plan.step_us / 1e3)
-                        # The kernel uses no external solver, and collecting its evidence is not part of a
+                        # The kernel uses no external solver. The collection of its evidence is not part of a
                         # step.
                         levels = () if key[0] == "compiled" else session.plan.levels
                         solves[key].append(sum(level.qp_us for level in levels) / 1e3)
@@ -110,8 +110,8 @@ def _spread(times: list[float]) -> dict[str, float]:
 
 
 def ratios(timings: Sequence[Timing]) -> dict[str, Any]:
-    """Per horizon: the step time of each route over that of the compiled route, and ProxQP's QP time over
-    DAQP's."""
+    """Returns two ratios per horizon: the step time of each route to that of the compiled route, and ProxQP's
+    QP time to DAQP's."""
     found = {(t.horizon, t.route, t.solver): t for t in timings}
     result = {}
     for N in sorted({t.horizon for t in timings}):

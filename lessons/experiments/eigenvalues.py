@@ -22,8 +22,8 @@ _SECONDS = 4.0
 @final
 @dataclass(frozen=True)
 class EigenvalueJob(Work):
-    """A run during which the eigenvalues of M⁻¹M̄, M the plant's, are computed at every tick. A target that
-    can be dragged jumps by up to 10 cm along each axis every half second.
+    """A run that computes the eigenvalues of M⁻¹M̄, with the plant's M, at every tick. A target that can be
+    dragged jumps by up to 10 cm along each axis every half second.
 
     Its summary has `rms_mm`, the RMS distance of the TCP from its reference after the first second;
     `largest`, the largest eigenvalue; `beyond_2`, the largest number of consecutive ticks with an eigenvalue

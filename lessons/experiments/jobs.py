@@ -23,7 +23,7 @@ from lessons.session.velocity import VelocitySession
 Array = NDArray[np.float64]
 
 TIMING_KEYS = ("step_ms", "real_time_factor")
-"""Keys of a summary that differ from run to run; all others are the same to the bit."""
+"""Keys of a summary whose values differ from run to run; all other values are equal to the last bit."""
 
 _KEPT = ("t", "q", "v", "tau", "v_limit", "at_bound", "tau_demand", "step_us", "x", "x_d", "error", "cost")
 _KEPT_BY: Mapping[type[Session], tuple[str, ...]] = {
@@ -39,7 +39,7 @@ class Work(ABC):
 
     Attributes:
         spec: the run.
-        timed: whether its purpose is to measure step times; no other work runs at the same time then.
+        timed: whether the run measures step times; then no other work runs at the same time.
     """
 
     spec: RunSpec
@@ -53,7 +53,7 @@ class Work(ABC):
 @final
 @dataclass(frozen=True)
 class Job(Work):
-    """One run, as `himpc-lab run` does it."""
+    """One run, as `himpc-lab run` performs it."""
 
     def do(self) -> JobResult:
         recording = run(self.spec.prepared(), None, self.spec.seed)
@@ -64,7 +64,7 @@ class Job(Work):
 class JobResult:
     """The result of a job: the summary of `himpc-lab run --json` and the rows that plots need.
 
-    A run that failed has an `error`, an empty summary and no arrays; figures of it are NaN.
+    A run that failed has an `error`, an empty summary and no arrays; its figures are NaN.
     """
 
     job: Work
@@ -92,7 +92,7 @@ class JobResult:
 
     @property
     def lost_at(self) -> float | None:
-        """When control was lost, s; None if it was not."""
+        """The time at which control was lost, s; None if it was not lost."""
         return self.summary.get("diverged_at_s")
 
     @property
@@ -134,8 +134,8 @@ def _arrays(recording: Recording) -> dict[str, Array]:
 
 
 def perform_all(jobs: Iterable[Work], progress: Callable[[float], None] | None = None) -> Results:
-    """Runs jobs, equal jobs only once: first on all cores, then the timed jobs one after the other in this
-    process.
+    """Runs jobs, equal jobs only once. The jobs that are not timed run first, on all cores; then the timed
+    jobs run one after the other in this process.
 
     Args:
         jobs: what to run.
@@ -144,7 +144,7 @@ def perform_all(jobs: Iterable[Work], progress: Callable[[float], None] | None =
     Returns:
         the runs by job. A job that cannot be done is a run with an error sentence.
     """
-    # Long ones first: a core is not left idle at the end.
+    # Long jobs run first: no core is left idle at the end.
     unique = sorted(dict.fromkeys(jobs), key=_work, reverse=True)
     shared = [job for job in unique if not job.timed]
     timed = [job for job in unique if job.timed]
@@ -165,7 +165,7 @@ def perform_all(jobs: Iterable[Work], progress: Callable[[float], None] | None =
 
 
 def _work(job: Work) -> float:
-    """A guess of a job's cost, to order jobs and to show progress."""
+    """Returns an estimate of a job's cost, for the order of the jobs and for the progress."""
     spec = job.spec
     horizons = [float(each.partition("=")[2]) for each in spec.set if each.startswith("horizon=")]
     horizon = horizons[-1] if horizons else 5.0

@@ -1,4 +1,4 @@
-"""How to find M̄ without a model: Remark 4 of the HIMPC paper, step by step."""
+"""Finds M̄ without a model by Remark 4 of the HIMPC paper, step by step."""
 
 from __future__ import annotations
 
@@ -25,7 +25,8 @@ class Trial:
         scale: factor on the scene's M̄.
         M_bar: the diagonal tried, kg·m².
         error: RMS of the level-1 error in the second half of the run, m or rad.
-        roughness: RMS over joints and ticks of the second half of Δτ over the joint's torque limit.
+        roughness: RMS of Δτ divided by the joint's torque limit, over the joints and the ticks of the second
+            half.
         gauge: largest spectral radius of I − M⁻¹M̄ during the run; it is unknown for a real robot.
         verdict: "go on", "too small", "satisfactory", "noisy" or "control lost".
     """
@@ -47,17 +48,17 @@ def tune(
     seconds: float,
     seed: int = 0,
 ) -> Iterator[Trial]:
-    """Remark 4: begin with a sufficiently small M̄; increase it until tracking is satisfactory or the closed
-    loop almost shows a noisy response.
+    """Yields the trials of Remark 4: M̄ is small at first, and increases until tracking is satisfactory or
+    the closed loop almost shows a noisy response.
 
-    All M̄_i grow together. `chosen` returns the step that is the result.
+    All M̄_i increase by the same factor. `chosen` returns the best trial.
 
     Args:
         scene: the scene; its M̄ gives the proportions between the joints.
         start: first factor on the scene's M̄.
-        factor: from one step to the next, > 1.
-        accuracy: a level-1 error below this, m or rad, is satisfactory.
-        noise: a roughness above this is noisy.
+        factor: factor from one step to the next, > 1.
+        accuracy: a trial with a level-1 error below this, m or rad, is satisfactory.
+        noise: a trial with a roughness above this is noisy.
         seconds: simulated seconds per step.
         seed: seed of the runs.
 
@@ -75,8 +76,8 @@ def tune(
         recording = run(replace(scene, settings=settings), seconds, seed)
         error, roughness = _error(recording), _roughness(recording)
         if recording.session.diverged_at is not None:
-            # Control lost before any satisfactory step means that M̄ is too small, afterwards that it is too
-            # large.
+            # If no step has kept control before, lost control means that M̄ is too small, otherwise that it
+            # is too large.
             verdict = "control lost" if kept_control else "too small"
         elif roughness > noise:
             verdict = "noisy"
@@ -97,7 +98,8 @@ def tune(
 
 
 def chosen(steps: list[Trial]) -> Trial | None:
-    """The step with the least error among those that kept control without noise; None if none did."""
+    """The step with the least error among those that kept control without noise; None if there is no such
+    step."""
     good = [step for step in steps if step.verdict in ("go on", "satisfactory")]
     return min(good, key=lambda step: step.error, default=None)
 

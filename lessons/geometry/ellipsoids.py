@@ -14,16 +14,17 @@ from himpc.tasks import FrameOrientation, FramePosition
 Array = NDArray[np.float64]
 
 _GONE = 1e-6
-"""Directions in which joints of unit speed move by less than this, m/s or rad/s, count as lost."""
+"""Directions in which joints of unit speed move a frame more slowly than this, m/s or rad/s, count as
+lost."""
 
 
 @dataclass(frozen=True, eq=False)
 class Ellipsoid:
-    """{ẋ = J_i q̇: ‖q̇‖ ≤ 1, J_p q̇ = 0 for every level p above}, of a frame's velocity.
+    """The set {ẋ = J_i q̇: ‖q̇‖ ≤ 1, J_p q̇ = 0 for every level p above} of a frame's velocities.
 
     Attributes:
         level, task: names.
-        turns: whether the velocity is a rotational one.
+        turns: whether the velocity is an angular velocity.
         position: (3,) m, of the frame.
         axes: (3, 3), orthonormal columns, right-handed: the semi-axes' directions in the world.
         radii: (3,) m/s or rad/s for joints of unit speed, the longest first; 0 in directions without motion.
@@ -40,7 +41,7 @@ class Ellipsoid:
 def ellipsoids(configuration: Configuration, stack: Stack) -> list[Ellipsoid]:
     """The ellipsoids of all frame tasks of the enabled levels, highest priority first.
 
-    An ellipsoid has the axes that its task controls: for a task of x alone it is a needle along x.
+    An ellipsoid has the axes that its task controls: that of a task that controls x alone is a line along x.
     """
     n = configuration.q.size
     free, found = np.eye(n), []

@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class TickProblems:
-    """The problems and solutions of the strict hierarchy at one tick, whatever controller ran.
+    """The problems and solutions of the strict hierarchy at one tick, whichever controller ran.
 
     Attributes:
         plan: the plan that was applied.
@@ -55,7 +55,7 @@ def tick_of(session: TorqueSession) -> TickProblems:
         raise InputError("No QP was solved yet: let the robot run, or take a single tick (key T)")
     problems = controller.problems
     if len(problems) != len(plan.levels):
-        raise InputError("This tick held the torque and solved no QP: let the robot run on")
+        raise InputError("This tick held the torque and solved no QP: let the robot continue")
     strict: Sequence[LevelSolution] = plan.levels
     if isinstance(controller, Weighted):
         strict = solve_problems(problems, plan.rows, {})
@@ -63,12 +63,13 @@ def tick_of(session: TorqueSession) -> TickProblems:
 
 
 def plane_of(session: TorqueSession, joints: tuple[int, int], through: str, shift: float = 0.0) -> Plane:
-    """The last tick cut along the first increments of two joints.
+    """The cut through the last tick along the first increments of two joints.
 
     Args:
         session: the session.
         joints: the two joints, counted from 0.
-        through: name of the level through whose solution the cut goes; any other word: the applied solution.
+        through: name of the level whose solution lies in the cut; any other word: the applied solution lies
+            in the cut.
         shift: offset of the other joints' first increments from that solution, N·m.
 
     Raises:
@@ -91,7 +92,7 @@ def plane_of(session: TorqueSession, joints: tuple[int, int], through: str, shif
 
 
 def matrix_of(session: TorqueSession, level: str) -> Matrix:
-    """The QP of a level at the last tick; of the first level if there is none of this name.
+    """The QP of a level at the last tick; the QP of the first level if no level has this name.
 
     Raises:
         InputError: there is no such tick, see `tick_of`.

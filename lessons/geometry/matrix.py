@@ -13,7 +13,7 @@ from himpc.cascade.level import LevelProblem, LevelSolution
 from himpc.limits import Rows
 
 LARGEST = 64
-"""Largest number of rows and columns that are shown; of a larger Hessian, the first knots that fit are
+"""Largest number of rows and columns that are shown; for a larger Hessian, only the first knots that fit are
 shown."""
 DECADES = 6
 """Entries that are smaller than the largest by more than this number of powers of ten look like zero."""
@@ -21,8 +21,8 @@ DECADES = 6
 
 @dataclass(frozen=True)
 class ActiveRow:
-    """An active bound: the joint, counted from 0, the knot of the first increment on which it acts, the
-    limit, its side, and the size of its multiplier."""
+    """An active bound: the joint (counted from 0), the knot of the first increment that it restricts, the
+    limit, the side of the limit, and the size of the multiplier."""
 
     joint: int
     knot: int
@@ -37,7 +37,7 @@ class Matrix:
 
     Attributes:
         level: its name.
-        joints, knots, shown: n, N, and how many knots are shown.
+        joints, knots, shown: n, N, and the number of knots that are shown.
         shade: (k, k) int8; sign of the entry times 1 … 100, by its size on a logarithmic scale; 0 for entries
             that look like zero.
         largest: the largest entry's size, 1/(N·m)².

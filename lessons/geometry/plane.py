@@ -1,9 +1,9 @@
 """One tick's QPs cut along the increments of two joints: a box, ellipses, lines and points.
 
-All other variables of a QP (the other joints, later knots) have their values in one level's solution. In that
-cut the cost of a level is (w − c)ᵀ P (w − c) + least, w = (Δτ_a, Δτ_b) of knot 0 in N·m; the bounds are a
-box, since no row couples two joints (rows of constraints that do are left out); and the set that (33) allows
-is the plane, a line, a point or empty.
+All other variables of a QP (the other joints, later knots) have the values of one level's solution. In this
+cut the cost of a level is (w − c)ᵀ P (w − c) + least, with w = (Δτ_a, Δτ_b) of knot 0 in N·m. The bounds are
+a box, since no row couples two joints; rows of constraints that couple joints are left out. The set that (33)
+allows is the whole plane, a line, a point or empty.
 """
 
 from __future__ import annotations
@@ -28,25 +28,26 @@ _MET = 1e-7
 
 @dataclass(frozen=True, eq=False)
 class TorqueBox:
-    """lower ≤ w ≤ upper, (2,) N·m, ±inf without a bound; kinds: per joint, the kinds of the limits at (lower,
-    upper), None without a bound."""
+    """The box lower ≤ w ≤ upper, (2,) N·m, ±inf without a bound; kinds: per joint, the kinds of the limits at
+    (lower, upper), None without a bound."""
 
     lower: Array
     upper: Array
     kinds: tuple[tuple[str | None, str | None], tuple[str | None, str | None]]
 
     def inside(self, w: Array, room: float = 0.0) -> bool:
-        """Whether w is in the box, or no farther outside than `room`, N·m."""
+        """Whether w is in the box, or at most `room` outside it, N·m."""
         return bool((self.lower - room <= w).all() and (w <= self.upper + room).all())
 
 
 @dataclass(frozen=True, eq=False)
 class Allowed:
-    """The part of the plane that (33) allows: at + span·s. It is empty if `at` is None: the cut misses it.
+    """The part of the plane that (33) allows: the points at + span·s. If `at` is None, (33) allows no point
+    of the plane.
 
     Attributes:
         at: (2,) a point of it, N·m.
-        span: (2, d) orthonormal, d = 2 the whole plane, 1 a line, 0 a point.
+        span: (2, d) orthonormal; d = 2: the whole plane, 1: a line, 0: a point.
     """
 
     at: Array | None
@@ -71,13 +72,13 @@ class LevelCut:
         name: of the level.
         P: (2, 2), the cost's curvature, 1/(N·m)².
         centre: (2,) N·m, the minimum of the cost without bounds and without levels above.
-        least: the cost there.
+        least: the cost at `centre`.
         allowed: the set that the levels above leave.
         optimum: (2,) N·m, the best allowed point of the box, computed from this geometry alone; None if there
             is none.
         solved: (2,) N·m, the controller's own solution.
-        apart: distance of that solution from the cut, N·m, in directions that change the cost of this level
-            or of one above; if it is 0, the optimum is the solution.
+        apart: distance of `solved` from the cut, N·m, in the directions that change the cost of this level or
+            of a level above; if it is 0, `optimum` and `solved` are equal.
         leaves: the set that (33) leaves to the levels below this one.
     """
 
@@ -224,7 +225,7 @@ def _box(rows: Rows, pair: list[int], held: Array) -> TorqueBox:
 
 
 def _left(B: Array, wanted: Array, pair: list[int], held: Array) -> Allowed:
-    """{w: B u = wanted} with the other joints held, (33) at knot 0."""
+    """The set {w: B u = wanted} of (33) at knot 0, with the values of the other joints fixed."""
     others = held.copy()
     others[pair] = 0.0
     A, b = B[:, pair], wanted - B @ others
@@ -269,8 +270,8 @@ def _best_on(P: Array, centre: Array, at: Array, along: Array, box: TorqueBox) -
 
 
 def _stretch(at: Array, along: Array, box: TorqueBox) -> tuple[float, float]:
-    """The interval of s in which at + s·along is in the box; the first bound exceeds the second if it is
-    empty.
+    """The interval of s in which at + s·along is in the box; if the interval is empty, its first bound
+    exceeds its second.
     """
     low, high = -np.inf, np.inf
     for axis in (0, 1):

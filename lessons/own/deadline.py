@@ -17,11 +17,11 @@ _T = TypeVar("_T")
 
 
 class TooLong(BaseException):
-    """Ends a call. It is a BaseException, which user code does not catch by mistake."""
+    """Ends a call. User code does not catch a BaseException by mistake."""
 
 
 def within(seconds: float, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
-    """function(…), ended by TooLong when it takes longer."""
+    """Returns function(…). Raises TooLong if the call takes longer than `seconds`."""
     return CallDeadline(seconds).call(function, *args, **kwargs)
 
 
@@ -39,7 +39,7 @@ class CallDeadline:
         self._heard = False
 
     def call(self, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
-        """function(…). Raises TooLong."""
+        """Returns function(…). Raises TooLong if the call takes too long."""
         if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "setitimer"):
             return function(*args, **kwargs)
         self._begin()
@@ -52,7 +52,7 @@ class CallDeadline:
             signal.signal(signal.SIGALRM, before)
 
     def _begin(self) -> None:
-        """Starts the time of a call."""
+        """Starts the measurement of a call's time."""
         self._computed = time.thread_time()
         self._since = (time.monotonic(), waited(os.getpid())) if self._heard else None
 

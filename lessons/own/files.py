@@ -29,7 +29,7 @@ class Source:
     """A file as it was read.
 
     Attributes:
-        path: as it was given.
+        path: its path, as the user gave it.
         text: its content.
     """
 
@@ -43,7 +43,7 @@ class Source:
 
     @property
     def module(self) -> str:
-        """The name under which Python knows it."""
+        """The name of the file's module in Python."""
         place = hashlib.sha256(os.fsencode(Path(self.path).absolute())).hexdigest()[:12]
         return f"himpc_lab_own_{place}"
 
@@ -75,14 +75,14 @@ def fingerprint(path: str) -> str:
 
 
 def by_name(words: Iterable[str]) -> list[str]:
-    """Words to choose from, with file names instead of full paths: a code from another person must not reveal
-    folders of this machine."""
+    """Returns choices with file names instead of full paths. A message about a code from another person must
+    not reveal folders of this machine."""
     return [Path(word).name if is_file(word) else word for word in words]
 
 
 def with_fingerprint(mark: str, files: Iterable[str], kind: str) -> str:
-    """The file with a given fingerprint, among several files; kind: the kind of file, which is also the name
-    of its option. Raises InputError if no file has this fingerprint."""
+    """Returns the file, among several, that has a given fingerprint. kind: the kind of file, which is also
+    the name of its option. Raises InputError if no file has this fingerprint."""
     name = mark.partition("@")[0]
     alike = [each for each in files if is_file(each) and Path(each).name == name]
     for each in alike:

@@ -1,4 +1,4 @@
-"""The folder of the users' files that may be named while the program runs, not only at its start."""
+"""The folder with the users' files that may be named not only at the start of the program, but also later."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Folder:
 
     @classmethod
     def at(cls, name: str) -> Folder:
-        """The folder of a name. Raises InputError if there is none."""
+        """Returns the folder with this name. Raises InputError if it does not exist."""
         try:
             path = Path(os.path.realpath(name))
         except (OSError, ValueError):  # the folder "." was removed, or this is not a path
@@ -39,7 +39,7 @@ class Folder:
         relative if the file is below the folder in which the program was started.
 
         Raises:
-            InputError: it leads outside the folder. The sentence does not reveal whether there is such a
+            InputError: the path leads outside the folder. The message does not reveal whether there is such a
                 file.
         """
         given = str(self.path / name)

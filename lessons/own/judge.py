@@ -11,7 +11,7 @@ from lessons.own.load import load
 from robots import InputError
 from robots.processes.isolation import Allowance, Fault, isolated
 
-LOADING = Allowance(10.0, 2_000_000_000, "loading it", "ends the program", "leave out what does that")
+LOADING = Allowance(10.0, 2_000_000_000, "loading it", "ends the program", "leave that out")
 """Limits for loading a file before it is known to be harmless."""
 
 

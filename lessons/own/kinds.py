@@ -1,4 +1,4 @@
-"""Finds out what a user's file defines."""
+"""Determines the kind of a user's file."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def kind_of(module: ModuleType) -> Kind:
         "scene": "SCENE" in names or callable(names.get("scene")),
         "task": "TASK" in names,
         "lesson": "LESSON" in names,
-        # A solution names its exercise by a text.
+        # In a student's solution, EXERCISE is only the name of an exercise.
         "exercise": not isinstance(names.get("EXERCISE", ""), str),
     }
     found: list[Kind] = [kind for kind in KINDS if defined[kind]]

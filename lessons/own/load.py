@@ -25,7 +25,7 @@ LONGEST = 10.0
 _REFUSED = ("os.fork", "os.forkpty", "os.kill", "os.killpg", "os.exec", "os.posix_spawn", "os.system",
             "os.spawn", "pty.spawn", "signal.pthread_kill")  # fmt: skip
 _BY_ITSELF = ("subprocess.Popen",)
-"""Calls that an installed package may make during its import, and a user's file may not."""
+"""Calls that an installed package may make during its import, but that a user's file may not make."""
 _SHARED = ("builtins", "math", "numpy", "scipy", "pinocchio", "os", "time", "himpc", "robots", "lessons")
 _running: ContextVar[str] = ContextVar("_running", default="")
 
@@ -43,7 +43,7 @@ def alone(path: str) -> Iterator[None]:
 
 @cache
 def _watched() -> None:
-    """Installs one audit hook, which cannot be removed; it does nothing while no such code runs."""
+    """Installs one audit hook, which cannot be removed; it does nothing while no code runs within `alone`."""
     sys.addaudithook(_hook)
 
 
@@ -52,11 +52,11 @@ def _hook(event: str, _: Sequence[Any]) -> None:
         return
     path = _running.get()
     if path and (event in _REFUSED or _caller() == path):
-        raise PermissionError(f"a file of your own may start and signal no process ({event}): leave that out")
+        raise PermissionError(f"your own file must not start or signal a process ({event}): leave that out")
 
 
 def _caller() -> str:
-    """The file whose code starts a program."""
+    """Returns the path of the file whose code starts a process."""
     frame = sys._getframe(2)
     while frame.f_back is not None and frame.f_code.co_filename == sys.modules["subprocess"].__file__:
         frame = frame.f_back
@@ -67,7 +67,7 @@ def load(source: Source, seconds: float = LONGEST) -> ModuleType:
     """The module that a file defines.
 
     Raises:
-        InputError: it cannot be executed (the message names the line), computes or sleeps for more than
+        InputError: the file cannot be executed (the message names the line), computes or sleeps for more than
             `seconds`, starts or signals a process, or replaces an object that the lab uses, too.
     """
     before, handlers = _shared(), _handlers()
@@ -121,7 +121,7 @@ def _in_time(source: Source, seconds: float) -> ModuleType:
 
 
 def _shared() -> dict[str, dict[str, Any]]:
-    """The functions, classes and modules that are attributes of the modules of the lab and its libraries."""
+    """The functions, classes and modules in the modules of the lab and of its libraries."""
     return {
         name: {key: value for key, value in vars(module).items() if _is_code(value)}
         for name, module in list(sys.modules.items())

@@ -4,4 +4,4 @@ from lessons.papers import himpc_paper, htmpc_paper
 from lessons.papers.item import Item
 
 ITEMS: dict[str, Item] = {item.name: item for paper in (himpc_paper, htmpc_paper) for item in paper.ITEMS}
-"""Everything that can be reproduced, by name."""
+"""All items that can be reproduced, by name."""

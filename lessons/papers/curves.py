@@ -26,8 +26,8 @@ _BROAD = (2.4, 1.0)
 def by_controller(
     runs: Sequence[JobResult], field: str, k: int, scale: float = 1.0, weights: tuple[float, float] = _BROAD
 ) -> tuple[PlotCurve, ...]:
-    """A field of several controllers' runs, each in its colour. weights: widths of the first curve, if there
-    are others, and of the others; the first is broad, so that it stays visible below curves that coincide
+    """A field of several controllers' runs, each in its colour. weights: line widths of the first curve and
+    of the others. The first of several curves is broad, so that it stays visible below curves that coincide
     with it."""
     shown = [run for run in runs if len(run.t)]
     return tuple(
@@ -49,8 +49,8 @@ BAND = 0.05
 
 
 def banded(panel: Panel) -> Panel:
-    """The panel with each curve as the band between its least and largest value in windows of BAND; a signal
-    that chatters would otherwise fill an area."""
+    """Returns the panel with each curve as a band between the least and the largest value in windows of BAND.
+    As a line, a signal that chatters would fill an area."""
     return replace(panel, curves=tuple(_band(each) for each in panel.curves))
 
 
@@ -87,9 +87,9 @@ FAINTEST = 1e-4
 def log_error_panels(
     runs: Sequence[JobResult], tasks: Sequence[tuple[str, int, str, float]]
 ) -> tuple[Panel, ...]:
-    """The panels of `error_panels` with the largest size of the error in windows of BAND on logarithmic axes,
-    so that small errors are visible, too. The first half of the curves is broad, because others may coincide
-    with them."""
+    """The panels of `error_panels`, with the largest size of the error in windows of BAND on logarithmic
+    axes, so that small errors are visible, too. The first half of the curves is broad, because others may
+    coincide with them."""
     panels = []
     for panel in error_panels(runs, tasks):
         curves = tuple(
@@ -133,8 +133,8 @@ def joint_panels(
     joints: int | None = None,
     weights: tuple[float, float] = _BROAD,
 ) -> tuple[Panel, ...]:
-    """A panel per joint of a per-joint field, with ± the bound's field of the first run that has one; weights
-    as in `by_controller`."""
+    """One panel per joint of a field with one number per joint. The first run that did not fail gives the
+    bound, drawn on both sides of zero. weights: see `by_controller`."""
     known = next((run for run in runs if run.error is None), None)
     if known is None:
         return (Panel(f"${symbol}$ ({unit})", ()),)

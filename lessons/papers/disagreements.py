@@ -22,13 +22,13 @@ a run. HIMPC is Wang, Liu, Leibold, Buss, Lee, T-RO 2024; HTMPC is Du, Zhou, Sch
 
 {tally}
 
-HIMPC's paper prints neither its plants (masses, friction, how a velocity is measured) nor its code; HTMPC's
-neither its weights (ours are from the authors' published set-up) nor its targets. So a number that differs
-need not be wrong, neither theirs nor ours; but each must have a reason that can be looked at. Here is every
-row that does not agree within its tolerance, 10 % where none is named, ordered by what we think is the cause.
-*Opposite* means that an effect has the other direction. `reproduce` judges each row on both sides: it also
-fails if a disagreement shrinks or vanishes without this page being changed. Every number of ours, in the
-tables and in the texts below them, is measured by `reproduce` and held against the one stored before.
+HIMPC's paper prints neither its plants (masses, friction, how a velocity is measured) nor its code. HTMPC's
+paper prints neither its weights (ours are from the authors' published set-up) nor its targets. So if two
+numbers differ, neither of them need be wrong, but the difference must have a reason that can be examined.
+Here is every row that does not agree within its tolerance (10 % if none is named), ordered by what we think
+is the cause. *Opposite* means that an effect has the other direction. `reproduce` judges each row on both
+sides: it also fails if a disagreement shrinks or vanishes and this page is not changed. Every number of ours,
+in the tables and in the texts below them, is measured by `reproduce` and compared with the stored number.
 """
 _NO_TOPIC = Topic("", "Not explained yet", "none.", "not known.", "run the item.")
 
@@ -68,10 +68,10 @@ def _tally(rows: Sequence[Row]) -> str:
     compared = sum(counts[each] for each in ("agrees", "differs", "opposite"))
     copied = sum(row.copied and row.verdict == "agrees" for row in rows)
     return (
-        f"Of {compared} comparisons with what the papers print, {counts['agrees']} agree, "
-        f"{counts['differs']} differ and {counts['opposite']} come out the other way round. A printed number "
-        f"counts once for each of our readings of it, and {copied} of those that agree are settings that we "
-        "took over."
+        f"Of {compared} comparisons with numbers and statements of the papers, {counts['agrees']} agree, "
+        f"{counts['differs']} differ and {counts['opposite']} are opposite. A printed number counts once for "
+        f"each of our readings of it. Of the comparisons that agree, {copied} are settings that we copied "
+        "from the papers."
     )
 
 

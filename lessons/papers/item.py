@@ -11,11 +11,11 @@ from lessons.experiments.jobs import Results, Work
 from lessons.plots.panels import Picture
 
 CLOSE = 0.10
-"""Ours and the paper's number agree if their ratio differs from 1 by at most this. The papers print neither
+"""Our number and the paper's agree if their ratio differs from 1 by at most this. The papers print neither
 plant nor model error, so that a closer agreement cannot be expected."""
 
 TIE = 0.02
-"""An effect that is closer to its turning point than this share counts as no effect."""
+"""An effect whose relative distance from its turning point is smaller than this counts as no effect."""
 
 Verdict = Literal["agrees", "differs", "opposite", "no number", ""]
 Side = Literal["below", "above", "about"]
@@ -30,14 +30,15 @@ class Row:
         unit: unit of both numbers.
         paper: the printed value; None: the paper prints none.
         ours: the measured value; NaN: there is none.
-        why: one sentence with the cause if the two differ, or if there is no printed number.
+        why: one sentence with the cause if the two numbers differ, or if there is no printed number.
         turns_at: for an effect, the value at which it turns into its opposite: 1 for a ratio, 0 for a
             difference.
-        says: the side of `turns_at` that the paper states, if it prints no number.
+        says: the side of `turns_at` that the paper states, if the paper prints no number.
         within: the two numbers agree if their ratio differs from 1 by at most this.
         band: largest deviation from the stored number, as a share; times need a wide band.
-        topic: the disagreement (`lessons.papers.topics`) that explains it, if the two do not agree.
-        copied: whether ours is a setting taken from the paper instead of a measurement.
+        topic: if the two do not agree, the disagreement of `lessons.papers.topics` that explains the
+            difference.
+        copied: whether our number is a setting taken from the paper, and not a measurement.
     """
 
     quantity: str
@@ -54,7 +55,7 @@ class Row:
 
     @property
     def ratio(self) -> float | None:
-        """Ours over the paper's."""
+        """The ratio of our number to the paper's."""
         if self.paper is None or not math.isfinite(self.ours) or self.paper == 0:
             return None
         return self.ours / self.paper
@@ -90,8 +91,8 @@ class Row:
 
     @property
     def remark(self) -> str:
-        """How well ours agrees with the paper's number; `why` if it does not agree, or if the paper states
-        only a direction."""
+        """How well the two numbers agree; `why` if they do not agree, or if the paper states only a
+        direction."""
         if self.verdict == "agrees" and self.says is None:
             return (
                 f"agrees within {self.within:.4g}"
@@ -154,8 +155,8 @@ class Item:
         name: e.g. "himpc-table-2".
         title: one line.
         source: paper and section.
-        jobs: returns the runs that it needs; the argument says whether it is the quick version.
-        report: returns the section with their results. The figures of a failed run are NaN.
+        jobs: returns the runs of the item; the argument is true for the quick version.
+        report: returns the section with the results of these runs. The figures of a failed run are NaN.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""The values the papers print, one data file per table."""
+"""The values that the papers print, one data file per table."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ class Report:
     """An item with its section and the runs that failed or lost control.
 
     Attributes:
-        judged: every row and check against the stored numbers.
+        judged: every row and check, compared with the stored numbers.
     """
 
     item: Item
@@ -45,7 +45,7 @@ class Report:
 def reproduce(
     items: Sequence[Item], quick: bool = False, progress: Callable[[float], None] | None = None
 ) -> list[Report]:
-    """Runs everything that the items need, shared runs only once, and makes their sections.
+    """Performs the runs of the items, shared runs only once, and makes the sections of the items.
 
     Args:
         items: what to reproduce.
@@ -71,7 +71,7 @@ def recalled(items: Sequence[Item]) -> list[Report]:
             if item is not None:
                 section = from_memory(item, memory, quick)
                 found.append(Report(item, section, (), judged(section, memory)))
-    # The whole version counts where both are stored.
+    # If both versions are stored, the whole version counts.
     latest = {report.item.name: report for report in found}
     return [latest[item.name] for item in items if item.name in latest]
 
@@ -195,8 +195,8 @@ def _markdown(reports: Sequence[Report], quick: bool) -> str:
         f"Numbers and statements of the papers: {tally(rows)}. [Where we disagree](disagreements.md).",
         "",
         "Ratio: ours over the paper's. – : no such number. *agrees*: the ratio is within 10 % of 1, if no "
-        "other tolerance is named, since neither paper prints its plant; *opposite*: an effect is the other "
-        "way round. Every number is also held against the one stored before, on both sides.",
+        "other tolerance is named, since neither paper prints its plant; *opposite*: an effect has the other "
+        "direction. Every number is also compared with the stored one; deviations to both sides count.",
     ]
     for report in reports:
         lines += ["", f"## {report.item.name}: {report.item.title}", "", f"*{report.item.source}*"]

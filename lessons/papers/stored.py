@@ -1,4 +1,5 @@
-"""The stored measurements. New measurements are compared with them, and they are shown if nothing is run.
+"""The stored measurements. New measurements are compared with the stored ones, which are shown if nothing is
+run.
 
 `stored.json` holds, for the whole and for the quick version, the rows and checks of every item as they were
 measured at the last review. Written by `himpc-lab reproduce --store`.
@@ -83,7 +84,8 @@ def judged(section: Section, memory: StoredItem | None) -> tuple[PaperCheck, ...
 
     A row must have the stored verdict, and the stored ratio (or, if the paper prints no number, the stored
     value) within its band. A row that does not agree with the paper must have a topic that explains it. No
-    stored number may be missing, and none may be new. Without stored numbers only the topics are checked.
+    stored number may be missing now, and no number may be new. Without stored numbers only the topics are
+    checked.
     """
     found = [_explained(row) for row in section.rows if row.verdict in ("differs", "opposite")]
     if memory is None:

@@ -15,7 +15,7 @@ from lessons.replay.state import State
 from lessons.scenes.run_spec import RunSpec
 
 Measured = Mapping[tuple[str, str], tuple[float, float | None]]
-"""By item and quantity: ours, and its ratio to the paper's."""
+"""By item and quantity: our number, and its ratio to the paper's."""
 
 
 @dataclass(frozen=True)
@@ -24,9 +24,9 @@ class Quoted:
 
     Attributes:
         item, row: name of an item, and the quantity of one of its rows.
-        ratio: whether the text has ours over the paper's number instead of ours.
-        less: number that is subtracted from it: 1 turns a ratio into a change.
-        scale: factor for the unit of the text, applied after that.
+        ratio: whether the text contains the ratio of our number to the paper's, instead of our number.
+        less: number to subtract, e.g. 1, which turns a ratio into a change.
+        scale: factor for the unit of the text, applied after the subtraction.
         form: a Python format.
     """
 
@@ -57,7 +57,7 @@ class Topic:
         evidence: text about our measurements; a {name} is replaced by that number of `numbers`.
         cause: text about the most likely cause; names are replaced here, too.
         look: text that says how to see the difference.
-        scene, set: the setting that shows it; "" for none.
+        scene, set: the setting that shows the disagreement; "" for none.
         numbers: the measured numbers, by name.
         given: the numbers in the texts that are not measured, but given by a paper or a setting.
     """
@@ -79,7 +79,7 @@ class Topic:
 
     @property
     def state(self) -> State | None:
-        """The setting that shows it."""
+        """The setting that shows the disagreement."""
         return State(RunSpec(self.scene, set=self.set)) if self.scene else None
 
 

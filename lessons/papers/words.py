@@ -19,7 +19,7 @@ def number(value: float | None) -> str:
 
 
 def tally(rows: Sequence[Row]) -> str:
-    """The numbers of rows that agree, differ and are opposite, in words; "–" if there are none."""
+    """Says how many rows agree, differ and are opposite; "–" if there are none."""
     found = [row.verdict for row in rows]
     counted = [f"{found.count(each)} {words}" for each, words in _VERDICTS.items() if each in found]
     return ", ".join(counted) or "–"
@@ -51,7 +51,7 @@ def gain_rows(scene: str, table: dict[str, Any]) -> tuple[Row, ...]:
                     unit,
                     entry[gain],
                     ours,
-                    "the scene was given other gains",
+                    "the scene has other gains",
                     within=1e-9,
                     band=1e-9,
                     copied=True,

@@ -17,7 +17,7 @@ from lessons.plots.style import BOUND, RC, REFERENCE, colour
 from lessons.plots.ticks import label_values
 
 WIDTH = 7.2
-"""Inches: a page between its margins."""
+"""Width of a page between its margins, inches."""
 DPI = 150
 _MARKED = 12
 """A curve with at most this number of points has a marker at each point."""
@@ -82,8 +82,8 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
     if panel.y_range is not None:
         axes.set_ylim(*panel.y_range)
     elif panel.bounds and not panel.log_y:
-        # The range is that of the curve, so that distant bounds do not flatten it, but includes bounds
-        # nearby.
+        # The range is that of the curve, so that distant bounds do not flatten it, but includes nearby
+        # bounds.
         low, high = min(panel.bounds), max(panel.bounds)
         margin = 0.08 * (high - low or abs(high) or 1.0)
         bottom, top = axes.get_ylim()
@@ -97,7 +97,7 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
 
 
 def _draw_lines(axes: Axes, panel: Panel) -> None:
-    """Bounds, marked instants, shaded intervals and notes; the first of each kind is named."""
+    """Draws bounds, marked instants, shaded intervals and notes. The legend names the first of each kind."""
     dotted = (0, (4, 1.5, 1, 1.5))
     for place, bound in enumerate(panel.bounds):
         label = panel.bound_label if place == 0 else ""
@@ -180,7 +180,7 @@ def _mark_zeros(axes: Axes, panel: Bars, width: float) -> None:
 
 
 def _label_shared_x(picture: Picture, grid: np.ndarray) -> None:
-    """Removes a label that all panels of a column share from all of them but the last."""
+    """If all panels of a column have the same label, removes it from all panels except the last."""
     for column in grid.T:
         shown = [axes for axes in column if axes.axison]
         if len({axes.get_xlabel() for axes in shown}) == 1:

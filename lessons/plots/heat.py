@@ -41,7 +41,7 @@ def draw_map(
     Args:
         path: the PNG file.
         title, metric: the headline, and the quantity that colour or curve shows, with its unit.
-        labels, values, log: per axis: the path, its values, whether they have equal ratios.
+        labels, values, log: per axis: the path, its values, and whether the values have equal ratios.
         z: metric, (n,) or (n_1, n_2); NaN for a cell without a value.
         diverged, failed: cells that lost control, and cells that could not be run; same shape as z.
     """
@@ -73,7 +73,7 @@ def _norm(z: Array) -> Normalize:
 
 
 def _edges(values: tuple[float, ...], log: bool) -> Array:
-    """Borders of the cells around the values, halfway (in ratio if log)."""
+    """Borders of the cells: halfway between two values, in ratio if `log`."""
     centres = np.log(values) if log else np.array(values)
     if len(centres) == 1:
         half = 0.5 * (abs(centres[0]) or 1.0)

@@ -48,7 +48,7 @@ class Panel:
         notes: (x, y, text) beside points.
         title: above the panel.
         log_x, log_y: logarithmic axes.
-        equal: one metre is as long in x as in y.
+        equal: x and y have the same scale.
         y_range: fixed range of y; curves are cut at its ends, and the picture's caption says so.
         x_names: labels at x = 0, 1, … instead of numbers.
     """
@@ -73,7 +73,7 @@ class Panel:
 
 @dataclass(frozen=True, eq=False)
 class Bars:
-    """Groups of bars: one group per `groups`, in it one bar per series.
+    """Groups of bars: one group per entry of `groups`, with one bar per series.
 
     Attributes:
         series: (label, colour, one value per group).
@@ -88,7 +88,7 @@ class Bars:
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """Panels on a grid, one legend for all.
+    """Panels on a grid, with one legend for all panels.
 
     Attributes:
         name: file name without ending.

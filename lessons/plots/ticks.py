@@ -11,8 +11,8 @@ _FEW = 8
 
 
 def label_values(axis: Axis, values: Sequence[float], log: bool) -> None:
-    """Sets ticks at the values themselves if they are few, otherwise at round numbers, with labels that are
-    plain numbers instead of powers."""
+    """Sets ticks at the values if there are few of them, otherwise at round numbers. The labels are plain
+    numbers, without powers of ten."""
     if 0 < len(values) <= _FEW:
         axis.set_major_locator(FixedLocator(list(values)))
     elif not log and all(float(value).is_integer() for value in values):

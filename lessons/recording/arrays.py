@@ -1,4 +1,4 @@
-"""A run's rows as named arrays: those of `himpc-lab run --npz`, and of the page."""
+"""A run's rows as named arrays, for `himpc-lab run --npz` and for the page."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _PER_TASK = ("x", "x_d", "v_d", "a_d", "error")
 
 
 def arrays(recording: Recording, how: dict[str, Any]) -> dict[str, Any]:
-    """A recording, see `named`; `how`: scene, URDF, seed and settings as the user gave them."""
+    """The arrays of a recording, see `named`; `how`: scene, URDF, seed and settings as the user gave them."""
     session = recording.session
     events = [(t, event) for t, event in session.log]
     return named(session.robot, session.settings, recording.layout, recording.rows, how, events)
@@ -48,13 +48,13 @@ def named(
 
     More fields, for an independent replay:
 
-    - `q_measured`, `v_measured`: the state that the controller got;
-    - `tau_0`: the torque until the tick; at velocity level, the command;
+    - `q_measured`, `v_measured`: the state that the controller received;
+    - `tau_0`: the torque that acted until the tick; at velocity level, the command;
     - `tip`: the name of the frame; `a_max`: (n,);
     - `position_margin` (rad), `position_reaction` (s), `position_return_rate` (1/s): the constants of
-      `himpc.limits.viability`, NaN if it is not in force.
+      `himpc.limits.viability`, NaN if this limit is not in force.
 
-    x_d, v_d and a_d at the next knot are those of the next row.
+    The values of x_d, v_d and a_d at the next knot are in the next row.
 
     Args:
         robot, settings: those at the end of the run.

@@ -18,8 +18,8 @@ from robots import Robot
 
 def constants(robot: Robot, settings: SceneSettings) -> dict[str, Any]:
     """a_max, (n,) rad/s² (m/s²), and the constants of the bound that stops a joint before its limit: margin
-    (rad), reaction (s) and return rate (1/s); NaN if that bound is not in force. At velocity level it never
-    is."""
+    (rad), reaction (s) and return rate (1/s); NaN if this bound is not in force. It is never in force at
+    velocity level."""
     a_max, *bound = _OF[type(settings)](robot, settings)
     names = ("position_margin", "position_reaction", "position_return_rate")
     return {"a_max": np.array(a_max), **dict(zip(names, map(np.array, bound), strict=True))}

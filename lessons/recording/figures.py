@@ -1,4 +1,4 @@
-"""Figures that the summaries of both kinds of runs hold."""
+"""Figures that the summaries of both kinds of runs contain."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def qp_figures(recording: Recording, fallbacks: Sequence[str]) -> dict[str, Any]
 
 
 def position_share(recording: Recording) -> float | None:
-    """The largest distance of a joint from mid-range over half its range."""
+    """The largest distance of a joint from the middle of its range, divided by half its range."""
     with np.errstate(all="ignore"):
         middle = 0.5 * (recording["q_lower"] + recording["q_upper"])
         half = 0.5 * (recording["q_upper"] - recording["q_lower"])

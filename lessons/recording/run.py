@@ -48,10 +48,10 @@ def record(
     progress: Callable[[float], None] | None = None,
     to_the_end: bool = False,
 ) -> Recording:
-    """As `run`, for a session that has begun."""
+    """As `run`, for a session that has already begun."""
     rows, elapsed, started = [], 0.0, perf_counter()
     layout = session.layout
-    # Half a period's tolerance: a sum of periods carries rounding.
+    # Half a period of tolerance: a sum of periods contains rounding errors.
     while not rows or elapsed < seconds - 0.5 * session.settings.T_s:
         row = session.tick().copy()
         if session.layout is not layout:  # an event changed the stack

@@ -53,8 +53,8 @@ def _contact(recording: Recording) -> dict[str, float]:
 
 
 def _levels(recording: Recording) -> list[dict[str, Any]]:
-    """Per enabled level the number of its rows, and of the directions that it gets at the robot's final
-    pose."""
+    """Per enabled level, the number of its rows, and the number of directions that the level can control at
+    the robot's final pose."""
     found = recording.session.ranks()
     return [{"name": name, "rank": rank, "rows": rows} for name, (rank, rows) in found.items()]
 
@@ -87,7 +87,7 @@ def _limits(recording: Recording) -> dict[str, dict[str, float | None]]:
         acceleration = np.diff(v, axis=0) / session.settings.T_s
         return {
             "torque": {
-                # While a limit is being tightened the two sides may differ.
+                # While a limit is tightened, its two sides may differ.
                 "max_ratio": peak(_share(recording["tau_demand"], recording)),
                 "applied_max_ratio": peak(_share(recording["tau"], recording)),
             },
@@ -100,7 +100,7 @@ def _limits(recording: Recording) -> dict[str, dict[str, float | None]]:
 
 
 def _share(tau: Array, recording: Recording) -> Array:
-    """Torque over the bound on its side."""
+    """The ratio of a torque to the bound on its side."""
     return np.maximum(tau / _bounded(recording["tau_upper"]), tau / _bounded(recording["tau_lower"]))
 
 

@@ -64,7 +64,8 @@ def _mean(values: Array) -> float | None:
 
 
 def _part(recording: Recording, name: str, start: float, end: float) -> dict[str, Any]:
-    """One part of a run; normalised errors are the base error over that at the part's start."""
+    """One part of a run; a normalised error is the base error divided by its value at the start of the
+    part."""
     t = recording["t"][:, 0]
     rows = (t >= start - 1e-9) & (t < end - 1e-9)
     base = np.linalg.norm(recording["error/base"][rows], axis=1)

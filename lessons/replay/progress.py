@@ -33,7 +33,7 @@ Proof = Literal["signed", "not signed", "signed with another key"]
 
 @dataclass(frozen=True)
 class LearnerProgress:
-    """The steps that a learner has seen, and the points of challenges.
+    """The steps whose run a learner has seen, and the points of challenges.
 
     Attributes:
         seen: per lesson the places of the steps whose run was seen.
@@ -52,7 +52,7 @@ class LearnerProgress:
         return replace(self, best={**self.best, lesson: max(points, self.best.get(lesson, 0.0))})
 
     def next_place(self, lesson: str, steps: int) -> int:
-        """The first step not seen yet; 0 if all were."""
+        """The first step that was not seen; 0 if all steps were seen."""
         seen = self.seen.get(lesson, frozenset())
         return next((place for place in range(steps) if place not in seen), 0)
 
@@ -64,15 +64,15 @@ class LearnerProgress:
 
 
 def kept(progress: LearnerProgress, key: bytes | None, account: str = "") -> str:
-    """The progress in the form that the browser stores. account: the name with which the learner signed in;
-    with a key, it is signed as well."""
+    """The progress in the form that the browser stores. account: the name with which the learner signed in; a
+    key signs this name, too."""
     text = progress.dumped()
     return text if key is None else _seal(_of(account, text), key) + text
 
 
 def load_progress(text: str | None, key: bytes | None, account: str = "") -> LearnerProgress:
-    """The progress that a browser stored; with a key, only progress of this account that is signed with
-    it."""
+    """The progress that a browser stored. With a key, only progress that is signed with it for this account
+    counts."""
     if key is None or not text:
         return progress_from(text)
     seal, body = text[:64], text[64:]
@@ -123,8 +123,8 @@ class HandedIn:
         at: time, ISO 8601.
         progress: progress in the lessons.
         code: state code of the setting on the page at that time; "" if none could be made.
-        account: the name with which the learner signed in, as the proxy in front of the lab told it; "" if
-            there was none.
+        account: the name with which the learner signed in, as reported by the proxy in front of the lab; ""
+            if there was none.
     """
 
     name: str
@@ -135,7 +135,7 @@ class HandedIn:
 
 
 def written(handed: HandedIn, key: bytes | None) -> str:
-    """What a learner hands in, as a text of letters, digits, "-" and "_"."""
+    """The text that a learner hands in; it has only letters, digits, "-" and "_"."""
     given = {"n": handed.name[:LONGEST_NAME], "t": handed.at, "p": handed.progress.dumped(), "c": handed.code}
     given |= {"a": handed.account} if handed.account else {}
     body = base64.urlsafe_b64encode(zlib.compress(json.dumps(given, ensure_ascii=False).encode(), 9))
@@ -144,8 +144,8 @@ def written(handed: HandedIn, key: bytes | None) -> str:
 
 
 def read_handed_in(text: str, key: bytes | None) -> tuple[HandedIn, Proof]:
-    """Reads a text that was handed in, and checks its seal. Without a key a signature cannot be checked, and
-    the text counts as not signed.
+    """Reads a text that was handed in, and checks its signature or checksum. Without a key a signature cannot
+    be checked, and the text counts as not signed.
 
     Raises:
         InputError: the text is of another kind, incomplete or damaged, or was written by a newer version.

@@ -97,7 +97,7 @@ def _arguments(run: RunSpec) -> tuple[str | None, ...]:
 
 
 def _measures_time(settings: SceneSettings, events: Log) -> bool:
-    """Whether the run depended on measured time at any point."""
+    """Whether the run depended on measured times at any moment."""
     for event in (None, *(event for _, event in events)):
         settings = settings if event is None else settings_after(settings, (event,))
         if settings.measures_time:
@@ -116,7 +116,7 @@ def _tuple(name: str, items: Iterable[str]) -> str:
 
 
 def _call(event: Event) -> str:
-    """An event as the call that makes it, without arguments that have their default value."""
+    """The Python call that creates an event, without arguments that have their default value."""
     given = [
         f"{field.name}={_literal(value)}" if place > 1 else _literal(value)
         for place, field in enumerate(fields(event))
@@ -126,7 +126,7 @@ def _call(event: Event) -> str:
 
 
 def _literal(value: Any) -> str:
-    """A Python literal: NumPy's numbers and arrays as plain ones."""
+    """A Python literal: NumPy's numbers and arrays become plain numbers and lists."""
     if isinstance(value, (np.ndarray, np.generic)):
         return _literal(value.tolist())
     if isinstance(value, (list, tuple)):

@@ -24,7 +24,7 @@ VERSION = 1
 """Version of the format; a higher number means that an older himpc-lab cannot read the code."""
 
 MAX_CODE = 12_000
-"""Characters: a length that still fits into a link or a chat message."""
+"""Largest number of characters of a code, which still fits into a link or a chat message."""
 _MAX_TEXT = 60_000
 _MAX_ASSIGNMENTS = 500
 _MAX_ASSIGNMENT = 2_000
@@ -41,7 +41,7 @@ class State:
         run: the run; its assignments contain all differences from the scene's own settings. It has no events
             and lasts as long as the scene.
         lesson: name of the active lesson.
-        step: its place in the lesson, 1 being the first.
+        step: its place in the lesson; the first step has place 1.
     """
 
     run: RunSpec
@@ -113,8 +113,8 @@ def _marked(value: Any) -> Any:
 
 
 def decode(code: str) -> State:
-    """The state of a code. It is data only: names and numbers, which are checked once more when the scene is
-    prepared; nothing in it is executed, and it opens no file.
+    """Returns the state in a code. A code is data only: names and numbers, which are checked once more when
+    the scene is prepared. Nothing in it is executed, and it opens no file.
 
     Raises:
         InputError: the text is not a code, is incomplete or changed, or was made by a newer version.
@@ -138,7 +138,7 @@ def _body(code: str) -> str:
     found = _PREFIX.match(code)
     if found is None or not re.fullmatch(r"[\w-]+", code, re.ASCII):
         raise InputError(
-            f"this is not a state code: one begins with hl{VERSION}- and has only letters, digits, - and _"
+            f"this is not a state code: a code begins with hl{VERSION}- and has only letters, digits, - and _"
         )
     if int(found[1]) > VERSION:
         raise InputError(

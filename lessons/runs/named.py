@@ -30,10 +30,10 @@ TASK_SCENE = "iiwa14-hold"
 def scene_named(
     name: str, urdf: str | None = None, tip: str | None = None, urdf_text: str | None = None
 ) -> Scene:
-    """A scene by its name, or the scene or task of a file; arguments as of `load_scene`.
+    """A scene by its name, or the scene or task of a file; the arguments are those of `load_scene`.
 
     Raises:
-        InputError: as `load_scene`; or the file cannot be used, with its line.
+        InputError: see `load_scene`; or the file cannot be used, and the message names the line.
     """
     if not is_file(name):
         return load_scene(name, urdf, tip, urdf_text)
@@ -44,7 +44,7 @@ def scene_named(
 
 @lru_cache(maxsize=64)
 def _scene_of(source: Source) -> Scene:
-    """The scene of a file. Each content of a file is tested only once."""
+    """The scene of a file. A file is tested again only if its content has changed."""
     module = module_of(source)
     if kind_of(module) == "task":
         return with_task(load_scene(TASK_SCENE), source.path)
@@ -85,7 +85,8 @@ def with_task(scene: Scene, name: str) -> TorqueScene:
 
 
 def with_tasks(scene: Scene, files: Iterable[str]) -> Scene:
-    """The scene with the tasks of files added to the kinds that its stack may name, if it takes torques.
+    """The scene with the tasks of files added to the kinds that its stack may name. A scene at velocity level
+    is returned unchanged.
 
     Raises:
         InputError: a file cannot be used, or the task's Jacobian is wrong.
@@ -95,7 +96,7 @@ def with_tasks(scene: Scene, files: Iterable[str]) -> Scene:
 
 def with_files(scene: Scene, controllers: Iterable[str], tasks: Iterable[str]) -> Scene:
     """The scene with users' files attached: files of controllers that it may use, and files of tasks that its
-    stack may name. A scene at velocity level cannot have files.
+    stack may name. A scene at velocity level is returned unchanged.
 
     Raises:
         InputError: the file of a task cannot be used, or the task's Jacobian is wrong.
@@ -104,7 +105,7 @@ def with_files(scene: Scene, controllers: Iterable[str], tasks: Iterable[str]) -
 
 
 def misfits(robot: Robot, files: Iterable[str]) -> dict[str, str]:
-    """Per file whose task cannot be used on a robot, the sentence of the error."""
+    """The error messages of the files whose task cannot be used on a robot, by file."""
     found = {}
     for name in files:
         try:
@@ -115,7 +116,7 @@ def misfits(robot: Robot, files: Iterable[str]) -> dict[str, str]:
 
 
 def _task_for(robot: Robot, name: str) -> Task:
-    """The task of a file. Raises InputError if it cannot be used, or not on this robot."""
+    """The task of a file. Raises InputError if it cannot be used at all or on this robot."""
     task = task_in(name)
     called(read(name), partial(check_task, task, robot, name))
     return task

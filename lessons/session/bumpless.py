@@ -49,8 +49,8 @@ class Handover:
         self.new.reset(tau_0)
 
     def configure(self, settings: Settings) -> None:
-        """Gives the settings to both. Raises InputError, without any change, if they do not fit the new
-        one."""
+        """Gives the settings to both controllers. Raises InputError, without any change, if they do not fit
+        the new controller."""
         self.new.configure(settings)
         if self._old is not None:
             try:
@@ -61,7 +61,7 @@ class Handover:
     def step(
         self, q: Array, v: Array, previews: Mapping[str, Preview], tau_applied: Array | None = None
     ) -> Plan:
-        """One control period of both; `step_us` counts the new controller only."""
+        """Computes one control period of both controllers; `step_us` counts the new controller only."""
         plan = self.new.step(q, v, previews, tau_applied)
         if self._old is None:
             return plan
@@ -76,5 +76,5 @@ class Handover:
 
 
 def settled(controller: Controller) -> Controller:
-    """The controller itself, or the new one of a hand-over that is done."""
+    """Returns the controller itself or, for a finished hand-over, its new controller."""
     return controller.new if isinstance(controller, Handover) and controller.done else controller

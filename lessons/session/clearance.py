@@ -1,4 +1,4 @@
-"""The distance of the nearest pair of a robot's links and of what is around it, for telemetry."""
+"""The distance of the nearest pair among a robot's links and the objects around it, for telemetry."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Nearest(NamedTuple):
     """The nearest pair: its distance minus the distance that it must keep is the smallest of all pairs.
 
     Attributes:
-        distance: m, negative inside; NaN if no pair is near.
+        distance: m, negative if the two penetrate each other; NaN if no pair is near.
         kept: the distance that the pair must keep, d_safe plus its margin, m; NaN unless distances are kept.
         pair: its names.
     """
@@ -38,8 +38,8 @@ NOTHING = Nearest()
 
 
 class Clearance:
-    """Measures the nearest pair from the plant's true state, whatever the controller. It measures nothing
-    unless distances are kept or the world has more than a floor."""
+    """Measures the nearest pair from the plant's true state, for every controller. Nothing is measured unless
+    distances are kept or the world has more than a floor."""
 
     def __init__(self, plant: Plant) -> None:
         self._plant = plant

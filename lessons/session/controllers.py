@@ -1,4 +1,4 @@
-"""A controller by its name, or by the path of a file of one's own."""
+"""A controller by its name, or by the path of a user's file."""
 
 from __future__ import annotations
 

@@ -13,9 +13,9 @@ class DelayedTorque:
 
     A tick whose torque is in time applies it and discards the waiting torque: an old torque never acts after
     a newer one. A tick whose torque is late applies the waiting torque or, if there is none, holds the torque
-    of the previous tick; its own torque then waits. So one late tick costs one tick of holding, and of two
-    late ones in a row the second applies the first one's torque: a controller that is always late acts
-    exactly like one whose torque is delayed by one tick. However late it is, it waits at most one tick.
+    of the previous tick; its own torque then waits. So one late tick costs one tick of holding. Of two late
+    ticks in a row, the second applies the torque of the first. A controller that is always late acts exactly
+    like one whose torque is delayed by one tick. A torque waits at most one tick, however late it is.
     """
 
     def __init__(self) -> None:

@@ -15,15 +15,15 @@ from lessons.settings.settings import SceneSettings
 from robots import InputError
 
 _SAME = 1e-6
-"""s: times closer than this are the same moment; ticks are further apart."""
+"""s: times closer than this count as the same moment; ticks are further apart."""
 
 
 def ghost_scene(scene: Scene, leader: SceneSettings, own: Sequence[str]) -> Scene:
     """The scene that a ghost runs.
 
     Args:
-        scene: as the leader loaded it.
-        leader: the leader's settings at its last reset, where both begin.
+        scene: the scene, as the leader loaded it.
+        leader: the leader's settings at its last reset, at which both begin.
         own: assignments "PATH=VALUE" on top of them.
 
     Raises:
@@ -38,14 +38,14 @@ class GhostDriver:
 
     The ghost's settings are, at any time, the leader's with its own assignments on top: if the leader changes
     a setting that the ghost assigns itself, the ghost does not change; every other change applies to the
-    ghost, too. With no assignments the rows are the leader's to the last bit.
+    ghost, too. Without assignments, the ghost's rows are equal to the leader's to the last bit.
 
     A reset takes effect at once, even if the ghost had not yet reached the leader's time.
     """
 
     def __init__(self, session: Session, leader: SceneSettings, own: Sequence[str]) -> None:
-        """session: of `ghost_scene`, fresh; leader: the leader's settings at the last reset, where both
-        begin; own: assignments."""
+        """session: a new session of `ghost_scene`; leader: the leader's settings at the last reset, at which
+        both begin; own: assignments."""
         self.session = session
         self._scene = session.scene
         self._leader = leader
@@ -69,11 +69,11 @@ class GhostDriver:
 
     @property
     def due(self) -> bool:
-        """Whether the leader is at least one of the ghost's control periods further."""
+        """Whether the leader is at least one of the ghost's control periods ahead."""
         return self.session.t + self.session.settings.T_s <= self._until + _SAME
 
     def take(self) -> None:
-        """Takes the events that are due; to be called after every control period."""
+        """Applies the events that are due. It must be called after every control period."""
         while self._script and self._script[0][0] <= self.session.t + _SAME:
             self._take(self._script.popleft()[1])
         self.session.drain()
@@ -107,8 +107,8 @@ def swapped(settings: SceneSettings, own: Sequence[str]) -> tuple[tuple[str, ...
         own: the ghost's assignments.
 
     Returns:
-        the ghost's new assignments, with the leader's present values; and the events that give the leader
-        the ghost's.
+        the ghost's new assignments, with the leader's present values; and the events that give the ghost's
+        values to the leader.
 
     Raises:
         InputError: an assignment sets more than one value, or has an unknown path.

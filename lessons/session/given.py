@@ -1,4 +1,4 @@
-"""What a controller was given at a tick."""
+"""The inputs of a controller at a tick."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 
 class Given(NamedTuple):
-    """The inputs of a controller at a tick: the measured state, (n,) each, and the references' previews."""
+    """The measured state, (n,) each, and the references' previews: all inputs of a controller at a tick."""
 
     q: Array
     v: Array

@@ -1,4 +1,4 @@
-"""What the simulation tells a controller of the objects around the robot: their true places."""
+"""The objects around the robot as the simulation reports them to a controller: at their true places."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from robots.world import Post, Thing
 
 
 def observed(plant: Plant, avoidance: Avoidance) -> Observed:
-    """The objects of a plant's world where they are now, if distances are kept."""
+    """The objects of a plant's world at their present places, if distances are kept."""
     return objects_of(plant) if avoidance.on else NOTHING
 
 
 def objects_of(plant: Plant) -> Observed:
-    """The objects of a plant's world where they are now. A free box or post counts as upright."""
+    """The objects of a plant's world at their present places. A free box or post counts as upright."""
     shapes, moving = [thing.shape for thing in plant.world], plant.object_velocities()
     if not len(moving):
         return Observed(tuple(shapes))

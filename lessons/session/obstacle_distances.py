@@ -1,5 +1,5 @@
-"""The distances between a robot and its obstacles at velocity level: where they are, and where they are
-reported."""
+"""The distances at velocity level between a robot and its obstacles, at their true and at their reported
+places."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ WITHIN = 1.0
 
 
 class ObstacleDistances:
-    """Measures the nearest obstacle, whatever the controller does about it."""
+    """Measures the distance to the nearest obstacle, for every controller."""
 
     def __init__(self, robot: Robot, settings: HTMPCSettings) -> None:
-        """settings: with the obstacles where they are."""
+        """settings: contain the obstacles at their true places."""
         self._robot, self._self_collision = robot, settings.self_collision
         self._obstacles = self._reported = settings.obstacles
         self._true = self._told = CollisionModel(robot, settings.obstacles, settings.self_collision)
 
     def tell(self, obstacles: tuple[Obstacle, ...]) -> None:
-        """Sets the obstacles as they are reported, which may differ from the true ones."""
+        """Sets the reported obstacles, which may differ from the true ones."""
         if obstacles == self._reported:
             return
         self._reported = obstacles
@@ -37,7 +37,7 @@ class ObstacleDistances:
         self._told = self._true if same else CollisionModel(self._robot, obstacles, self._self_collision)
 
     def at(self, q: Array) -> Array:
-        """Distances to the nearest obstacle, (2,) m: as they are, and as they are reported; negative inside,
+        """Distances to the nearest true and to the nearest reported obstacle, (2,) m; negative inside,
         infinite if none is within WITHIN. q: (n,), the true positions."""
         true = _least(self._true, q)
         return np.array([true, true if self._told is self._true else _least(self._told, q)])

@@ -9,8 +9,8 @@ from himpc.telemetry import Layout
 
 class Places(NamedTuple):
     """The indices of the fields that a session writes into a row. `truth` is the first of three adjacent
-    values that need the plant's M; `touch` is the depth of a contact, and the force follows it; `near` is a
-    distance, and what is kept of it follows it."""
+    values that need the plant's M; `touch` is the depth of a contact, and the next value its force; `near` is
+    the distance of the nearest pair, and the next value the distance that it must keep."""
 
     t: int
     late: int

@@ -14,7 +14,7 @@ COMMAND_HZ = 100.0
 
 
 def command_step(period: float) -> tuple[int, float]:
-    """(commands in a control period, s between two)."""
+    """Returns the number of commands in a control period, and the time between two commands, s."""
     count = max(1, round(period * COMMAND_HZ))
     return count, period / count
 
@@ -48,5 +48,5 @@ class Commands:
 
     @property
     def done(self) -> bool:
-        """Whether all commands of the period were given."""
+        """Whether all commands of the period were returned."""
         return self._given == self._count

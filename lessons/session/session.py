@@ -18,7 +18,7 @@ from robots import InputError, Plant, Robot, VelocityPlant
 Array = NDArray[np.float64]
 
 LOST_SPEED = 20.0
-"""A joint faster than this many times its limit counts as divergence."""
+"""A joint whose speed is more than this many times its limit counts as divergence."""
 
 
 class Session(ABC):
@@ -26,7 +26,7 @@ class Session(ABC):
     wait in the mailbox until a period begins.
 
     Attributes:
-        scene: the scene that it started from.
+        scene: the scene from which the session started.
         seed: seed of the run; all randomness comes from it.
         robot: the scene's robot.
         settings: the settings in force.
@@ -34,7 +34,7 @@ class Session(ABC):
         plant: the simulation.
         diverged_at: simulated time at which control was lost, s; None if it was not.
         failure: one sentence if the user's code no longer controls the robot; None as long as it does.
-        notices: sentences for the learner (refused events, divergence); drain them.
+        notices: sentences for the learner (refused events, divergence); the reader removes them.
         log: (time, event) of every event that took effect.
     """
 
@@ -73,14 +73,15 @@ class Session(ABC):
     @property
     @abstractmethod
     def over(self) -> bool:
-        """Whether the run is complete, which ends a headless run."""
+        """Whether the run is complete; a headless run then ends."""
 
     @abstractmethod
     def advance(self) -> Array | None:
-        """One step; the row of `tick` if a control period ended with it, else None."""
+        """Computes one step. Returns the row of `tick` if a control period ended with it, else None."""
 
     def tick(self) -> Array:
-        """One control period; returns the row of telemetry at its start (a buffer: copy it to keep it)."""
+        """Computes one control period. Returns the row of telemetry at its start (a buffer: copy it to keep
+        it)."""
         row = self.advance()
         while row is None:
             row = self.advance()
@@ -130,20 +131,20 @@ class Session(ABC):
 
     @abstractmethod
     def _happen(self, event: Event) -> None:
-        """Carries out an event that changes no settings. Raises InputError for an event that this kind does
-        not have.
+        """Carries out an event that changes no settings. Raises InputError for an event that this kind of
+        session does not have.
         """
 
     @abstractmethod
     def adopt(self, settings: SceneSettings) -> None:
-        """Takes over settings of the scene's kind at once, as an event that changed them would. Raises
-        InputError if they do not fit."""
+        """Takes over settings of the scene's kind at once, like an event that changes them. Raises InputError
+        if they do not fit."""
 
     # ---------------------------------------------------------------- state for the page
 
     @property
     def settings_now(self) -> SceneSettings:
-        """The settings in force, including the state of the run that a scene can start with."""
+        """The settings in force, including the part of the run's state with which a scene can start."""
         return self.settings
 
     @abstractmethod

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 
 def target_at(task: Task, value: Array) -> Target:
-    """A draggable target of a task that starts at one of its `Task.target`s."""
+    """A draggable target of a task. It starts at `value`, a result of `Task.target`."""
     if value.ndim == 2:
         return dragged_target(value, ROTATION_CAPS)
     in_space = task.unit == "m" or isinstance(task, Pointing)
@@ -35,7 +35,7 @@ def kept(task: Task, reference: Reference | None, value: Array) -> Reference:
     Args:
         task: the task.
         reference: the scene's, if it has one for a task of that name.
-        value: one of its `Task.target`s.
+        value: a result of its `Task.target`.
     """
     if reference is not None:
         preview = reference.preview(0.0, 1e-3, 1)
@@ -45,7 +45,7 @@ def kept(task: Task, reference: Reference | None, value: Array) -> Reference:
 
 
 def carried(old: Task, reference: Reference, task: Task, value: Array) -> Reference:
-    """The reference of a task that replaces an old task of its name, without a jump.
+    """Returns the reference, without a jump, of a task that replaces an old task of the same name.
 
     A task that controls the same coordinates keeps the reference. If the task controls other axes of the same
     frame, its target keeps its value along the axes that remain, and has the robot's present value along the

@@ -190,7 +190,7 @@ class TorqueSession(Session):
 
     def renew(self) -> None:
         """Switches to the user's changed code without a jump in torque. Raises InputError if the code has a
-        fault; the old code then stays."""
+        fault; the old code then remains in use."""
         self._hand_over(self._controller_of(self.settings, self.robot))
         self.failure = None
 
@@ -225,7 +225,7 @@ class TorqueSession(Session):
         if self.diverged_at is None:
             wild = self._is_wild(q, v)
             if wild or self._is_far(row):
-                # A target dragged out of reach makes the level-1 error large, too: no notice.
+                # A target that was dragged out of reach also makes the level-1 error large: no notice.
                 self._lost(t, notice=wild)
         return row
 
@@ -287,7 +287,7 @@ class TorqueSession(Session):
         return path
 
     def ranks(self) -> dict[str, tuple[int, int]]:
-        """Per enabled level the number of directions it can control now, and its rows."""
+        """Per enabled level, the number of directions that it can control now, and of its rows."""
         q = np.asarray(self.plant.q)
         return ranks(self.settings.levels, Configuration(self.robot, self._data, q, q))
 

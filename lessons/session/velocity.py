@@ -33,8 +33,8 @@ Array = NDArray[np.float64]
 
 @final
 class VelocitySession(Session):
-    """A run whose controller gives velocities. A control period is one or more commands to the servos, and
-    `advance` is one of them.
+    """A run whose controller gives velocities. A control period has one or more commands to the servos;
+    `advance` sends one of them.
 
     Attributes:
         bounds: the bounds in force.
@@ -83,8 +83,8 @@ class VelocitySession(Session):
 
     @property
     def settings_now(self) -> VelocitySettings:
-        """The settings in force. If the scene has an option for the order of priorities, it contains the
-        present order of the run."""
+        """The settings in force. If the scene has an option for the order of priorities, this option contains
+        the present order of the run."""
         settings, options = self.settings, self.settings.options
         order = tuple(task.name for task in self.progress.mission if task.name in self.roles)
         if not isinstance(options, OrderOptions) or len(order) < len(self.roles):
@@ -111,7 +111,7 @@ class VelocitySession(Session):
 
     def adopt(self, settings: SceneSettings) -> None:
         assert isinstance(settings, VelocitySettings)
-        # A controller that refuses them leaves everything as it is; the window's order comes with the tick.
+        # If the controller refuses the settings, nothing changes. The next tick sets the order of the window.
         fitted = make_velocity_controller(settings.controller, self.robot, settings.htmpc)
         if settings.controller != self.settings.controller:
             self.controller = fitted if self.controller is not None else None
@@ -126,8 +126,8 @@ class VelocitySession(Session):
         if settings.options.decoupled and self.progress.window:
             base = base_joints(self.robot)
             driving = self.progress.window[0].task.role == "base"
-            # The base may turn on the spot: an arm that reaches only forwards could not reach a goal behind
-            # it.
+            # The base may turn on the spot: otherwise an arm that reaches only forwards could not reach a
+            # goal behind it.
             still = set(range(self.robot.n)) - set(base) if driving else set(base[:2])
             hold = (*hold, *(self.robot.joint_names[joint] for joint in sorted(still)))
         told = settings.options.reported(settings.htmpc.obstacles, self.t)
@@ -160,8 +160,8 @@ class VelocitySession(Session):
         return command_step(self.settings.T_s)[1] if self._commands is None else self._commands.h
 
     def advance(self) -> Array | None:
-        """One command to the servos, after planning if a control period begins; the row of `tick` when the
-        period is over, else None."""
+        """Sends one command to the servos, after planning if a control period begins. Returns the row of
+        `tick` when the period is over, else None."""
         if self._commands is None:
             self._commands = self._decide()
             self._nearest = self._distances.at(self.plant.q)

@@ -79,8 +79,8 @@ FALLBACKS = ("solve", "widened", "keep")
 def write_plan(row: Array, layout: Layout, plan: VelocityPlan, delta: float | None) -> None:
     """Writes the values of a plan into a row filled with NaN; a level without a role is left out.
 
-    delta: δ of (12), m (or rad), which gives `bound`: the bound that the levels below must respect for a
-    level's error at knot 1, ‖|e*| + δ‖ over its coordinates. None: (12) is not in force, and there is no such
+    delta: δ of (12), m (or rad), which gives `bound`: the bound on a level's error at knot 1 that the levels
+    below must respect, ‖|e*| + δ‖ over its coordinates. None: (12) is not in force, and there is no such
     bound.
     """
     fields = layout.fields
@@ -114,7 +114,7 @@ def write_truth(
 ) -> None:
     """Writes the true positions of the points, their present references, and the errors.
 
-    places: of the roles in the window, 1 the first; references: of the same roles.
+    places: the places of the roles in the window, from 1; references: those of the same roles.
     """
     fields = layout.fields
     t = float(row[fields["t"]][0])
@@ -141,7 +141,7 @@ def manipulability(at: Configuration) -> float:
 
 
 def write_bounds(row: Array, layout: Layout) -> None:
-    """Writes which joints are at a bound: their command, its acceleration, or their position."""
+    """Writes which joints are at a bound of the command, of its acceleration, or of the position."""
     fields = layout.fields
     q, lower, upper = row[fields["q"]], row[fields["q_lower"]], row[fields["q_upper"]]
     near = 1.0 - _AT

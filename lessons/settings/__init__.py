@@ -1,1 +1,1 @@
-"""Everything a learner can change, by its path."""
+"""All settings that a learner can change, by path."""

@@ -13,7 +13,7 @@ S = TypeVar("S", bound=SceneSettings)
 
 
 def parse_assignment(text: str) -> tuple[str, Any]:
-    """("horizon", 10) from "horizon=10". Values are JSON (numbers, true, lists) or plain words.
+    """Returns ("horizon", 10) for "horizon=10". Values are JSON (numbers, true, lists) or plain words.
 
     Raises:
         InputError: there is no "=", or the value is NaN or infinite.
@@ -50,7 +50,7 @@ def with_assignments(settings: S, assignments: Iterable[str]) -> S:
 
 
 def assignment(path: str, value: Any) -> str:
-    """ "PATH=VALUE" from which `parse_assignment` gets the same value again, to the last bit."""
+    """Returns "PATH=VALUE", from which `parse_assignment` returns the same value, to the last bit."""
     if path == "order" and not any("," in name for name in value):
         value = ",".join(value)
     text = json.dumps(value, ensure_ascii=False, separators=(",", ":"), default=_plain)
@@ -73,7 +73,7 @@ def _parsed(text: str) -> Any:
 
 
 def differences(own: SceneSettings, settings: SceneSettings) -> tuple[str, ...]:
-    """The assignments that turn a scene's own settings into others of the same scene.
+    """The assignments that turn a scene's own settings into other settings of the same scene.
 
     The controller comes first, so that a setting that changes with it (its rate) is listed only if it
     differs.

@@ -13,16 +13,17 @@ class Entry:
     `robots.ranges`; this row gives the usual values.
 
     Attributes:
-        path: as of `--set`; "*" stands for a name: "levels.*.Q".
+        path: as in `--set`; "*" stands for a name: "levels.*.Q".
         label: a few words or a symbol.
         help: one or two sentences; empty if the label is enough.
         unit: of the value.
-        low, high, step: of a slider, in the unit `shown`; a value outside extends the range. step 0: about a
-            hundredth of the range.
+        low, high, step: of a slider, in the unit `shown`; a value outside the range extends it. step 0: about
+            a hundredth of the range.
         log: whether the slider is logarithmic; then low > 0.
         shown: the unit that the page shows instead; empty: `unit`.
         factor: the number of `shown` in one `unit`.
-        tries: typical values for comparisons, as typed; the first one is rarely a scene's own value.
+        tries: typical values for comparisons, as the user types them; the first is rarely a scene's own
+            value.
         name: used instead of the label if no heading names the group.
     """
 

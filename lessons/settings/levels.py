@@ -14,7 +14,7 @@ def ordered(stack: Stack, names: Any) -> Stack:
 
     Args:
         stack: the levels.
-        names: of all of them, highest priority first: "a,b,c" or a list.
+        names: the names of all levels, highest priority first: "a,b,c" or a list.
 
     Raises:
         InputError: a name is missing, unknown or given twice.
@@ -27,7 +27,7 @@ def ordered(stack: Stack, names: Any) -> Stack:
 
 
 def moved(stack: Stack, name: str, to: int) -> Stack:
-    """The levels with one of them at another place, 0 being the highest priority.
+    """The levels with one of them at another place; place 0 has the highest priority.
 
     Raises:
         InputError: no level of that name, or no such place.

@@ -17,8 +17,8 @@ class SettingLine:
     """One setting, as text.
 
     Attributes:
-        path: as of `--set`; in a list of several scenes with "*" for a name.
-        now: its value, as typed.
+        path: as in `--set`; in a list of several scenes, "*" stands for a name.
+        now: its value, as the user types it.
         allowed: the allowed values.
         unit: of the value.
         help: a description.
@@ -33,7 +33,7 @@ class SettingLine:
 
 def lines(settings: SceneSettings) -> list[SettingLine]:
     """Every setting of a scene in the order of the page. Levels are listed by their names only, although a
-    path may also contain their place."""
+    path may also contain a level's place."""
     paths = [path for path in settings.paths() if not _BY_PLACE.fullmatch(path)]
     order = [entry.path for entry in settings.entries]
     told = {path: _pattern(settings, path) for path in paths}
@@ -42,7 +42,8 @@ def lines(settings: SceneSettings) -> list[SettingLine]:
 
 
 def reference(scenes: Sequence[SceneSettings]) -> list[SettingLine]:
-    """Every setting that any of some scenes of a kind has, names written as "*"; `now` is the first one's."""
+    """Every setting of several scenes of a kind, with "*" for names; `now` is the value of the first scene
+    that has it."""
     found: dict[str, SettingLine] = {}
     for settings in scenes:
         for path in settings.paths():

@@ -20,15 +20,15 @@ from robots.ranges import Range, check_fields
 Array = NDArray[np.float64]
 Home = Mapping[str, Array]
 Architecture = Literal["hierarchical", "single_task", "decoupled"]
-"""How a sequence is carried out: two tasks at a time (L = 2); one at a time by the whole body (L = 1); or one
-at a time by a part of it: the base drives with the arm at rest, then the arm moves and the base may turn. The
-last architecture has no plan for the arm: if the arm is folded against its limits, it may not reach a goal
-behind it."""
+"""How a sequence is carried out: two tasks at a time (L = 2), one task at a time by the whole body (L = 1),
+or one task at a time by base or arm. In the last architecture the base drives with the arm at rest, then the
+arm moves and the base may turn. This architecture has no plan for the arm: if the arm is folded against its
+limits, it may not reach a goal behind it."""
 
 
 @dataclass(frozen=True)
 class MissionOptions(ABC):
-    """The choices of a scene; each field is a path of its own (`--set peak=[-2,1]`)."""
+    """The options of a scene; each field is a path of its own (`--set peak=[-2,1]`)."""
 
     parts: ClassVar[tuple[str, ...]] = ()
     """Names of equally long parts of the run that are evaluated separately."""
@@ -49,21 +49,22 @@ class MissionOptions(ABC):
 
     @property
     def decoupled(self) -> bool:
-        """Whether base and arm move in turns: one of them stands still while the other has its task."""
+        """Whether base and arm move in turns: one of them stands still while the other carries out its
+        task."""
         return False
 
     def person(self, task: str) -> int | None:
-        """The person that a task of the mission visits, 0 the first; None: nobody."""
+        """The number of the person that a task of the mission visits, from 0; None: nobody."""
         return None
 
     @property
     def misreported(self) -> tuple[float, float] | None:
-        """The time from which an obstacle is reported where it is not, and the time from which it is reported
-        right again, s; None: the controller is never told anything wrong."""
+        """The time from which an obstacle is reported at a wrong place, and the time from which it is
+        reported at its true place again, s. None: every report is right."""
         return None
 
     def reported(self, obstacles: tuple[Obstacle, ...], t: float) -> tuple[Obstacle, ...]:
-        """The obstacles as the controller is told of them at time t, s."""
+        """The obstacles as they are reported to the controller at time t, s."""
         del t
         return obstacles
 
@@ -73,12 +74,12 @@ class ArchitectureOptions(MissionOptions):
     """Scenes that compare architectures.
 
     The architectures differ only in the tasks of the window. The HTMPC paper does not print when a task
-    counts as completed, so this is an option, whose value applies to all of them.
+    counts as completed, so this is an option, whose value applies to all architectures.
 
     Attributes:
         architecture: see `Architecture`.
-        base_tolerance: a task of the base is completed within this distance of its place, m.
-        base_at_rest: whether it must also be slower than REST to be completed.
+        base_tolerance: a task of the base is completed within this distance of its goal, m.
+        base_at_rest: whether the base must also be slower than REST.
     """
 
     architecture: Architecture = "hierarchical"
@@ -127,7 +128,7 @@ class OrderOptions(MissionOptions):
 
 @dataclass(frozen=True)
 class Stay(OrderOptions):
-    """Both targets stay where they are until somebody drags them."""
+    """Both targets stay at their places until a user drags them."""
 
     def mission(self, home: Home) -> Mission:
         return self.in_order(
@@ -185,25 +186,25 @@ def random_peaks(seed: int, count: int, ee_home: Array) -> list[tuple[float, flo
 
 
 CRUISE = 0.5
-"""m/s, of the planned base and EE paths."""
+"""Speed of the planned base and EE paths, m/s."""
 HAND_TOLERANCE = 0.02
 """m: a task of the EE is completed within this distance of its goal, whatever the architecture."""
 REST = 0.02
 """m/s: a slower base counts as at rest."""
 _ANYWHERE = 100.0
-"""m: larger than any scene."""
+"""m: a distance larger than any scene."""
 
 
 @dataclass(frozen=True)
 class WaypointOptions(ArchitectureOptions):
-    """Fig. 8: two EE waypoints; in between the base goes past the first one.
+    """Fig. 8: two EE waypoints; between the two, the base drives past the first one.
 
     The hierarchical architecture sends the base straight to its place for the second waypoint. The
-    single-task one sends it first to a place at a predefined distance from the first waypoint.
+    single-task architecture first sends the base to a place at a predefined distance from the first waypoint.
 
     Attributes:
         height: m, of the first EE waypoint.
-        hold_s: s at each EE waypoint.
+        hold_s: time at each EE waypoint, s.
     """
 
     height: float = 0.8
@@ -233,7 +234,7 @@ SEATS: tuple[tuple[tuple[float, float, float], tuple[float, float]], ...] = (
 """(hand of the person, place of the base), m, anticlockwise from (2.5, 1)."""
 
 MAX_VISITS = 100
-"""Per round, and rounds: a mission is a list of all its tasks."""
+"""Largest number of visits per round, and of rounds: a mission is a list of all its tasks."""
 
 
 @dataclass(frozen=True)
@@ -245,7 +246,7 @@ class DeliveryOptions(ArchitectureOptions):
         rounds: number of visits to each person.
         hold_s: time that the EE stays at a person's hand, s; null: until the person takes the ball (event
             Release).
-        cruise: m/s of the planned base paths.
+        cruise: speed along the planned base paths, m/s.
     """
 
     seats: tuple[float, ...] = (0, 2, 5)

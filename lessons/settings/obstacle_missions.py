@@ -53,13 +53,14 @@ BESIDE_THE_WAY: tuple[Obstacle, ...] = (Floor(), Box(CRATE, (1.9, 1.4, 0.25), (0
 class PerceptionOptions(OrderOptions):
     """Hand and base move along straight parallel paths, and for a while the crate is reported elsewhere.
 
-    The controller avoids the crate where it is reported; whether something is touched depends on where it is.
+    The controller avoids the crate at its reported place; whether something is touched depends on its true
+    place.
 
     Attributes:
         false_report: whether the report is ever wrong.
         report_offset: the reported position minus the true one while the report is wrong, m.
-        report_start, report_end: times from which the report is wrong, and right again, s.
-        cruise: m/s of both paths.
+        report_start, report_end: times from which the report is wrong, and from which it is right again, s.
+        cruise: speed along both paths, m/s.
     """
 
     false_report: bool = True

@@ -25,12 +25,12 @@ class Place:
 
     Attributes:
         read: returns the value in some settings.
-        write: returns the settings with another value, which `fit` returned.
+        write: returns the settings with another value, in the form that `fit` returns.
         form: the allowed values.
-        own_fit: returns, from settings, path and value, the value as it is stored, if the form is not enough
-            for this. Raises InputError, which names the path, for a value that is not allowed.
-        shorthand: whether the value has another path, too, or the path stands for several values at once;
-            `read` then returns the first of them.
+        own_fit: used if the form is not enough. It returns the stored value for settings, path and value, and
+            raises InputError, which names the path, for a value that is not allowed.
+        shorthand: whether the value also has another path, or the path stands for several values at once;
+            `read` then returns the first value.
     """
 
     read: Callable[[Any], Any]
@@ -45,8 +45,8 @@ class Place:
         return self.form.fit(path, value) if self.own_fit is None else self.own_fit(settings, path, value)
 
     def element(self, at: int, count: int) -> Place:
-        """The place of one of the `count` numbers of a list. If the settings have fewer numbers, the last one
-        is first repeated."""
+        """The place of one of the `count` numbers of a list. If the settings have fewer numbers, the last
+        number is repeated first."""
 
         def spread(settings: Any) -> list[Any]:
             now = self.read(settings)
@@ -64,7 +64,7 @@ class Place:
 
 
 class SceneSettings(ABC):
-    """Everything a learner can change of a scene; subclasses are frozen trees of frozen data."""
+    """All settings of a scene that a learner can change; subclasses are frozen trees of frozen data."""
 
     entries: ClassVar[tuple[Entry, ...]]
     """The description of every path for users."""
@@ -92,11 +92,12 @@ class SceneSettings(ABC):
 
     @abstractmethod
     def places(self) -> Mapping[str, Place]:
-        """The place of every path. A table serves all settings whose levels, tasks and options have the same
-        names."""
+        """The place of every path. All settings whose levels, tasks and options have the same names share a
+        table."""
 
     def elements(self, path: str) -> int:
-        """The number of elements of a path that can be changed one by one, as "M_bar.3"; 0: none."""
+        """The number of elements of a path that can be changed one by one, such as "M_bar.3"; 0: there are
+        none."""
         return 0
 
     def place(self, path: str) -> Place:
@@ -119,8 +120,8 @@ class SceneSettings(ABC):
         return entry_at(self.entries, path)
 
     def special_differences(self, wanted: Any) -> list[tuple[str, Any]]:
-        """The differences between these settings and `wanted`, as paths and values that turn these into
-        `wanted`. Only paths that are not in `places` are considered."""
+        """Paths and values that turn these settings into `wanted`. Only paths that are not in `places` are
+        considered."""
         return []
 
     def recomposed(self, wanted: Any) -> list[tuple[str, Any]]:
@@ -167,12 +168,13 @@ Whole = Callable[[S, Any], S]
 def field_places(
     owner: type[Any], read: Part[S], write: Whole[S], prefix: str = "", without: tuple[str, ...] = ()
 ) -> dict[str, Place]:
-    """A place for each field of a dataclass that is itself part of settings, typed by its annotation.
+    """A place for each field of a dataclass that is part of the settings; the annotation of the field gives
+    its form.
 
     Args:
         owner: the dataclass.
-        read: the owner in some settings.
-        write: the settings with another owner.
+        read: returns the owner in some settings.
+        write: returns the settings with another owner.
         prefix: prefix of the paths.
         without: fields that are not settings.
     """

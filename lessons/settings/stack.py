@@ -18,7 +18,7 @@ from robots.errors import shortened, unknown_name
 from robots.ranges import field_types
 
 MOST_TASKS = 20
-"""In a stack."""
+"""Largest number of tasks in a stack."""
 _LONGEST_NAME = 40
 _NAME = re.compile(r"\w(?:[\w -]*\w)?")
 _LEVEL_KEYS = ("Q", "R", "horizon", "enabled")
@@ -77,7 +77,8 @@ def _tasks(stack: Stack) -> dict[str, list[Task]]:
 
 
 def level_of(entry: Any, before: Stack, taken: list[str], own: Own) -> Level:
-    """A level from an entry; see `read_stack`. taken: names of tasks, to which its own are added."""
+    """A level from an entry; see `read_stack`. taken: names of tasks, to which the names of its tasks are
+    added."""
     given = (
         {"tasks": list(entry)}
         if isinstance(entry, (list, tuple))
@@ -99,7 +100,7 @@ def level_of(entry: Any, before: Stack, taken: list[str], own: Own) -> Level:
 
 
 def _made(entry: Any, before: Stack, taken: list[str], own: Own) -> list[Task]:
-    """The task of an entry, or the two of a pose."""
+    """The task of an entry, or the two tasks of a pose."""
     given = entry_of(entry, "a task of the stack")
     word = given.pop("task", None)
     template = _of_file(word, own)

@@ -16,9 +16,9 @@ from robots.errors import shortened, unknown_name
 
 
 def add(stack: Stack, value: Any, own: Own = NONE) -> Stack:
-    """Adds a task: {"task": KIND, …}. With "level" it gets a level of its own at that place, 1 being the
-    highest priority; with "with", the name of a task or level, it gets that priority; otherwise it gets a
-    level just above the last one."""
+    """Adds a task: {"task": KIND, …}. With "level" the task gets a level of its own at that place; place 1
+    has the highest priority. With "with", the name of a task or level, the task gets that priority. Otherwise
+    it gets a level directly above the last level."""
     given = entry_of(value, "stack.add")
     place, beside = given.pop("level", None), given.pop("with", None)
     taken = [task.name for level in stack for task in level.tasks]

@@ -62,7 +62,7 @@ class TorqueSettings(SceneSettings):
     Attributes:
         levels: the stack.
         M_bar: diagonal of M̄ before scaling.
-        M_bar_scale: factor on all of it.
+        M_bar_scale: factor on the whole diagonal.
         M_bar_adapt: whether the controller adapts M̄ to the payload, see `himpc.controllers.adaptation`.
         nominal: the plant as the nominal model of model-based controllers describes it.
         deadline_ms: a torque that is ready later than this after the beginning of its tick acts one tick
@@ -72,10 +72,10 @@ class TorqueSettings(SceneSettings):
             everywhere. 0: the measured computing time, and then no two runs are the same.
         plant: the parameters of the simulated plant.
         options: the scene's own choices, if it has any.
-        files: users' Python files that may be its controller. They have no path: data from elsewhere (a
-            code, a page) must not choose which files are run.
-        own_tasks: (path, task) of users' Python files whose tasks the stack may name; they have no path
-            either.
+        files: users' Python files that may be the controller. They have no path: data from elsewhere (a code,
+            a page) must not choose which files are executed.
+        own_tasks: (path of the file, task) of users' Python files whose tasks the stack may name; no
+            setting's path changes them.
     """
 
     entries: ClassVar[tuple[Entry, ...]] = TORQUE_ENTRIES
@@ -105,7 +105,7 @@ class TorqueSettings(SceneSettings):
         return CONTROLLERS | dict.fromkeys(self.files, "a controller of your own, in a file of this machine")
 
     def for_controller(self) -> ControllerSettings:
-        """The controller's part. Raises InputError for invalid values."""
+        """The part of the settings for the controller. Raises InputError for invalid values."""
         if self.controller not in self.controllers:
             raise unknown_name("controller", self.controller, by_name(self.controllers))
         check_fields(self)
@@ -126,7 +126,8 @@ class TorqueSettings(SceneSettings):
     def is_late(self, measured_ms: float) -> bool:
         """Whether a torque with this computing time misses its deadline."""
         assumed = self.solve_ms_per_knot * self.horizon
-        # Rounding of N times a decimal fraction must not make a torque late that exactly meets its deadline.
+        # A torque that exactly meets its deadline must not be late by the rounding of N times a decimal
+        # fraction.
         return 0.0 < self.deadline_ms < (assumed or measured_ms) - 1e-9
 
     @property
@@ -143,7 +144,7 @@ class TorqueSettings(SceneSettings):
 
     def places(self) -> Mapping[str, Place]:
         """Fields ("horizon", "M_bar", …) and those of the scene's options; "stack", a list of levels as
-        `lessons.settings.stack.read_stack` takes it; "order", the names of all levels,
+        `lessons.settings.stack.read_stack` reads it; "order", the names of all levels,
         highest priority first ("a,b,c" or a list); "Q" or "R" for all levels (one number, or one per level);
         "levels.NAME.KEY" with the level's name or its place 1 … r, KEY one of Q, R, horizon, enabled, K_p,
         K_v (gains of all its tasks); "tasks.NAME.K_p|K_v"; "limits.KEY"; "avoidance.KEY"; "nominal.KEY";
@@ -158,7 +159,8 @@ class TorqueSettings(SceneSettings):
         return len(self.M_bar) if per_joint else 0
 
     def place(self, path: str) -> Place:
-        """As in `Settings`; besides "stack.add" and the other `CHANGES`, which change the stack in part."""
+        """As in `Settings`, and also "stack.add" and the other `CHANGES`, which change a part of the
+        stack."""
         return _CHANGE_PLACES.get(path) or super().place(path)
 
     def recomposed(self, wanted: TorqueSettings) -> list[tuple[str, Any]]:

@@ -30,7 +30,7 @@ TORQUE_ENTRIES = (
     Entry("M_bar", "M̄", "The diagonal of M̄, one number per joint, before scaling", "kg·m²"),
     Entry("limits.position", "Position",
           "viability: limits the speed to one from which the joint can still stop. paper: the rows as "
-              "printed, which a horizon of a few milliseconds cannot keep; the list of fallbacks shows it.",
+              "printed, which a horizon of a few milliseconds cannot keep, as the list of fallbacks shows",
           tries=("paper", "off", "viability"), name="position limits"),
     Entry("limits.torque", "Torque", "Impose the torque limits, (32f)", name="torque limits"),
     Entry("limits.velocity", "Velocity", "Impose the velocity limits, (32e)", name="velocity limits"),
@@ -43,25 +43,25 @@ TORQUE_ENTRIES = (
               "distance; 0: (32e) as printed",
           "1/s", 0.0, 100.0, 1.0),
     Entry("limits.torque_rate", "Torque rate",
-          "Largest change of each joint's torque per second, which himpc, hiqp, nhimpc and weighted keep "
-              "above all levels; 0: not imposed",
+          "Largest change of each joint's torque per second; himpc, hiqp, nhimpc and weighted keep this "
+              "limit above all levels. 0: not imposed",
           "N·m/s", 0.0, 2000.0, 10.0, name="torque rate limit"),
     Entry("avoidance.on", "Keep distances",
-          "Distances between links, and between links and objects, are kept above all levels by himpc, "
-              "hiqp, nhimpc and weighted, and behind all levels by himpc_filtered",
+          "Keep distances between links, and between links and objects. himpc, hiqp, nhimpc and weighted "
+              "do this above all levels, himpc_filtered by a filter behind its levels",
           tries=("true", "false"), name="distances kept"),
     Entry("avoidance.d_safe", "d_safe", "The distance that is kept", "m", 0.0, 100.0, 1.0, shown="mm",
           factor=1e3, name="safe distance"),
     Entry("avoidance.margin", "Margin",
           "Added to d_safe, for the delay of time-delay estimation", "m", 0.0, 100.0, 1.0, shown="mm",
           factor=1e3, name="margin of distances"),
-    Entry("avoidance.reaction", "Reaction", "Time before the robot brakes, which the bound allows for", "s",
+    Entry("avoidance.reaction", "Reaction", "Time before the robot brakes, as the bound assumes", "s",
           0.0, 1.0, 0.01, name="reaction of distances"),
     Entry("avoidance.deceleration", "Deceleration",
-          "How fast the approach to an object can be slowed down, as the bound assumes", "m/s²", 0.1, 20.0,
+          "Deceleration of the approach to an object, as the bound assumes", "m/s²", 0.1, 20.0,
           0.1, name="deceleration of distances"),
     Entry("avoidance.pull", "Pull",
-          "Largest error of a position on which its task acts while distances are kept; other tasks act on "
+          "While distances are kept, a task of a position acts on at most this error; other tasks act on "
               "up to five times as many rad. 0: no limit",
           "m", 0.0, 2.0, 0.01, name="pull of targets"),
     Entry("avoidance.velocity_margin", "Free velocity",
@@ -70,8 +70,8 @@ TORQUE_ENTRIES = (
           "", 0.0, 0.5, 0.01, name="margin of velocities"),
     Entry("route", "Route", "Method that computes the torque; both methods give the same torque"),
     Entry("solver", "QP solver",
-          "Solver of the QPs of hqp and of the explicit route; controllers without QPs and the compiled "
-              "route, which has its own method, accept daqp only. qpoases needs the extra 'bench'"),
+          "Solver of the QPs of hqp and of the explicit route. Controllers without QPs, and the "
+              "compiled route with its own method, accept daqp only. qpoases needs the extra 'bench'"),
     Entry("R_on", "R weighs", "Quantity that R weighs: Δτ as printed, or M̄⁻¹Δτ"),
     Entry("damping", "Damp what no level controls",
           "R weighs changes of torque only, so a direction without a task keeps its torque and does not "

@@ -28,7 +28,7 @@ class Form:
     elements: the form of the elements of a list; None: lists are not allowed.
     words: the words to choose from; empty: any.
     null: whether null is allowed.
-    range: of every number.
+    range: the range of every number.
     """
 
     kind: str | None
@@ -38,7 +38,7 @@ class Form:
     range: Range = ANY
 
     def __str__(self) -> str:
-        """For people: "a whole number from 1 to 60"; "viability, paper or off"."""
+        """Text for users: "a whole number from 1 to 60"; "viability, paper or off"."""
         found = [] if self.kind is None else [self._one(self.kind)]
         if self.elements is not None:
             found.append(

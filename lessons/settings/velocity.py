@@ -23,10 +23,10 @@ from robots.collision import Ball, Box, Floor, Obstacle
 from robots.errors import unknown_name
 
 STAGE_WEIGHT: dict[str, float] = {"proximal": 10.0, "paper": 1.0}
-"""Q of (8) with which each formulation was tuned; the choice of a formulation sets it."""
+"""Q of (8) with which each formulation was tuned; the choice of a formulation sets this Q."""
 
 _RATE_HZ = {"htidkc": 50.0}
-"""Control rate that goes with a controller, 10 Hz for all others; choosing a controller sets it."""
+"""Control rate of a controller, 10 Hz for all others; the choice of a controller sets this rate."""
 
 
 @dataclass(frozen=True)
@@ -34,12 +34,13 @@ class VelocitySettings(SceneSettings):
     """Settings of a velocity-level run.
 
     Attributes:
-        htmpc: the controller's settings; its stack has one level per role, and the mission's window orders
-            them.
+        htmpc: the controller's settings. Their stack has one level per role; the mission's window orders the
+            levels.
         controller: one of VELOCITY_CONTROLLERS.
-        compensate_delay: whether the measured state is predicted over the plant's lag before planning.
-        delay_measured: whether the commands of a plan are delayed by its measured computing time in addition
-            to `plant.delay_ms`, as on a real robot, which does not wait; then no two runs are the same.
+        compensate_delay: whether the measured state is predicted forward by the plant's lag before planning.
+        delay_measured: whether the commands of a plan are delayed by the plan's measured computing time in
+            addition to `plant.delay_ms`, as on a real robot, which does not wait; then no two runs are the
+            same.
         plant: the parameters of the simulated plant.
         options: the scene's own choices.
     """
@@ -63,7 +64,7 @@ class VelocitySettings(SceneSettings):
             raise unknown_name("velocity-level controller", self.controller, VELOCITY_CONTROLLERS)
 
     def felt(self, solve_ms: float) -> VelocityPlantSettings:
-        """The plant that the commands of a plan act on, if the plan took this many ms to compute."""
+        """The plant on which the commands of a plan act if the computation of the plan took this many ms."""
         if not self.delay_measured:
             return self.plant
         return replace(self.plant, delay_ms=min(self.plant.delay_ms + solve_ms, LONGEST_DELAY))
@@ -102,8 +103,8 @@ class VelocitySettings(SceneSettings):
     def places(self) -> Mapping[str, Place]:
         """A field of HTMPCSettings ("horizon", "delta_m", "formulation", …), "controller",
         "compensate_delay", "delay_measured", the fields of the scene's options ("peak", "seats", …; "order"
-        takes effect when a run starts), "limits.KEY", "plant.KEY", "Q" for all levels (a new formulation
-        brings its own), "levels.NAME.Q|enabled" with the level's name or its place 1 … r."""
+        takes effect when a run starts), "limits.KEY", "plant.KEY", "Q" for all levels (a new formulation sets
+        its own), "levels.NAME.Q|enabled" with the level's name or its place 1 … r."""
         return _places(tuple(level.name for level in self.levels), type(self.options))
 
     def elements(self, path: str) -> int:
@@ -250,7 +251,7 @@ def _obstacle(known: Mapping[str, Ball | Box], path: str, name: str, value: Any)
     if isinstance(numbers, tuple) and len(numbers) == 3 and name in known:
         x, y, z = numbers
         return replace(known[name], centre=(x, y, z))
-    movable = f", or move {', '.join(known)} to [x, y, z], or take one away by null" if known else ""
+    movable = f", or move {', '.join(known)} to [x, y, z], or remove one by null" if known else ""
     raise InputError(
         f"{path} is {value!r}: give a ball as [x, y, z, radius] in m, e.g. [2, 0, 1, 0.3]{movable}"
     )

@@ -88,7 +88,7 @@ VELOCITY_ENTRIES = (
     Entry("architecture", "Architecture", _CARRIED_OUT),
     Entry("base_tolerance", "Base is there within", "The task of the base is completed within this "
           "distance of its goal, for every architecture; takes effect at the next start. decoupled needs "
-          "0.05 m and rest", "m", 0.02, 1.0, 0.01,
+          "0.05 m and a base at rest", "m", 0.02, 1.0, 0.01,
           tries=("0.05", "0.25", "0.5"), name="base is there within, m"),
     Entry("base_at_rest", "and at rest", "The task of the base is completed only if the base is slower "
               "than 0.02 m/s",
@@ -102,8 +102,8 @@ VELOCITY_ENTRIES = (
     Entry("rounds", "Rounds", "Number of visits to each person", low=1, high=10),
     Entry("cruise", "Cruise", "Speed along the planned paths of the base", "m/s", 0.1, 1.0, 0.05),
     Entry("goal", "Goal", "Goal of the base, x and y", "m"),
-    Entry("false_report", "Reported wrongly", "Whether the controller is told a wrong position of the crate "
-          "for a while",
+    Entry("false_report", "Reported wrongly", "Whether a wrong position of the crate is reported to the "
+          "controller for a while",
           tries=("false", "true"), name="false report"),
     Entry("report_offset", "Reported minus true position", "Position of the crate as it is reported, minus "
           "its true position, while the report is wrong", "m", -3.0, 3.0, 0.05),

@@ -50,9 +50,9 @@ TEXTS = (
     )),
     Exempt("definition", "", (
         ("further/deliveries", "The next person moves so that the direction"),
-        ("disagreements", "So a number that differs need not be wrong"),
+        ("disagreements", "So if two numbers differ"),
         ("disagreements", "Here is every row that does not agree"),
-        ("lessons/papers/disagreements.py", "So a number that differs need not be wrong"),
+        ("lessons/papers/disagreements.py", "So if two numbers differ"),
         ("lessons/papers/disagreements.py", "Here is every row that does not agree"),
     )),
     # ---------------------------------------- consequences of equations

@@ -83,7 +83,7 @@ REFERENCE = (
         ("himpc/references/target.py", "The acceleration a is constant in each step"),
     )),
     Exempt("mathematics", LESSONS + "geometry.py::test_the_box_is_where_the_rows_hold", (
-        ("lessons/geometry/plane.py", "In that cut the cost of a level is"),
+        ("lessons/geometry/plane.py", "The bounds are a box"),
     )),
     Exempt("mathematics", LESSONS + "geometry.py::test_geometry_and_solver_find_the_same_points", (
         ("lessons/scenes/plane.py", "The wrist is where joint 3 sits"),

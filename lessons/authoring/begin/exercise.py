@@ -8,8 +8,8 @@ You need: what a torque is
 
 # The text above is the exercise's card: title, question, duration in minutes, required knowledge.
 #
-#     himpc-lab grade --check FILE.py              shows it, and tests the solution and every mistake
-#     himpc-lab new controller start.py --from FILE.py   writes what students begin with
+#     himpc-lab grade --check FILE.py              shows the card; tests the solution and every mistake
+#     himpc-lab new controller start.py --from FILE.py   writes the file with which students begin
 #     himpc-lab grade FILE.py submissions/               grades a folder, or one file
 
 from lessons.exercises.exercise import GradeCheck, pushed
@@ -18,7 +18,8 @@ from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.lesson import card_of
 from lessons.teaching.measure import Measure, Signal
 
-# What students begin with. Their lines replace the one line with TODO; `now` has the symbols of the paper.
+# The code with which students begin. Their lines replace the line with TODO; `now` has the symbols of the
+# paper.
 START = """
 def torque(now):
     posture = now.level("posture")
@@ -31,7 +32,8 @@ acceleration = -posture.K_p * posture.error - posture.K_v * posture.x_dot
 return now.gravity + now.M_bar * acceleration
 """
 
-# Wrong lines, by the sentence that names the mistake; a student whose torques are the same reads it.
+# Wrong lines, each after a sentence that names the mistake. A student whose torques are the same reads this
+# sentence.
 MISTAKES = {
     "the damping K_v is missing": """
         return now.gravity - now.M_bar * posture.K_p * posture.error
@@ -45,7 +47,7 @@ MISTAKES = {
         """,
 }
 
-# The scene: the settings of himpc-lab run planar3-hold --set …, only the posture is controlled.
+# The scene, with the settings of himpc-lab run planar3-hold --set …; only the posture is controlled.
 ARM = RunSpec(
     "planar3-hold",
     set=(
@@ -59,7 +61,7 @@ ARM = RunSpec(
 
 
 def checks(seed):
-    """The statements that are measured; the seed decides the direction of the push."""
+    """Returns the statements to be measured; the seed decides the direction of the push."""
     push = pushed(ARM, seed, "link_3", 10.0, plane=True)
     return (
         GradeCheck(

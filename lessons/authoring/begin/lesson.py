@@ -8,8 +8,8 @@ You need: nothing
 
 # The text above is the lesson's card: title, question, duration in minutes, required knowledge.
 #
-#     himpc-lab --lesson FILE.py             opens it
-#     himpc-lab lessons --check FILE.py tests every claim, and tests that it fails under its `fails_with`
+#     himpc-lab --lesson FILE.py             opens the lesson
+#     himpc-lab lessons --check FILE.py tests that every claim holds, and fails with its `fails_with`
 
 from lessons.teaching.claim import Claim
 from lessons.teaching.control import Control

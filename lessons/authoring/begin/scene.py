@@ -17,8 +17,8 @@ START = load_scene("planar3-hold")
 
 
 def references(robot, stack):
-    """The desired motion per task name; a task without one gets a target that can be dragged."""
-    # Half a turn per second on a circle of 5 cm; it begins where the hand is: at (0.6, 0.3) m.
+    """Returns the desired motions by task name; every other task gets a target that can be dragged."""
+    # Half a turn per second on a circle of 5 cm; the motion begins at the hand's position, (0.6, 0.3) m.
     centre, radius = np.array([0.55, 0.3]), 0.05
     u, w = np.array([radius, 0.0]), np.array([0.0, radius])
     return {"position": Circle(centre, u, w, Phase(np.pi, "eased"))}

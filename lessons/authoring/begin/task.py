@@ -2,8 +2,8 @@
 
     himpc-lab run FILE.py
 
-runs it on the iiwa, on a level of its own below the hand's position. Before the robot moves, finite
-differences of the value are compared with the Jacobian.
+runs the task on the iiwa, on a level of its own below that of the hand's position. Before the robot moves,
+finite differences of the value are compared with the Jacobian.
 """
 
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from himpc.tasks import Task
 
 @dataclass(frozen=True, kw_only=True)
 class Reach(Task):
-    """x = √(p_x² + p_y²), m, of a frame at p; the empty name is the robot's tip."""
+    """The coordinate x = √(p_x² + p_y²), m, of a frame at p. The empty name means the robot's tip."""
 
     frame: str = ""
 
@@ -24,7 +24,7 @@ class Reach(Task):
         return ("reach",)
 
     def value(self, configuration):
-        """x at the measured state, (m,)."""
+        """Returns x at the measured state, (m,)."""
         p = configuration.placement(self.frame).translation
         return np.array([np.hypot(p[0], p[1])])
 

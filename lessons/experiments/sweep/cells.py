@@ -52,14 +52,15 @@ def metrics(sweep: Sweep) -> list[str]:
 
 
 def check_metric(metric: str, choices: Sequence[str]) -> str:
-    """The metric. Raises InputError if it is none of the choices."""
+    """Returns the metric. Raises InputError if it is not one of the choices."""
     if metric not in choices:
         raise unknown_name("metric", metric, choices)
     return metric
 
 
 def _numbers(data: Any, path: str = "") -> Iterator[tuple[str, float]]:
-    """Every number of a summary by its dotted path; a list of numbers is the root of its sum of squares."""
+    """Every number of a summary by its dotted path. A list of numbers counts as the root of its sum of
+    squares."""
     if isinstance(data, dict):
         for key, value in data.items():
             yield from _numbers(value, f"{path}.{key}" if path else str(key))
@@ -89,6 +90,6 @@ def perform_cell(spec: RunSpec) -> dict[str, Any]:
 
 
 def best_cell(cells: Sequence[Cell], metric: str) -> Cell | None:
-    """The cell with the least value of a metric; None if no cell has one."""
+    """The cell with the least value of a metric; None if no cell has a value."""
     known = [cell for cell in cells if math.isfinite(cell.value(metric))]
     return min(known, key=lambda cell: cell.value(metric), default=None)

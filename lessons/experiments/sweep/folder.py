@@ -1,7 +1,7 @@
 """Stores the finished cells of a sweep in a folder; a stopped sweep continues from there.
 
-It holds `sweep.json` (the definition), `cells.jsonl` (one line per finished cell, appended as it finishes)
-and, at the end, `results.json` (the cells in the order of the grid).
+The folder contains `sweep.json` (the definition), `cells.jsonl` (one line per finished cell, appended as it
+finishes) and, at the end, `results.json` (the cells in the order of the grid).
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ from robots import InputError
 
 
 def usual_folder(sweep: Sweep) -> Path:
-    """The default folder of a sweep. Each sweep has a different one, in which the same sweep continues."""
+    """The default folder of a sweep. Different sweeps have different folders; a repeated sweep continues in
+    its folder."""
     wanted = json.dumps(sweep.as_data(), sort_keys=True)
     names = "-".join([Path(sweep.base.scene).stem, *(axis.path for axis in sweep.axes)])
     readable = re.sub(r"[^\w.-]+", "_", names, flags=re.ASCII)[:80]
@@ -31,7 +32,7 @@ def usual_folder(sweep: Sweep) -> Path:
 
 
 def finished_cells(sweep: Sweep, folder: Path) -> dict[int, Cell]:
-    """The cells that the folder already holds; makes the folder if need be.
+    """Returns the finished cells of the folder; creates the folder if it does not exist.
 
     Raises:
         InputError: the folder holds another sweep, or cannot be written.
@@ -48,7 +49,7 @@ def finished_cells(sweep: Sweep, folder: Path) -> dict[int, Cell]:
             different = ", ".join(key for key in wanted if held.get(key) != wanted[key])
             raise InputError(
                 f"--out {folder} holds another sweep ({different} differ): give another folder, or repeat "
-                "the command that began it"
+                "the command that began that sweep"
             )
         written = file.read_bytes()
         whole = written[: written.rfind(b"\n") + 1]
@@ -59,7 +60,7 @@ def finished_cells(sweep: Sweep, folder: Path) -> dict[int, Cell]:
     except OSError as error:
         raise InputError(f"--out {folder}: cannot be used ({error.strerror}); give another folder") from None
     except (json.JSONDecodeError, TypeError, AttributeError):
-        raise InputError(f"--out {folder}: its files are not a sweep's; give another folder") from None
+        raise InputError(f"--out {folder}: its files are not those of a sweep; give another folder") from None
     return {cell.index: cell for cell in cells}
 
 
@@ -78,7 +79,7 @@ def carry_on(
         all cells in the order of the grid. After an interruption, the folder contains all finished cells.
 
     Raises:
-        InputError: as `finished_cells`; or a user's file that takes part was changed during the sweep.
+        InputError: see `finished_cells`; or a user's file that the sweep uses was changed during the sweep.
     """
     cells = finished_cells(sweep, folder)
     total, files = len(sweep.points), sweep.files()

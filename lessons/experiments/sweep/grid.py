@@ -19,13 +19,13 @@ from robots import InputError
 
 MAX_CELLS = 100_000
 _DECADE = 10.0
-"""A range whose upper end is at least this many times its lower end is divided in equal ratios instead of
-equal steps."""
+"""A range is divided in equal ratios instead of equal steps if its upper end is at least this many times its
+lower end."""
 
 
 @dataclass(frozen=True)
 class Axis:
-    """One swept path and its values; `log` if they are in equal ratios."""
+    """One swept path and its values; `log`: the values have equal ratios."""
 
     path: str
     values: tuple[float, ...]
@@ -41,7 +41,7 @@ class Sweep:
 
     @cached_property
     def points(self) -> list[tuple[float, ...]]:
-        """Values per axis of every cell, the last axis running fastest."""
+        """The values of every cell, one per axis; the last axis changes fastest."""
         return list(itertools.product(*(axis.values for axis in self.axes)))
 
     def run(self, cell: int) -> RunSpec:
@@ -63,8 +63,8 @@ class Sweep:
         }
 
     def files(self) -> dict[str, list[str]]:
-        """The fingerprints of the user's files that take part; empty if there are none. Raises InputError if
-        one cannot be read."""
+        """The fingerprints of the user's files that the sweep uses; empty if there are none. Raises
+        InputError if a file cannot be read."""
         base = self.base
         own = [each for each in (base.scene, base.controller or "", *base.tasks) if is_file(each)]
         return {"files": [fingerprint(each) for each in own]} if own else {}

@@ -74,8 +74,8 @@ def _remark_8(results: Results, quick: bool) -> Section:
     return Section(
         notes=(
             f"**Remark 8, shorter horizons for lower levels.** The horizon of level 1 has {_N} knots, those "
-            "of levels 2 and 3 have fewer; R weighs Δτ as printed. If they have one knot, a step takes "
-            f"{number(medians[-1] / medians[0])} of its time with all knots: most of a step is spent on "
+            "of levels 2 and 3 have fewer; R weighs Δτ as printed. With one knot there, a step takes "
+            f"{number(medians[-1] / medians[0])} of the time with all knots: most of a step is spent on "
             "kinematics and null spaces, which level 1 needs at every knot.",
         ),
         tables=(Table("Remark 8: time against accuracy", columns, tuple(rows)),),
@@ -118,7 +118,7 @@ def _over(
         tables=(Table(f"{title}: level-1 RMSE, worst axis (mm)", (what, *runs), rows),),
         pictures=(
             Picture(
-                f"himpc-{title.lower().replace(' ', '-')}", f"Level-1 RMSE over the {what.lower()}.", (panel,)
+                f"himpc-{title.lower().replace(' ', '-')}", f"Level-1 RMSE by the {what.lower()}.", (panel,)
             ),
         ),
     )

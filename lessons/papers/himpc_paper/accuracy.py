@@ -56,9 +56,9 @@ class ModelErrors:
 def model_errors(run: JobResult) -> ModelErrors:
     """The errors along a run, from their definitions.
 
-    With q̈_k the mean acceleration of period k, from the plant's true velocities:
-    γ_k = M_n⁻¹(τ_k − N_n) − q̈_k, what (21) expands; δ_k = q̈_k − q̈_{k−1} − M̄⁻¹(τ_k − τ_{k−1}), the M̄⁻¹ε_q
-    that (16) leaves and (25) expands; β = J₁γ and ε_x = J₁δ. NaN for a run that failed or lost control.
+    q̈_k is the mean acceleration of period k, from the plant's true velocities. γ_k = M_n⁻¹(τ_k − N_n) − q̈_k
+    is expanded in (21). δ_k = q̈_k − q̈_{k−1} − M̄⁻¹(τ_k − τ_{k−1}), the M̄⁻¹ε_q of (16), is expanded in
+    (25). β = J₁γ and ε_x = J₁δ. A run that failed or lost control gives NaN.
     """
     if not run.completed:
         return ModelErrors(math.nan, math.nan, math.nan, math.nan)
@@ -116,7 +116,7 @@ def _section(results: Results, quick: bool) -> Section:
     panels = [_panel(r"$T_s$ (ms)", {ms: model_errors(run) for ms, run in periods.items()})]
     if scales:
         panels.append(_panel(r"factor on $\bar M$", {s: model_errors(run) for s, run in scales.items()}))
-    caption = "Errors of the nominal model (20 % light, friction unknown) and of the incremental one on RT1."
+    caption = "Errors of the nominal model (20 % too light, no friction) and of the incremental one on RT1."
     return Section(
         notes=(
             "The error of each model's next acceleration along HIMPC's own motion, from the definitions of "

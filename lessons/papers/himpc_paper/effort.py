@@ -1,4 +1,4 @@
-"""‖τ‖² in the cost instead of ‖Δτ‖², which section IV-C argues against."""
+"""The cost with ‖τ‖² instead of ‖Δτ‖²; section IV-C argues against ‖τ‖²."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ _LOST = 0.5
 class EffortJob(Work):
     """A run with all tasks of a scene in one cost, one step ahead, without bounds and priorities.
 
-    min ‖e_{k+1}‖² + R‖Δτ‖² or min ‖e_{k+1}‖² + R‖τ₀ + Δτ‖², with e of (28) by the incremental system and
-    N = 1. In the paper's weights R stands for R_i/Q_i, 0.05.
+    The problem is min ‖e_{k+1}‖² + R‖Δτ‖² or min ‖e_{k+1}‖² + R‖τ₀ + Δτ‖², with e of (28) by the incremental
+    system and N = 1. R stands for R_i/Q_i; the paper's weights give 0.05.
 
     Attributes:
         effort: the quantity that R weighs: the "increment" Δτ or the whole "torque" τ.
@@ -80,7 +80,7 @@ class EffortJob(Work):
 
     @property
     def words(self) -> str:
-        """The run in words, because no single command repeats it."""
+        """The run in words, because no single command repeats the run."""
         what = "still" if self.hold_deg else "moving"
         return f"{self.spec.scene}, {what}, R = {self.R:g} on the {self.effort}"
 
@@ -88,7 +88,7 @@ class EffortJob(Work):
 def _residual(
     form: StackForm, at: Configuration, previews: Mapping[str, Preview], before: Array, T_s: float
 ) -> tuple[Array, Array, Array, Array]:
-    """J, x̃, e_{k+1} for Δτ = 0, and ẋ."""
+    """Returns J, x̃, e_{k+1} for Δτ = 0, and ẋ."""
     J = form.jacobian(at)[0]
     error = measure(form.tasks, at, previews, {}, {})
     x_dot = J @ at.v

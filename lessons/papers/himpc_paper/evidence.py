@@ -22,7 +22,7 @@ from robots import Plant, convergence_gauge
 DEG = 180 / np.pi
 
 _LARGE = 5.0
-"""deg: an error of q₁ above this counts as large; in our run it grows from 1° to 5° in 0.2 s."""
+"""deg: an error of q₁ above this counts as large; in our run the error grows from 1° to 5° in 0.2 s."""
 _HALF_SWING = "q1_amplitude_deg=-60"
 _SOFT = "R=1e5"
 _BARE = "plant.friction=0"
@@ -31,7 +31,7 @@ _ON_ACCELERATION = (*ENCODER, "R_on=acceleration")
 _THIRD = "M_bar_scale=0.3"
 _OTHERS = {"M̄ × 0.3": (_THIRD,), "the paper's encoder": ENCODER}
 _EARLY = 1.2
-"""s of RT4 in which no joint is near a limit."""
+"""Time at the start of RT4, s, in which no joint is near a limit."""
 
 
 def _own(quantity: str, unit: str, ours: float, why: str = "the paper prints no number") -> Row:
@@ -100,9 +100,9 @@ def _swing(run: JobResult, start: float, end: float) -> tuple[float, float]:
 
 
 def weakest(scene: str) -> float:
-    """Q/R·σ²: the effect of the first increment on e over its cost, at the start, in the direction of level 1
-    in which the effect is smallest. σ² is the least eigenvalue of c₀² J₁ M̄⁻² J₁ᵀ, c₀ = 1 + K_V T_s; in that
-    direction a tick leaves 1/(1 + Q/R·σ²) of e."""
+    """Returns Q/R·σ²: the effect of the first increment on e divided by its cost, at the start, in the
+    direction of level 1 in which the effect is smallest. σ² is the least eigenvalue of c₀² J₁ M̄⁻² J₁ᵀ, c₀ =
+    1 + K_V T_s; in that direction a tick leaves 1/(1 + Q/R·σ²) of e."""
     ready = prepared(torque_scene(scene), "himpc", ())
     robot, settings = ready.robot, ready.settings
     (task,) = settings.levels[0].tasks
@@ -241,7 +241,7 @@ def _rivals(results: Results, quick: bool) -> Section:
                 "✓",
                 float(printed("himpc_text")["rt4_unstable"][controller]),
                 math.nan if run.error is not None else float(run.lost_at is not None),
-                trouble(run) or f"runs to its end, {number(share)} times as far as a position limit",
+                trouble(run) or f"runs to its end; a joint moves to {number(share)} times its limit",
                 turns_at=0.5,
                 topic="rt4-rivals",
             )
@@ -255,7 +255,7 @@ def _rivals(results: Results, quick: bool) -> Section:
     ]
     return Section(
         notes=(
-            "Unstable: the run loses control (a level-1 error above 0.5 m, a speed far beyond its limit).",
+            "Unstable: the run loses control (a level-1 error above 0.5 m, or a speed far beyond its limit).",
         ),
         rows=tuple(rows),
     )
@@ -266,7 +266,7 @@ ITEMS = (
     Item("himpc-rivals", "RT4 without HIMPC", f"{SECTION_VI}-B", lambda _: tuple(map(rt4, _RIVALS)), _rivals),
     Item(
         "himpc-weights",
-        "What R is against Q, and M̄ against M",
+        "How R compares with Q, and M̄ with M",
         f"{SECTION_V}-A, {SECTION_VI}-A",
         lambda _: (),
         _weights,

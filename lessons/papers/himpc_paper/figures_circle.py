@@ -95,7 +95,7 @@ def _fig_4(results: Results, quick: bool) -> Section:
     runs = _runs(results, encoder_runs(COMPARED))
     caption = (
         "Size of the tracking errors on RT1 with the paper's encoder, the largest in every 50 ms. OSF and "
-        "HQP coincide, and so do TDEOSF and HIMPC. Cut below 1e-4."
+        "HQP coincide, and so do TDEOSF and HIMPC. Curves are cut off below 1e-4."
     )
     return _picture("himpc-fig-4", caption, log_error_panels(runs, PLANAR_ERRORS))
 
@@ -176,8 +176,8 @@ def _fig_8(results: Results, quick: bool) -> Section:
     )
     return Section(
         notes=(
-            "(41) with e from measurements, differentiated numerically: with an encoder mostly noise, in "
-            "which the controllers hardly differ.",
+            "The cost (41), with e from measurements that are differentiated numerically. With an encoder e "
+            "is mostly noise, in which the controllers hardly differ.",
         ),
         rows=compared,
         tables=(Table("Average cost (41)", ("controller", "level 1", "level 2", ""), rows),),

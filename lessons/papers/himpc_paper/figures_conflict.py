@@ -71,7 +71,7 @@ def _growth_rows(results: Results, growth: dict[str, float]) -> tuple[Row, ...]:
             "HIMPC's growth over HQP's",
             growth["himpc"] / growth["hqp"],
             "conflict_himpc_over_hqp",
-            "HIMPC is the one that the conflict does not touch",
+            "the conflict hardly affects HIMPC, unlike HQP",
         ),
         (
             "RT2: level-1 RMSE, HIMPC's over HQP's",

@@ -56,7 +56,7 @@ def _fig_18(results: Results, quick: bool) -> Section:
     )
     panel = Panel("$e_x$ (mm)", curves)
     return Section(
-        pictures=(Picture("himpc-fig-18", "Error of x on RT4 over the horizon, HIMPC.", (panel,)),)
+        pictures=(Picture("himpc-fig-18", "Error of x on RT4 against the horizon N, HIMPC.", (panel,)),)
     )
 
 
@@ -95,8 +95,8 @@ def _fig_20(results: Results, quick: bool) -> Section:
         (str(N), number(value), trouble(run)) for N, value, run in zip(Ns, average, runs, strict=True)
     )
     note = (
-        "The paper shows bars without numbers, growing exponentially with N (8.05 ms at N = 5, Table VII). "
-        "Here bases and bounds cost in proportion to N and the least squares with its cube."
+        "The paper shows bars without numbers, which grow exponentially with N (8.05 ms at N = 5, Table "
+        "VII). Here the time for bases and bounds is proportional to N, that for the least squares to N³."
     )
     return Section(
         notes=(note,),
@@ -117,8 +117,8 @@ def _fig_21(results: Results, quick: bool) -> Section:
     )
     whole = Panel(r"$\tau_1$ (N·m)", curves)
     panels = (
-        replace(banded(whole), title="between which values in every 50 ms"),
-        replace(excerpt(whole, 1.0, 1.05), title="50 ms of it"),
+        replace(banded(whole), title="least and largest value in every 50 ms"),
+        replace(excerpt(whole, 1.0, 1.05), title="an excerpt of 50 ms"),
     )
     caption = f"Torque of joint 1 with encoders of 5e-3°: S = {number(smoothness(coarse, benchmark))} N·m."
     return Section(pictures=(Picture("himpc-fig-21", caption, panels, 2),))

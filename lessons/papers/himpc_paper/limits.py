@@ -17,8 +17,8 @@ MODES = {
     "barrier and margin": (),
 }
 """Three kinds of limits. The first: rows as printed. The second: velocity bounds that are approached at
-15 1/s. The third, the lab's default: in addition, each position limit bounds the velocity from which the
-joint can still stop 7 mrad before the limit, with a reaction time of a third of a second."""
+15 1/s. The third, the lab's default, also bounds each velocity by the position limit: the joint can still
+stop 7 mrad before the limit, with a reaction time of a third of a second."""
 PLANTS = {
     "nominal": (),
     "payload 1 kg": ("plant.payload_kg=1",),
@@ -41,7 +41,7 @@ _KINDS = ("position", "velocity")
 
 
 def _over(run: JobResult, kind: str) -> float:
-    """The largest |value| over its limit; 1 is the limit."""
+    """The largest ratio of a |value| to its limit."""
     return run.figure("limits", kind, "max_ratio")
 
 
@@ -94,11 +94,11 @@ def _section(results: Results, quick: bool) -> Section:
         notes=(
             "RT4 from rest under the data sheet's limits: the reference is too fast for joint 1, and joints "
             "come near the ends of their ranges. As printed, speeds exceed their limits and a few QPs have "
-            "no solution. A barrier on speed alone makes it worse: a slow joint cannot obey a position row "
-            "that requires it to turn back within 5 ms. With position limits before which the joint can "
-            "stop, position is kept and every QP has a solution; speed is kept to 1 %, except with an "
-            "unknown payload of 2 kg: with it from the start on, none of the three keeps level 1. The "
-            "constants are settings.",
+            "no solution. A barrier on speed alone makes this worse: a slow joint cannot obey a position "
+            "row that requires it to turn back within 5 ms. With position limits before which the joint can "
+            "stop, positions keep their limits and every QP has a solution. Speeds keep theirs to 1 %, "
+            "except with an unknown payload of 2 kg: with this payload from the start on, level 1 is lost "
+            "under all three kinds of limits. The constants are settings.",
         ),
         rows=tuple(rows),
         tables=(Table("Violations, errors and QPs without a solution", columns, lines),),

@@ -20,17 +20,17 @@ COORDINATES = (("x", "position", 0, "m"), ("y", "position", 1, "m"), ("q1", "q1"
 
 
 def rt1(controller: str, *assignments: str) -> Job:
-    """RT1, 8 s."""
+    """The run of RT1, 8 s."""
     return Job(RunSpec(RT1, controller=controller, set=assignments))
 
 
 def rt2(controller: str, *assignments: str) -> Job:
-    """RT2, 8 s."""
+    """The run of RT2, 8 s."""
     return Job(RunSpec(RT2, controller=controller, set=assignments))
 
 
 def rt3(controller: str) -> Job:
-    """RT3, 16 s."""
+    """The run of RT3, 16 s."""
     return Job(RunSpec(RT3, controller=controller))
 
 

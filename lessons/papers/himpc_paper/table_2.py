@@ -67,9 +67,9 @@ def _table_2(results: Results, quick: bool) -> Section:
     return Section(
         notes=(
             "RMSE after the first second of RT1. The paper's numbers are measured on its own arm, whose "
-            "masses, friction and model errors it does not print; ours are simulated on `planar3` with a "
-            "nominal model 20 % light and friction unknown to it. What can be compared are magnitudes and "
-            "ratios between controllers.",
+            "masses, friction and model errors it does not print. Ours are simulated on `planar3` with a "
+            "nominal model that is 20 % too light and contains no friction. Only magnitudes and ratios "
+            "between controllers can be compared.",
         ),
         rows=tuple(rows),
         tables=(

@@ -23,7 +23,7 @@ from lessons.papers.words import number, trouble
 from lessons.plots.style import name
 
 ACCURATE = 5e-4
-"""m: between the paper's 9e-5 (✓) and 3e-3 (✗)."""
+"""Largest RMSE that counts as accurate, m: between the paper's 9e-5 (✓) and 3e-3 (✗)."""
 LOST_LEVEL_1 = 0.03
 """m: a level-1 error above this means that level 1 was lost."""
 LOST_TORQUE = 4.0
@@ -40,15 +40,14 @@ CRITERIA = {
 
 @dataclass(frozen=True)
 class PropertyResult:
-    """holds: whether a property holds, None if a run that it needs failed; and the numbers that decided
-    it."""
+    """Whether a property holds (None if a run that it needs failed), and the numbers that decided this."""
 
     holds: bool | None
     numbers: str
 
     @property
     def tick(self) -> str:
-        """✓, ✗ or –."""
+        """The result as ✓, ✗ or –."""
         return {True: "✓", False: "✗", None: "–"}[self.holds]
 
 
@@ -98,7 +97,7 @@ def _cell(results: Results, criterion: str, controller: str) -> Row:
 
 
 APPROACHES = (0.0, 8.0, 15.0)
-"""1/s: how fast velocity bounds may be approached on RT2: as printed, the scene's own, the default."""
+"""Rates, 1/s, at which velocity bounds may be approached on RT2: as printed, the scene's own, the default."""
 
 
 def _at_approach(rate: float) -> Job:
@@ -124,8 +123,8 @@ def _section(results: Results, quick: bool) -> Section:
         notes=(
             "Each ✓ or ✗ of ours is decided by a criterion on these runs, with the numbers beside it:",
             "\n".join(f"- **{criterion}**: {text}." for criterion, text in CRITERIA.items()),
-            "HIMPC's level 1 on RT2 depends on how fast a velocity bound may be approached, which the paper "
-            "does not have: see the rows.",
+            "HIMPC's level 1 on RT2 depends on how fast a velocity bound may be approached, a setting that "
+            "the paper does not have: see the rows.",
         ),
         rows=(
             *(_cell(results, criterion, controller) for criterion in CRITERIA for controller in COMPARED),

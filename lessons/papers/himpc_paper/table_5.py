@@ -68,10 +68,10 @@ def _table_5(results: Results, quick: bool) -> Section:
     rows += _share_rows(results)
     return Section(
         notes=(
-            f"RMSE over the whole run, which starts on the reference, N = 5. {OPEN} Some 300 readings were "
-            "tried; none gives all seven numbers. Disturbed, the paper says 'each diagonal element of the "
-            "inertia matrix': read as links with 20 % more or less rotational inertia, or density, and "
-            "literally as diag M(q) altered in the dynamics, which no mechanism does.",
+            f"RMSE over the whole run, which starts on the reference, N = 5. {OPEN} About 300 readings were "
+            "tried; none gives all seven numbers. The paper disturbs 'each diagonal element of the inertia "
+            "matrix'. We read this as links with 20 % more or less rotational inertia or density, and "
+            "literally as diag M(q) altered in the dynamics, a property that no mechanism has.",
         ),
         rows=tuple(rows),
         tables=(
@@ -87,7 +87,7 @@ def _why_table_5(task: str, reading: str) -> str:
     if task == "q1":
         return "the start or the limits of the paper's joint 1 differ from our reading"
     if reading == "diag M(q) scaled":
-        return "our errors scale with diag M(q): estimation errors do, and the printed ones do not"
+        return "our errors scale with diag M(q), as estimation errors do; the printed errors do not"
     if task == "orientation":
         return "depends on the wrist's unprinted inertias: see the lighter wrist below"
     return "depends on the unprinted inertias and M̄, but not on a common factor: see the other plants below"
@@ -102,7 +102,8 @@ def _topic(task: str, reading: str) -> str:
 def _change_row(
     results: Results, reading: str, extra: tuple[str, ...], label: str, task: str, k: int, unit: str
 ) -> Row:
-    """A row with the error of the disturbed plant over that of the nominal one, the subject of the table."""
+    """A row with the ratio of the disturbed plant's error to the nominal plant's, the subject of the
+    table."""
     paper = printed("himpc_table_5")
     nominal, disturbed = results[rt4()], results[rt4("himpc", *extra)]
     return Row(
@@ -117,7 +118,7 @@ def _change_row(
 
 
 def _shares(results: Results, words: str) -> dict[str, float]:
-    """Errors with another plant or setting over the nominal ones, by coordinate."""
+    """Ratios of the errors with another plant or setting to the nominal errors, by coordinate."""
     run, nominal = results[rt4("himpc", *_OTHERS[words])], results[rt4()]
     return {
         label: run.error_of(task, k, "rmse") / nominal.error_of(task, k, "rmse")
@@ -137,7 +138,7 @@ def _share_rows(results: Results) -> list[Row]:
         for label, share in _shares(results, _LIGHT_WRIST).items()
         if label in ("o_X", "o_Y", "o_Z", "q₁")
     ]
-    return [Row(text, "1", None, share, "no number of the paper's") for text, share in rows]
+    return [Row(text, "1", None, share, "the paper prints no such number") for text, share in rows]
 
 
 def _others(results: Results) -> Table:

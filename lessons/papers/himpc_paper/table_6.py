@@ -1,4 +1,4 @@
-"""Table VI: RMSE over the horizon."""
+"""Table VI: RMSE against the horizon."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ printed position rows: with them the error of x is 5 mm at N = 5."""
 
 
 _N = 5
-"""The scene's own."""
+"""The horizon of the scene."""
 
 
 def horizon_job(controller: str, N: int, extra: tuple[str, ...] = (), quick: bool = False) -> Job:
-    """RT4 with a horizon; the quick version is shorter."""
+    """The run of RT4 with a horizon; the quick version is shorter."""
     own = () if N == _N else (f"horizon={N}",)
     return rt4(controller, *own, *extra, seconds=2.0 if quick else None)
 
 
 def horizons(controller: str, quick: bool) -> tuple[int, ...]:
-    """The horizons of the runs; the quick version leaves out those that take minutes."""
+    """The horizons of the runs; the quick version leaves out the runs that take minutes."""
     if controller == "nhimpc":
         return (10,) if quick else (10, 20, 30)
     return (5, 10, 20) if quick else (5, 10, 20, 30)
@@ -75,7 +75,7 @@ def _table_6(results: Results, quick: bool) -> Section:
                             "1",
                             printed_value / paper["himpc"]["5"] if printed_value else None,
                             errors[N] / base,
-                            trouble(run) or "what R weighs decides whether a horizon helps",
+                            trouble(run) or "the quantity that R weighs decides whether a horizon helps",
                             turns_at=1.0,
                             topic="horizon",
                         )
@@ -93,7 +93,7 @@ def _table_6(results: Results, quick: bool) -> Section:
             "and only where joints meet their limits, which it predicts earlier. With R on M̄⁻¹Δτ, the "
             "accelerations, the result shows the paper's trend; the position limits are then those before "
             "which a joint can stop.",
-            *(("Quick: 2 s of the 4, without N = 30 and most of NHIMPC.",) if quick else ()),
+            *(("Quick version: 2 s of 4 s, without N = 30 and most of NHIMPC.",) if quick else ()),
         ),
         rows=tuple(rows),
         checks=tuple(checks),

@@ -16,14 +16,14 @@ from lessons.scenes.run_spec import RunSpec
 
 
 def timed(controller: str, N: int, quick: bool) -> Job:
-    """RT4 for step times: alone on the machine, half a second."""
+    """The run of RT4 for step times: half a second, alone on the machine."""
     return Job(
         RunSpec(RT4, controller=controller, set=(f"horizon={N}",), duration=0.2 if quick else 0.5), timed=True
     )
 
 
 def step_seconds(run: JobResult) -> dict[str, float]:
-    """Average, median and maximum step time, s; the first ten steps warm up. NaN for a failed run."""
+    """Average, median and maximum step time, s, without the first ten steps. NaN for a failed run."""
     times = 1e-6 * run.column("step_us")[10:]
     if not len(times):
         return dict.fromkeys(("average", "median", "maximum"), math.nan)
@@ -77,7 +77,7 @@ def _table_7(results: Results, quick: bool) -> Section:
         ),
     )
     return Section(
-        notes=("Step times with nothing else of ours running, state in to torque out, N = 5.",),
+        notes=("Step times from state in to torque out, N = 5, while no other job of ours runs.",),
         rows=tuple(rows),
         tables=(table,),
         checks=(

@@ -1,4 +1,4 @@
-"""Table VIII: smoothness of the torque over the encoders' resolution."""
+"""Table VIII: smoothness of the torque against the encoders' resolution."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _FREE = ("limits.position=off",)
 
 
 def resolution_job(thousandths: float, quick: bool = False) -> Job:
-    """RT4 with encoders of a resolution in 1e-3 deg, no state bound active."""
+    """The run of RT4 with encoders of a resolution in 1e-3 deg; no state bound is active."""
     extra = (*_FREE, f"plant.encoder_resolution_deg={thousandths * 1e-3:g}")
     return rt4("himpc", *extra, seconds=2.0 if quick else None)
 
@@ -29,7 +29,7 @@ def _jobs(quick: bool) -> tuple[Job, ...]:
 
 
 def smoothness(run: JobResult, benchmark: JobResult) -> float:
-    """S of section VI-D: the RMS of ‖τ − τ of the benchmark‖, N·m, over the time both ran."""
+    """S of section VI-D: the RMS of ‖τ − τ of the benchmark‖, N·m, over the time that both ran."""
     ticks = min(len(run.t), len(benchmark.t))
     if not ticks:
         return math.nan
@@ -57,8 +57,8 @@ def _section(results: Results, quick: bool) -> Section:
     worst = max(abs(row.ratio - 1) if row.ratio else math.inf for row in rows)
     return Section(
         notes=(
-            "q̇ is the backward difference of the quantised q, and position limits are off besides velocity "
-            f"limits: no state bound clips the chatter. The benchmark has {paper['benchmark']:g}e-3°.",
+            "q̇ is the backward difference of the quantised q. Position and velocity limits are off: no "
+            f"state bound clips the chatter. The benchmark has {paper['benchmark']:g}e-3°.",
         ),
         rows=rows,
         checks=(

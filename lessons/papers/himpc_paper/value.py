@@ -23,10 +23,10 @@ _FAR = 10.0
 
 
 def decrease(V: Array, t: Array) -> tuple[float, float]:
-    """(ε_N, α) such that V(k+1) − V(k) ≤ −α V(k) + ε_N on all ticks far from the reference, see (39).
+    """Returns (ε_N, α) with V(k+1) − V(k) ≤ −α V(k) + ε_N on all ticks far from the reference, see (39).
 
-    ε_N is the largest value after V has settled. α is the least value for which (39) holds with this ε_N at
-    the ticks before, as long as V > 10 ε_N. If α > 0, V decreases there. NaN without such ticks.
+    ε_N is the largest value after V has settled. α is the largest value for which (39) holds with this ε_N at
+    all ticks before, as long as V > 10 ε_N. If α > 0, V decreases there. Without such ticks α is NaN.
     """
     late = V[t >= _SETTLED_AFTER]
     if not len(late):
@@ -59,14 +59,16 @@ def _section(results: Results, quick: bool) -> Section:
         ),
     )
     caption = (
-        "Value functions of the three levels from rest on RT4, and level 1's from tick to tick. Level 3 "
-        "climbs: joint 1 may not turn as fast as asked, and (39) promises nothing for lower levels."
+        "Value functions of the three levels from rest on RT4, and that of level 1 from tick to tick. That "
+        "of level 3 rises: joint 1 may not turn as fast as its reference, and (39) guarantees nothing for "
+        "lower levels."
     )
     return Section(
         notes=(
-            "V_N(k) is the optimal cost of each level, from the telemetry. Level 1 must decrease as long as "
-            "it is far above the bound ε_N that the estimation error leaves (39); lower levels only as far "
-            f"as level 1 lets them. ε_N = {number(epsilon)}. {trouble(run)}",
+            "V_N(k) is the optimal cost of each level, from the telemetry. By (39), the cost of level 1 must "
+            "decrease as long as it is far above the bound ε_N that the estimation error leaves. The cost of "
+            "a lower level decreases only as far as level 1 permits. "
+            f"ε_N = {number(epsilon)}. {trouble(run)}",
         ),
         checks=(
             PaperCheck(

@@ -1,4 +1,4 @@
-"""Fig. 9: the delivery rounds by architecture and by the rule for when a base is there."""
+"""Fig. 9: the delivery rounds by architecture, and by the rule for when the base counts as arrived."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ CASES = (
     ("decoupled", "5 cm, at rest"),  # 80 cm away from its goal, a folded arm cannot reach every hand
 )
 EVERY = 6
-"""Of the 20 layouts of three seats out of six these are measured: a hundred such runs take long."""
+"""Every sixth of the 20 layouts (three seats out of six) is measured: all layouts need a hundred runs."""
 
 
 def _layouts(quick: bool) -> list[tuple[int, ...]]:
@@ -104,7 +104,7 @@ def _ratios(time: dict[tuple[str, str], Array]) -> tuple[Row, ...]:
         "four rounds, people at our seats; the paper prints neither when the base counts as arrived nor "
         "where people stood"
     )
-    apart = "no comparison of architectures alone: each has another rule"
+    apart = "no comparison of architectures alone: each has its own rule"
 
     def row(over: tuple[str, str], under: tuple[str, str], words: str, same: bool) -> Row:
         each = time[over] / time[under]

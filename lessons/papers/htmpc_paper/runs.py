@@ -52,7 +52,7 @@ def hand_mm(run: JobResult) -> tuple[float, float, float]:
 
 
 def normalised(run: JobResult) -> Array:
-    """The base error over time, over its value at the start of each part."""
+    """The base error over time, divided by its value at the start of each part."""
     error = np.linalg.norm(run["error/base"], axis=1)
     half = len(error) // 2
     return np.concatenate([error[:half] / error[0], error[half:] / error[half]]) if half else error

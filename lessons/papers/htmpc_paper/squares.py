@@ -26,13 +26,13 @@ from lessons.papers.words import number
 from lessons.plots.panels import Panel, Picture, PlotCurve
 
 BASE_GAINS = (0.3, 0.6, 0.65, 0.7, 0.75)
-"""1/s: base gains of HTIDKC that are tried to match HTMPC on Part 1; the authors' is the first."""
+"""Base gains of HTIDKC, 1/s, that are tried to match HTMPC on Part 1; the first one is the authors' gain."""
 COLLINEAR = math.radians(15.0)
 """Peak, valley and EE lie on a line if the directions from the EE differ by less than this from 0 or 180°."""
 
 
 def _idkc(peak: tuple[float, float], gain: float) -> Job:
-    # The authors' gains are the scene's own: the same run as without any.
+    # The authors' gains are the scene's own, and need no assignment.
     return square("htidkc", peak, *(() if gain == BASE_GAINS[0] else (f"gains=[0.5,{gain}]",)))
 
 
@@ -97,8 +97,8 @@ def _fig_4(results: Results, quick: bool) -> Section:
         for words, run in runs.items()
     )
     caption = (
-        "The example: base error over its value at the start of each part, and EE error. Cut below 1e-3; "
-        "HTMPC (broad) and HTMPC_WPT coincide until the former sees the step at 8 s."
+        "The example: base error divided by its value at the start of each part, and EE error, cut off "
+        "below 1e-3. HTMPC (broad) and HTMPC_WPT coincide until HTMPC sees the step at 8 s."
     )
     return Section(rows=rows, pictures=(Picture("htmpc-fig-4", caption, panels),))
 
@@ -169,7 +169,7 @@ def _fig_6(results: Results, quick: bool) -> Section:
         _strip(f"Part {k + 1}", {words: each[k] for words, each in errors.items()}) for k in (0, 1)
     )
     notes = (
-        "Base error over its value at the start of each part, mean over the part, one dot per square wave. "
+        "Base error divided by its value at the start of the part, mean over the part, per square wave. "
         '"Better": Part 2 against HTIDKC with the authors\' gains.',
     )
     caption = "Fitted density, one dot per square wave, and the mean, in the order of the table's methods."
@@ -240,7 +240,7 @@ def _fig_7(results: Results, quick: bool) -> Section:
         apart = [errors[chosen].mean() if chosen.any() else math.nan for chosen in (on_line, ~on_line)]
         lines.append((words, str(int(on_line.sum())), *(number(float(x)) for x in apart)))
     columns = ("method", "collinear waves", "their Part 2", "Part 2 of the others")
-    caption = "Part 2 base error by the place of the peak target, seen from the EE."
+    caption = "Base error in Part 2 by the position of the peak target, seen from the EE."
     return Section(
         tables=(Table("Peak, valley and EE on a line", columns, tuple(lines)),),
         pictures=(Picture("htmpc-fig-7", caption, tuple(panels), 2),),

@@ -69,7 +69,7 @@ def _table(results: Results, quick: bool) -> Section:
 
 
 def _order(results: Results, f: str, d: str) -> Row:
-    """The row with the table's subject: the hand's error with (12) over that with (11)."""
+    """The row with the table's subject: the ratio of the hand's error with (12) to that with (11)."""
     paper = printed("htmpc_table_1")
     mean = {e: hand_mm(results[_job(f, e, d)])[0] for e in EQUATIONS}
     return Row(
@@ -84,7 +84,7 @@ def _order(results: Results, f: str, d: str) -> Row:
 
 
 def _base_checks(results: Results) -> tuple[PaperCheck, ...]:
-    """Fig. 5: the base's error in Part 1 under (11), less that under (12)."""
+    """Fig. 5: the base's error in Part 1 under (11), minus that under (12)."""
     checks = []
     for f in FORMULATIONS:
         for d in DELTAS:
@@ -114,8 +114,8 @@ def _fig_5(results: Results, quick: bool) -> Section:
             )
         )
     caption = (
-        "Base error over its value at the start of each part, with the 5 % bound of the paper's Fig. 5. Cut "
-        "below 1e-3."
+        "Base error divided by its value at the start of each part, with the 5 % bound of the paper's "
+        "Fig. 5. Curves are cut off below 1e-3."
     )
     return Section(
         checks=_base_checks(results), pictures=(Picture("htmpc-fig-5", caption, tuple(panels), 2),)
