@@ -1,8 +1,7 @@
 """A measured robot instead of a simulated one: read q and v from your source, send the torque to your bus.
 
-The loop needs only `read` and `write`, with joints in the order of the URDF, in rad, rad/s and N·m. This
-driver returns one invalid reading. Prints the ticks, the late ticks, the reaction to it, and the hand's
-error.
+The loop needs only `read` and `write` (joints in the order of the URDF; rad, rad/s, N·m). This driver returns
+one invalid reading. Prints the ticks, the late ticks, the reaction to this reading, the hand's error.
 """
 
 from __future__ import annotations
