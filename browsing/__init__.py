@@ -1,1 +1,1 @@
-"""Actions of a learner in a real Chromium, for tests, benchmarks and the pictures of docs/."""
+"""Functions that act as a learner in a real Chromium, for tests, benchmarks and the pictures of docs/."""

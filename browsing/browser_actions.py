@@ -1,4 +1,4 @@
-"""A Chromium, and functions that find and use the controls that viser draws."""
+"""Opens the page in a Chromium; functions find and use the controls that viser draws."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from urllib.parse import urlsplit
 from playwright.sync_api import Browser, Locator, Page
 
 CHROMIUM_ARGS = ["--no-sandbox", "--disable-dev-shm-usage", "--enable-unsafe-swiftshader"]
-SLOW = 60_000  # ms: WebGL in software on two shared cores
+SLOW = 60_000  # time limit of an action, ms, for WebGL in software on two shared cores
 BETWEEN = 120  # ms between two controls: viser throttles a container to one change per 50 ms
 
 SCALE = 0.25
-"""Pixels per CSS pixel when nobody looks at the picture."""
+"""Pixels per CSS pixel for pages that nobody looks at."""
 OFTEN, SELDOM = 80, 300
-"""Time between two pictures, ms: while something is dragged in the 3D view, and otherwise."""
+"""Time between two frames, ms: OFTEN while the mouse drags in the 3D view, otherwise SELDOM."""
 
 _RESTING = """(() => {
   const frame = window.requestAnimationFrame.bind(window);
@@ -52,8 +52,8 @@ _UNDRAWN = """(() => {
     };
   }
 })()"""
-"""Replaces the calls that fill the pixels of a canvas of the page; they then do nothing. All steps before
-these calls are done as usual: the scene, its placements, visibility, what the mouse meets, the triangles."""
+"""Makes the calls that fill the pixels of the page's canvases do nothing. All steps before these calls are
+done as usual: scene, poses, visibility, the search for the object under the mouse, triangles."""
 
 _PICTURES = """() => new Promise((done) => {
   let left = 3;
@@ -83,8 +83,8 @@ def open_page(
     scale: float = SCALE,
     rest: int = SELDOM,
 ) -> Page:
-    """A fresh browser profile in which the page is loaded and the robot is drawn; arguments as for
-    `new_page`."""
+    """Returns a page in a new browser profile after it is loaded and the robot is drawn; the arguments are
+    those of `new_page`."""
     page = new_page(browser, width, height, scale, rest)
     # By default, viser draws at least one pixel per CSS pixel.
     load(page, url if scale >= 1 else f"{url}{'&' if urlsplit(url).query else '?'}fixedDpr={scale}")
@@ -94,15 +94,15 @@ def open_page(
 def new_page(
     browser: Browser, width: int = 1300, height: int = 480, scale: float = SCALE, rest: int = SELDOM
 ) -> Page:
-    """An empty page of a fresh browser profile, in which pictures cost little.
+    """Returns an empty page in a new browser profile; drawing in it needs little processor time.
 
     Args:
-        browser: without a graphics card every picture takes both cores a tenth of a second.
-        width, height: of the page, CSS pixels.
-        scale: pixels per CSS pixel. Below 1 edges are not smoothed, and the light comes from a plain grey
-            sky: nobody looks. (viser's is of a million pixels, blurred seven times: four seconds of a core.)
-            At `SCALE` or below no pixel is filled, which costs a third of what an open page does.
-        rest: ms between two pictures. While a hand drags they are `OFTEN`.
+        browser: without a graphics card, a frame takes a tenth of a second on two cores.
+        width, height: size of the page in CSS pixels.
+        scale: pixels per CSS pixel. Below 1, edges are not smoothed, and a plain grey sky gives the light.
+            (viser's sky has a million pixels and is blurred seven times: four seconds of one core.)
+            At `SCALE` or below no pixel is filled; the page then takes a third of the processor time.
+        rest: time between two frames, ms. During a drag it is `OFTEN`.
     """
     page = browser.new_context(
         viewport={"width": width, "height": height}, device_scale_factor=scale
@@ -124,7 +124,7 @@ def load(page: Page, url: str) -> None:
              p = p.parentElement) o *= parseFloat(getComputedStyle(p).opacity); return o > 0.99; }""",
         timeout=SLOW,
     )
-    # "Software WebGL" covers the canvas and swallows the mouse.
+    # The notice "Software WebGL" covers the canvas and would receive the mouse events.
     page.add_style_tag(
         content=".mantine-Notifications-root, .mantine-Notifications-root *"
         "{pointer-events:none !important;opacity:0}"
@@ -141,7 +141,7 @@ def wait_for_scene(page: Page, node: str = "/actual") -> None:
 
 
 def row(page: Page, label: str) -> Locator:
-    """The row that contains a control's label and inputs."""
+    """Returns the row that contains a control's label and inputs."""
     return page.locator(
         f'xpath=(//label[@for and normalize-space(.)="{label}"]'
         '/ancestor::div[contains(@class,"mantine-Flex-root")])[1]'
@@ -185,8 +185,8 @@ def tab(page: Page, name: str) -> None:
 
 
 def unfold(page: Page, title: str, at: int = 0) -> None:
-    """Unfolds a folder and waits until it has its whole height. Before that, a control may move between the
-    press and the release of the mouse, and then gets no click."""
+    """Opens a folder and waits until it has its full height. Before, a control may move between the press
+    and the release of the mouse, and would then receive no click."""
     folder = page.get_by_text(title, exact=True).nth(at)
     folder.click()
     assert eventually(page, lambda: folder.evaluate("(title) => !title.nextElementSibling.style.height"))
@@ -198,7 +198,7 @@ def key(page: Page, name: str) -> None:
 
 
 def position(page: Page, node: str) -> tuple[float, float, float]:
-    """The position at which the browser draws a node, in its parent's frame."""
+    """Returns the position at which the browser draws a node, in its parent's frame."""
     found: Any = page.evaluate(
         "(n) => { const p = window.__viserMutable.nodeRefFromName[n].position; return [p.x, p.y, p.z]; }",
         node,
@@ -215,7 +215,7 @@ def is_drawn(page: Page, node: str) -> bool:
 
 
 def camera(page: Page) -> tuple[float, float, float]:
-    """The position of the camera in the browser's own frame."""
+    """Returns the position of the camera in the browser's own frame."""
     found: Any = page.evaluate(
         "() => { const p = window.__viserMutable.camera.position; return [p.x, p.y, p.z]; }"
     )
@@ -223,7 +223,7 @@ def camera(page: Page) -> tuple[float, float, float]:
 
 
 def sheet(page: Page) -> tuple[float, float]:
-    """The left and right edge of the panel on a phone, pixels."""
+    """Returns the left and right edge of the panel on a phone, in pixels."""
     found: Any = page.evaluate(
         """() => { const r = [...document.querySelectorAll("div")].find((d) =>
              getComputedStyle(d).position === "fixed" && d.textContent.includes("Playback"))
@@ -233,7 +233,7 @@ def sheet(page: Page) -> tuple[float, float]:
 
 
 def target_position(page: Page, node: str = "/target/ball") -> tuple[float, float, float]:
-    """The position at which the browser draws the target's ball, in world coordinates."""
+    """Returns the position at which the browser draws the target's ball, in world coordinates."""
     found: Any = page.evaluate(
         """(node) => { const m = window.__viserMutable;
              const world = (name) => { const n = m.nodeRefFromName[name]; n.updateWorldMatrix(true, false);
@@ -247,7 +247,7 @@ def target_position(page: Page, node: str = "/target/ball") -> tuple[float, floa
 
 @contextmanager
 def often(page: Page) -> Iterator[None]:
-    """Within this context pictures follow each other quickly."""
+    """Within this context the time between two frames is `OFTEN`."""
     before: Any = page.evaluate(
         "(rest) => { const before = window.picturesRest; window.picturesRest = rest; return before; }", OFTEN
     )
@@ -258,12 +258,12 @@ def often(page: Page) -> Iterator[None]:
 
 
 def drag_target(page: Page, axis: int, along: float, node: str = "/target", arm: float = 0.18) -> None:
-    """Drags the gizmo's arrow of a world axis by a distance, m. arm: distance from the centre at which the
-    arrow is grabbed, m."""
+    """Drags the gizmo's arrow along a world axis by a distance, m. The mouse grabs the arrow at the
+    distance `arm` from the gizmo's centre, m."""
     direction = [0.0, 0.0, 0.0]
     direction[axis] = 1.0
     with often(page):
-        _see(page)  # a change of the camera takes effect with the next picture
+        _see(page)  # a change of the camera takes effect with the next frame
         start = page.evaluate(_PROJECT, [node, [arm * c for c in direction]])
         end = page.evaluate(_PROJECT, [node, [(arm + along) * c for c in direction]])
         _drag(page, start, end)
@@ -290,7 +290,7 @@ def click_on(page: Page, node: str) -> None:
 
 def turn_target(page: Page, degrees: float) -> None:
     """Drags the ring around the target's own z axis."""
-    radius = 0.16  # 0.65 of the gizmo's size for the iiwa
+    radius = 0.16  # m: 0.65 of the gizmo's size for the iiwa
 
     def on_ring(angle: float) -> Any:
         at = [radius * math.cos(math.radians(angle)), radius * math.sin(math.radians(angle)), 0.0]
@@ -302,13 +302,13 @@ def turn_target(page: Page, degrees: float) -> None:
 
 
 def _see(page: Page) -> None:
-    """Waits, without a time limit, until the browser has drawn the next pictures, and then for 0.25 s."""
+    """Waits, without a time limit, until the browser has drawn the next frames, and then for 0.25 s."""
     page.evaluate(_PICTURES)
     page.wait_for_timeout(250)
 
 
 def _drag(page: Page, start: list[float], end: list[float]) -> None:
-    """Drags in twelve steps, as a hand would."""
+    """Drags the mouse in twelve steps, as a user would."""
     page.mouse.move(*start)
     _see(page)  # the arrow must have received the mouse event first
     page.mouse.down()

@@ -1,6 +1,6 @@
-"""A Firefox that runs the expressions of a test, over WebDriver BiDi, the protocol that Firefox speaks.
+"""Starts a Firefox and evaluates expressions in it by its protocol, WebDriver BiDi.
 
-It has a virtual screen: without one Firefox has no WebGL.
+Firefox runs on a virtual screen: without a screen it has no WebGL.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from websockets.sync.client import connect
 from websockets.sync.connection import Connection
 
 NEEDED = ("firefox-esr", "Xvfb")
-"""The programs, as Debian calls them."""
+"""The names of the required programs in Debian."""
 _PATIENCE = 120.0
-"""Time for an answer, s."""
+"""Time limit for an answer, s."""
 
 
 def missing() -> str | None:
-    """Says which program is missing; None if both are here."""
+    """Returns a message that names a missing program, or None if no program is missing."""
     for program in NEEDED:
         if shutil.which(program) is None:
             return f"no {program} found (Debian: apt-get install firefox-esr xvfb)"
@@ -37,7 +37,7 @@ def missing() -> str | None:
 
 
 class Tab:
-    """The tab of a Firefox."""
+    """A tab of a Firefox."""
 
     def __init__(self, socket: Connection) -> None:
         self._socket, self._numbers = socket, count(1)
@@ -54,11 +54,11 @@ class Tab:
         return told["result"]
 
     def goto(self, address: str) -> None:
-        """Opens a page, and returns when it is loaded."""
+        """Opens a page and waits until it is loaded."""
         self._ask("browsingContext.navigate", **self._target, url=address, wait="complete")
 
     def evaluate(self, expression: str) -> Any:
-        """Returns the value of an expression, which JSON can hold; waits for a promise.
+        """Returns the value of an expression; it must be a JSON value or a promise of one.
 
         Raises:
             RuntimeError: the expression throws.
@@ -70,13 +70,13 @@ class Tab:
         return json.loads(found["result"]["value"])
 
     def screenshot(self) -> bytes:
-        """Returns what the window shows, as PNG."""
+        """Returns a PNG picture of the window."""
         return base64.b64decode(self._ask("browsingContext.captureScreenshot", **self._target)["data"])
 
 
 @contextmanager
 def firefox() -> Iterator[Tab]:
-    """A Firefox with a new profile on a screen of its own; it ends with the block."""
+    """Yields a tab of a Firefox with a new profile and its own virtual screen; the `with` block ends both."""
     with TemporaryDirectory() as profile, _screen() as display:
         given = ("--no-remote", "--profile", profile, "--remote-debugging-port", "0", "about:blank")
         said = Path(profile, "said.txt")
@@ -93,7 +93,7 @@ def firefox() -> Iterator[Tab]:
 
 
 def _address(browser: subprocess.Popen[bytes], said: Path) -> str:
-    """Waits for the sentence in which a browser tells its address."""
+    """Waits until the browser has printed its address, and returns it."""
     until = time.monotonic() + _PATIENCE
     while (found := re.search(r"BiDi listening on (ws://\S+)\n", said.read_text())) is None:
         if browser.poll() is not None or time.monotonic() > until:
@@ -104,7 +104,7 @@ def _address(browser: subprocess.Popen[bytes], said: Path) -> str:
 
 @contextmanager
 def _screen() -> Iterator[str]:
-    """A virtual screen; its name."""
+    """Starts a virtual screen and yields its name."""
     read, write = os.pipe()
     size = ("-screen", "0", "1440x900x24", "-nolisten", "tcp")
     screen = subprocess.Popen(

@@ -1,4 +1,4 @@
-"""A JupyterHub on this machine, with the icon of himpc-lab in its launcher, and what its users do."""
+"""Starts a JupyterHub with the icon of himpc-lab on this machine; functions act as its users."""
 
 from __future__ import annotations
 
@@ -50,9 +50,9 @@ c.ConfigurableHTTPProxy.pid_file = "{folder}/proxy.pid"
 
 
 def find_proxy() -> str | None:
-    """The hub's own proxy, from npm: `npm install configurable-http-proxy` and its folder .bin in PATH. The
-    Python package of the same name does not answer with the subprotocol of a web socket, so that browsers
-    close the page's connection."""
+    """Returns the path of the hub's own proxy, or None. Install it with `npm install configurable-http-proxy`
+    and add its folder .bin to PATH. The Python package of the same name does not answer with the
+    subprotocol of a web socket, so that browsers close the page's connection."""
     found = shutil.which("configurable-http-proxy")
     if found is None or "node" not in Path(found).resolve().read_text(errors="replace")[:200]:
         return None
@@ -61,7 +61,7 @@ def find_proxy() -> str | None:
 
 @contextmanager
 def hub(folder: Path, proxy: str, key: str) -> Iterator[str]:
-    """Runs a hub whose users need no password; yields its address. key: what signs the learners' progress."""
+    """Runs a hub whose users need no password; yields its address. The key signs the learners' progress."""
     ports = [_free_port() for _ in range(3)]
     url = f"http://127.0.0.1:{ports[0]}"
     (folder / "key.txt").write_text(key)
@@ -105,7 +105,7 @@ def hub(folder: Path, proxy: str, key: str) -> Iterator[str]:
 
 
 def entry_point(folder: Path) -> Path:
-    """A folder that makes the entry point of this checkout known, whatever is installed."""
+    """Returns a folder that declares the entry point of this checkout; himpc-lab need not be installed."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     site = folder / "site"
     about = site / "himpc_lab-0.dist-info"
@@ -117,7 +117,7 @@ def entry_point(folder: Path) -> Path:
 
 
 def log_in(browser: Browser, url: str, user: str) -> Page:
-    """A page of a new browser profile whose user has logged in and sees JupyterLab's launcher."""
+    """Logs a user in in a new browser profile and returns the page with JupyterLab's launcher."""
     page = new_page(browser, 1300, 700)
     page.goto(f"{url}/hub/login")
     page.fill("#username_input", user)
@@ -129,7 +129,7 @@ def log_in(browser: Browser, url: str, user: str) -> Page:
 
 
 def open_lab(page: Page) -> Page:
-    """Presses the icon of himpc-lab; returns the page that opens once it shows the robot."""
+    """Presses the icon of himpc-lab; returns the page that opens, as soon as it shows the robot."""
     with page.context.expect_page() as opened:
         page.click(_ICON)
     lab = opened.value
@@ -138,7 +138,7 @@ def open_lab(page: Page) -> Page:
              return m && t && m.nodeRefFromName["/actual"] && t.rendererInfo.render.triangles > 0; }""",
         timeout=2 * SLOW,
     )
-    # "Software WebGL" covers the page and swallows the mouse.
+    # The notice "Software WebGL" covers the page and would receive the mouse events.
     lab.add_style_tag(
         content=".mantine-Notifications-root, .mantine-Notifications-root *"
         "{pointer-events:none !important;opacity:0}"
@@ -158,7 +158,7 @@ def run_first_step(page: Page) -> Lesson:
 
 
 def hand_in(page: Page) -> str:
-    """The text that the page writes for the learner to hand in."""
+    """Returns the text that the page writes for the learner to hand in."""
     tab(page, "Export")
     page.get_by_text("Hand in your progress").click()
     press(page, "Write the text")
@@ -168,7 +168,7 @@ def hand_in(page: Page) -> str:
 
 
 def port_of_lab(folder: Path) -> int:
-    """The port of the himpc-lab that was started last."""
+    """Returns the port of the himpc-lab that was started last."""
     told = (folder / "hub.log").read_text()
     return int(re.findall(r"himpc-lab ready at http://localhost:(\d+)/", told)[-1])
 

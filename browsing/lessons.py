@@ -1,4 +1,4 @@
-"""Actions of a learner in a lesson on the page: open it, predict, run, read, continue."""
+"""Functions that act as a learner in a lesson on the page: open the lesson, predict, run, read, continue."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from lessons.teaching.challenge import Challenge
 from lessons.teaching.lesson import Lesson, Step
 from lessons.teaching.prediction import Choice, Prediction, Sketch
 
-RUN = 120_000  # ms for a scripted run on a busy machine
+RUN = 120_000  # time limit of a scripted run on a busy machine, ms
 
 
 def open_lesson(page: Page, lesson: Lesson) -> None:
-    """Opens a lesson by its card in the list of all lessons."""
+    """Opens a lesson: clicks on its card in the list of all lessons."""
     label = f"{COURSE.index(lesson.name) + 1} · {lesson.card.title}"
     key(page, "l")
     page.locator(".mantine-Modal-content").get_by_role("button", name=label).click()
@@ -51,7 +51,7 @@ def predict(page: Page, prediction: Prediction) -> None:
 
 
 def hurry(page: Page) -> None:
-    """Speeds up the run as far as possible."""
+    """Sets the highest speed of the run."""
     box = row(page, "As fast as possible").get_by_role("checkbox")
     if not box.is_checked():
         box.click()
@@ -59,11 +59,11 @@ def hurry(page: Page) -> None:
 
 
 def run(page: Page, button: str = "Run this step") -> None:
-    """Presses the button and waits until the run has ended."""
+    """Presses a button that starts a run, and waits until the run has ended."""
     page.get_by_role("button", name=button, exact=True).click()
     expect(page.get_by_text("DONE", exact=True)).to_be_visible(timeout=RUN)
 
 
 def marks(page: Page, sign: str) -> Locator:
-    """The claims or goals with a given mark: "✓", "✗" or "…"."""
+    """Returns the claims or goals with a mark: "✓", "✗" or "…"."""
     return page.get_by_text(sign, exact=True)

@@ -1,4 +1,4 @@
-"""Loads another scene on an open page, or the present one anew, which is quicker than opening a new page."""
+"""Loads another scene, or the same scene again, on an open page. This is faster than opening a new page."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from app.link.messages import Load, Status
 from browsing.browser_actions import eventually, press, tab, wait_for_scene
 
 _SOON = 2.0
-"""Simulated time, s; a run that was reset before this time is not told apart from a new one."""
+"""Simulated time, s; up to this time a run is not distinguished from a new run."""
 
 
 def reset_all(page: Page, learner: SimulationClient) -> None:
     """Presses "Reset all", and waits until the simulation runs from the beginning and the page shows it.
-    Before that, a click on a control that is about to be replaced has no effect."""
+    Before, the page may replace a control, and a click on it has no effect."""
     before = learner.status
     press(page, "Reset all")
     if before is not None:
@@ -29,7 +29,7 @@ def reset_all(page: Page, learner: SimulationClient) -> None:
 
 
 def _began_after(status: Status | None, before: Status) -> bool:
-    """Whether the run began after a status. A new process, which replaces one in trouble, counts its resets
+    """Returns whether the run began after a status. A process that replaces a failed one counts its resets
     from 1."""
     return status is not None and (status.resets != before.resets or status.t < before.t)
 
@@ -40,10 +40,10 @@ def _time_shown(page: Page) -> float:
 
 
 def show_scene(page: Page, learner: SimulationClient, choice: SceneChoice) -> None:
-    """Loads a torque-level scene, if it is not already loaded, and waits until the page is rebuilt."""
+    """Loads a torque-level scene, unless it is already loaded, and waits until the page is rebuilt."""
     if learner.choice == choice:
         return
-    tab(page, "Robot")  # a rebuilt page begins with another tab
+    tab(page, "Robot")  # a rebuilt page shows another tab first
     learner.send(Load(choice))
     assert eventually(page, lambda: learner.choice == choice)
     expect(page.get_by_text("Drag the target by its arrows")).to_be_visible()

@@ -1,4 +1,4 @@
-"""A tab without a browser: it keeps what the page stores, and opens again when its server is gone."""
+"""A tab without a browser: it stores the data of the page, and can be opened again if its server ends."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from websockets.exceptions import InvalidHandshake, InvalidMessage
 from browsing.wire import Wire
 
 RETRY = 1.0
-"""Time, s, after which viser's page tries to connect again."""
+"""Time after which viser's page tries to connect again, s."""
 _TEXT = r'("(?:[^"\\]|\\.)*")'
 _KEEP = re.compile(rf"sessionStorage\.setItem\({_TEXT}, {_TEXT}\)")
 _COPY = re.compile(rf'localStorage\.setItem\({_TEXT}, sessionStorage\.getItem\({_TEXT}\) \?\? ""\)')
@@ -21,14 +21,14 @@ _PREFIX = "viser-user:"
 
 
 class Storage:
-    """What a browser keeps: for all its tabs, and for this one."""
+    """The storages of a browser: `local` for all its tabs, `session` for one tab."""
 
     def __init__(self) -> None:
         self.local: dict[str, str] = {}
         self.session: dict[str, str] = {}
 
     def run(self, script: str) -> None:
-        """Does what a script of the page does with the storages."""
+        """Applies the changes that a script of the page makes to the storages."""
         for key, text in _KEEP.findall(script):
             self.session[json.loads(key)] = json.loads(text)
         for to, key in _COPY.findall(script):
@@ -36,7 +36,7 @@ class Storage:
 
 
 class Tab(Wire):
-    """A page whose browser stores what it is told."""
+    """A page without a browser that stores data as a browser does."""
 
     def __init__(self, url: str, storage: Storage) -> None:
         self.storage = storage
@@ -44,11 +44,11 @@ class Tab(Wire):
 
     @property
     def is_open(self) -> bool:
-        """Whether the server has not closed the connection."""
+        """Whether the connection to the server is open."""
         return self._reader.is_alive()
 
     def answered(self, header: str) -> str:
-        """A header of the answer to the handshake."""
+        """Returns a header of the answer to the handshake."""
         response = self._socket.response
         return "" if response is None else response.headers[header]
 
@@ -69,8 +69,8 @@ class Tab(Wire):
 
 
 def opened(url: str, storage: Storage, within: float) -> Tab:
-    """Opens a page, and tries again as viser's page does while no server takes it; raises TimeoutError after
-    `within` seconds."""
+    """Opens a page. As viser's page does, it tries again while no server accepts the page; it raises
+    TimeoutError after `within` seconds."""
     until = time.monotonic() + within
     while True:
         try:

@@ -1,4 +1,4 @@
-"""A page without a browser: it uses viser's protocol and stores what the page shows, but draws nothing."""
+"""A page without a browser: it uses viser's protocol and stores the page's content, but draws nothing."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ from viser import __version__, _messages
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
-_HEAD = 16  # bytes: sizes of the message part, raw and compressed
+_HEAD = 16  # bytes of the header: the sizes of the messages, raw and compressed
 
 
 def messages_of(raw: bytes) -> list[dict[str, Any]]:
-    """The messages in a packet; arrays are replaced by placeholders."""
+    """Returns the messages in a packet, with placeholders instead of arrays."""
     size, packed = (int.from_bytes(raw[at : at + 8], "little") for at in (0, 8))
     inner = zstandard.ZstdDecompressor().decompress(raw[_HEAD : _HEAD + packed], max_output_size=size)
     return msgspec.msgpack.decode(inner)["messages"]
 
 
 def pack(message: _messages.Message) -> bytes:
-    """Serialises messages for the server."""
+    """Serialises a message for the server."""
     return msgspec.msgpack.encode(message.as_serializable_dict())
 
 
 def let_in(link: str) -> str:
-    """The cookie that a browser gets and sends when it opens a link of `PageServer`; "" if the server sets
-    none."""
+    """Opens a link of `PageServer` and returns the cookie that the server sets, as a browser sends it; "" if
+    the server sets no cookie."""
     parts = urlsplit(link)
     connection = http.client.HTTPConnection(parts.hostname or "", parts.port, timeout=30)
     connection.request("GET", f"/?{parts.query}")
@@ -42,26 +42,26 @@ def let_in(link: str) -> str:
 
 
 def nothing_kept(request: str) -> _messages.LocalStorageGetItemResponseMessage:
-    """The answer of a new browser, which has stored nothing."""
+    """Returns the answer of a new browser, which has stored nothing."""
     return _messages.LocalStorageGetItemResponseMessage(None, None, request)
 
 
 class Wire:
-    """A connection that answers what a page is asked (camera, empty local storage).
+    """A connection that answers the server's requests to a page (camera, empty local storage).
 
     Attributes:
-        controls: by identity, what the page shows, as the message that made it with the updates since.
-        commands: by identity, what the palette holds.
-        made: every control there ever was, in the order they came.
-        controls_3d: by name, to whom arrows and rings in the 3D view belong.
-        meshes: the same of things that can be clicked and pulled.
+        controls: controls on the page by id: the message that created the control, with later updates.
+        commands: commands of the palette by id.
+        made: all controls that were ever created, in order, including removed ones.
+        controls_3d: owners of the arrows and rings in the 3D view by name.
+        meshes: owners of the objects in the 3D view that can be clicked and dragged, by name.
         notices: (title, body) of every notification.
-        standing: by identity, of those that were not taken back.
-        eye: m, where the page last told the browser to look from.
+        standing: (title, body) of the notifications that are still shown, by id.
+        eye: the last camera position that the server sent, m.
     """
 
     def __init__(self, url: str, headers: Mapping[str, str] | None = None) -> None:
-        """headers: what else the browser, or a proxy, sends with the handshake."""
+        """headers: further headers of the handshake, from the browser or a proxy."""
         protocol: Any = [f"viser-v{__version__}"]
         self.controls: dict[str, dict[str, Any]] = {}
         self.commands: dict[str, dict[str, Any]] = {}
@@ -91,7 +91,7 @@ class Wire:
         self._reader.join(5.0)
 
     def say(self, message: _messages.Message) -> None:
-        """Sends a message as a browser would."""
+        """Sends a message as a browser does."""
         self._socket.send(pack(message))
 
     def send(self, raw: bytes) -> None:
@@ -99,31 +99,31 @@ class Wire:
         self._socket.send(raw)
 
     def write(self, uuid: str, /, **updates: Any) -> None:
-        """Changes attributes of a control, as its input does with `value`."""
+        """Changes attributes of a control, as its input changes `value`."""
         self.say(_messages.GuiUpdateMessage(uuid, updates))
 
     def turn(self, node: str, xyzw: Sequence[float]) -> None:
-        """Rotates rings in the 3D view to an orientation."""
+        """Turns the rings of a node in the 3D view to an orientation."""
         x, y, z, w = (float(part) for part in xyzw)
         owner = self.controls_3d[node]
         self.say(_messages.TransformControlsUpdateMessage(node, (w, x, y, z), (0.0, 0.0, 0.0), owner))
 
     def press_key(self, hotkey: str) -> None:
-        """Triggers the command of a key."""
+        """Triggers the command with a hotkey."""
         found = next(uuid for uuid, each in self.commands.items() if each["hotkey"] == hotkey)
         self.say(_messages.CommandTriggerMessage(found))
 
     def find(self, label: str) -> str | None:
-        """The control with a label."""
+        """Returns the id of the control with a label, or None."""
         shown = list(self.controls.items())
         return next((uuid for uuid, each in shown if each["props"].get("label") == label), None)
 
     def folders(self, words: str) -> int:
-        """The number of folders so far whose label begins with the given words."""
+        """Returns how many controls were created whose label begins with these words."""
         return sum(str(each["props"].get("label", "")).startswith(words) for each in list(self.made))
 
     def shows(self, text: str) -> bool:
-        """Whether the page shows a text."""
+        """Returns whether the page shows a text."""
         shown = [each for each in list(self.controls.values()) if each["props"].get("visible", True)]
         return any(text in str(each["props"].get("content", "")) for each in shown)
 
@@ -185,7 +185,7 @@ def eventually(condition: Callable[[], bool], timeout: float = 40.0) -> bool:
 
 
 def camera() -> _messages.ViewerCameraMessage:
-    """The first message of every page; the server then treats the client as a page."""
+    """Returns the first message of every page, by which the server recognises the client as a page."""
     return _messages.ViewerCameraMessage(
         wxyz=(1.0, 0.0, 0.0, 0.0),
         position=(2.0, -2.0, 1.5),

@@ -96,8 +96,8 @@ def write_index(out: Path) -> None:
     lines = [
         "# The lessons, walked through",
         "",
-        "Each step before and after its run, as the page shows it. `python -m docs.gallery` makes these",
-        "pictures. Its predictions are the tempting answers, so many of them are wrong.",
+        "The pictures show every step before and after its run, as on the page; `python -m docs.gallery`",
+        "makes them. The predictions in them are plausible, but many of them are wrong.",
     ]
     for number, name in enumerate(COURSE, start=1):
         if (out / f"{name}.webp").exists():

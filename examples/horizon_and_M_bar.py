@@ -1,9 +1,10 @@
-"""N and M̄ by hand: the cost and the benefit of the horizon, and when the diagonal M̄ is too large.
+"""Setting N and M̄ by hand: cost and benefit of the horizon, and which diagonal M̄ is too large.
 
 M̄ replaces the robot's mass matrix M. Time-delay estimation multiplies its error by I − M⁻¹M̄ from tick to
-tick, so the spectral radius of that matrix has to stay below 1. A smaller M̄ keeps it below 1, but is less
-accurate. Prints a line per N and a line per factor on M̄: the RMS error of level 1 after the first quarter,
-the median time of a step, and the spectral radius at the start. "control lost" is a valid result.
+tick, so the spectral radius of that matrix has to stay below 1. A smaller M̄ keeps it below 1, but makes
+control less accurate. Prints a line per N and a line per factor on M̄: the RMS error of level 1 after the
+first quarter, the median time of a step, and the spectral radius at the start. The result "control lost" is
+valid.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""A mission of your own under HTMPC: the hand visits two points and the base one, two tasks at a time.
+"""A mission of your own under HTMPC: the hand visits two points, the base visits one; two tasks at a time.
 
-The task manager gives the controller a window of the next two tasks: the first one has priority, the second
-one is prepared with the remaining freedom. Prints a line per completed task with its time, and at the end the
+The task manager gives the controller a window of the next two tasks: the first task has priority, the
+second task uses the remaining freedom. Prints a line per completed task with its time, and at the end the
 positions of hand and base.
 """
 

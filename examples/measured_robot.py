@@ -1,7 +1,7 @@
-"""A measured robot instead of a simulated one: pass q and v from your source, send the torque to your bus.
+"""A measured robot instead of a simulated one: read q and v from your source, send the torque to your bus.
 
-The loop needs only `read` and `write`: joints in the order of the URDF, rad, rad/s, N·m. This driver returns
-one invalid reading. Prints the ticks, the late ticks, the reaction to that reading, and the hand's error.
+The loop needs only `read` and `write` (joints in the order of the URDF; rad, rad/s, N·m). This driver returns
+one invalid reading. Prints the ticks, the late ticks, the reaction to this reading, the hand's error.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Obstacles: HTMPC drives a mobile manipulator up to a post and under a ball.
 
-The task of level 1 keeps the hand at its place. The task of level 2 moves the base towards a post, which it
-must not touch. Prints the smallest distance to an obstacle along the path, the largest distance of the hand
-from its place, and the final position of the base.
+The task of level 1 keeps the hand in its position. The task of level 2 moves the base towards a post, which
+it must not touch. Prints the smallest distance to an obstacle along the path, the largest distance of the
+hand from this position, and the final position of the base.
 """
 
 from __future__ import annotations

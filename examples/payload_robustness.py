@@ -1,8 +1,8 @@
-"""An unknown payload is added while the arm holds still: compares how three controllers react.
+"""An unknown payload is added while the arm holds its pose: compares how three controllers react.
 
 After half of the time the plant's hand becomes heavier; the controllers do not know it. Prints a line per
-controller: how far the hand sagged at most, and how far it is from its place at the end. Incremental control
-(himpc) counts from the last torque, which already balances the new weight after one tick; model-based control
+controller: how far the hand sagged at most, and how far it is from its target at the end. Incremental control
+(himpc) adds to the last torque, which already balances the new weight after one tick; model-based control
 (osf) keeps an error that is proportional to the weight.
 """
 

@@ -1,8 +1,8 @@
-"""Swapping priorities while the robot moves: `configure` takes new settings between two ticks, bumplessly.
+"""Swapping priorities while the robot moves: `configure` applies new settings without a jump of the torque.
 
-The hand has the first priority and the posture the second; half-way they are swapped. Prints the errors of
-hand and posture before the swap and at the end, and the largest step of the torque at the swap beside the
-largest one elsewhere.
+The hand has the first priority and the posture the second; in the middle of the run they are swapped. Prints
+the errors of hand and posture before the swap and at the end, and the largest step of the torque at the swap
+beside the largest one elsewhere.
 """
 
 from __future__ import annotations

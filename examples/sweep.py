@@ -1,8 +1,8 @@
 """A sweep in Python: a grid of runs on all cores, stored in a folder, and continued after an interruption.
 
 The grid is payload × horizon. Prints how many cells there are, the error of each, and the best one; the
-folder `sweep-out` holds cells.jsonl, results.json and map.png. A second run of this program computes no cell
-again.
+folder `sweep-out` contains cells.jsonl, results.json and map.png. A second run of this program computes no
+cell again.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-// Bundles the live figures into one classic script, with the worker's program as text inside: node build.mjs OUT.
+// Bundles the live figures into one classic script, which contains the worker's program as text: node build.mjs OUT.
 import { writeFileSync } from "node:fs";
 import { build } from "esbuild";
 

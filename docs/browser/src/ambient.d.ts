@@ -1,4 +1,4 @@
-/** The program of the worker, put here by build.mjs. */
+/** The program of the worker; build.mjs inserts its text. */
 declare const WORKER_TEXT: string;
 declare module "*.css" {
   const text: string;

@@ -1,4 +1,4 @@
-/** State codes, as lessons/replay/state.py reads and writes them: all settings of a run in a link. */
+/** State codes, which contain all settings of a run; the format is that of lessons/replay/state.py. */
 import { through } from "./data";
 
 const PREFIX = "hl1-", MOST = 12_000;
@@ -11,7 +11,7 @@ export async function encode(state: State): Promise<string> {
   return PREFIX + btoa(String.fromCharCode(...packed)).replace(/\+/g, "-").replace(/\//g, "_").replace(/=+$/, "");
 }
 
-/** The state of a code; null for a text that is none. Nothing in it is run: names and numbers, checked where they are used. */
+/** Returns the state of a code, or null if the text is not a code. Its names and numbers are checked where they are used. */
 export async function decode(code: string): Promise<State | null> {
   if (!code.startsWith(PREFIX) || code.length > MOST || !/^[\w-]+$/.test(code)) return null;
   try {
@@ -24,7 +24,7 @@ export async function decode(code: string): Promise<State | null> {
   }
 }
 
-/** Path and value of "PATH=VALUE". */
+/** Splits "PATH=VALUE" into path and value. */
 export function split(assignment: string): [path: string, value: unknown] {
   const at = assignment.indexOf("="), text = assignment.slice(at + 1);
   try {
@@ -34,6 +34,6 @@ export function split(assignment: string): [path: string, value: unknown] {
   }
 }
 
-/** "PATH=VALUE" of a changed setting. */
+/** Returns a changed setting as "PATH=VALUE". */
 export const assignment = (path: string, value: unknown): string =>
   `${path}=${typeof value === "string" ? value : JSON.stringify(value)}`;

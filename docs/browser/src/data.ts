@@ -1,4 +1,4 @@
-/** What docs/figures/ writes for the page. SI units; quaternions x y z w; null: no limit. */
+/** The data that docs/figures/ writes for the page. Units are SI, quaternions are x y z w, and null means no limit. */
 import type { Manifest } from "../../../himpc/export/files/himpc.mjs";
 import type { State } from "./code";
 
@@ -22,9 +22,9 @@ export interface TaskData {
   frame: { joint: number; pos: number[] } | null;
 }
 export interface LevelData { name: string; Q: Numbers; R: Numbers; enabled: boolean }
-/** An object that is drawn: its body in MuJoCo, its geometry there, and where it is at the start. */
+/** An object that is drawn: its body in MuJoCo, its geometry in MuJoCo, and its pose at the start. */
 export interface Thing { body: string; kind: string; size: number[]; pose: number[] }
-/** The array is empty for fields that the session itself writes. */
+/** A field of a row; `array` is "" for fields that the session itself writes. */
 export type Field = [name: string, array: string, start: number, width: number];
 export type SceneEvent = { t: number; event: string; [key: string]: unknown };
 export interface SceneData {
@@ -34,7 +34,7 @@ export interface SceneData {
   levels: LevelData[]; tasks: TaskData[];
   limits: { torque: boolean; velocity: boolean; position: string; torque_scale: number; velocity_scale: number };
   plant: PlantSettings; events: SceneEvent[]; model: string; poses: number[]; objects: Thing[];
-  /** Controllers by their N; the fields of a row, and where controllers have them; HTML. */
+  /** The controllers by their N; the fields of a row with the controller's arrays; the HTML of the controls. */
   images: Record<string, { memory: Piece; manifest: Manifest }>; fields: Field[]; controls: string;
 }
 
@@ -54,14 +54,14 @@ export interface StepData {
   asking: string; claims: ClaimData[]; prediction: PredictionData | null;
 }
 
-/** A description, and the pieces that it refers to. */
+/** A description, and the bytes of the pieces to which it refers. */
 export interface Pack<T> { told: T; pieces: Uint8Array<ArrayBuffer> }
 export interface Scenes { scene?: SceneData; steps?: Record<string, StepData> }
 
 export const through = (bytes: ReadableStream, way: CompressionStream | DecompressionStream, type = ""): Response =>
   new Response(bytes.pipeThrough(way), { headers: { "Content-Type": type } });
 
-/** The content of a script of the site; the browser decodes and decompresses it while it is read. */
+/** Returns the content of a script of the site; the browser decodes and decompresses it while the caller reads it. */
 export async function unwrapped(text: string): Promise<Response> {
   const { body } = await fetch(`data:;base64,${text}`);
   return through(body!, new DecompressionStream("gzip"), "application/wasm");

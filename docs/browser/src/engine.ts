@@ -3,7 +3,7 @@ import type { Simulation, Told } from "./worker";
 
 type Answer<K extends keyof Simulation> = Awaited<ReturnType<Simulation[K]>>;
 
-/** The text of the script that gave data to the page under a name. */
+/** Returns the data that a script stored on the page under a name, as text. */
 export function packed(name: string): string {
   const text = window.HIMPC_PACKS?.[name];
   if (text === undefined) throw new Error(`the file with ${name} was not loaded`);
@@ -14,11 +14,11 @@ export class Engine {
   private worker = new Worker(URL.createObjectURL(new Blob([WORKER_TEXT], { type: "text/javascript" })));
   private waiting: PromiseWithResolvers<never>[] = [];
   mujoco = "";
-  /** Called with messages that the simulation sends without being called, and with errors of `tell`. */
+  /** Called with messages that the simulation sends unasked, and with errors of `tell`. */
   onTold: (told: Told) => void = () => {};
 
   constructor() {
-    // Calls are answered in the order in which they were made.
+    // The simulation answers calls in the order in which the page makes them.
     this.worker.onmessage = ({ data }: MessageEvent<Told | { answer: unknown } | { refusal: string }>) => {
       if ("answer" in data) this.waiting.shift()!.resolve(data.answer as never);
       else if ("refusal" in data) this.waiting.shift()!.reject(new Error(data.refusal));
@@ -30,13 +30,13 @@ export class Engine {
     this.mujoco = await this.call("load", packed("mujoco"), packed("kernel"));
   }
 
-  /** Calls a function of the simulation and waits for its answer; throws an Error with the sentence of a refusal. */
+  /** Calls a function of the simulation and waits for its answer; throws an Error with a sentence if it refuses. */
   call<K extends keyof Simulation>(name: K, ...given: Parameters<Simulation[K]>): Promise<Answer<K>> {
     this.worker.postMessage({ name, given });
     return this.waiting[this.waiting.push(Promise.withResolvers<never>()) - 1].promise;
   }
 
-  /** Calls a function that answers nothing. */
+  /** Calls a function of the simulation that returns nothing; does not wait. */
   tell<K extends keyof Simulation>(name: K, ...given: Parameters<Simulation[K]>): void {
     this.call(name, ...given).catch(({ message }: Error) => this.onTold({ error: message }));
   }

@@ -13,14 +13,14 @@ declare global {
 }
 
 export interface Asked {
-  /** "scene/NAME" or "lesson/NAME", and the step. */
+  /** pack is "scene/NAME" or "lesson/NAME"; step is the number of the step, or null for a scene. */
   pack: string; robot: string; step: string | null; assignments: string[]; wide: boolean; running: boolean;
-  /** Settled when the scripts of the simulation are loaded. The first picture needs only those of robot and scene. */
+  /** Settled when the scripts of the simulation are loaded. The first picture needs only the scripts of robot and scene. */
   loaded: Promise<unknown>;
 }
 
 export class Figure {
-  /** None in a browser without WebGL. */
+  /** null in a browser without WebGL. */
   private view: View | null = null;
   private plots!: Plots;
   private panel!: Panel;
@@ -34,12 +34,12 @@ export class Figure {
   private notice = element("p", { class: "hl-notice", role: "status" });
   private run = button("Run", () => this.engine.tell(this.frame?.running ? "pause" : "run"));
   private code = element("input", { readOnly: true, type: "text", ariaLabel: "State code" });
-  /** The last moment that was shown; for tests. */
+  /** The frame that was shown last; tests read it. */
   frame: Frame | null = null;
 
   constructor(private root: HTMLElement, private engine: Engine, private asked: Asked) {}
 
-  /** Draws the robot at its start; it moves as soon as MuJoCo and the kernel are compiled. */
+  /** Draws the robot in its start pose. The robot moves as soon as MuJoCo and the kernel are compiled. */
   async open(): Promise<this> {
     const { asked, engine, drag } = this;
     const [pack, scenes] = await Promise.all([unpacked<RobotData>(packed(`robot/${asked.robot}`)), unpacked<Scenes>(packed(asked.pack))]);
@@ -49,7 +49,7 @@ export class Figure {
     try {
       this.view = new View(pack, scene, drag);
     } catch {
-      this.say("This browser has no WebGL, which the 3D view needs: plots and controls work without it.");
+      this.say("This browser has no WebGL, which the 3D view needs. Plots and controls work without the 3D view.");
     }
     for (const each of asked.assignments) this.changes.set(...split(each));
     this.plots = new Plots(scene.tasks, robot.joints.length);
@@ -77,7 +77,7 @@ export class Figure {
     this.engine.tell("target", task, place);
   };
 
-  /** Lays the figure out; returns the controls, which cannot be used yet. */
+  /** Builds the layout of the figure; returns the element with the controls, which is inert at first. */
   private lay(): HTMLElement {
     const { step, asked, root, view, plots } = this, reset = button("Reset", () => this.engine.tell("reset"));
     const link = element("div", { class: "hl-bar" }, button("Copy the link", () => this.copy()), this.code);
@@ -90,7 +90,7 @@ export class Figure {
     return side;
   }
 
-  /** The prediction before the run, the list of claims, and what runs the step. */
+  /** Returns the controls of a step: the prediction, the list of claims, and the button that runs the step. */
   private asking({ asking, scene }: StepData): Element[] {
     return [...element("div", { innerHTML: asking }).children,
       button(`Run the step (${scene.duration} s)`, () => void this.again())];
@@ -98,13 +98,13 @@ export class Figure {
 
   private get claims(): HTMLElement[] { return [...this.root.querySelectorAll<HTMLElement>(".hl-claims li")]; }
 
-  /** What is predicted: the number of an option, or a value. */
+  /** The learner's prediction: the number of an option, or a value. */
   private get guess(): number | null {
     const given = this.root.querySelector<HTMLInputElement>(".hl-guess :is(:checked, [type=number])")?.value;
     return given ? Number(given) : null;
   }
 
-  /** The step from its beginning, with its own settings. */
+  /** Runs the step from its beginning with its original settings. */
   private async again(): Promise<void> {
     await this.reopen([]);
     this.changes.clear();
@@ -126,14 +126,14 @@ export class Figure {
     if (asked) {
       const was = number(prediction, asked.measure.unit), { options } = asked;
       const right = options?.findIndex(({ low, high }) => limit(low, -1) <= prediction && prediction < limit(high)) ?? -1;
-      this.root.querySelector(".hl-answer")!.textContent = options ? right < 0 ? "The run gave nothing to measure." :
+      this.root.querySelector(".hl-answer")!.textContent = options ? right < 0 ? "The run gave no measured value." :
         `${guess === right ? "Right" : "It was"}: ${options[right].text} (${was}).` :
-        guess === null ? `It was ${was}.` : `You said ${number(guess, asked.measure.unit)}, it was ${was}.`;
+        guess === null ? `The run gave ${was}.` : `Your prediction was ${number(guess, asked.measure.unit)}; the run gave ${was}.`;
     }
-    this.say("The step is over and judged. Run goes on by hand: drag the target, change the settings.");
+    this.say("The step is over and its claims are judged. Press Run to continue: drag the target, or change the settings.");
   }
 
-  /** Where the target of a task is on the screen, in pixels; for tests. */
+  /** Returns the position of a task's target on the screen, in pixels; tests use it. */
   pixel(task: string): [number, number] { return this.view!.pixel(task); }
 
   private say(words: string): void { this.notice.textContent = words; }
@@ -158,7 +158,7 @@ export class Figure {
       this.say("The link is copied.");
     } catch {
       this.code.select();
-      this.say("Copy the code from the field: this browser does not let a page copy.");
+      this.say("Copy the code from the field: this browser does not allow pages to copy text.");
     }
   }
 
@@ -180,7 +180,7 @@ export class Figure {
       if (!raw && frame.restarted) this.panel.aimed(task, AXES.map((axis) => value[axes.indexOf(axis)]));
       this.view?.place(task, value, raw);
     }
-    const slow = frame.running && frame.speed < 0.97 ? ` · time runs at ${frame.speed.toFixed(2)} × here` : "";
+    const slow = frame.running && frame.speed < 0.97 ? ` · simulated time runs at ${frame.speed.toFixed(2)} × real time` : "";
     this.status.textContent = `t = ${frame.t.toFixed(2)} s${frame.running ? "" : " · paused"}${slow}` +
       `${frame.us ? ` · ${Math.round(frame.us)} µs a period` : ""} · binding: ${frame.binding.join(", ") || "nothing"}` +
       (frame.fallback === "solve" ? "" : ` · fallback: ${frame.fallback}`) +

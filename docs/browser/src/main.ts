@@ -1,4 +1,4 @@
-/** What pages call: a live figure in a lesson, and the page Try it. */
+/** The functions that pages call: for a live figure in a lesson, and for the page Try it. */
 import uPlotStyle from "uplot/dist/uPlot.min.css";
 import { decode, encode } from "./code";
 import { unpacked } from "./data";
@@ -9,7 +9,7 @@ import style from "./style.css";
 // The first thread starts while the other scripts are loaded.
 let engine: Engine | null = null, spare: Engine | null = new Engine(), shown: Figure | null = null;
 
-/** Opens a figure in an element; an earlier one on the page ends. */
+/** Opens a figure in an element and ends the figure that was open on the page. */
 async function open(root: HTMLElement, asked: Asked): Promise<Figure> {
   engine?.end();
   engine = spare ?? new Engine();

@@ -1,7 +1,7 @@
-/** The robot and its objects in MuJoCo's language: the text of docs/figures/model.py with the numbers of the settings. */
+/** The robot and its objects as MJCF: the text of docs/figures/model.py with the numbers of the settings. */
 import { each, type Numbers, type PlantSettings, type RobotData, type SceneData } from "./data";
 
-/** MJCF of a scene; without contacts its objects are left out. */
+/** Returns the MJCF of a scene. If contacts are off, it contains no objects. */
 export function mjcf({ model, plant }: SceneData, robot: RobotData): string {
   const text = plant.contacts ? model : model.replace(/<!-- objects -->.*<!-- objects -->/, "");
   return text.replace(/@(\w+) (\d+)@/g, (_, name: string, joint: string) => {
@@ -13,7 +13,7 @@ export function mjcf({ model, plant }: SceneData, robot: RobotData): string {
   });
 }
 
-/** Mass, centre and inertia of a body, scaled, and with the payload at the tip: robots/truth.py. */
+/** Returns mass, centre and inertia of a body, scaled and with the payload at the tip, as robots/truth.py does. */
 function inertia(robot: RobotData, plant: PlantSettings, k: number): Record<string, Numbers> {
   const own = robot.bodies[k], n = robot.bodies.length, load = plant.payload_kg;
   if (!own) return {};

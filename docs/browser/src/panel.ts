@@ -51,12 +51,12 @@ export class Panel {
     this.acts.target(task, AXES.map((axis) => sliders.get(axis) ?? 0));
   }
 
-  /** The sliders of a target. */
+  /** Returns the sliders of a target. */
   private aims(task: string): HTMLInputElement[] {
     return [...this.root.querySelectorAll<HTMLInputElement>("[data-task]")].filter(({ dataset }) => dataset.task === task);
   }
 
-  /** Where a target was dragged to. */
+  /** Shows on the sliders the position (m) to which a target was dragged. */
   aimed(task: string, place: number[]): void {
     for (const slider of this.aims(task)) {
       slider.valueAsNumber = place[AXES.indexOf(slider.dataset.axis!)];

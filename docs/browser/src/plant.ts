@@ -1,4 +1,4 @@
-/** The robot in MuJoCo under torque control: robots/plant.py and robots/signals.py, without an altered diagonal, lag or delay. */
+/** The robot in MuJoCo under torque control, as in robots/plant.py and robots/signals.py, without diagonal_scale, lag and delay. */
 import type { MainModule, MjData, MjModel } from "@mujoco/mujoco";
 import { limit, type RobotData, type SceneData } from "./data";
 import { mjcf } from "./model";
@@ -12,7 +12,7 @@ export class Plant {
   broken = false;
   private model!: MjModel;
   data!: MjData;
-  /** When the last period began, and q then. */
+  /** The time at which the last period began, and q at that time. */
   private before!: [t: number, q: Vector];
   private wrench: { joint: number; values: number[] } | null = null;
   /** The largest force between the robot and something that it touched during the last step, N. */
@@ -51,7 +51,7 @@ export class Plant {
     this.before = [-period, this.q.map((value, a) => value - period * v[a])];
   }
 
-  /** A copy of the state, with everything computed that depends on positions. */
+  /** Returns a copy of the state with all quantities computed that depend on positions. */
   private probe(): MjData {
     const probe = new this.mj.MjData(this.model);
     probe.qpos.set(this.data.qpos as Vector);
@@ -59,14 +59,14 @@ export class Plant {
     return probe;
   }
 
-  /** The torque that keeps the robot where it is. */
+  /** Returns the torque that keeps the robot in its present pose. */
   private holding(): Vector {
     using probe = this.probe();
     this.mj.mj_fwdVelocity(this.model, probe);
     return Float64Array.from(probe.qfrc_bias.subarray(0, this.n) as Vector);
   }
 
-  /** Takes changed settings over. The robot's numbers come first; objects appear or vanish with the contacts. */
+  /** Applies changed settings and keeps the state. The robot's numbers come first; objects exist only with contacts. */
   configure(): void {
     const { t } = this, kept = (["qpos", "qvel", "qacc_warmstart"] as const).map((name) => [name, [...this.data[name]]] as const);
     this.build();
@@ -77,7 +77,7 @@ export class Plant {
     if (this.wrench) this.push(this.wrench.joint, this.wrench.values);
   }
 
-  /** A force (N) and torque (N·m) on the body of a joint from now on; joint 0 ends it. */
+  /** Applies a force (N) and a torque (N·m) to the body of a joint from now on; joint 0 ends the push. */
   push(joint: number, values: number[]): void {
     this.data.xfrc_applied.fill(0);
     this.wrench = joint ? { joint, values } : null;
@@ -114,7 +114,7 @@ export class Plant {
     }
   }
 
-  /** The largest force between two bodies of which one is the robot's, N, the sum over their points. */
+  /** Returns the largest force between a body of the robot and another body, N, summed over their contact points. */
   private touch(): number {
     const { mj, data, model } = this, forces = new Map<string, number[]>(), object = mj.mj_name2id(model, 5, "shape0");
     using found = new mj.DoubleBuffer(6);
@@ -130,25 +130,25 @@ export class Plant {
     return Math.max(0, ...[...forces.values()].map((force) => Math.hypot(...force)));
   }
 
-  /** ‖I − M⁻¹M̄‖₂ and the spectral radius of I − M⁻¹M̄: robots/inertia.py. */
+  /** Returns ‖I − M⁻¹M̄‖₂ and the spectral radius of I − M⁻¹M̄, as robots/inertia.py does. */
   gauge(M_bar: number[]): [norm: number, radius: number] {
     const { n, mj } = this, { nv } = this.model, unit = (at: number): number => Number(at % (n + 1) === 0);
     using probe = this.probe();
     using solved = new mj.DoubleBuffer(n * nv);
     mj.mj_solveM(this.model, probe, solved, Array.from({ length: n * nv }, (_, at) => (at % (nv + 1) ? 0 : M_bar[at % nv])));
     const ratio = Float64Array.from(solved.GetView() as Vector).filter((_, at) => at % nv < n);
-    // Row j of the ratio is column j of M⁻¹M̄; the symmetric M̄^½M⁻¹M̄^½ has its eigenvalues.
+    // Row j of the ratio is column j of M⁻¹M̄; the symmetric M̄^½M⁻¹M̄^½ has the same eigenvalues.
     const root = (at: number): number => Math.sqrt(M_bar[at % n] / M_bar[Math.floor(at / n)]);
     return [norm(ratio.map((value, at) => unit(at) - value), n), norm(ratio.map((value, at) => unit(at) - root(at) * value), n)];
   }
 
-  /** Position and quaternion x y z w of the body of each joint at the last stage of the last step, (n, 7). */
+  /** Returns position and quaternion x y z w of the body of each joint at the last stage of the last step, (n, 7). */
   poses(): Float32Array {
     this.mj.mj_kinematics(this.model, this.data);
     return this.placed(this.robot.joints.map((_, k) => `body${k + 1}`));
   }
 
-  /** Position and quaternion w x y z of each object that is drawn. */
+  /** Returns position and quaternion x y z w of each object that is drawn. */
   objects(): Float32Array {
     const { objects } = this.scene;
     return this.scene.plant.contacts ? this.placed(objects.map(({ body }) => body)) : Float32Array.from(objects.flatMap(({ pose }) => pose));
@@ -168,13 +168,13 @@ export class Plant {
   }
 }
 
-/** Rounds to the nearest whole number, halves to even ones, as NumPy does. */
+/** Rounds to the nearest whole number, and halves to the nearest even number, as NumPy does. */
 function even(value: number): number {
   const down = Math.floor(value);
   return value - down === 0.5 ? 2 * Math.round(down / 2) : Math.round(value);
 }
 
-/** The largest singular value of an n × n matrix A. Squaring B = A/‖A‖ again and again as BᵀB keeps its direction only. */
+/** Returns the largest singular value of an n × n matrix A by repeated squaring: B = A/‖A‖ is replaced by BᵀB. */
 function norm(A: Vector, n: number): number {
   let power = A, log = 0;
   for (let k = 0; k < 50; k++) {

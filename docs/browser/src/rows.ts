@@ -1,4 +1,4 @@
-/** The rows of a run, one per control period, and numbers about them: lessons/teaching/measure.py. */
+/** The rows of a run, one per control period, and the measures of lessons/teaching/measure.py on them. */
 import type { ClaimData, Field, MeasureData, SignalData } from "./data";
 
 const KEPT = 60_000;
@@ -24,7 +24,7 @@ export class Rows {
 
   clear(): void { this.rows = []; }
 
-  /** The values of a field in a row; -1 is the last row. */
+  /** Returns the values of a field in a row; -1 is the last row. */
   at(row: number, name: string): Float64Array {
     const found = this.fields.get(name);
     if (!found) throw new Error(`this run has no ${name}`);
@@ -40,7 +40,7 @@ const share = (value: string, bound: string): OfRow => (rows, row) => {
 };
 const bit = (wanted: number): OfRow => (rows, row) =>
   rows.at(row, "at_bound").some((bits) => (finite(bits) & wanted) !== 0) ? 1 : 0;
-/** The largest value of a formula over the joints; its arguments are a joint's speed and its distance to the end ahead. */
+/** Returns the largest value of a formula over the joints, of a joint's speed and its distance to the limit ahead. */
 const towards = (formula: (v: number, left: number) => number): OfRow => (rows, row) => {
   const q = rows.at(row, "q"), low = rows.at(row, "q_lower"), high = rows.at(row, "q_upper");
   const found = rows.at(row, "v").map((v, a) => formula(v, Math.max(v > 0 ? high[a] - q[a] : q[a] - low[a], 0)));
@@ -86,7 +86,7 @@ const STATISTICS: Record<string, (values: number[]) => number> = {
   sum,
 };
 
-/** The number so far; NaN as long as there is nothing to measure. */
+/** Returns the measured number up to now; NaN as long as there are no values. */
 export function measured(measure: MeasureData, rows: Rows, ghost: Rows | null): number {
   const values: number[] = [];
   for (let row = 0; row < rows.count; row++) {

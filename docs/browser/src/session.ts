@@ -1,4 +1,4 @@
-/** One run: references, controller, plant, script and settings; lessons/session/torque.py. */
+/** One run with its references, controller, plant, script and settings, as in lessons/session/torque.py. */
 import type { MainModule } from "@mujoco/mujoco";
 import { ENABLED, FALLBACKS, GAINS, LIMITS, M_BAR, ORDER, Q, R, TARGET, type Manifest, type kernel } from "../../../himpc/export/files/himpc.mjs";
 import { each, limit, pieceOf, type Pack, type RobotData, type SceneData, type SceneEvent, type Scenes } from "./data";
@@ -12,7 +12,7 @@ type Controller = ReturnType<Create>;
 export interface Tools {
   mj: MainModule;
   create: Create;
-  /** With the memory of the exported controllers. */
+  /** The scenes, and the memory of the exported controllers. */
   scenes: Pack<Scenes>;
 }
 
@@ -47,7 +47,7 @@ export class Session {
   get t(): number { return this.plant.t; }
 
   private controllerFor(N: number): [Controller, Manifest] {
-    if (!(N in this.scene.images)) throw new Error(`this page has no controller with N = ${N}; himpc-lab has`);
+    if (!(N in this.scene.images)) throw new Error(`this page has no controller with N = ${N}; himpc-lab has one`);
     const { manifest, memory } = this.scene.images[N];
     if (!this.made.has(N)) this.made.set(N, [this.tools.create(pieceOf(this.tools.scenes, memory), manifest), manifest]);
     return this.made.get(N)!;
@@ -56,7 +56,7 @@ export class Session {
   reset(): void {
     const { q, v, tau } = this.scene.start;
     this.plant.reset(q, v, tau);
-    // Targets return to where they were at the start; the kernel alone would leave them where they were dragged to.
+    // Targets return to their start; without this line the kernel would keep the dragged targets.
     this.controller.view("raw").set(this.begun);
     this.controller.reset(this.plant.tau);
     this.script = [...this.scene.events];
@@ -68,7 +68,7 @@ export class Session {
     this.rows.clear();
   }
 
-  /** One control period. */
+  /** Performs one control period. */
   tick(): void {
     while (this.script.length && this.script[0].t <= this.t + 1e-9) this.happen(this.script.shift()!);
     if (this.t >= this.pushUntil - 1e-9) {
@@ -99,7 +99,7 @@ export class Session {
     this.lost ||= plant.broken || wild;
   }
 
-  /** The torque that acts although that of this period may be late: lessons/session/deadline.py. */
+  /** Returns the torque that acts: if the present one is late, an earlier one, as in lessons/session/deadline.py. */
   private applied(tau: Float64Array, late: boolean, before: Float64Array): Float64Array {
     const taken = late ? this.waiting ?? this.held ?? before : tau;
     this.waiting = late ? tau : null;
@@ -125,7 +125,7 @@ export class Session {
     this.controller.set(TARGET, index, whole);
   }
 
-  /** Where the target of a position is. */
+  /** Returns the target of a task of a position, m. */
   target(task: string): Float64Array {
     const { index, rows } = named(this.manifest.tasks, task, "task"), samples = this.controller.view("samples");
     const at = index * (samples.length / this.manifest.tasks.length);
@@ -134,7 +134,7 @@ export class Session {
 
   private M_bar(): number[] { return this.scene.M_bar.map((each) => each * this.scene.M_bar_scale); }
 
-  /** Changes a setting; the paths are those of himpc-lab. Throws an Error with a sentence if it cannot. */
+  /** Changes a setting; the paths are those of himpc-lab. Throws an Error with a sentence if this is not possible. */
   set(path: string, value: unknown): void {
     const { scene } = this, [head, name, key] = path.split("."), { plant } = scene;
     if (path === "horizon") this.exchange(Number(value));
@@ -148,20 +148,20 @@ export class Session {
       else if (head === "limits" && name in scene.limits && name !== "position") Object.assign(scene.limits, { [name]: value });
       else if (head === "tasks" && ["K_p", "K_v"].includes(key)) Object.assign(named(scene.tasks, name, "task"), { [key]: value });
       else if (head === "levels" && ["enabled", "Q", "R"].includes(key)) Object.assign(named(scene.levels, name, "level"), { [key]: value });
-      else throw new Error(`${path} cannot be changed here; himpc-lab can`);
+      else throw new Error(`${path} cannot be changed on this page, only in himpc-lab`);
       this.send();
     }
   }
 
-  /** Gives the levels another order; damping stays the last. */
+  /** Gives the levels another order; the level damping stays last. */
   private arrange(order: string[]): void {
     const { levels } = this.manifest, own = this.scene.order, whole = [...order, "damping"].slice(0, levels.length);
-    if (order.toSorted().join() !== own.toSorted().join()) throw new Error(`${order.join(", ")} is no order of ${own.join(", ")}`);
+    if (order.toSorted().join() !== own.toSorted().join()) throw new Error(`${order.join(", ")} is not an order of ${own.join(", ")}`);
     this.controller.set(ORDER, 0, whole.map((name) => levels.findIndex((level) => level.name === name)));
     this.scene.order = order;
   }
 
-  /** Sends all numbers of the settings to the kernel; those that have not changed have no effect. */
+  /** Sends all numbers of the settings to the kernel; unchanged numbers have no effect. */
   private send(): void {
     const { robot, scene, controller, manifest } = this, { limits } = scene, ends = limits.position !== "off";
     const M_bar = this.M_bar(), before = controller.view("M_bar").slice(), weights = controller.view("R").slice();
@@ -176,7 +176,7 @@ export class Session {
       ...scaled(robot.q_lower, ends, 1, -1), ...scaled(robot.q_upper, ends, 1)]);
     for (const { name, index, rows } of manifest.levels) {
       const own = scene.levels.find((level) => level.name === name);
-      // Damping is no level of the scene: its R follows M̄ only.
+      // The level damping is not in the scene: its R changes with M̄ only.
       const R_own = own ? each(own.R, n).map((value, a) => value * (heavy ? M_bar[a] ** 2 : 1)) :
         M_bar.map((value, a) => weights[index * n + a] * (heavy ? (value / before[a]) ** 2 : 1));
       if (own) controller.set(Q, index, each(own.Q, rows));
@@ -189,7 +189,7 @@ export class Session {
     }
   }
 
-  /** Goes on with the controller of another N: himpc/tick/tick.py, `recall`. */
+  /** Continues with the controller of another N, as `recall` in himpc/tick/tick.py does. */
   private exchange(horizon: number): void {
     const { controller: old, horizon: N, manifest: { tasks }, plant: { n } } = this;
     if (horizon === N) return;

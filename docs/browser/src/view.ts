@@ -1,4 +1,4 @@
-/** The 3D view: the robot, its ghost, objects, and targets that are dragged with mouse, touch or keys. */
+/** The 3D view: the robot, its ghost, objects, and targets that the user drags with mouse, touch or keys. */
 import {
   AmbientLight, BoxGeometry, BufferAttribute, BufferGeometry, CylinderGeometry, DirectionalLight, GridHelper, Group,
   HemisphereLight, Mesh, MeshBasicMaterial, MeshLambertMaterial, Object3D, PerspectiveCamera, Scene, SphereGeometry, Vector3,
@@ -27,12 +27,12 @@ export class View {
   private links: Group[];
   private ghosts: Group[];
   private objects: Object3D[];
-  /** For each task: the ball at its target, and the invisible object that is grasped, at the place to which it was dragged. */
+  /** For each task: `filtered`, a ball at its target, and `raw`, the object that the user drags, at the dragged position. */
   private balls = new Map<string, { raw: Mesh; filtered: Mesh }>();
   private planned = 0;
   private fitted = false;
 
-  /** onMove is called with the place (m) to which the target of a task is moved. */
+  /** onMove is called with a task and the position (m) to which its target is moved. */
   constructor(private robot: Pack<RobotData>, private told: SceneData, private onMove: (task: string, place: number[]) => void) {
     const { canvas, scene, camera, controls, dragged } = this, { planar, reach } = robot.told;
     const sun = new DirectionalLight(0xffffff, 1.8), grid = new GridHelper(4, 16, 0x9aa4b0, 0xc9d0d8);
@@ -100,7 +100,7 @@ export class View {
     this.draw();
   }
 
-  /** Draws a target (value: filtered, raw: as dragged, m). Along axes that it does not control it follows the hand. */
+  /** Draws a target (m; value: filtered, raw: as dragged). Along axes that its task does not control, it follows the hand. */
   place(task: string, value: ArrayLike<number>, raw: number[] | undefined): void {
     const { frame, axes } = this.told.tasks.find(({ name }) => name === task)!;
     if (!frame) return;
@@ -127,7 +127,7 @@ export class View {
     if (!width || !height) return;
     this.renderer.setPixelRatio(Math.min(2, devicePixelRatio));
     this.renderer.setSize(width, height, false);
-    // A narrow picture is seen from farther away, so that the arm's reach fits into it.
+    // In a narrow picture the camera is farther away, so that the arm's reach fits into the picture.
     if (!this.fitted && width < height * 1.2) camera.position.lerp(controls.target, 1 - (1.2 * height) / width);
     this.fitted = true;
     camera.aspect = width / height;
@@ -140,14 +140,14 @@ export class View {
     return [box.left + (0.5 + 0.5 * at.x) * box.width, box.top + (0.5 - 0.5 * at.y) * box.height];
   }
 
-  /** Called when a ball was moved in a plane in front of the camera; the ball of a planar arm is projected along the ray to its plane. */
+  /** Reports a ball that was moved parallel to the picture. For a planar arm it is projected to the arm's plane along the ray. */
   private drag({ name, position }: Mesh): void {
     const eye = this.camera.position, ray = position.clone().sub(eye), own = this.balls.get(name)!.filtered.position.z;
     if (this.robot.told.planar) position.copy(eye).addScaledVector(ray, (own - eye.z) / ray.z);
     this.onMove(name, position.toArray());
   }
 
-  /** Moves the target or the camera; with Shift the arrow keys are left to the controls of the camera. */
+  /** Moves the target, or the camera with + and -; with Shift, OrbitControls handles the arrow keys. */
   private key(event: KeyboardEvent): void {
     const { controls, robot } = this, [ball] = this.dragged.objects;
     const move = event.shiftKey ? undefined : (robot.told.planar ? FLAT : MOVES)[event.key];
@@ -161,7 +161,7 @@ export class View {
   }
 }
 
-/** Puts things where their bodies are: position and quaternion x y z w of each. */
+/** Moves objects to the poses of their bodies: position and quaternion x y z w of each. */
 function put(things: Object3D[], poses: ArrayLike<number>): void {
   things.forEach((each, k) => {
     each.position.fromArray(poses, 7 * k);
@@ -169,7 +169,7 @@ function put(things: Object3D[], poses: ArrayLike<number>): void {
   });
 }
 
-/** A link drawn once more, violet. */
+/** Returns a transparent violet copy of a link. */
 function ghostOf(link: Group): Group {
   const found = link.clone(), given = { color: GHOST, transparent: true, opacity: 0.35, depthWrite: false };
   for (const each of found.children as Mesh[]) each.material = new MeshLambertMaterial(given);

@@ -1,4 +1,4 @@
-/** The simulation, in a separate thread. It runs in real time, or reports how much slower it is. */
+/** The simulation, in a separate thread. It runs in real time, or reports its lower speed. */
 import loadMujoco from "@mujoco/mujoco";
 import { FALLBACKS, kernel } from "../../../himpc/export/files/himpc.mjs";
 import { split } from "./code";
@@ -11,16 +11,16 @@ const NAMES = ["torque", "velocity", "position"];
 
 export interface Open { scenes: Pack<Scenes>; robot: RobotData; step: string | null; assignments: string[] }
 export interface Verdict { claims: number[]; prediction: number }
-/** What a figure draws of a moment; curves: t, then errors of the tasks, torques and speeds over their bounds. */
+/** What a figure draws at one moment. Rows of curves: t, errors of the tasks, torques and speeds as shares of their bounds. */
 export interface Frame {
   t: number; running: boolean; poses: Float32Array; ghost: Float32Array | null; objects: Float32Array;
   curves: number[]; width: number; targets: { task: string; value: Float64Array }[]; binding: string[];
   fallback: string; speed: number; us: number; order: string[]; off: string[]; horizon: number;
   lost: boolean; restarted: boolean;
 }
-/** Messages that the simulation sends without being called. */
+/** Messages that the simulation sends unasked. */
 export type Told = { frame: Frame } | { verdict: Verdict } | { error: string };
-// MuJoCo frees its objects by this name, which Safari does not have yet.
+// MuJoCo frees its objects by a method with this symbol as its name; Safari does not define the symbol yet.
 (Symbol as { dispose?: symbol }).dispose ??= Symbol.for("Symbol.dispose");
 const post = (told: Told | { answer: unknown } | { refusal: string }): void => (self as unknown as Worker).postMessage(told);
 
@@ -28,9 +28,9 @@ let tools: Omit<Tools, "scenes">;
 let session: Session, ghost: Session | null = null, step: StepData | null = null;
 let running = false, judged = false, due = 0, last = 0, speed = 1, us = 0, curves: number[] = [], restarted = true, timer = 0;
 
-/** What a page may call; each call ends before the next begins. */
+/** The functions that a page may call; each call ends before the next begins. */
 const simulation = {
-  /** Loads MuJoCo, compiled while it is decompressed, and the kernel; returns the version of MuJoCo. */
+  /** Loads MuJoCo, which is compiled during decompression, and the kernel; returns the version of MuJoCo. */
   async load(mujoco: string, controller: string): Promise<string> {
     const compiled = WebAssembly.compileStreaming(unwrapped(mujoco));
     const create = await kernel(await (await unwrapped(controller)).arrayBuffer()), module = await compiled;
@@ -63,7 +63,7 @@ const simulation = {
     [judged, restarted, curves] = [false, true, []];
     pace();
   },
-  /** Changes a setting of the run, and of its ghost unless the ghost has a value of its own for it. */
+  /** Changes a setting of the run, and also of its ghost unless the step sets it for the ghost. */
   set(path: string, value: unknown): void {
     session.set(path, value);
     if (ghost && !step!.ghost_set.includes(path)) ghost.set(path, value);
@@ -75,7 +75,7 @@ const simulation = {
     for (const each of both()) each.happen({ t: 0, event: "Push", joint, force, torque: [0, 0, 0], seconds });
   },
 
-  /** The torques of a number of periods from the start, row by row, and the measured claims and prediction. */
+  /** Runs a number of periods from the start; returns their torques, row by row, and the measured claims and prediction. */
   replay(ticks: number): { tau: Float64Array } & Verdict {
     simulation.reset();
     const n = session.plant.n, tau = new Float64Array(ticks * n);
@@ -111,7 +111,7 @@ function verdict(): Verdict {
     prediction: step?.prediction ? of(step.prediction.measure) : NaN };
 }
 
-/** Simulates up to the present, for a bounded time. If the time is not enough, simulated time runs slower. */
+/** Simulates up to the present, for a bounded time. If this time is not enough, simulated time runs slower. */
 function loop(): void {
   if (!running) return;
   const begun = performance.now(), { period } = session.scene;
