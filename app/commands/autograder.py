@@ -1,4 +1,4 @@
-"""`himpc-lab grade --autograder`: the folder of an autograder as Gradescope's containers need it."""
+"""`himpc-lab grade --autograder`: writes the folder of an autograder for Gradescope's containers."""
 
 from __future__ import annotations
 
@@ -41,11 +41,11 @@ _OWN = "exercise.py"
 
 
 def write_autograder(exercise: str, folder: Path) -> int:
-    """Writes the folder: `setup.sh`, `run_autograder`, what it installs, and himpc-lab itself.
+    """Writes the folder: `setup.sh`, `run_autograder`, the list of packages to install, and himpc-lab itself.
 
     Args:
-        exercise: name of an exercise, or path of the file of a teacher's own.
-        folder: a folder that does not exist yet.
+        exercise: name of an exercise, or path of the file of a teacher's own exercise.
+        folder: path of the folder, which must not exist yet.
 
     Raises:
         InputError: there is no such exercise, or the folder exists already or cannot be written.
@@ -77,7 +77,7 @@ def write_autograder(exercise: str, folder: Path) -> int:
 
 
 def requirements() -> list[str]:
-    """The packages that himpc-lab needs, with the versions that are installed here."""
+    """Returns the packages that himpc-lab needs, with the versions that are installed here."""
     found: dict[str, str] = {}
     left = ["himpc-lab"]
     while left:

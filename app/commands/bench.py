@@ -14,9 +14,10 @@ if TYPE_CHECKING:
 
 
 def bench(ticks: int = 300, json: str | None = None) -> int:
-    """Time the control step: compiled route against the explicit one with DAQP and with ProxQP.
+    """Measure the time of the control step: compiled route, and explicit route with DAQP and with ProxQP.
 
-    Each time is that of the whole step from state to torque, kinematics included. The routes run in turns.
+    Each time is the time of the whole step from state to torque, kinematics included. The routes run in
+    turns.
 
     Args:
         ticks: number of timed ticks per route.
