@@ -20,9 +20,7 @@ def handed_in(file: Path, key: str | None, json: str | None) -> int:
     try:
         text = file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError):
-        raise InputError(
-            f"{file}: cannot be read as text; give the file that the page exported"
-        ) from None
+        raise InputError(f"{file}: cannot be read as text; give the file that the page exported") from None
     try:
         handed, proof = read_handed_in(text, None if key is None else read_key(key))
     except InputError as error:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 PATIENCE = 4.5
 """Time, s, within which a command must end by itself."""
 _AGAIN = 0.05  # s; after that, an interrupt that a library ignored is raised again
-_LATER = 0.02  # s after which it is raised if that happens while the swallowed one is still being reported
+_LATER = 0.02  # s; the same if Python is still reporting the ignored exception at that time
 
 Interrupted = threading.Event
 """Set once a signal has arrived."""
@@ -41,7 +41,7 @@ def interruptible() -> Iterator[Interrupted]:
         interrupted.set()
         if frame is None or frame.f_code is not unraisable.__code__:
             raise KeyboardInterrupt
-        signal.setitimer(signal.ITIMER_REAL, _LATER)  # Python would report an exception raised in its hook
+        signal.setitimer(signal.ITIMER_REAL, _LATER)  # Python would report an exception of its hook
 
     def unraisable(report: UnraisableHookArgs) -> None:
         if interrupted.is_set():

@@ -85,7 +85,7 @@ def test_a_phone_votes_and_the_projector_shows_who_was_right(browser: Browser, c
     for vote, letter in (("Vote: 1 answered", "A"), ("Second vote: 1 answered", "B")):
         lead.get_by_role("button", name="Open the ").click()
         phone.locator("#answers button", has_text=letter).first.click()
-        expect(phone.get_by_text("Your vote is counted.")).to_be_visible()
+        expect(phone.get_by_text("Counted.")).to_be_visible()
         expect(phone.get_by_text(f"You said {letter}.")).to_be_visible()
         expect(lead.get_by_text(vote)).to_be_visible()
         expect(lead.locator("#bars li")).to_have_count(0)
