@@ -18,7 +18,7 @@ class Audience(Protocol):
     watching process is silent."""
 
     def look(self) -> list[Order]:
-        """Returns the targets that were dragged since the last call. It is called continually."""
+        """Returns the targets that were dragged since the last call. Called continually."""
         ...
 
     def wish(self) -> str | None:

@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 _LOOK = 0.02
 """Time, s, between two readings of the loop's rows."""
-_AT_ONCE = 100  # rows that are read before the page's requests are read again
+_AT_ONCE = 100  # largest number of rows in one reading
 _PRIORITY = 50
 _PATIENCE = 4.0
 """Time, s, within which a loop must end after a request; it needs at most 2 s."""

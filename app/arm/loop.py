@@ -25,7 +25,7 @@ RAMP_SECONDS = 0.5
 """Time, s, in which the torque is reduced to zero at the end."""
 MOST_SECONDS = 1.5
 """Time, s, after which the loop ends even if the arm still moves."""
-ASKED = "the watcher asked for it"
+ASKED = "the watcher requested it"
 """The reason of an end that the watcher requested."""
 _STILL = 0.02  # rad/s
 _CALMING = 0.3  # share of the largest torque that brakes a joint at its largest velocity

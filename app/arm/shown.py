@@ -54,7 +54,7 @@ _MOST = 64  # commands of a page in one reading
 DEAF = 3.0
 """Time, s, for which the page may read nothing; after that the arm is stopped."""
 ONLY_TARGETS = (
-    "On an arm only targets can be moved: the settings are those with which himpc-lab arm was started."
+    "On an arm, only targets can be moved. The settings are those with which himpc-lab arm was started."
 )
 STOPPED = "The arm was stopped: start himpc-lab arm again."
 PRESSED, LEFT, GONE = "Stop gently was pressed", "the page was closed", "the page's program has ended"
@@ -106,7 +106,7 @@ class Shown:
 
     def stay(self, driven: Driven) -> None:
         """Shows the reason why the drive ended, until the page's program ends."""
-        rest = "" if driven.gently else "; it was not brought to rest by us"
+        rest = "" if driven.gently else "; it did not come to rest under control"
         self._ended = driven.why + rest
         while self._there:
             self._wire.poll(_LOOK)

@@ -24,8 +24,8 @@ PERIOD = 0.2
 messages that it reads."""
 _AGAIN = "this server tries again, and its learners can continue"
 _REFUSED = (
-    f"the class's server does not let this one in: start it with --class, and both with the same --class-key "
-    f"FILE; {_AGAIN}"
+    f"the class's server refuses this server: start the class's server with --class, and both servers with "
+    f"the same --class-key FILE; {_AGAIN}"
 )
 _QUESTIONS = 4  # largest number that are answered at the same time
 
@@ -133,7 +133,7 @@ class Link:
             try:
                 told = of_class.decode(await line.recv())
             except (msgspec.MsgspecError, UnicodeError, RecursionError):
-                raise InputError("the class's server sent something that cannot be understood") from None
+                raise InputError("the class's server sent a message that is not valid") from None
             match told:
                 case ClassNow():
                     await asyncio.to_thread(self._branch.hear, told)

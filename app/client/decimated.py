@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from himpc.telemetry import Layout
 
 WINDOW = 8.0  # s of simulated time in the plots
-BUCKETS = 160  # number in a window
+BUCKETS = 160  # number of buckets in a window
 KEPT = 60.0  # s of simulated time that the page can show again
 _SPAN = WINDOW / BUCKETS
 _AGES = np.linspace(-WINDOW, 0.0, 2 * BUCKETS)

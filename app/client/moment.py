@@ -1,4 +1,4 @@
-"""What the page shows: one instant of a run, now or up to a minute ago, with the ghost at that instant."""
+"""The data that the page shows: one instant of a run, at most a minute old, with the ghost at that instant."""
 
 from __future__ import annotations
 

@@ -181,7 +181,7 @@ class SimulationClient(Simulation):
         super()._enter(ready)
 
     def choice_of(self, ready: Ready) -> SceneChoice:
-        """Returns the choice of a scene, as `settings_of` its settings. It may be a later step of the lesson
+        """Returns the choice of a scene (compare `settings_of`). It may be a later step of the lesson
         than the loaded step."""
         with self._lock:
             return self.choice if self.ready is ready else ready.choice

@@ -129,7 +129,7 @@ def _finish(driven: Driven, image: Image, npz: str | None, plot: str | None, how
     """Prints the reason of a drive's end, writes its files, and returns the exit code."""
     from app.arm.recorded import arrays
 
-    rest = "it came to rest under control" if driven.gently else "it was not brought to rest by us"
+    rest = "it came to rest under control" if driven.gently else "it did not come to rest under control"
     print(f"ended: {driven.why}; {rest}", flush=True)
     data = arrays(driven, image)
     if npz is not None:
@@ -161,7 +161,7 @@ def _found(scene: TorqueScene, robot: str, real_time: bool) -> tuple[Any, Any]:
     if robot == SIMULATED:
         return _arm(scene, robot, real_time, scene.q_0).limits, scene.q_0
     if scene.settings.T_s != 1e-3:
-        raise InputError(f"T_s is {scene.settings.T_s} s: a Franka arm takes a torque every 0.001 s")
+        raise InputError(f"T_s is {scene.settings.T_s} s: a Franka arm needs a torque every 0.001 s")
     there = Franka(robot, real_time)
     try:
         return there.limits, there.at_rest(scene.robot)

@@ -59,7 +59,7 @@ def write_autograder(exercise: str, folder: Path) -> int:
         folder.mkdir(parents=True)
     except OSError as error:
         raise InputError(
-            f"--out {folder}: cannot be made ({error.strerror}); give a folder that does not exist yet"
+            f"--out {folder}: cannot be created ({error.strerror}); give a folder that does not exist yet"
         ) from None
     for name, text in (("setup.sh", _SETUP), ("run_autograder", _RUN)):
         (folder / name).write_text(text.replace("EXERCISE", _OWN if own else exercise), encoding="utf-8")
@@ -70,7 +70,7 @@ def write_autograder(exercise: str, folder: Path) -> int:
     for name in PACKAGES:
         shutil.copytree(_ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
     print(
-        f"{folder} is written. Zip what is in it, not the folder itself, and upload it to Gradescope:\n"
+        f"{folder} is written. Zip its content, not the folder itself, and upload the file to Gradescope:\n"
         f"  cd {folder} && zip -r ../autograder.zip ."
     )
     return 0
@@ -84,7 +84,7 @@ def requirements() -> list[str]:
         name = left.pop()
         try:
             installed = distribution(name)
-        except PackageNotFoundError:  # another system needs it
+        except PackageNotFoundError:  # needed on another system
             continue
         if name != "himpc-lab":
             found[name] = installed.version
@@ -93,6 +93,6 @@ def requirements() -> list[str]:
         left += sorted(names - found.keys() - {"himpc-lab"})
     if not found:
         raise InputError(
-            f"the packages of himpc-lab are not known to {sys.executable}: install it with pip first"
+            f"{sys.executable} does not know the packages of himpc-lab: install himpc-lab with pip first"
         )
     return [f"{name}=={version}" for name, version in sorted(found.items())]

@@ -46,7 +46,7 @@ def bench(ticks: int = 300, json: str | None = None) -> int:
         ]
         write_json({**blocks[0], "dragged": blocks[1]}, json)
         return 0
-    columns = ("N", "route", "solver", "step ms, median", "p95", "p99", "of it QP solver, median")
+    columns = ("N", "route", "solver", "step ms, median", "p95", "p99", "QP solver alone, median")
     for scene, timings in found.items():
         rows = [
             [

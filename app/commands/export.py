@@ -60,7 +60,7 @@ def export(
     for each in (scene, controller or ""):
         if is_file(each):
             raise InputError(
-                f"{each} is Python, which export cannot translate: name a scene and a controller of ours"
+                f"{each} is Python, which export cannot translate: give a scene and a controller of the lab"
             )
     assignments = (*([f"stack={stack}"] if stack is not None else ()), *set)
     spec = RunSpec(scene, urdf, tip, controller=controller, seed=seed).but(*assignments)
@@ -131,7 +131,7 @@ def _made(out: str) -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"--out {out}: cannot be made ({error.strerror}); give another folder") from None
+        raise InputError(f"--out {out}: cannot be created ({error.strerror}); give another folder") from None
     return folder
 
 

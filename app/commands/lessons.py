@@ -45,7 +45,7 @@ def lessons(
         return 0 if sound else 1
     for lesson in chosen:
         rows = [_row(verdict) for verdict in verdicts if verdict.lesson == lesson.name]
-        columns = ("", "step and what it states", "measured", "must be", "where it must fail")
+        columns = ("", "step and its statement", "measured", "must be", "where it must fail")
         print_table(f"{lesson.card.title} ({lesson.name})", columns, rows)
     for verdict in verdicts:
         if verdict.fault:

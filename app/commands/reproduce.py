@@ -34,7 +34,7 @@ def reproduce(
     Args:
         items: names of tables and figures, e.g. himpc-table-2 himpc-fig-12; all of them by default.
         out: folder to write to.
-        quick: shorter and fewer runs.
+        quick: do fewer and shorter runs.
         stored: run nothing; only judge the stored numbers and write disagreements.md.
         store: store the measured numbers; later runs are compared with them.
         json: write the results also as JSON to this file, or to standard output for "-".

@@ -171,8 +171,8 @@ def _leak(result: dict[str, Any]) -> str:
 def _mission(result: dict[str, Any]) -> dict[str, str]:
     """Returns the figures that only velocity-level scenes have."""
     found = {
-        part["name"]: f"base error {_figure(part['normalised_base_error'])} of that at its start on average, "
-        f"{_figure(part['final_base_error'])} at its end; hand {_figure(part['ee_error_mm']['mean'])} mm "
+        part["name"]: f"base error {_figure(part['normalised_base_error'])} of the initial error on average, "
+        f"{_figure(part['final_base_error'])} at the end; hand {_figure(part['ee_error_mm']['mean'])} mm "
         f"on average, {_figure(part['ee_error_mm']['max'])} mm at most"
         for part in result.get("parts", ())
     }

@@ -102,7 +102,7 @@ def serve(
         )
     if class_of is not None and of_class is None:
         raise InputError(
-            "--class-of ADDRESS needs the key of the class: add --class-key FILE, with the same key as there"
+            "--class-of ADDRESS needs the key of the class: add --class-key FILE, with the key of that server"
         )
     if class_key is not None and class_of is None and not class_:
         raise InputError("--class-key is for a class: add --class or --class-of ADDRESS, or leave it out")

@@ -90,7 +90,7 @@ def _conclude(definition: Sweep, cells: list[Cell], metric: str, out: Path) -> N
     if best is not None:
         point = zip(definition.axes, definition.points[best.index], strict=True)
         at = ", ".join(f"{axis.path} = {value:g}" for axis, value in point)
-        print(f"least {metric}: {best.value(metric):.3g} at {at}")
+        print(f"smallest {metric}: {best.value(metric):.3g} at {at}")
     first = next((cell.error for cell in cells if cell.error), None)
     if first:
         print(f"first failure: {first}")

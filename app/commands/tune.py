@@ -59,7 +59,7 @@ def tune(
     if json is not None:
         write_json({"steps": [asdict(step) for step in steps], "chosen": found and asdict(found)}, json)
     elif found is None:
-        print("no step kept control: take a smaller --start, or look at the scene with himpc-lab run")
+        print("no step kept control: give a smaller --start, or check the scene with himpc-lab run")
     else:
         listed = ",".join(f"{value:g}" for value in found.M_bar)
         print(f"M̄ = diag({listed.replace(',', ', ')}) kg·m²: --set M_bar=[{listed}]")

@@ -99,7 +99,7 @@ class Process:
         self._child.close()
 
     def _follow(self) -> bool:
-        """Reads reports until the child has ended; returns whether the last one was a failure."""
+        """Reads reports until the child has ended; returns whether the last report was a failure."""
         failed, over = False, 0.0
         while True:
             there, news = self._wait(None if not over else over - time.monotonic())

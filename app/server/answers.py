@@ -17,7 +17,7 @@ _PAGE = (
 )
 
 NOT_OPEN = Answer(HTTPStatus.SERVICE_UNAVAILABLE, "Starting or stopping", "<p>Try again in a moment.</p>")
-CROWDED = Answer(HTTPStatus.SERVICE_UNAVAILABLE, "Too many pages", "<p>Close some of them and try again.</p>")
+CROWDED = Answer(HTTPStatus.SERVICE_UNAVAILABLE, "Too many pages", "<p>Close some pages and try again.</p>")
 FULL = Answer(
     HTTPStatus.SERVICE_UNAVAILABLE,
     "All places are taken",

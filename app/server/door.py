@@ -78,19 +78,19 @@ class Door:
             return _foreign("The request must name one host and at most one origin.")
         if not self._is_ours(hosts[0]):
             return _foreign(
-                "It names a host that is not this server. If the name is right, start himpc-lab with "
-                "--trusted-origin and the whole address, e.g. --trusted-origin http://NAME:8080."
+                "The request names a host that is not this server. If the name is right, start himpc-lab "
+                "with --trusted-origin and the whole address, e.g. --trusted-origin http://NAME:8080."
             )
         if origins and not self._is_own_page(origins[0], hosts[0]):
-            return _foreign("It comes from a page of another site.")
+            return _foreign("The request comes from a page of another site.")
         if not is_upgrade(request) and _is_embedded(headers, bool(self.embedders)):
             return _foreign("A page of another site embeds this page.")
         if self.proxy_only and not _PLAIN.fullmatch(request.path.partition("?")[0]):
             # A proxy may treat //v/x as /v/x, for which it asks no password. This server treats the two as
             # different addresses.
-            return _foreign("Its address has an unusual form.")
+            return _foreign("The address of the request has an unusual form.")
         if _leads_away(request) and urlsplit(request.path).path != f"/{NAME}":
-            return _foreign("Its address would connect the page to another server.")
+            return _foreign("The address of the request would connect the page to another server.")
         return None
 
     def is_owner(self, request: Request, who: str = "") -> bool:
@@ -182,16 +182,16 @@ _FIELD = (
     "<button>Open the page</button></form>"
 )
 _NEEDED = (
-    "<p>Open the whole address that himpc-lab printed in the terminal where it was started; it ends in "
-    f"<code>?{QUERY}=…</code>. Or give the token here:</p>{_FIELD}"
-    '<p>Have you been here before? <a href="./">Open the page</a>.</p>'
+    "<p>Open the whole address that himpc-lab printed in its terminal. The address ends in "
+    f"<code>?{QUERY}=…</code>. Or enter the token here:</p>{_FIELD}"
+    '<p>If you have opened this page before: <a href="./">Open the page</a>.</p>'
 )
 _ELSEHOW = (
     "<p>This himpc-lab can only be opened through the site that started it, for example from the launcher of "
     "JupyterHub.</p>"
 )
 _WRONG = (
-    "<p>This is not the token of the himpc-lab that runs now; each start has a new token. It is printed in "
+    "<p>This token is not valid now: each start of himpc-lab has a new token. The token is printed in "
     f"the terminal where himpc-lab was started:</p>{_FIELD}"
 )
 

@@ -59,9 +59,10 @@ class ConnectionGuard:
     ) -> None:
         """Admits requests according to `door` from now on.
 
-        places: the sessions, for /health and /metrics. refers: while every place is used, new visitors are
-            refused with status 503, and a proxy tries the next server; otherwise the page says that all
-            places are used. class_door: the pages of a class, if there is one.
+        places: the sessions, for /health and /metrics.
+        refers: while every place is used, new visitors are refused with status 503, and a proxy tries the
+            next server; otherwise the page says that all places are used.
+        class_door: the pages of a class, if there is one.
         """
         self._door, self._places, self._refers, self._open = door, places, refers, True
         self._class = class_door

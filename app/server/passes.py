@@ -26,7 +26,7 @@ VARIABLE = "HIMPC_LAB_TOKEN"
 """The environment variable with the user's own token."""
 CLASS_VARIABLE = "HIMPC_LAB_CLASS_KEY"
 """The environment variable with the key of a class."""
-LONGEST_ACCOUNT = 80  # characters
+LONGEST_ACCOUNT = 80  # largest number of characters
 SHORTEST = 16  # smallest number of characters of a user's own token
 Role = Literal["guest", "owner"]
 _ROLES: tuple[Role, ...] = ("owner", "guest")

@@ -259,7 +259,7 @@ class Visit:
     def _refuse_upload(self) -> None:
         self._client.add_notification(
             "Not uploaded",
-            f"Files that are being uploaded may have {UPLOADS // 1_000_000} MB in all: choose a smaller "
+            f"All uploads together may have at most {UPLOADS // 1_000_000} MB: choose a smaller "
             "file, or wait until the other uploads are complete.",
             color="red",
         )

@@ -13,7 +13,9 @@ def warm(say: Callable[[str], None]) -> None:
     that waits."""
     from himpc.compilation.compiling import compile_all
 
-    compile_all(lambda ready, of: say(f"compiling the controllers, this once: {ready} of {of} functions"))
+    compile_all(
+        lambda ready, of: say(f"compiling the controllers, only this time: {ready} of {of} functions")
+    )
     from app.worker.main import rehearse
 
     rehearse()

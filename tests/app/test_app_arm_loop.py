@@ -108,7 +108,7 @@ def test_the_torque_that_acted_counts(bench: Bench) -> None:
         drags = {50: bench.order(0.03, 0.0, 0.03)}
         late = bench.plant(delay_ms=2.0)
         ended, rows, at, _ = bench.run(note, 2500, drags, late, commanded, delay)
-        assert ended.why == "the watcher asked for it"
+        assert ended.why == "the watcher requested it"
         speeds.append(np.abs(rows[2300:2500, at.v]).max())
     assert speeds[1] < 0.03 < 0.1 < speeds[0]
 
