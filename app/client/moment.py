@@ -1,4 +1,4 @@
-"""The data that the page shows: one instant of a run, at most a minute old, with the ghost at that instant."""
+"""The data that the page shows: one instant of a run, at most a minute old, with the ghost at that time."""
 
 from __future__ import annotations
 
