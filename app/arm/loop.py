@@ -146,7 +146,7 @@ class _Cycle:
         self._controller.reset(reading.tau)
         moved = np.abs(reading.q - start).max()
         self._set(reading, self._tau, 0, time.perf_counter(), False)
-        return f"the arm has moved by {moved:.3f} rad since its pose was read" if moved > _MOVED else None
+        return f"the arm has moved by {moved:.3f} rad after its pose was read" if moved > _MOVED else None
 
     def until(self, guard: ArmGuard) -> str:
         """Runs until there is a reason to end, and returns the reason."""
