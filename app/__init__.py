@@ -1,27 +1,29 @@
 """The page: one simulation process per browser, the 3D view and the panels. No other package imports viser.
 
-The way down, of a dragged target from the browser to the tick:
+The path of a dragged target from the browser to the tick:
 1. The browser sends the pose of the gizmo. `server/guard` counts the bytes, `page/inlet` refuses values that
    a control cannot have, and viser calls back on its loop: `view/target`, then `view/drag`.
 2. `view/reachability`, on a thread of its own, computes the nearest pose that the robot can reach;
    `view/drag` posts a `MoveTarget`.
-3. `client/simulation_client` puts it into `link/outbox`, which never waits; its thread writes to `link/wire`.
-4. `worker/main` reads it and hands it to `worker/simulation`, which puts it into the session's mailbox.
+3. `client/simulation_client` puts the message into `link/outbox`, which never waits. The outbox's thread
+   writes to `link/wire`.
+4. `worker/main` reads the message and passes it to `worker/simulation`, which puts it into the session's
+   mailbox.
 5. The session (`lessons/session/session.py`) empties its mailbox when the next tick begins.
 
-The way up, of a row of telemetry from the tick to the browser:
-1. A tick of the session returns it; `worker/simulation` writes it into `link/ring`, memory of both sides.
-2. The page's thread (`page/page`, 30 Hz) gets the instant to show from `client/moment`, which reads the new
+The path of a row of telemetry from the tick to the browser:
+1. A tick of the session returns the row; `worker/simulation` writes it into the shared memory of `link/ring`.
+2. The page's thread (`page/page`, 30 Hz) gets the time to show from `client/moment`, which reads the new
    rows.
 3. `client/decimated` keeps the minimum, the maximum and the last value of each column in each interval of
    time.
 4. `page/layout` gives the moment to `page/torque_ui` or `velocity_ui`, which draws the panels' curves.
 5. viser sends the changes. Data that need not be sent every tick (settings, notices, the progress of a
-   lesson) come ten times a second as a `Status` over `link/wire`; `client/simulation` receives them.
+   lesson) are sent ten times a second as a `Status` over `link/wire`; `client/simulation` receives them.
 """
 
 import os
 
 # One thread per matrix product, here and in every child: the matrices are tiny, and every session has its own
-# process. NumPy reads these variables when it is imported, so this line precedes every other import.
+# process. NumPy reads these variables when it is imported, so this line stands before every other import.
 os.environ.update(dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1"))

@@ -13,18 +13,18 @@ from importlib import import_module
 from app.commands.interrupts import interruptible
 
 COMMANDS: dict[str, str] = {
-    "serve": "open the page (also what himpc-lab does without a command)",
+    "serve": "open the page (the default if no command is given)",
     "run": "run a scene headless and print the results",
     "scenes": "list the scenes",
     "controllers": "list the controllers",
     "robots": "list the robots, or check a URDF",
-    "lessons": "list the lessons, or run every claim of them headless",
+    "lessons": "list the lessons, or check all their claims headless",
     "grade": "judge solutions of the exercises, one file or a folder of them",
     "new": "write a template of a controller, scene, lesson, task or exercise of your own",
-    "bench": "control-step times of the routes and solvers, side by side",
-    "reproduce": "the papers' tables and figures: our number beside the printed one",
-    "sweep": "a grid of runs over settings, as a map; a stopped sweep can be continued",
-    "export": "a controller as C or WebAssembly, with its numbers and a recorded run to replay",
+    "bench": "compare the control-step times of the routes and solvers",
+    "reproduce": "compare our results with the papers' tables and figures",
+    "sweep": "run a grid of settings and draw a map; a stopped sweep can be continued",
+    "export": "export a controller as C or WebAssembly, with its numbers and a recorded run to replay",
     "arm": "drive a real arm, or a simulated one, by an exported controller",
     "tune": "find M̄ step by step, as Remark 4 of the HIMPC paper says",
 }
@@ -37,7 +37,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         try:
             return _run(list(sys.argv[1:] if argv is None else argv))
         except BrokenPipeError:
-            # The reader of our output has closed the pipe (e.g. `| head`), so that no message can be shown.
+            # The reader of our output has closed the pipe (e.g. `| head`): no message can be shown.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return 0
         except BaseException:

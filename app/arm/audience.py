@@ -18,7 +18,7 @@ class Audience(Protocol):
     watching process is silent."""
 
     def look(self) -> list[Order]:
-        """Returns the targets that were dragged since the last call. It is called continually."""
+        """Returns the targets that were dragged since the last call. Called continually."""
         ...
 
     def wish(self) -> str | None:
@@ -26,9 +26,10 @@ class Audience(Protocol):
         ...
 
     def given(self, order: Order) -> None:
-        """Called when an order was given to the arm."""
+        """Called after an order was sent to the arm."""
         ...
 
     def see(self, t: float, row: Array, model: Model) -> None:
-        """Called with each row of the loop at t (s since the first one), and with the model at that time."""
+        """Called with each row of the loop at time t (s since the first row), and with the model at that
+        time."""
         ...

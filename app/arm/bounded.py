@@ -1,4 +1,4 @@
-"""An arm whose calls cannot hang for ever."""
+"""An arm whose calls cannot block forever."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ STUCK = 5.0
 
 @final
 class Bounded(Arm):
-    """Passes all calls on to another arm. If the arm's library waits forever in compiled code, where no
-    exception can end it, the operating system ends the process."""
+    """Passes all calls on to another arm. If a call blocks in the compiled code of the arm's library, no
+    exception can end it. The operating system then ends the process."""
 
     def __init__(self, arm: Arm, stuck: float = STUCK) -> None:
-        """stuck: s, see STUCK."""
+        """stuck: longest time of a call, s, see STUCK."""
         self.limits, self._arm, self._stuck = arm.limits, arm, stuck
         signal.signal(signal.SIGALRM, signal.SIG_DFL)
 

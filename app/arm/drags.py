@@ -1,4 +1,4 @@
-"""The drags of a command line: the time, the target and the distance of each."""
+"""Reads the drags of a command line: the time, the target and the distance of each drag."""
 
 from __future__ import annotations
 
@@ -22,13 +22,14 @@ def drags_of(texts: Sequence[str], session: TorqueSession, manifest: dict[str, A
     """Returns the drags in the order of their times.
 
     Args:
-        texts: "TIME:TASK=X,Y,Z" each: seconds after the start; how far the target of a position moves along
-            the world's axes (m); turns about them for an orientation (rad, a rotation vector); joints (rad).
-        session: at its start, with the targets where they are.
-        manifest: of the exported controller.
+        texts: "TIME:TASK=X,Y,Z" each. TIME is in s after the start. X,Y,Z is the displacement of a position
+            target along the world's axes (m), the rotation vector of an orientation target (rad), or the
+            displacement of the joints (rad).
+        session: the session at its start, with the initial targets.
+        manifest: the manifest of the exported controller.
 
     Raises:
-        InputError: a text cannot be read, or names a task without a target that can be dragged.
+        InputError: a text cannot be read, or it names a task whose target cannot be dragged.
     """
     tasks = {each["name"]: each for each in manifest["tasks"]}
     movable = [name for name, each in tasks.items() if each["target"] in KINDS]
@@ -62,8 +63,8 @@ def _read(text: str) -> tuple[float, str, Array, str]:
 
 
 def order_to(session: TorqueSession, manifest: dict[str, Any], name: str) -> Order | None:
-    """Returns the order that moves the arm's target of a task to the place that it has in the session; None
-    if this target cannot be moved on an arm."""
+    """Returns the order that gives the arm's target of a task the value that it has in the session; None if
+    this target cannot be moved on an arm."""
     (entry,) = (each for each in manifest["tasks"] if each["name"] == name)
     target = session.target(name)
     if target is None or entry["target"] not in KINDS:
@@ -76,8 +77,8 @@ def _task(session: TorqueSession, name: str) -> Any:
 
 
 def _place(task: Any, raw: Array) -> Array:
-    """Returns three coordinates, with those of `raw` at the controlled axes; the kernel uses only these
-    axes."""
+    """Returns three coordinates: `raw` on the controlled axes, zero on the others. The kernel uses only the
+    controlled axes."""
     full = np.zeros(3)
     full[_components(task, raw)] = raw
     return full
@@ -88,7 +89,7 @@ def _components(task: Any, raw: Array) -> Any:
 
 
 class Kind(NamedTuple):
-    """A kind of target. move: (task, raw target, how far) → new raw target; values: (task, raw target) →
+    """A kind of target. move: (task, raw target, displacement) → new raw target; values: (task, raw target) →
     values of an order."""
 
     move: Callable[[Any, Array, Array], Array]

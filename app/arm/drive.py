@@ -1,4 +1,5 @@
-"""Drives an arm and watches it: starts the loop in a process of its own, reads its rows, gives it orders."""
+"""Drives an arm and watches it: starts the loop in a separate process, reads the loop's rows and sends it
+orders."""
 
 from __future__ import annotations
 
@@ -27,8 +28,8 @@ from robots.arms.arm import Arm, ArmLimits
 Array = NDArray[np.float64]
 
 _LOOK = 0.02
-"""s between two looks at the loop."""
-_AT_ONCE = 100  # rows between two looks at the page
+"""Time, s, between two readings of the loop's rows."""
+_AT_ONCE = 100  # largest number of rows in one reading
 _PRIORITY = 50
 _PATIENCE = 4.0
 """Time, s, within which a loop must end after a request; it needs at most 2 s."""
@@ -43,16 +44,16 @@ class Drag(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """What is to be driven.
+    """The plan of a drive.
 
     Attributes:
-        arm: makes the arm, in the process of the loop.
-        controller: makes a controller of the exported kernel.
-        limits: those in force.
-        start: (n,) rad, where the arm is.
-        period: s.
-        duration: s.
-        drags: in the order of their times.
+        arm: creates the arm; called in the process of the loop.
+        controller: creates a controller from the exported kernel.
+        limits: the limits in force.
+        start: (n,) rad, the arm's joint positions at the start.
+        period: the control period, s.
+        duration: the length of the drive, s.
+        drags: the drags, in the order of their times.
         tolerances: see `ArmGuard` and `Tolerances.distance`.
         delay: see `run`.
         stuck: see `Bounded`.
@@ -71,14 +72,14 @@ class Drive:
 
 
 class Driven(NamedTuple):
-    """A drive that is over.
+    """The result of a drive.
 
     Attributes:
-        why: why it ended.
-        wanted: whether the time was over or it was interrupted, and nothing else.
+        why: the reason for its end.
+        wanted: whether it ended normally: the time was over, or somebody stopped it.
         gently: whether the arm came to rest under control.
-        rows: of the loop, (k, Columns.width).
-        q_model, tau_model: of the model at these rows, (k, n) rad and N·m (without gravity).
+        rows: the rows of the loop, (k, Columns.width).
+        q_model, tau_model: the model's values at these rows, (k, n) rad and N·m (without gravity).
     """
 
     why: str
@@ -96,9 +97,9 @@ def drive(
     gently, and the drive returns.
 
     Args:
-        plan: see there.
-        model: the simulated robot beside it.
-        tell: is told what happens, a sentence at a time.
+        plan: the plan of the drive.
+        model: the simulated robot beside the arm.
+        tell: called with a sentence about each event.
         audience: a page, if there is one.
     """
     watcher = _Watcher(plan, model, tell, audience)
@@ -115,7 +116,7 @@ def drive(
 
 
 class _Watcher:
-    """The state of a drive between two looks at the loop."""
+    """Watches the loop and stores the state of the drive."""
 
     def __init__(
         self, plan: Drive, model: Model, tell: Callable[[str], None], audience: Audience | None
@@ -138,7 +139,7 @@ class _Watcher:
         self._pipe, self._child = _started(plan, controller, self._orders, self._block)
 
     def watch(self) -> None:
-        """Looks at the loop until it has ended."""
+        """Watches the loop until it has ended."""
         drags = list(self._plan.drags)
         while self._child.is_alive():
             self._orders.beat()
@@ -169,7 +170,7 @@ class _Watcher:
             self._orders.stop()
 
     def wait(self) -> None:
-        """Waits for the end of the loop's process, and reads what is left."""
+        """Waits for the end of the loop's process, and reads the remaining rows."""
         until = time.monotonic() + _PATIENCE
         while self._child.is_alive() and time.monotonic() < until:
             self._orders.beat()
@@ -206,8 +207,8 @@ class _Watcher:
             self._audience.given(order)
 
     def _look(self) -> float:
-        """Reads the new rows and advances the model to them; returns the time from the first row to the last,
-        s."""
+        """Reads the new rows and advances the model to the time of each; returns the time from the first row
+        to the last, s."""
         first, rows = self._block.since(self._count)
         self._behind = len(rows) > _AT_ONCE
         for place, row in enumerate(rows[:_AT_ONCE]):
@@ -221,7 +222,7 @@ class _Watcher:
         at, model = self._at, self._model
         if self._first is None:
             self._first = float(row[at.t])
-            self._tell("the loop has taken over")
+            self._tell("the loop controls the arm")
         t = float(row[at.t]) - self._first
         while self._applied < min(int(row[at.orders]), len(self._given)):
             model.take(self._given[self._applied])
@@ -250,10 +251,10 @@ class _Watcher:
 
 
 def _started(plan: Drive, controller: NativeController, orders: Orders, block: Block) -> tuple[Any, Any]:
-    """Starts the process of the loop; returns the connection on which it tells how it ended, and the
-    process."""
+    """Starts the process of the loop; returns the process and, before it, the connection on which the process
+    reports its end."""
     ours, theirs = multiprocessing.Pipe(duplex=False)
-    fork = multiprocessing.get_context("fork")  # it shares the memory, and has everything imported
+    fork = multiprocessing.get_context("fork")  # the child shares the memory and the imported modules
     child = fork.Process(target=_work, args=(plan, controller, orders, block, theirs), daemon=False)
     child.start()
     theirs.close()
@@ -261,7 +262,7 @@ def _started(plan: Drive, controller: NativeController, orders: Orders, block: B
 
 
 def hurry(priority: int) -> None:
-    """Asks for real-time scheduling of this process, where that is allowed."""
+    """Requests real-time scheduling for this process; does nothing if the system forbids it."""
     with contextlib.suppress(OSError, AttributeError):
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
 
@@ -279,6 +280,6 @@ def _work(plan: Drive, controller: NativeController, orders: Orders, block: Bloc
             arm, controller, plan.limits, plan.start, orders, block, plan.tolerances, plan.period, plan.delay
         )
     except Exception as error:
-        ended = Ended(f"the loop could not go on: {error}", False, block.count)
+        ended = Ended(f"the loop failed: {error}", False, block.count)
     with contextlib.suppress(OSError):
         pipe.send(ended)

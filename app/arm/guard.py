@@ -18,15 +18,16 @@ _HOLD = FALLBACKS.index("hold")
 
 @dataclass(frozen=True)
 class Tolerances:
-    """The limits of what is accepted.
+    """The limits of the guard. Beyond each of them the control ends.
 
     Attributes:
-        missed: periods that may be missed one after another.
-        missed_share: share of the periods that may be missed, on average over about a second.
-        rate: periods one after another in which the torque may want to change faster than the arm accepts.
-        lost: periods one after another in which the controller may be without a usable state.
-        silent: s, the time that the watcher may be silent.
-        distance: rad, how far a joint may be from the simulated one.
+        missed: number of periods that may be missed one after another.
+        missed_share: share of the periods that may be missed, averaged over about a second.
+        rate: number of periods, one after another, in which the controller may request a faster change of
+            torque than the arm accepts.
+        lost: number of periods, one after another, in which the controller may have no usable state.
+        silent: time, s, for which the watcher may be silent.
+        distance: largest distance, rad, of a joint from the simulated joint.
     """
 
     missed: int = 10
@@ -39,10 +40,10 @@ class Tolerances:
 
 @final
 class ArmGuard:
-    """Checks every period of a loop. After `check` has returned a reason, the loop must end."""
+    """Checks every period of a loop. The loop must end when `check` returns a reason."""
 
     def __init__(self, limits: ArmLimits, tolerances: Tolerances, period: float) -> None:
-        """period: s."""
+        """period: the control period, s."""
         self._limits, self._tolerances, self._period = limits, tolerances, period
         self._share, self._hurried, self._lost = 0.0, 0, 0
         self._beats, self._heard = -1, 0.0
@@ -53,12 +54,12 @@ class ArmGuard:
         """Returns the reason why the control must end; None if it can continue.
 
         Args:
-            reading: of this period.
-            missed: periods that were missed before it.
-            hurried: whether the torque wanted to change faster than the arm accepts.
-            fallback: which one acted, an index of `FALLBACKS`.
-            beats: how often the watcher has said that it is there.
-            now: s, by this computer's clock.
+            reading: the measurement of this period.
+            missed: number of periods that were missed before this one.
+            hurried: whether the controller requested a faster change of torque than the arm accepts.
+            fallback: the fallback that acted, an index of `FALLBACKS`.
+            beats: number of signs of life from the watcher so far.
+            now: time, s, of this computer's clock.
         """
         tolerances = self._tolerances
         self._share += (missed / (1 + missed) - self._share) * min(1.0, self._period * (1 + missed))
@@ -80,7 +81,7 @@ class ArmGuard:
                 f"{self._limits.v[joint]:.2f} rad/s"
             )
         if self._hurried > tolerances.rate:
-            return f"the torque wanted to change too fast in {self._hurried} periods one after another"
+            return f"the requested torque changed too fast in {self._hurried} periods one after another"
         if self._lost > tolerances.lost:
             return f"the controller had no torque in {self._lost} periods one after another"
         if now - self._heard > tolerances.silent:

@@ -1,4 +1,5 @@
-"""The loop that drives an arm: read, one period of the exported controller, write."""
+"""The loop that drives an arm: it reads the arm, runs one period of the exported controller, and writes the
+torque."""
 
 from __future__ import annotations
 
@@ -23,19 +24,19 @@ Array = NDArray[np.float64]
 RAMP_SECONDS = 0.5
 """Time, s, in which the torque is reduced to zero at the end."""
 MOST_SECONDS = 1.5
-"""Time, s, after which the loop ends, also if the arm still moves."""
-ASKED = "the watcher asked for it"
+"""Time, s, after which the loop ends even if the arm still moves."""
+ASKED = "the watcher requested it"
 """The reason of an end that the watcher requested."""
 _STILL = 0.02  # rad/s
-_CALMING = 0.3  # share of the largest torque that acts against the largest velocity
-_MOVED = 0.02  # rad, between the first look at the arm and the loop's beginning
+_CALMING = 0.3  # share of the largest torque that brakes a joint at its largest velocity
+_MOVED = 0.02  # rad, allowed motion between the first reading of the arm and the start of the loop
 
 
 class Columns(NamedTuple):
-    """Columns of the rows that the loop writes: time (s); q and v of the arm (rad, rad/s); the torque that
-    acted during the period before, and the torque set now (N·m, without gravity); periods missed before; the
-    time that the controller and its guard took (µs); the fallback; the number of orders taken so far; and
-    whether the loop is ending; and the errors of all tasks (m, rad)."""
+    """Columns of the rows that the loop writes: time (s); q and v of the arm (rad, rad/s); the torque of the
+    previous period and the new torque (N·m, without gravity); the number of periods missed before; the time
+    that the controller and its guard took (µs); the fallback; the number of orders received so far; whether
+    the loop is ending; and the errors of all tasks (m, rad)."""
 
     t: int
     q: slice
@@ -52,7 +53,7 @@ class Columns(NamedTuple):
 
     @classmethod
     def of(cls, n: int, M: int) -> Columns:
-        """n: number of joints; M: rows of all tasks."""
+        """n: number of joints; M: number of rows of all tasks."""
         q, v, tau_0, tau = (slice(1 + k * n, 1 + (k + 1) * n) for k in range(4))
         rest = 1 + 4 * n
         error = slice(rest + 5, rest + 5 + M)
@@ -60,7 +61,7 @@ class Columns(NamedTuple):
 
 
 class Ended(NamedTuple):
-    """How a loop ended: why, whether the arm came to rest under control, and the number of rows."""
+    """The end of a loop: its reason, whether the arm came to rest under control, and the number of rows."""
 
     why: str
     gently: bool
@@ -78,22 +79,22 @@ def run(
     period: float,
     delay: int = 0,
 ) -> Ended:
-    """Drives an arm until it gets an order to stop or the guard finds a reason. The torque is then reduced to
-    zero smoothly, and the arm holds its position by itself.
+    """Drives an arm until the watcher orders a stop or the guard finds a reason to stop. The torque is then
+    reduced to zero smoothly, and the arm holds its position by itself.
 
     Args:
         arm: the arm, not yet under control.
-        controller: for its robot.
-        limits: those in force, see `ArmLimits.with_robot`.
-        start: (n,) rad, where the controller's targets were put.
-        orders: from the watcher.
-        block: where the rows go.
+        controller: the exported controller for this arm.
+        limits: the limits in force, see `ArmLimits.with_robot`.
+        start: (n,) rad, the joint positions at which the controller's targets begin.
+        orders: the orders of the watcher.
+        block: the memory for the rows.
         tolerances: see `ArmGuard`.
-        period: s.
-        delay: periods after which a torque acts; 0: the arm's own word for what acted counts.
+        period: the control period, s.
+        delay: number of periods after which a torque acts; 0: the torque that the arm reports is used.
     """
     gc.collect()
-    gc.disable()  # a collection takes longer than a period
+    gc.disable()  # a garbage collection takes longer than a period
     cycle = _Cycle(arm, controller, limits, orders, block, period, delay)
     try:
         why = cycle.begin(start) or cycle.until(ArmGuard(limits, tolerances, period))
@@ -106,7 +107,8 @@ def run(
 
 
 def accepted(wanted: Array, before: Array, limits: ArmLimits, period: float) -> Array:
-    """Returns the torque, (n,) N·m, nearest to the wanted one that an arm accepts after `before`."""
+    """Returns the torque, (n,) N·m, that is nearest to `wanted` and that an arm accepts after the torque
+    `before`."""
     step = limits.tau_rate * period
     low, high = np.maximum(before - step, -limits.tau), np.minimum(before + step, limits.tau)
     return np.minimum(np.maximum(wanted, low), high)
@@ -135,19 +137,19 @@ class _Cycle:
         self._t: float | None = None
 
     def begin(self, start: Array) -> str | None:
-        """Takes control of the arm; returns the reason if this is impossible, else None."""
+        """Takes control of the arm; returns None, or the reason why this is impossible."""
         limits = self._limits
         self._controller.set(LIMITS, 0, [*limits.tau, *limits.v, *limits.q_lower, *limits.q_upper])
         reading = self._next()
-        # The acting torque is known without gravity. The controller's increments start from it.
+        # The measured torque excludes gravity. The controller's increments start from it.
         self._tau = reading.tau
         self._controller.reset(reading.tau)
         moved = np.abs(reading.q - start).max()
         self._set(reading, self._tau, 0, time.perf_counter(), False)
-        return f"the arm has moved by {moved:.3f} rad since it was looked at" if moved > _MOVED else None
+        return f"the arm has moved by {moved:.3f} rad after its pose was read" if moved > _MOVED else None
 
     def until(self, guard: ArmGuard) -> str:
-        """Runs until there is a reason to end, and returns it."""
+        """Runs until there is a reason to end, and returns the reason."""
         while True:
             reading = self._next()
             begun = time.perf_counter()
@@ -165,8 +167,8 @@ class _Cycle:
                 return why or ASKED
 
     def end(self) -> bool:
-        """Takes the torque away: τ = s τ₀ − D q̇, with s from 1 to 0 and D = 0.3 τ_max/q̇_max; returns whether
-        the arm stands still."""
+        """Reduces the torque to zero: τ = s τ₀ − D q̇, with s from 1 to 0 and D = 0.3 τ_max/q̇_max; returns
+        whether the arm stands still."""
         calm = _CALMING * self._limits.tau / self._limits.v
         first, began = self._tau, self._t or 0.0
         while True:
@@ -187,8 +189,8 @@ class _Cycle:
         return reading
 
     def _set(self, reading: Reading, wanted: Array, fallback: int, begun: float, ending: bool) -> bool:
-        """Sets a torque as near to the wanted one as the arm accepts, and writes the row; returns whether it
-        would have to change faster."""
+        """Sets the torque nearest to `wanted` that the arm accepts, and writes the row; returns whether
+        `wanted` changes faster than the arm accepts."""
         tau = accepted(wanted, self._tau, self._limits, self._period)
         hurried = bool((np.abs(wanted - self._tau) > self._limits.tau_rate * self._period).any())
         us = 1e6 * (time.perf_counter() - begun)

@@ -1,4 +1,4 @@
-"""The simulated robot beside the arm: the same controller with the same orders."""
+"""The simulated robot beside the arm. It has the same controller and gets the same orders."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ class Model:
     """Simulates up to the arm's clock, including periods that the arm missed.
 
     Attributes:
-        q, tau: of the simulated robot, (n,) rad and N·m (without gravity).
+        q, tau: state and torque of the simulated robot, (n,) rad and N·m (without gravity).
         x_d, R_d: the filtered targets, per row (m, rad) and per task (rotations).
     """
 
     def __init__(self, plant: Plant, controller: NativeController, limits: ArmLimits, period: float) -> None:
-        """plant: where the arm starts; controller: a controller of its own; limits: as of the arm's loop;
-        period: s."""
+        """plant: the simulated robot, in the pose of the arm; controller: an independent controller; limits:
+        those of the arm's loop; period: the control period, s."""
         self._arm = SimulatedArm(plant, period, in_step=False)
         self._controller, self._limits, self._period = controller, limits, period
         controller.set(LIMITS, 0, [*limits.tau, *limits.v, *limits.q_lower, *limits.q_upper])

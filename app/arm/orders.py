@@ -1,7 +1,8 @@
-"""Shared memory for the orders of a watcher to the loop of an arm. Neither process waits for the other.
+"""Shared memory for the orders that a watcher gives to the loop of an arm. Neither process waits for the
+other.
 
-The watcher writes targets, and a counter that shows that it is still running. The loop looks once per period;
-if the watcher is writing at that moment, the loop looks again in the next period.
+The watcher writes targets, and a counter that shows that it is still running. The loop reads the memory once
+per period. If the watcher is writing at that moment, the loop reads again in the next period.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ class Order(NamedTuple):
 
 @final
 class Orders:
-    """The memory, which forked processes share. One process writes, one reads."""
+    """The memory, which forked processes share. One process writes, the other one reads."""
 
     def __init__(self, tasks: int) -> None:
         """tasks: number of tasks."""
@@ -50,7 +51,7 @@ class Orders:
         self._head[_STOP] = 1
 
     def drag(self, order: Order) -> None:
-        """Moves a target; only the last place of each task counts."""
+        """Moves a target. Only the latest order of each task counts."""
         size = len(order.values)
         self._head[_WRITES] += 1  # odd: a write is in progress
         self._values[order.task, :size] = order.values
@@ -76,7 +77,7 @@ class Orders:
         return int(self._taken.sum())
 
     def news(self) -> list[Order]:
-        """The targets that were dragged since the last call; none while they are being written."""
+        """The targets that were dragged since the last call; empty while the watcher is writing."""
         before = int(self._head[_WRITES])
         if before == self._seen or before % 2:
             return []

@@ -1,4 +1,4 @@
-"""From the rows of an arm's loop to the rows of telemetry that a page draws."""
+"""Converts the rows of an arm's loop into the rows of telemetry that a page draws."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ class PageRows:
     def __init__(
         self, layout: Layout, manifest: dict[str, Any], robot: Robot, limits: ArmLimits, period: float
     ) -> None:
-        """layout: of the page's rows; manifest: of the exported controller; limits: those in force; period:
-        s."""
+        """layout: the layout of the page's rows; manifest: that of the exported controller; limits: those in
+        force; period: the control period, s."""
         self._tasks = manifest["tasks"]
         self._at = Columns.of(robot.n, sum(task["rows"] for task in self._tasks))
         self._fields = fields = layout.fields
@@ -40,8 +40,8 @@ class PageRows:
             self._row[fields[name]] = value
 
     def of(self, t: float, row: Array, model: Model) -> Array:
-        """Returns the page's row (a buffer) for a row of the loop at t (s since the first row). model: at the
-        same time; its filtered targets are the same as the arm's."""
+        """Returns the page's row (a buffer) for a row of the loop at t (s since the first row). model: the
+        model at the same time; its filtered targets equal those of the arm."""
         at, fields, found = self._at, self._fields, self._row
         found[fields["t"]], found[fields["step_us"]] = t, row[at.us]
         found[fields["late"]] = row[at.missed] > 0

@@ -1,4 +1,4 @@
-"""The picture of a drive: arm and model drawn over each other, errors and torques."""
+"""The picture of a drive: the curves of arm and model in the same axes, with errors and torques."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ def picture(name: str, data: Mapping[str, Any], image: Image) -> Picture:
     """Returns the plots of a drive over its time.
 
     Args:
-        name: file name without ending.
+        name: file name without extension.
         data: see `app.arm.recorded.arrays`.
-        image: of its controller.
+        image: the exported controller of the drive.
     """
     some = slice(None, None, 1 + len(data["t"]) // _POINTS)
     t = data["t"][some] - data["t"][0] if len(data["t"]) else data["t"]

@@ -1,4 +1,4 @@
-"""From a scene to what a drive needs: the exported controller with its targets where the arm is."""
+"""Prepares a drive from a scene: exports the controller, with its targets at the pose of the arm."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from robots.arms.arm import ArmLimits
 Array = NDArray[np.float64]
 
 _NEAR = 0.05
-"""Largest error of a task, m or rad, at which the controller may take over the arm."""
+"""Largest error of a task, m or rad, at which the controller may take control of the arm."""
 
 
 class Prepared(NamedTuple):
-    """What a drive needs of a scene: the exported controller, the limits in force, a simulated robot in the
-    pose of the arm, the drags, and a session that begins in this pose. The session simulates no gravity: an
-    arm compensates its own."""
+    """The data of a scene that a drive needs: the exported controller, the limits in force, a simulated robot
+    in the pose of the arm, the drags, and a session that begins in this pose. The session simulates no
+    gravity, since an arm compensates its own gravity."""
 
     image: Image
     limits: ArmLimits
@@ -41,9 +41,9 @@ def prepared(scene: TorqueScene, start: Array, limits: ArmLimits, texts: Sequenc
     """Prepares a drive.
 
     Args:
-        scene: its robot's joints are those of the arm, in the same order.
-        start: (n,) rad, where the arm is; targets that can be dragged begin there.
-        limits: the arm's.
+        scene: a scene whose robot has the joints of the arm, in the same order.
+        start: (n,) rad, the joint positions of the arm; targets that can be dragged begin at this pose.
+        limits: the limits of the arm.
         texts: see `drags_of`.
 
     Raises:
@@ -67,13 +67,13 @@ def prepared(scene: TorqueScene, start: Array, limits: ArmLimits, texts: Sequenc
 
 
 def nominal(scene: TorqueScene, plain: TorqueScene) -> TorqueScene:
-    """Returns a scene with the plant of the scene `plain`. `--set plant.…` changes the simulated arm only,
-    and not the simulation that runs beside it."""
+    """Returns `scene` with the plant of the scene `plain`. `--set plant.…` thus changes the simulated arm
+    only, and not the simulation that runs beside it."""
     return replace(scene, settings=replace(scene.settings, plant=plain.settings.plant))
 
 
 def check_start(controller: NativeController, start: Array) -> None:
-    """Raises InputError if the motion of a task begins far from where the arm is."""
+    """Raises InputError if the motion of a task begins far from the pose of the arm."""
     controller.tick(start, np.zeros(controller.n))
     error, first = controller.view("error"), 0
     for task in controller.manifest["tasks"]:
@@ -87,5 +87,5 @@ def check_start(controller: NativeController, start: Array) -> None:
 
 
 def maker(library: Path, image: Image) -> Callable[[], NativeController]:
-    """Returns a function that makes independent controllers."""
+    """Returns a function that creates independent controllers."""
     return lambda: NativeController.of(library, image)

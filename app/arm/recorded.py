@@ -15,10 +15,11 @@ def arrays(driven: Driven, image: Image) -> dict[str, Any]:
     """Returns one array per field, with one row per period.
 
     - `t`: the arm's clock, s; `q`, `v`: rad and rad/s.
-    - `tau_0` and `tau`: the torque before this period and the new one, N·m without gravity.
-    - `missed`: periods that were missed before this one; `us`: time of the controller and its guard, µs.
-    - `fallback`; `ending`: whether the arm is being stopped; `error/TASK`: m or rad.
-    - `q_model`, `tau_model`: of the simulated robot; `joint_names`."""
+    - `tau_0` and `tau`: the torque before this period and the new torque, N·m without gravity.
+    - `missed`: number of periods that were missed before this one; `us`: time of the controller and its
+      guard, µs.
+    - `fallback`: the fallback that acted; `ending`: whether the arm is being stopped; `error/TASK`: m or rad.
+    - `q_model`, `tau_model`: the same for the simulated robot; `joint_names`: the names of the joints."""
     manifest = image.manifest
     at = Columns.of(len(manifest["joints"]), sum(task["rows"] for task in manifest["tasks"]))
     rows, found = driven.rows, {}

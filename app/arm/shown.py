@@ -48,13 +48,13 @@ Array = NDArray[np.float64]
 
 _STATUS = 0.1  # s
 _SCRIPT = 0.02  # s
-_LOOK = 0.05  # s between two looks at the page while no arm is driven
+_LOOK = 0.05  # s between two readings of the page's commands while no arm is driven
 _AHEAD = 0.5  # s
-_MOST = 64  # commands of a page in one look
+_MOST = 64  # commands of a page in one reading
 DEAF = 3.0
-"""Time, s, after which the arm is stopped if its page reads nothing."""
+"""Time, s, for which the page may read nothing; after that the arm is stopped."""
 ONLY_TARGETS = (
-    "On an arm only targets can be moved: the settings are those with which himpc-lab arm was started."
+    "On an arm, only targets can be moved. The settings are those with which himpc-lab arm was started."
 )
 STOPPED = "The arm was stopped: start himpc-lab arm again."
 PRESSED, LEFT, GONE = "Stop gently was pressed", "the page was closed", "the page's program has ended"
@@ -62,10 +62,11 @@ PRESSED, LEFT, GONE = "Stop gently was pressed", "the page was closed", "the pag
 
 @final
 class Shown:
-    """See `app.arm.audience.Audience`."""
+    """Connects a drive with its page, see `app.arm.audience.Audience`."""
 
     def __init__(self, wire: Wire, choice: SceneChoice, ready: Prepared, period: float) -> None:
-        """wire: to the page; choice: the run that the page shows; period: s."""
+        """wire: the connection to the page; choice: the run that the page shows; period: the control period,
+        s."""
         self._wire, self._choice, self._image = wire, choice, ready.image
         self._session, self._start = ready.session, np.array(ready.plant.q)
         self._run, self._outlet = TorqueRun(ready.session), Outlet(ready.session)
@@ -97,22 +98,22 @@ class Shown:
     # ---------------------------------------------------------------- before and after the drive
 
     def wait_for_start(self) -> bool:
-        """Waits until Run is pressed on the page; returns False if the program was ended before."""
+        """Waits until Run is pressed on the page; returns False if the program ended before that."""
         while self._there and not self._begun and self._wish is None:
             self._wire.poll(_LOOK)
             self._attend()
         return self._begun and self._wish is None
 
     def stay(self, driven: Driven) -> None:
-        """Shows how a drive ended until the page's program ends."""
-        rest = "" if driven.gently else "; it was not brought to rest by us"
+        """Shows the reason why the drive ended, until the page's program ends."""
+        rest = "" if driven.gently else "; it did not come to rest under control"
         self._ended = driven.why + rest
         while self._there:
             self._wire.poll(_LOOK)
             self._attend()
 
     def interrupt(self) -> None:
-        """The program was interrupted on its terminal."""
+        """Called when the program was interrupted in its terminal."""
         self._wish = self._wish or "it was interrupted"
 
     # ---------------------------------------------------------------- an audience
@@ -230,7 +231,7 @@ class Shown:
     @property
     def _follows(self) -> bool:
         """Whether to send the ghost a new script: time has passed, and the ghost has nearly reached the end
-        of the last one. Scripts sent to a ghost that is late would fill the queue of its commands."""
+        of the last script. More scripts would fill the command queue of a ghost that is late."""
         return self._t != self._script_t and self._script_t < self._reached + _AHEAD
 
     def _tasks(self) -> tuple[TaskView, ...]:

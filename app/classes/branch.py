@@ -1,5 +1,5 @@
-"""A server that belongs to a class whose teacher uses another server. It brings its own learners to the
-class's steps and reports about them."""
+"""A server in a class whose teacher uses another server. This server brings its own learners to the class's
+steps and reports their state to the teacher's server."""
 
 from __future__ import annotations
 
@@ -27,19 +27,19 @@ from robots import InputError
 
 
 class Branch(Room):
-    """The learners of one server of a class whose teacher's page is on another server."""
+    """The learners of one server in a class whose teacher's page is on another server."""
 
     def __init__(self, sessions: Learners, own: str | None = None) -> None:
-        """own: the lesson that this server was started with."""
-        super().__init__(sessions, named=False)  # nobody is asked before the class says so
+        """own: the lesson with which this server was started."""
+        super().__init__(sessions, named=False)  # nobody is asked for a name before the class requests names
         self.server = secrets.token_urlsafe(16)
-        """Identifies this server when its connection comes back."""
+        """Identifies this server when it connects again."""
         self.course = course(own)
         """The lessons that this server has."""
         self._linked = False
         self._before: dict[str, tuple[str, ...]] = {}
-        self._names: dict[str, str] = {}  # as they were typed on this server
-        self._told: dict[str, tuple[LearnerNow, float]] = {}  # what the class has heard
+        self._names: dict[str, str] = {}  # the names that were typed on this server
+        self._told: dict[str, tuple[LearnerNow, float]] = {}  # the last reports to the class
 
     @property
     def guide(self) -> None:
@@ -52,24 +52,24 @@ class Branch(Room):
     # ---------------------------------------------------------------- the link
 
     def linked(self) -> None:
-        """Called when the class's server has accepted this server. As soon as the state of the class arrives,
-        this server reports all its learners again."""
+        """Called when the class's server has accepted this server. When the state of the class arrives, this
+        server reports all its learners again."""
         with self._lock:
             self._told, self._linked = {}, False
 
     def cut_off(self) -> None:
-        """Called when the connection was lost: learners may go on without the class."""
+        """Called when the connection was lost. Learners may then continue without the class."""
         with self._lock:
             self._linked = False
             self._state = replace(self._state, stays=False)
             self._keep()
 
     def hear(self, now: ClassNow) -> None:
-        """Takes the state of the class, and brings the learners to its step. Raises InputError for an
-        impossible state."""
+        """Receives the state of the class, and brings the learners to the class's step. Raises InputError for
+        an impossible state."""
         if now.place is not None and now.place[0] not in (each["name"] for each in self.course):
             nowhere = {"place": None, "is_open": None, "rounds": [], "running": False, "truth": None}
-            now = msgspec.structs.replace(now, **nowhere)  # a lesson of the teacher's own
+            now = msgspec.structs.replace(now, **nowhere)  # the teacher's own lesson
         with self._lock:
             before = self._state
             self._state = read_class(now, self.course, before.members)
@@ -83,10 +83,10 @@ class Branch(Room):
             self._let_run()
 
     def news(self) -> Iterator[bytes]:
-        """Messages about the learners of whom the class has not heard what they do now."""
+        """Messages about the learners whose state has changed since the last report."""
         with self._lock:
             if not self._linked:
-                return  # a vote may belong to another step than the class's
+                return  # a vote may belong to a step that is not the class's
             state, now = self._state, time.monotonic()
             fresh = {who: (self._of(who), each.since) for who, each in state.members.items()}
             telling = {who: (_lasting(told), since) for who, (told, since) in fresh.items()}
@@ -151,6 +151,6 @@ class Branch(Room):
 
 
 def _lasting(told: LearnerNow) -> LearnerNow:
-    """The data that are reported whenever they change. For a learner who has left, the step of the class does
-    not count."""
+    """Returns the part of a learner's data that is reported whenever it changes. If the learner has left,
+    visit and answer are not part of it."""
     return told if told.here else msgspec.structs.replace(told, visit=0, answer=None)

@@ -1,4 +1,4 @@
-"""The state of a class as data: its step, its vote, and who is in it. Each method returns the next state."""
+"""The state of a class as data: its step, its vote and its members. Each method returns the next state."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from robots import InputError
 MEMBERS = 2000
 """Largest number of people in a class."""
 Stage = Literal["waiting", "open", "closed", "running", "decided"]
-"""Before a vote; while it takes votes; after it; while the robot runs; when the run has decided."""
+"""Before a vote; during the vote; after the vote; while the robot runs; after the run."""
 
 
 @dataclass(frozen=True)
 class Held:
-    """A vote that was held. truth: what the run measured; NaN if it did not run."""
+    """A past vote. truth: the value that the run measured; NaN if the step did not run."""
 
     place: LessonPlace
     poll: Poll
@@ -36,14 +36,15 @@ class Gathering:
     Attributes:
         named: whether people are asked for their names.
         place: the step that the teacher chose.
-        poll: its vote, if one was opened.
-        truth: what its run measured; NaN before.
+        poll: the vote on this step, if it was opened.
+        truth: the value that the step's run measured; NaN before the run.
         running: whether the step runs.
-        stays: whether learners stay at this step until the teacher goes on.
-        everywhere: whether the step runs on all pages; otherwise on the teacher's robot alone.
-        members: by an identity that only their page and the server know.
+        stays: whether learners stay at this step until the teacher chooses another one.
+        everywhere: whether the step runs on all pages; otherwise it runs on the teacher's robot only.
+        members: the members by identity; only a member's page and the server know this identity.
         past: earlier votes.
-        visits: how often the class has gone to a step; runs: how often it has run the present one since.
+        visits: number of times that the class has gone to a step; runs: number of times that it has run the
+            present step since then.
     """
 
     named: bool = True
@@ -70,7 +71,7 @@ class Gathering:
 
     @property
     def votes(self) -> tuple[Held, ...]:
-        """All votes that anybody took part in, the present one last."""
+        """All votes with at least one voter, the present vote last."""
         if self.place is None or self.poll is None or not any(self.poll.rounds):
             return self.past
         return (*self.past, Held(self.place, self.poll, self.truth))
@@ -78,38 +79,39 @@ class Gathering:
     # ---------------------------------------------------------------- the teacher
 
     def going_to(self, place: LessonPlace) -> Gathering:
-        """The class at another step, or at the same one from its beginning."""
+        """Returns the class at another step, or at the beginning of the same step."""
         fresh = replace(self, place=place, poll=None, truth=math.nan, running=False, past=self.votes)
         return replace(fresh, visits=self.visits + 1, runs=0)
 
     def opened(self) -> Gathering:
-        """The class with an open vote, its first or its second. Raises InputError if there is nothing to vote
-        on, or if the run has already shown the answer."""
+        """Returns the class with an open vote, the first or the second one. Raises InputError if there is
+        nothing to vote on, or if the run has already shown the answer."""
         asked = question_of(self.place)
         if self.stage in ("running", "decided"):
             raise InputError("this step has run: choose it again for a new vote, or choose another one")
         return replace(self, poll=Poll(asked) if self.poll is None else self.poll.again())
 
     def closed(self) -> Gathering:
-        """The class after its vote. Raises InputError if no vote is open."""
+        """Returns the class after its vote. Raises InputError if no vote is open."""
         if self.poll is None or not self.poll.is_open:
             raise InputError("no vote is open")
         return replace(self, poll=self.poll.closed())
 
     def started(self) -> Gathering:
-        """The class while its step runs; this closes the vote. Raises InputError without a step."""
+        """Returns the class while its step runs; the vote is then closed. Raises InputError if no step is
+        chosen."""
         if self.place is None:
             raise InputError("choose a step first")
         poll = None if self.poll is None else self.poll.closed()
         return replace(self, running=True, truth=math.nan, poll=poll, runs=self.runs + 1)
 
     def measured(self, truth: float) -> Gathering:
-        """The class after the run. truth: the measured number; NaN if the step measures none."""
+        """Returns the class after the run. truth: the measured number; NaN if the step measures none."""
         return replace(self, running=False, truth=truth)
 
     def guess(self) -> Answer | None:
-        """The prediction that is used for a learner without one: the most frequent answer of the class. None
-        if the step asks for no prediction."""
+        """Returns the prediction for a learner who made none: the most frequent answer of the class. None if
+        the step asks for no prediction."""
         prediction = None if self.place is None else _prediction(self.place)
         match prediction:
             case None:
@@ -124,9 +126,9 @@ class Gathering:
     # ---------------------------------------------------------------- the members
 
     def entered(self, who: str, kind: Kind, now: float, account: str = "") -> Gathering:
-        """The class with one more member, or with one who came back. account: with which they signed in,
-        their name unless the class goes without names. Raises InputError if the class is full; a phone that
-        left without a vote makes room."""
+        """Returns the class with one more member, or with a member who came back. account: the account with
+        which the member signed in; it becomes the member's name if the class uses names. Raises InputError if
+        the class is full; before that, a phone that left without a vote is removed."""
         known, account = self.members.get(who), account if self.named else ""
         if known is not None and (known.here, known.account) == (True, account):
             return self
@@ -147,14 +149,13 @@ class Gathering:
         return replace(self, members={**members, who: member})
 
     def left(self, who: str) -> Gathering:
-        """The class after a page was closed. Votes and progress stay."""
+        """Returns the class after a member's page was closed. Votes and progress are kept."""
         known = self.members.get(who)
         return self if known is None or not known.here else self._with(who, replace(known, here=False))
 
     def succeeded(self, who: str, before: Sequence[str], account: str = "") -> Gathering:
-        """The class after a learner who had left came back under another identity, `who`: with a
-        browser that they used before (`before`: its identities), or with any browser and their
-        account."""
+        """Returns the class after a learner who had left came back under another identity, `who`. The learner
+        is recognised by the browser (`before`: its earlier identities) or by the account."""
         members, account = self.members, account if self.named else ""
         theirs = [one for one, each in members.items() if account and each.account == account]
         known = [*theirs, *(one for one in before if one in members and members[one].account == account)]
@@ -167,15 +168,15 @@ class Gathering:
         return replace(self, members=members, past=past, poll=poll)
 
     def called(self, who: str, name: str) -> Gathering:
-        """The class after a member typed a name, which is ignored if the class goes without names, or if they
-        signed in under another one."""
+        """Returns the class after a member typed a name. The name is ignored if the class uses no names, or
+        if the member signed in with an account."""
         known = self.members.get(who)
         if known is None or known.account or not self.named:
             return self
         return self._with(who, known.named(name))
 
     def voted(self, who: str, answer: object, now: float) -> Gathering:
-        """The class after a vote. Raises InputError if it cannot be counted."""
+        """Returns the class after a vote. Raises InputError if it cannot be counted."""
         if self.poll is None:
             raise InputError("no vote is open: wait for your teacher")
         poll, known = self.poll.with_vote(who, answer), self.members.get(who)
@@ -184,7 +185,8 @@ class Gathering:
         return replace(self._with(who, replace(known, since=now)), poll=poll)
 
     def seen(self, who: str, at: LessonPlace | None, lecture: Lecture | None, now: float) -> Gathering:
-        """The class after a look at a learner's page, whose prediction is their vote while one is open."""
+        """Returns the class after a check of a learner's page. While a vote is open, the learner's prediction
+        counts as a vote."""
         known = self.members.get(who)
         if known is None:
             return self
@@ -204,27 +206,28 @@ class Gathering:
         answer: object,
         since: float,
     ) -> Gathering:
-        """The class after a report of another server about a learner, see `seen`. answer: the learner's
+        """Returns the class after another server reported about a learner, see `seen`. answer: the learner's
         prediction; since: the time of the learner's last action, s."""
         known = self.members[who]
         member = replace(known, at=at, done={**known.done, **done}, since=since)
         return self._with(who, member)._expecting(who, answer, since)
 
     def _expecting(self, who: str, answer: object, now: float) -> Gathering:
-        """The class after a look at a prediction, which is a vote while one is open."""
+        """Returns the class after a prediction was read. While a vote is open, the prediction counts as a
+        vote."""
         if answer is None or self.poll is None or not self.poll.is_open:
             return self
         try:
             return self.voted(who, answer, now)
         except InputError:
-            return self  # there are too many voters, which their page need not know
+            return self  # there are too many voters; the learner's page does not show this
 
     def _with(self, who: str, member: Member) -> Gathering:
         return replace(self, members={**self.members, who: member})
 
 
 def question_of(place: LessonPlace | None) -> Choice | Value:
-    """The question of a step that can be voted on. Raises InputError if there is none."""
+    """Returns the question of a step on which the class can vote. Raises InputError if there is none."""
     if place is None:
         raise InputError("choose a step first")
     found = _prediction(place)

@@ -31,20 +31,20 @@ class Hall(Room):
     """The class on the server that has the teacher's page."""
 
     def __init__(self, sessions: Learners | None, robot: SimulationClient, named: bool = True) -> None:
-        """sessions: the learners with robots of their own; None if all watch the teacher's. robot: the
-        teacher's. named: whether people are asked for names."""
+        """sessions: the learners with robots of their own; None if all watch the teacher's robot. robot: the
+        teacher's robot. named: whether people are asked for names."""
         self.robot = robot
         self.code = "".join(secrets.choice(_LETTERS) for _ in range(_CODE))
-        """Gives the right to vote and to watch, as a part of the phones' address."""
+        """A part of the phones' address. It gives the right to vote and to watch."""
         super().__init__(sessions, named, "" if sessions is not None else f"v/{self.code}")
         start = robot.choice.exercise
         self.course = course(None if start is None else start.lesson)
         """The lessons of the teacher's list."""
-        self._runs = 0  # of the teacher's robot before the present run
+        self._runs = 0  # number of runs of the teacher's robot before the present one
         self._shape: tuple[object, Shape | None] = (None, None)
-        self._far: dict[str, str] = {}  # the other server on which a learner is
+        self._far: dict[str, str] = {}  # by learner: the server, if it is another one
         self._servers: set[str] = set()  # the other servers that are connected
-        self._replaced: dict[str, None] = {}  # identities of learners who go on under another one
+        self._replaced: dict[str, None] = {}  # old identities of learners who have a new one
 
     @property
     def guide(self) -> SimulationClient:
@@ -61,12 +61,13 @@ class Hall(Room):
         self.robot.load(self.robot.choice.at(place))
 
     def place(self, lesson: str, place: int) -> LessonPlace:
-        """A step of the course, or of the lesson that the class was started with. Raises InputError for any
-        other one."""
+        """Returns a step of the course, or of the lesson with which the class was started. Raises InputError
+        for any other step."""
         return read_place((lesson, place), self.course)
 
     def show_step(self) -> None:
-        """Brings the teacher's robot back to the step of the class. Raises InputError without a step."""
+        """Brings the teacher's robot back to the step of the class. Raises InputError if no step is
+        chosen."""
         place = self.state.place
         if place is None:
             raise InputError("choose a step first")
@@ -78,13 +79,13 @@ class Hall(Room):
             self._state = self._state.opened()
 
     def close_vote(self) -> None:
-        """Closes the vote. Raises InputError if none is open."""
+        """Closes the vote. Raises InputError if no vote is open."""
         with self._lock:
             self._state = self._state.closed()
 
     def run(self) -> None:
-        """Runs the step: on the teacher's robot, and, if set so, on those of all learners who are at it and
-        have not run it. Raises InputError without a step."""
+        """Runs the step on the teacher's robot. If `everywhere` is set, also runs it on the robots of all
+        learners who are at this step and have not run it. Raises InputError if no step is chosen."""
         with self._lock:
             self._state = self._state.started()
             state = self._state
@@ -94,7 +95,7 @@ class Hall(Room):
         self._let_run()
 
     def set(self, stays: bool, everywhere: bool) -> None:
-        """stays: learners stay with the class; everywhere: steps run on all pages."""
+        """Changes the settings. stays: learners stay with the class; everywhere: steps run on all pages."""
         with self._lock:
             self._state = replace(self._state, stays=stays, everywhere=everywhere)
             self._keep()
@@ -105,22 +106,22 @@ class Hall(Room):
         found = ((one, each) for one, each in self.state.members.items() if each.number == number)
         who, member = next(found, ("", None))
         if member is None or member.kind != "robot" or not member.here:
-            raise InputError("this learner has left, and the robot with them")
+            raise InputError("this learner has left, and has no robot any more")
         return who
 
     def server_of(self, who: str) -> str | None:
-        """The other server on which a learner is; None if it is this one."""
+        """The other server on which a learner is; None if the learner is on this server."""
         return self._far.get(who)
 
     def code_of(self, who: str) -> str:
-        """The code of a learner's state on this server. Raises InputError if there is none."""
+        """The state code of a learner on this server. Raises InputError if there is no code."""
         told = self._latest(who)
         if told is None:
             raise InputError("the robot of this learner does not answer")
         return code_of(told)
 
     def show_state(self, code: str) -> None:
-        """Loads a learner's state into the teacher's robot. Raises InputError if the code is not one."""
+        """Loads a learner's state into the teacher's robot. Raises InputError if the code is not valid."""
         self.robot.load(SceneChoice.of_state(decode(code)))
 
     # ---------------------------------------------------------------- the members
@@ -137,8 +138,8 @@ class Hall(Room):
             self._replaced = dict.fromkeys([*self._replaced, *gone][-4 * MEMBERS :])
 
     def enter(self, seat: str) -> str:
-        """Lets a phone in; returns its seat, a new one unless it had one. Raises InputError if the class is
-        full."""
+        """Admits a phone. Returns its seat: the seat that it had, otherwise a new one. Raises InputError if
+        the class is full."""
         with self._lock:
             known = self._state.members.get(seat)
             seat = seat if known is not None and known.kind == "phone" else secrets.token_urlsafe(12)
@@ -170,7 +171,7 @@ class Hall(Room):
             self._servers.add(server)
 
     def unlink(self, server: str) -> None:
-        """Called when the connection to another server was lost. Votes and progress stay."""
+        """Called when the connection to another server was lost. Votes and progress are kept."""
         with self._lock:
             self._servers.discard(server)
             for who, at in self._far.items():
@@ -178,8 +179,9 @@ class Hall(Room):
                     self._state = self._state.left(who)
 
     def hear(self, server: str, told: LearnerNow) -> None:
-        """Takes what another server tells of a learner. A learner of this server, or of a third one that is
-        connected, is not changed. Steps that this class does not have are left out."""
+        """Receives the report of another server about a learner. The report is ignored if the learner is on
+        this server, or on a third server that is connected. Steps that this class does not have are left
+        out."""
         at, done = known_place(told.at, self.course), read_done(told.done, self.course)
         now = time.monotonic()
         with self._lock:
@@ -204,24 +206,24 @@ class Hall(Room):
             self._far[told.who] = server
 
     def news(self) -> ClassNow:
-        """What the other servers of the class need to know."""
+        """The state of the class for its other servers."""
         return class_now(self.state)
 
     def _elsewhere(self) -> set[str]:
         return {who for who, server in self._far.items() if server in self._servers}
 
     def _lost(self) -> int:
-        """The other servers with learners to which there is no connection."""
+        """The number of other servers that have learners but no connection."""
         return len(set(self._far.values()) - self._servers)
 
     # ---------------------------------------------------------------- looking
 
     def everybody(self) -> View:
-        """What all pages show."""
+        """The data that all pages show."""
         return {**for_all(self.state), "robot": self._shape[1]}
 
     def teachers(self) -> View:
-        """What the teacher's page shows in addition."""
+        """The further data that only the teacher's page shows."""
         with self._lock:
             lecture = self._lecture_of(self.robot)
             over = lecture is not None and lecture.exercise == self._state.place and lecture.phase == "done"
@@ -235,7 +237,7 @@ class Hall(Room):
             }
 
     def pose(self) -> View | None:
-        """The teacher's robot at this instant; None while there is none."""
+        """The pose of the teacher's robot at this instant; None while there is no robot."""
         ready = self.robot.ready
         moment = self.robot.read(lambda block, _: block.moment())
         if ready is None or moment is None or not np.isfinite(moment[1]).all():

@@ -1,4 +1,4 @@
-"""The connection of a server to the class that it follows. It runs on the server's loop."""
+"""The connection of a server to the class that it follows. The code runs on the server's loop."""
 
 from __future__ import annotations
 
@@ -18,19 +18,20 @@ from app.classes.words import BRANCH, CLASS_KEY
 from robots import InputError
 
 FIRST, LAST = 1.0, 15.0
-"""Time, s, until the first new attempt to connect, and the longest one between two."""
+"""Time, s, until the first new attempt to connect, and the longest time between two attempts."""
 PERIOD = 0.2
-"""Time, s, between two messages of this server, and the shortest between two that it reads."""
-_AGAIN = "this server tries again, and its learners go on"
+"""Time, s, between two messages that this server sends. A quarter of it is the shortest time between two
+messages that it reads."""
+_AGAIN = "this server tries again, and its learners can continue"
 _REFUSED = (
-    f"the class's server does not let this one in: start it with --class, and both with the same --class-key "
-    f"FILE; {_AGAIN}"
+    f"the class's server refuses this server: start the class's server with --class, and both servers with "
+    f"the same --class-key FILE; {_AGAIN}"
 )
-_QUESTIONS = 4  # that are answered at once
+_QUESTIONS = 4  # largest number that are answered at the same time
 
 
 class _Direct(connect):
-    """A connection that follows no redirect: another server would get the key."""
+    """A connection that follows no redirect. After a redirect another server would get the key."""
 
     def process_redirect(self, exc: Exception) -> Exception | str:
         return exc
@@ -40,7 +41,8 @@ class Link:
     """Connects to the class, tries again after a failure, and passes on the messages of both sides."""
 
     def __init__(self, branch: Branch, address: str, key: str) -> None:
-        """address: of the class's server, as `as_origin` returns it; key: the key of the class."""
+        """address: the address of the class's server, as `as_origin` returns it; key: the key of the
+        class."""
         self._branch = branch
         self._address = f"{address.replace('http', 'ws', 1)}/{BRANCH}"
         self._key = key
@@ -62,7 +64,7 @@ class Link:
         """Ends the connection and the branch."""
         task = self._task
         if task is not None:
-            with suppress(RuntimeError):  # the loop has ended
+            with suppress(RuntimeError):  # raised if the loop has ended
                 task.get_loop().call_soon_threadsafe(task.cancel)
         self._branch.close()
 
@@ -88,7 +90,7 @@ class Link:
             self._pause = min(LAST, 2 * self._pause)
 
     def _report(self, sentence: str) -> None:
-        """Tells the person who started this server how the connection stands, whenever that changes."""
+        """Prints the state of the connection on the terminal whenever it changes."""
         if sentence != self._reported:
             self._reported = sentence
             print(f"himpc-lab: {sentence}", file=sys.stderr, flush=True)
@@ -106,7 +108,7 @@ class Link:
         )
 
     async def _talk(self, line: ClientConnection) -> None:
-        """Sends and receives until the connection ends. Then it raises an error."""
+        """Sends and receives until the connection ends. Then raises an error."""
         await line.send(msgspec.json.encode(Join(self._branch.server)), text=True)
         self._branch.linked()
         both = [asyncio.ensure_future(each) for each in (self._tell(line), self._hear(line))]
@@ -131,7 +133,7 @@ class Link:
             try:
                 told = of_class.decode(await line.recv())
             except (msgspec.MsgspecError, UnicodeError, RecursionError):
-                raise InputError("the class's server sent something that cannot be understood") from None
+                raise InputError("the class's server sent a message that is not valid") from None
             match told:
                 case ClassNow():
                     await asyncio.to_thread(self._branch.hear, told)
@@ -152,5 +154,5 @@ class Link:
 
 
 def _plain(reason: str) -> str:
-    """The printable characters of a reason, without the full stop."""
+    """Returns the printable characters of a reason, without the final full stop."""
     return "".join(each for each in reason if each.isprintable()).strip().rstrip(".")

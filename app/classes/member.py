@@ -9,24 +9,24 @@ from typing import Literal
 from app.link.exercise import Lecture, LessonPlace
 
 NAME = 60
-"""Longest name, characters."""
+"""Largest length of a name, characters."""
 Kind = Literal["robot", "phone"]
 
 
 @dataclass(frozen=True)
 class Member:
-    """What the teacher sees of a person.
+    """The data about a person that the teacher sees.
 
     Attributes:
-        number: 1 for the first who came.
+        number: 1 for the first person in the class.
         kind: whether they have a robot of their own or only a phone.
-        since: when they last did anything in the lesson, s on the clock of the server.
-        name: what they typed, or their account.
-        account: with which they signed in at the proxy; "" if there is none.
+        since: the time of their last action in the lesson, s on the clock of the server.
+        name: the name that they typed, or their account.
+        account: the account with which they signed in at the proxy; "" if there is none.
         here: whether their page is open.
         at: the step on their page.
-        done: claims that held, and claims in all, of every step whose run ended.
-        trace: what they did last, to notice when it changes.
+        done: for every step whose run ended, the number of claims that held and the number of all claims.
+        trace: their step and run at the last check; a difference is an action.
     """
 
     number: int
@@ -40,12 +40,12 @@ class Member:
     trace: Hashable = None
 
     def named(self, name: str) -> Member:
-        """The member under a name; what cannot be printed becomes a blank."""
+        """Returns the member with another name; characters that cannot be printed become blanks."""
         plain = "".join(sign if sign.isprintable() else " " for sign in name[:NAME])
         return replace(self, name=" ".join(plain.split()))
 
     def seen(self, at: LessonPlace | None, lecture: Lecture | None, now: float) -> Member:
-        """The member after a look at their page. at: the step that is loaded; lecture: its run."""
+        """Returns the member after a check of their page. at: the step that is loaded; lecture: its run."""
         run = None if lecture is None else (lecture.phase, lecture.attempt, lecture.answer)
         trace = (at, run)
         if trace == self.trace:
@@ -58,5 +58,5 @@ class Member:
 
     @property
     def claims(self) -> tuple[int, int]:
-        """Claims that held, and claims in all, over all steps whose run ended."""
+        """The number of claims that held and the number of all claims, over all steps whose run ended."""
         return sum(met for met, _ in self.done.values()), sum(count for _, count in self.done.values())

@@ -1,5 +1,5 @@
-"""The two pages of a class as HTML: the teacher's and the phones'. They use no library, load nothing from
-anywhere, and run only their own script."""
+"""The two pages of a class as HTML: the teacher's and the phones'. They use no library, load no other files,
+and run only their own script."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ PageName = Literal["phone", "teacher"]
 
 @cache
 def page(name: PageName) -> str:
-    """The page as one file."""
+    """Returns the page as one file."""
     return _file(f"{name}.html").replace("/*style*/", _style(name)).replace("/*script*/", _script(name))
 
 
 def policy(name: PageName, host: str) -> str:
-    """The page's Content-Security-Policy. host: the server as the browser knows it, for browsers that take
-    'self' for http only."""
+    """Returns the page's Content-Security-Policy. host: the server's name in the browser's request, for
+    browsers in which 'self' does not include web sockets."""
     return (
         f"default-src 'none'; script-src '{_digest(_script(name))}'; style-src '{_digest(_style(name))}'; "
         f"connect-src 'self' ws://{host} wss://{host}; frame-ancestors 'none'; base-uri 'none'; "
@@ -33,7 +33,7 @@ def policy(name: PageName, host: str) -> str:
 
 @lru_cache(maxsize=16)
 def qr(address: str) -> str:
-    """The QR code of an address as SVG."""
+    """Returns the QR code of an address as SVG."""
     drawn = io.BytesIO()
     segno.make(address, error="m").save(
         drawn, kind="svg", xmldecl=False, svgns=True, omitsize=True, border=2, light="#fff"

@@ -13,7 +13,8 @@ Shape = dict[str, Any]
 
 
 def shape_of(robot: Robot) -> Shape:
-    """The capsules of a robot: joint (0 for the base), both ends in the joint's axes and radius, mm."""
+    """Returns the capsules of a robot: for each its joint (0 for the base), both ends in the joint's axes,
+    mm, and its radius, mm."""
     return {
         "name": robot.name,
         "capsules": [
@@ -24,7 +25,8 @@ def shape_of(robot: Robot) -> Shape:
 
 
 def pose_of(t: float, poses: np.ndarray) -> Shape:
-    """Simulated time, s, and the poses (n + 1, 7) of joints and hand: position, mm, and quaternion wxyz."""
+    """Returns the simulated time, s, and the poses (n + 1, 7) of joints and tip: position, mm, and quaternion
+    wxyz."""
     return {
         "t": round(t, 2),
         "joints": [

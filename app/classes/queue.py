@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 
 PATIENCE = 10.0
-"""Time, s, after which a robot that is not ready no longer keeps the next one waiting."""
+"""Time, s, after which the next robot no longer waits for a robot that is not ready."""
 
 
 class BuildQueue:
@@ -15,31 +15,31 @@ class BuildQueue:
         """at_once: the number of robots that are built at the same time."""
         self._at_once = at_once
         self._waiting: list[str] = []
-        self._building: dict[str, float] = {}  # when it began, s
+        self._building: dict[str, float] = {}  # time at which the building began, s
 
     def clear(self) -> None:
-        """Removes all who wait. Learners whose robots are being built for an earlier step of the class stay,
-        and come first."""
+        """Removes all learners who wait. Learners whose robots are being built for an earlier step of the
+        class remain in the queue, at its start."""
         self._waiting, self._building = list(self._building), {}
 
     def enter(self, who: str) -> None:
-        """Lets somebody wait, behind all others."""
+        """Adds a learner at the end of the queue."""
         self._building.pop(who, None)
         self._waiting.append(who)
 
     def leave(self, who: str) -> None:
-        """Called when somebody has left."""
+        """Removes a learner who has left."""
         self._building.pop(who, None)
         if who in self._waiting:
             self._waiting.remove(who)
 
     def has(self, who: str) -> bool:
-        """Whether somebody waits for a robot to be built or to become ready."""
+        """Whether a learner waits for a robot to be built or to become ready."""
         return who in self._building or who in self._waiting
 
     def next(self, ready: Collection[str], now: float) -> list[str]:
-        """The learners whose robots must be built now. ready: the learners whose robots are at the class's
-        step; now: s."""
+        """Returns the learners whose robots must be built now. ready: the learners whose robots are at the
+        class's step; now: the time, s."""
         self._building = {
             who: since for who, since in self._building.items() if who not in ready and now - since < PATIENCE
         }
@@ -49,7 +49,8 @@ class BuildQueue:
         return chosen
 
     def before(self) -> dict[str, int]:
-        """For each learner the number of learners before them; 0 while the robot is being built."""
+        """Returns, for each learner in the queue, the number of learners before them; 0 while their robot is
+        being built."""
         return {
             **dict.fromkeys(self._building, 0),
             **{who: len(self._building) + k for k, who in enumerate(self._waiting)},

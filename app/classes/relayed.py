@@ -1,6 +1,6 @@
 """The messages between the servers of one class. The server with the teacher's page sends the state of the
-class; the other servers send the states of their learners. The data have bounds, and nothing of them is run
-or shown as HTML."""
+class; the other servers send the states of their learners. The data have bounds. No part of them is run as
+code or shown as HTML."""
 
 from __future__ import annotations
 
@@ -25,23 +25,23 @@ from robots import InputError
 LONGEST = 200_000
 """Largest message between two servers, B."""
 BEFORE = 8
-"""Largest number of earlier identities of a browser that are told."""
+"""Largest number of earlier identities of a browser in a message."""
 PORTION = 50_000
-"""Size, B, above which a message is sent, and further learners follow in the next one. One learner takes
-less than LONGEST − PORTION."""
+"""Size, B, above which a message is sent; further learners follow in the next message. The data of one
+learner are smaller than LONGEST − PORTION."""
 
 _SECRET = r"^[A-Za-z0-9_-]{16,64}\Z"
 Secret = Annotated[str, Meta(pattern=_SECRET)]
 Count = Annotated[int, Meta(ge=0, le=100_000)]
 Place = tuple[Short, Annotated[int, Meta(ge=0, le=1000)]]
 Ran = tuple[Short, Annotated[int, Meta(ge=0, le=1000)], Count, Count]
-"""Lesson, step, number of claims that are met, and number of all claims."""
+"""A run that ended: lesson, step, number of claims that held, and number of all claims."""
 Answered = int | Number
 Votes = Annotated[list[tuple[Answered, Count]], Meta(max_length=VOTERS)]
 
 
 class Join(msgspec.Struct, forbid_unknown_fields=True, tag_field="do", tag="join"):
-    """The first message of another server. server: identifies it when it comes back."""
+    """The first message of another server. server: identifies this server when it connects again."""
 
     server: Secret
 
@@ -50,15 +50,16 @@ class LearnerNow(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A learner on another server.
 
     Attributes:
-        who: their identity.
-        before: the identities that their browser had.
-        name: what they typed, None if nothing; account: with which they signed in.
-        here: whether their page is open.
-        at: the step on their page.
+        who: the learner's identity.
+        before: the earlier identities of the learner's browser.
+        name: the name that the learner typed, None if there is none; account: the account with which the
+            learner signed in.
+        here: whether the learner's page is open.
+        at: the step on the learner's page.
         done: every step whose run ended.
-        answer: their prediction at the class's step.
-        visit: how often the class had gone to a step when this was so.
-        quiet: time since they last did anything, s.
+        answer: the learner's prediction at the class's step.
+        visit: the class's number of visits to a step when this report was made, see `Gathering`.
+        quiet: time since the learner's last action, s.
     """
 
     who: Secret
@@ -74,7 +75,7 @@ class LearnerNow(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class LearnersNow(msgspec.Struct, forbid_unknown_fields=True, tag_field="do", tag="learners"):
-    """The learners about whom there is something new."""
+    """The learners whose data have changed."""
 
     learners: Annotated[list[LearnerNow], Meta(max_length=500)]
 
@@ -90,8 +91,8 @@ class ClassNow(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_fiel
     """The state of the class, see `app.classes.gathering.Gathering`.
 
     Attributes:
-        rounds: the votes of each round that is over, each answer with its number of voters; the round that
-            is open is empty.
+        rounds: the votes of each round: each answer with its number of voters. The round that is still open
+            is empty.
         is_open: whether a vote is open; None if there is none.
         truth: None if nothing was measured.
     """
@@ -109,7 +110,7 @@ class ClassNow(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_fiel
 
 
 class AskState(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="ask"):
-    """The teacher opens a learner's state."""
+    """A request for a learner's state, which the teacher wants to open."""
 
     who: Secret
 
@@ -122,12 +123,13 @@ of_class = msgspec.json.Decoder(OfClass)
 
 
 def is_secret(text: str) -> bool:
-    """Whether a text can be the identity of a learner; a browser may store anything in its place."""
+    """Whether a text can be the identity of a learner. A browser may have stored any other text there."""
     return re.match(_SECRET, text) is not None
 
 
 def read_place(told: Place, course: Sequence[View]) -> LessonPlace:
-    """A step of one of the lessons of a class. Raises InputError for any other one: no file is read."""
+    """Returns a step of one of the lessons of a class. Raises InputError for any other step. No file is
+    read."""
     lesson, place = told
     if lesson not in (each["name"] for each in course):
         raise InputError("there is no such lesson in this class")
@@ -135,7 +137,7 @@ def read_place(told: Place, course: Sequence[View]) -> LessonPlace:
 
 
 def known_place(told: Place | None, course: Sequence[View]) -> LessonPlace | None:
-    """As `read_place`, but None for a step that the class does not have."""
+    """As `read_place`, but returns None for a step that the class does not have."""
     try:
         return None if told is None else read_place(told, course)
     except InputError:
@@ -143,18 +145,19 @@ def known_place(told: Place | None, course: Sequence[View]) -> LessonPlace | Non
 
 
 def read_done(told: Sequence[Ran], course: Sequence[View]) -> dict[LessonPlace, tuple[int, int]]:
-    """For each step that the class has: the number of claims that held, and the number of claims."""
+    """Returns, for each step that the class has, the number of claims that held and the number of all
+    claims."""
     found = ((known_place((lesson, k), course), met, claims) for lesson, k, met, claims in told)
     return {place: (min(met, claims), claims) for place, met, claims in found if place is not None}
 
 
 def can_be_told(place: LessonPlace) -> bool:
-    """Whether a message can name a step: the path of a lesson of the teacher's own may be too long."""
+    """Whether a message can name a step. The path of a teacher's own lesson may be too long."""
     return len(place.lesson) <= LONGEST_NAME and place.lesson.isprintable()
 
 
 def class_now(state: Gathering) -> ClassNow:
-    """The state of a class without its members."""
+    """Returns the state of a class without its members."""
     place, poll = state.place, state.poll
     rounds = [] if poll is None else [sorted(Counter(votes.values()).items()) for votes in poll.rounds]
     if poll is not None and poll.is_open:
@@ -174,8 +177,8 @@ def class_now(state: Gathering) -> ClassNow:
 
 
 def read_class(now: ClassNow, course: Sequence[View], members: Mapping[str, Member]) -> Gathering:
-    """The state of a class with the members of another server. Raises InputError for a step or an answer that
-    it does not have."""
+    """Returns the state of a class, with the members of this server. Raises InputError for a step or an
+    answer that the course does not have."""
     place = None if now.place is None else read_place(now.place, course)
     return Gathering(
         now.named,

@@ -21,9 +21,9 @@ from robots import InputError
 RATE = 5.0
 """Rate at which the learners are checked, Hz."""
 BUILDS = 2 * (os.cpu_count() or 1)
-"""Robots that are built at once when the class goes to another step; the others wait for their turn."""
+"""Number of robots that are built at the same time when the class goes to another step; the others wait."""
 _TURN = 0.05  # s between two checks of the queue
-_LOADING = 30.0  # s after which a step that was not loaded is loaded again
+_LOADING = 30.0  # s; a step that is not loaded by then is loaded again
 
 
 class Learners(Protocol):
@@ -34,18 +34,18 @@ class Learners(Protocol):
 
 
 class Room(ABC):
-    """Leads the learners of this server through the class's steps, on a thread of its own that looks at them
-    `RATE` times a second. What people send may arrive on any thread."""
+    """Leads the learners of this server through the class's steps. A separate thread checks the learners
+    `RATE` times a second. People's messages may arrive on any thread."""
 
     def __init__(self, sessions: Learners | None, named: bool, vote: str = "") -> None:
-        """sessions: the learners with robots of their own; None if all watch the teacher's. named: whether
-        people are asked for names. vote: the page on which watchers vote."""
+        """sessions: the learners with robots of their own; None if all watch the teacher's robot. named:
+        whether people are asked for names. vote: the page on which watchers vote."""
         self._sessions = sessions
         self._state = Gathering(named)
         self._lock = threading.RLock()
         self._led: dict[str, tuple[Lecture | None, float]] = {}
-        """For each learner: the run that was reported before the class brought the learner to its step (None
-        if the learner was there already), and the time."""
+        """For each learner: the run that was reported before the learner was brought to the class's step
+        (None if the learner was there already), and the time."""
         self._builds = BuildQueue(BUILDS)
         self._due: set[str] = set()
         """The learners whose robots run the step as soon as it is loaded."""
@@ -55,7 +55,7 @@ class Room(ABC):
         self._thread = threading.Thread(target=self._follow, daemon=True, name="class")
 
     def start(self, hear: Callable[[], object]) -> None:
-        """Begins to follow the class. hear: called after every look."""
+        """Begins to follow the class. hear: called after every check of the learners."""
         self._hear = hear
         self._thread.start()
 
@@ -67,7 +67,7 @@ class Room(ABC):
 
     @property
     def state(self) -> Gathering:
-        """The class now."""
+        """The present state of the class."""
         with self._lock:
             return self._state
 
@@ -79,9 +79,10 @@ class Room(ABC):
     # ---------------------------------------------------------------- the learners
 
     def recognise(self, who: str, before: Sequence[str], account: str = "") -> None:
-        """Adds a learner to the class before their page is built, so that the name that they type there is
-        stored. A learner who comes back with another robot gets their votes and progress. before: the
-        identities that their browser had; account: with which they signed in."""
+        """Adds a learner to the class before the learner's page is built: the name that is typed there can
+        then be stored. A learner who comes back with another robot gets the earlier votes and progress.
+        before: the earlier identities of the browser; account: the account with which the learner signed
+        in."""
         with self._lock:
             self._state = self._state.succeeded(who, before, account)
             if self._sessions is None:
@@ -100,7 +101,7 @@ class Room(ABC):
         return "" if member is None else member.name
 
     def fetch(self, who: str) -> None:
-        """Brings one learner to the step of the class again, on their wish."""
+        """Brings one learner to the step of the class again, as the learner requested."""
         with self._lock:
             self._led.pop(who, None)
             self._builds.leave(who)
@@ -108,7 +109,7 @@ class Room(ABC):
     # ---------------------------------------------------------------- leading them
 
     def _lead(self) -> None:
-        """Brings all learners to the step of the class, a few at a time."""
+        """Begins to bring all learners to the step of the class, a few at a time."""
         with self._lock:
             self._led, self._due = {}, set()
             self._builds.clear()
@@ -123,8 +124,8 @@ class Room(ABC):
             learner.kept_at = self._state.place if self._state.stays else None
 
     def _let_run(self) -> None:
-        """Runs the step on the robots of all learners who are at it and have not run it; those that are still
-        being built run it afterwards."""
+        """Runs the step on the robots of all learners who are at this step and have not run it. Robots that
+        are still being built run it afterwards."""
         with self._lock:
             learners = self._learners() if self._state.everywhere else ()
             self._due = {each.token for each in learners if each.attached}
@@ -184,7 +185,7 @@ class Room(ABC):
             if not learner.attached:
                 if self._builds.has(learner.token):
                     self._builds.leave(learner.token)
-                    self._led.pop(learner.token, None)  # they are brought to the step when they come back
+                    self._led.pop(learner.token, None)  # the step is loaded when the page is open again
                 return
             try:
                 self._state = self._state.entered(learner.token, "robot", now, learner.account)
@@ -208,7 +209,7 @@ class Room(ABC):
                 learner.announce(place)
 
     def _arrived(self, learner: SimulationClient) -> bool:
-        """Whether a robot that was led has reached the class's step, and has not run it."""
+        """Whether a robot that was brought to the class's step has loaded it, and has not run it."""
         lecture, led = learner.lecture, self._led.get(learner.token)
         if lecture is None or led is None or lecture is led[0]:
             return False
@@ -226,12 +227,12 @@ class Room(ABC):
         return () if self._sessions is None else self._sessions.learners
 
     def _latest(self, who: str) -> Told | None:
-        """The run of a learner of this server as it was last reported; None if there is none."""
+        """The last reported run of a learner of this server; None if there is none."""
         learner = next((each for each in self._learners() if each.token == who), None)
         return None if learner is None else learner.latest()
 
     def _elsewhere(self) -> set[str]:
-        """The members who are here without a robot on this server."""
+        """The members whose page is open on another server."""
         return set()
 
     @property
@@ -241,7 +242,7 @@ class Room(ABC):
 
 
 def begin(learner: SimulationClient, lecture: Lecture | None, state: Gathering) -> None:
-    """Runs the step, with the class's prediction if the learner made none."""
+    """Runs the step. If the learner made no prediction, the class's prediction is used."""
     guess = state.guess()
     if guess is not None and (lecture is None or lecture.answer is None):
         learner.send(Predict(guess))

@@ -1,4 +1,4 @@
-"""The learners' pages, each of which shows what the class does."""
+"""The learners' pages, which show the state of the class."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from app.classes.views import View, for_all
 
 
 class Seats:
-    """For each learner's page the function that shows a view, and the view that is shown now."""
+    """Stores, for each learner's page, the function that shows a view and the view that is shown now."""
 
     def __init__(self, vote: str) -> None:
         """vote: the page on which watchers vote; "" if learners have robots of their own."""
@@ -19,7 +19,8 @@ class Seats:
         self._seats: dict[str, tuple[Callable[[View], object], View | None]] = {}
 
     def sit(self, who: str, show: Callable[[View], object]) -> None:
-        """Shows the class on a learner's page from now on. show: takes a view whenever it changes."""
+        """Shows the class on a learner's page from now on. show: called with the view whenever the view
+        changes."""
         with self._lock:
             self._seats[who] = show, None
 
@@ -29,8 +30,9 @@ class Seats:
             self._seats.pop(who, None)
 
     def show(self, state: Gathering, before: Mapping[str, int], cut_off: bool) -> None:
-        """Shows the class on all pages on which it has changed. before: by learner who waits for a robot at
-        the class's step, how many come first; cut_off: whether the class's server cannot be reached."""
+        """Updates all pages whose view has changed. before: for each learner who waits for a robot at the
+        class's step, the number of learners before them; cut_off: whether the class's server cannot be
+        reached."""
         with self._lock:
             seats = list(self._seats.items())
         everybody = for_all(state)
@@ -44,7 +46,7 @@ class Seats:
             try:
                 show(view)
             except Exception:
-                continue  # the page is being built anew, or was closed
+                continue  # the page is being rebuilt, or was closed
             with self._lock:
                 if who in self._seats and self._seats[who][0] is show:
                     self._seats[who] = show, view

@@ -1,4 +1,4 @@
-"""The connections of a class: phones that vote and watch, and the teacher's page. All of this runs on the
+"""The connections of a class: phones that vote and watch, and the teacher's page. This code runs on the
 server's loop."""
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ from app.classes.words import (
 from robots import InputError
 
 PAUSE = 0.2
-"""Time, s, between two messages of one page that are read."""
+"""Shortest time, s, between two messages that are read from one page."""
 _UNSENT = 64_000  # B that may wait for a slow page before pictures are left out
-_PATIENCE = 12.0  # s that another server has to tell the state of a learner
-_COUNTED = "Counted. You can change it until the vote is closed."
+_PATIENCE = 12.0  # s within which another server must send the state of a learner
+_COUNTED = "Your vote is counted. You can change it until the vote is closed."
 _NONSENSE = "this page sent something that the class does not understand: reload it"
 
 
@@ -45,7 +45,7 @@ class Line(Protocol):
     """A connection whose messages are limited in length and number."""
 
     async def recv_short(self) -> str | bytes:
-        """The next message. Raises ConnectionClosed at the end."""
+        """Returns the next message. Raises ConnectionClosed when the connection has ended."""
         ...
 
     async def send(self, message: str) -> None: ...
@@ -61,15 +61,16 @@ class Sockets:
         self._hall, self._address = hall, address
         self._phones: dict[Any, str] = {}  # seat by connection
         self._teachers: set[Any] = set()
-        self._servers: dict[str, tuple[Any, str]] = {}  # connection by server, and what it has heard
-        self._states: dict[str, asyncio.Future[str]] = {}  # that other servers were asked for, by learner
+        self._servers: dict[str, tuple[Any, str]] = {}  # each server's connection and last message
+        self._states: dict[str, asyncio.Future[str]] = {}  # by learner: requested from other servers
         self._said: dict[str, str] = {}
         self._behind: set[Any] = set()
-        """Pages that were too slow for the last changes; they then get the whole news instead."""
+        """Pages that were too slow for the last changes. They get all data next time instead of the
+        changes."""
         self._loop: asyncio.AbstractEventLoop | None = None
 
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
-        """Begins to send pictures and news to all pages."""
+        """Begins to send poses and changes to all pages."""
         self._loop = loop
         self._hall.start(self._tell)
 
@@ -165,7 +166,7 @@ class Sockets:
         return {}
 
     async def _open(self, number: int) -> str:
-        """Loads the state of a learner into the teacher's robot, and returns its code."""
+        """Loads the state of a learner into the teacher's robot, and returns the state's code."""
         who = self._hall.who(number)
         server = self._hall.server_of(who)
         if server is None:
@@ -176,7 +177,7 @@ class Sockets:
         return code
 
     async def _ask(self, server: str, who: str) -> str:
-        """The code of a state on another server. Raises InputError if it does not come."""
+        """Returns the code of a learner's state on another server. Raises InputError if no code arrives."""
         if server not in self._servers:
             raise InputError("the server of this learner cannot be reached")
         answer = self._states.setdefault(who, asyncio.get_running_loop().create_future())
@@ -194,8 +195,8 @@ class Sockets:
     # ---------------------------------------------------------------- another server
 
     async def server(self, line: Line) -> None:
-        """Serves another server of the class until its connection ends. Anything that cannot be understood
-        ends it, with one sentence."""
+        """Serves another server of the class until the connection ends. A message that is not valid ends the
+        connection, with one sentence as the reason."""
         name = ""
         try:
             joined = _understood(of_server, await line.recv_short())
@@ -205,7 +206,7 @@ class Sockets:
             name = joined.server
             before, self._servers[name] = self._servers.get(name), (line, "")
             if before is not None:
-                before[0].transport.abort()  # the connection that this one replaces
+                before[0].transport.abort()  # the old connection, which this one replaces
             while True:
                 await self._of_server(name, _understood(of_server, await line.recv_short()))
                 await asyncio.sleep(PAUSE)
@@ -237,7 +238,7 @@ class Sockets:
     # ---------------------------------------------------------------- all pages
 
     def _tell(self) -> None:
-        """Called on the thread of the class each time after it has looked at the pages."""
+        """Called on the thread of the class after each check of the pages."""
         news = {name: json.dumps(each) for name, each in self._news().items() if each is not None}
         loop, now = self._loop, _packed(self._hall.news())
         if loop is not None and not loop.is_closed():

@@ -20,8 +20,9 @@ COLUMNS = (
 
 
 def table(gathering: Gathering) -> str:
-    """One line for each person and each step on which the person voted or which the person ran. A person
-    without such a step has one line without a step. A class without names has no column for them."""
+    """Returns the table: one line for each person and each step on which the person voted or which the person
+    ran. A person without such a step has one line without a step. A class without names has no column for
+    names."""
     columns = COLUMNS if gathering.named else tuple(each for each in COLUMNS if each != "name")
     text = io.StringIO()
     writer = csv.DictWriter(text, columns, extrasaction="ignore", lineterminator="\n")
@@ -63,7 +64,7 @@ def _voted(who: str, held: Held) -> dict[str, object]:
 
 
 def answer(held: Held, vote: float | None) -> str:
-    """A vote as text: the letter of an option, or a number."""
+    """Returns a vote as text: the letter of an option, or a number."""
     if vote is None:
         return ""
     return LETTERS[int(vote)] if isinstance(held.poll.asked, Choice) else f"{vote:.3g}"

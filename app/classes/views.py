@@ -1,4 +1,4 @@
-"""What the pages of a class show, as data for JSON."""
+"""The data that the pages of a class show, for JSON."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ View = dict[str, Any]
 
 
 def for_all(gathering: Gathering) -> View:
-    """What everybody sees: the step, the question, and, when a vote is closed, its bars."""
+    """Returns the data for everybody: the step, the question, and the bars of each closed vote."""
     place = gathering.place
     return {
         "stage": gathering.stage,
@@ -35,7 +35,8 @@ def for_all(gathering: Gathering) -> View:
 
 
 def for_teacher(gathering: Gathering, now: float) -> View:
-    """What the teacher sees in addition: a row per learner, the number of phones, and what is set."""
+    """Returns the further data for the teacher: a row per learner, the number of phones, and the settings of
+    the class."""
     members = gathering.members.values()
     return {
         "rows": [_row(who, gathering, now) for who, one in gathering.members.items() if one.kind == "robot"],
@@ -47,8 +48,8 @@ def for_teacher(gathering: Gathering, now: float) -> View:
 
 
 def course(own: str | None = None) -> list[View]:
-    """The lessons with their steps, for the teacher's list; `asks`: what a step asks for, if anything. own: a
-    lesson of the teacher's own, which comes first."""
+    """Returns the lessons with their steps, for the teacher's list. `asks`: the kind of prediction for which
+    a step asks, "" if none. own: the teacher's own lesson, which comes first."""
     names = COURSE if own is None or own in COURSE else (own, *COURSE)
     return [
         {
@@ -63,7 +64,7 @@ def course(own: str | None = None) -> list[View]:
 
 
 def title(place: LessonPlace) -> str:
-    """The lesson and the step, in a few words."""
+    """Returns the titles of the lesson and the step."""
     return f"{place.whole.card.title} · {_step(place)['title']}"
 
 
@@ -76,7 +77,7 @@ def _step(place: LessonPlace) -> View:
 
 
 def _asked(place: LessonPlace | None) -> View | None:
-    """The question as HTML, with options or with a scale; None if there is none to vote on."""
+    """Returns the question as HTML, with options or with a scale; None if there is no question to vote on."""
     try:
         asked = question_of(place)
     except InputError:
@@ -91,7 +92,7 @@ def _asked(place: LessonPlace | None) -> View | None:
 
 
 def _bars(gathering: Gathering) -> list[list[View]]:
-    """The bars of each round that is over. While people vote, nobody sees what others answer."""
+    """Returns the bars of each round that is over. While people vote, nobody sees the answers of others."""
     poll = gathering.poll
     if poll is None:
         return []
@@ -112,7 +113,7 @@ def _bars(gathering: Gathering) -> list[list[View]]:
 
 
 def _result(gathering: Gathering) -> str:
-    """One sentence on what the run measured and who was right."""
+    """Returns sentences with the measured value and the number of people who were right."""
     poll, truth = gathering.poll, gathering.truth
     if poll is None or math.isnan(truth):
         return ""

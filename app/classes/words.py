@@ -9,36 +9,36 @@ import msgspec
 from msgspec import Meta
 
 LONGEST = 2000
-"""Largest message, B."""
+"""Largest size of a message, B."""
 TEACHER = "class"
 """The name of the teacher's page in an address."""
 
 PHONES = "/v/"
-"""Phones vote at an address that begins so and ends with the code of the class."""
+"""The beginning of the address at which phones vote; the code of the class follows."""
 TABLE = f"/{TEACHER}.csv"
 """The address of the table."""
 BRANCH = f"{TEACHER}/servers"
 """The address at which other servers of the class connect."""
 CLASS_KEY = "X-Himpc-Lab-Class-Key"
-"""The header in which they send the key of the class."""
+"""The header in which other servers send the key of the class."""
 
 
 def is_of_a_class(path: str) -> bool:
-    """Whether an address is one of a class's."""
+    """Whether an address belongs to a class."""
     plain = urlsplit(path).path
     return plain in (f"/{TEACHER}", TABLE, f"/{BRANCH}") or plain.startswith(PHONES)
 
 
 LONGEST_NAME = 100
-"""Longest name of a person or a lesson, characters."""
+"""Largest length of the name of a person or a lesson, characters."""
 Short = Annotated[str, Meta(max_length=LONGEST_NAME)]
 BOUND = 1e12
-"""Largest number."""
+"""Largest absolute value of a number."""
 Number = Annotated[float, Meta(ge=-BOUND, le=BOUND)]
 
 
 class Hello(msgspec.Struct, forbid_unknown_fields=True, tag_field="do", tag="hello"):
-    """A phone's first message. seat: the one it got at an earlier visit."""
+    """A phone's first message. seat: the seat that the phone got at an earlier visit."""
 
     seat: Short = ""
 
@@ -50,26 +50,26 @@ class CastVote(msgspec.Struct, forbid_unknown_fields=True, tag_field="do", tag="
 
 
 class TypedName(msgspec.Struct, forbid_unknown_fields=True, tag_field="do", tag="name"):
-    """The name that somebody typed."""
+    """The name that a person typed."""
 
     name: Short
 
 
 class GoTo(msgspec.Struct, forbid_unknown_fields=True, tag_field="do", tag="go"):
-    """The teacher's step, 0 for the first."""
+    """The step that the teacher chose; place: 0 for the first step."""
 
     lesson: Short
     place: Annotated[int, Meta(ge=0, le=1000)]
 
 
 class Press(msgspec.Struct, forbid_unknown_fields=True, tag_field="do", tag="press"):
-    """One of the teacher's buttons: open, close, run, back."""
+    """The teacher pressed a button: open, close, run or back."""
 
     button: Short
 
 
 class SetClass(msgspec.Struct, forbid_unknown_fields=True, tag_field="do", tag="set"):
-    """The teacher's settings, see `app.classes.gathering.Gathering`."""
+    """The teacher's settings of the class, see `app.classes.gathering.Gathering`."""
 
     stays: bool
     everywhere: bool

@@ -1,1 +1,1 @@
-"""The page's side of a simulation: its reports, its learner and its ghost."""
+"""The page's side of a simulation: the reports, the learner and the ghost."""

@@ -1,4 +1,4 @@
-"""The class's step on a page whose robot has not loaded this step yet."""
+"""The class's step as a page shows it while the robot has not loaded this step yet."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ if TYPE_CHECKING:
 @final
 @dataclass(frozen=True)
 class Coming:
-    """A step that a page shows before its robot has loaded it.
+    """A step that a page shows before the robot has loaded it.
 
     Attributes:
         lecture: the step before its run, with the prediction that the learner made meanwhile.
-        held: the learner's commands at this step; the robot gets them when it loads the step.
-        sent: whether the robot was told to load the step.
+        held: the learner's commands at this step; they are sent to the robot when it loads the step.
+        sent: whether the robot has received the command to load the step.
     """
 
     lecture: Lecture
@@ -29,7 +29,7 @@ class Coming:
 
     @classmethod
     def at(cls, place: LessonPlace, settings: SceneSettings | None) -> Coming | None:
-        """The step as it is before any command; None if its controls cannot be built from the present
+        """Returns the step before any command; None if its controls cannot be built from the present
         settings. Raises InputError if there is no such step."""
         from lessons.teaching.lesson import Step
 
@@ -44,14 +44,15 @@ class Coming:
         return cls(Lecture(place, "waiting", attempt=0, t=0.0, duration=part.duration))
 
     def after(self, command: Predict | RunStep) -> Coming:
-        """The same step after the learner made a prediction or wanted to run it."""
+        """Returns the same step after the learner made a prediction or pressed Run."""
         held = self.held if self.sent else (*self.held, command)
         if isinstance(command, Predict):
             return replace(self, lecture=replace(self.lecture, answer=command.answer), held=held)
         return replace(self, held=held)
 
     def sent_to(self, place: LessonPlace | None) -> Coming | None:
-        """The same step once the robot was told to load a step; None if that is another one."""
+        """Returns the same step after the robot received the command to load the step `place`; None if
+        `place` is another step."""
         return replace(self, held=(), sent=True) if place == self.lecture.exercise else None
 
     def is_at(self, lecture: Lecture) -> bool:

@@ -10,9 +10,9 @@ _LEVELS = (2, 4, 8, 16, 32)
 def decimate(curves: np.ndarray, tolerance: float, phase: int = 0) -> np.ndarray:
     """Selects the points that are needed to draw some curves within a tolerance.
 
-    The points are equally spaced. Of a block of 2, 4, … 32 points only the two ends are kept if every curve
-    is nearly straight within it. Blocks are aligned to the points' numbers, so that a scrolling curve loses
-    the same points in every picture and does not shimmer.
+    The points are equally spaced. In a block of 2, 4, … 32 points, only the two ends are kept if every curve
+    is nearly straight in this block. Blocks are aligned to the points' numbers, so that a scrolling curve
+    loses the same points in every picture and does not shimmer.
 
     Args:
         curves: (k, m), finite.
@@ -34,8 +34,8 @@ def decimate(curves: np.ndarray, tolerance: float, phase: int = 0) -> np.ndarray
             break
         end = start + blocks * size
         middle, ends = curves[:, start + half : end : size], curves[:, start : end + 1 : size]
-        # A curve is farthest from the chord of its half, and this chord from the chord of the block, near the
-        # middle: at worst the two distances add up.
+        # Near the middle, a curve is farthest from the chord of its half block, and this chord is farthest
+        # from the chord of the whole block. At worst the two distances add up.
         halves = bent[:, (start - first) // half :][:, : 2 * blocks]
         bent = np.maximum(halves[:, ::2], halves[:, 1::2])
         bent += np.abs(middle - 0.5 * (ends[:, :-1] + ends[:, 1:]))

@@ -15,26 +15,26 @@ if TYPE_CHECKING:
     from himpc.telemetry import Layout
 
 WINDOW = 8.0  # s of simulated time in the plots
-BUCKETS = 160  # in a window
+BUCKETS = 160  # number of buckets in a window
 KEPT = 60.0  # s of simulated time that the page can show again
 _SPAN = WINDOW / BUCKETS
 _AGES = np.linspace(-WINDOW, 0.0, 2 * BUCKETS)
 _SLOTS = round((KEPT + WINDOW) / _SPAN)
 _HELD = round(
     1.0 / _SPAN
-)  # buckets without a row that show the bucket before them: the period of a slow controller
+)  # largest number of buckets without a row (slow controller) that repeat the bucket before them
 
 Take = Callable[[np.ndarray], None]
 
 
 class History:
-    """For each bucket of simulated time: each column's minimum and maximum, in the order in which they came,
-    and the bucket's last row.
+    """Stores for each bucket of simulated time the minimum and the maximum of each column, in the order of
+    their times, and the bucket's last row.
 
-    A row is valid until the next one: a controller that is slower than the buckets leaves some without a row.
-    Buckets are aligned to simulated time, so that a curve scrolls without shimmering and two robots on one
-    clock have the same buckets. Each row is read once, whatever the window. A reset, which sets the time
-    back, clears the curves: otherwise a jump would look like a motion.
+    If the controller is slower than the buckets, some buckets have no row; a row is then valid until the next
+    row. Buckets are aligned to simulated time: curves scroll without shimmering, and two robots on one clock
+    have the same buckets. Each row is read once, for any window. A reset sets the time back and clears the
+    curves, since a jump would look like a motion.
     """
 
     def __init__(self, block: Block, layout: Layout, *takers: Take) -> None:
@@ -58,7 +58,7 @@ class History:
         self._first = np.full(layout.size, np.nan)  # the open bucket's first row
 
     def under(self, block: Block, layout: Layout, *takers: Take) -> History:
-        """The same curves in the layout of another stack; the run continues with that stack."""
+        """Returns the same curves in the layout of another stack; the run continues with that stack."""
         from himpc.telemetry import relaid
 
         def moved(rows: np.ndarray) -> np.ndarray:
@@ -93,7 +93,7 @@ class History:
         return len(rows)
 
     def _take(self, rows: np.ndarray) -> None:
-        self.latest = rows[-1].copy()  # a copy, since a view would keep all rows in memory
+        self.latest = rows[-1].copy()  # a copy: a view would keep all rows in memory
         bits = rows[:, self.layout.fields["at_bound"]]
         bits = np.where(np.isfinite(bits), bits, 0).astype(np.int64)
         for k in range(self.bound_ticks.shape[1]):
@@ -109,8 +109,8 @@ class History:
             take(rows)
 
     def _hold(self, until: int) -> None:
-        """Fills the buckets from the newest one up to, not including, another one with the values of the
-        newest."""
+        """Fills the buckets between the newest bucket and the bucket `until` with the last values of the
+        newest bucket."""
         before = self.bucket % _SLOTS
         if self.bucket < 0 or until - self.bucket > _HELD:
             return
@@ -138,7 +138,7 @@ class History:
         return slot
 
     def window(self, until: float | None = None) -> PlotWindow:
-        """The curves for the plots at the simulated time `until` (s); None: the present time."""
+        """Returns the curves for the plots up to the simulated time `until` (s); None: the present time."""
         end = self.bucket if until is None else int(np.floor(until / _SPAN + 1e-6))
         wanted = np.arange(end - BUCKETS + 1, end + 1)
         wanted[(wanted > self.bucket) & (wanted <= self.bucket + _HELD)] = self.bucket
@@ -148,7 +148,7 @@ class History:
         return PlotWindow(self.layout, 2 * (end - BUCKETS + 1), known, slots, self._pairs, self._bits)
 
     def at(self, t: float) -> np.ndarray:
-        """The newest row at the simulated time t (s), as precisely as the history stores it."""
+        """Returns the newest row at the simulated time t (s), as precisely as the history stores it."""
         bucket = int(np.floor(t / _SPAN - 1e-6))
         slot = bucket % _SLOTS
         return self._lasts[slot].copy() if bucket >= 0 and self._numbers[slot] == bucket else self.latest
@@ -179,22 +179,23 @@ class PlotWindow:
         self._pairs, self._bits = pairs, bits
 
     def columns(self, which: slice) -> np.ndarray:
-        """(2 · BUCKETS, k) of some columns; NaN where nothing was recorded."""
+        """Returns the values of some columns, (2 · BUCKETS, k); NaN where nothing was recorded."""
         return self._rows[:, which]
 
     @cached_property
     def _rows(self) -> np.ndarray:
-        # A plot reads about ten columns; reading them together takes as long as reading two one by one.
+        # A plot reads about ten columns. Reading them together takes as long as reading two separate columns.
         rows = self._pairs[self._slots]
         rows[~self._known] = np.nan
         return rows.reshape(2 * BUCKETS, -1)
 
     def at_bound(self, kind: int) -> np.ndarray:
-        """(2 · BUCKETS, n) whether each joint was at its torque (0), velocity (1) or position (2) bound."""
+        """Returns whether each joint was at its torque (0), velocity (1) or position (2) bound, (2 · BUCKETS,
+        n)."""
         hit = (self._bits[self._slots] & (1 << kind) != 0) & self._known[:, None]
         return np.repeat(hit, 2, axis=0)
 
     @staticmethod
     def ages() -> np.ndarray:
-        """(2 · BUCKETS,) times before the end of the window, s, ≤ 0."""
+        """The times before the end of the window, (2 · BUCKETS,) s, ≤ 0."""
         return _AGES.copy()

@@ -12,14 +12,14 @@ from app.link.process import Process
 from app.link.spares import Spares
 
 LEAD = 0.2
-"""Simulated time, s, that the robot may be ahead of its ghost. If the ghost cannot keep up, both slow down,
-and the page says so: a ghost that lags would look like one that tracks its target badly."""
+"""Largest simulated time, s, by which the robot may be ahead of its ghost. If the ghost is too slow, both
+slow down, and the page says so. A ghost that lags would look like a ghost that tracks its target badly."""
 
 
 @final
 class GhostClient(Simulation):
-    """The process of a ghost that follows a leader. The ghost starts where the first `Script` report says. It
-    reports the time that it has reached, which limits how far its leader may go ahead."""
+    """The process of a ghost that follows a leader. The first `Script` report contains the start of the
+    ghost. The ghost reports the time that it has reached; this time limits the leader's advance."""
 
     who = "The ghost"
 
@@ -31,9 +31,10 @@ class GhostClient(Simulation):
         reached: Callable[[float], None],
         lost: Callable[[GhostClient, str], None],
     ) -> None:
-        """words: name for the legend; own: assignments "PATH=VALUE" on top of the leader's settings; reached:
-        called with the time that the ghost has reached, s; lost: called with a sentence when the ghost cannot
-        start or has ended. Both are called on a thread of the process."""
+        """words: the ghost's name in the legend; own: assignments "PATH=VALUE" on top of the leader's
+        settings; reached: called with the time that the ghost has reached, s; lost: called with a sentence
+        when the ghost cannot start or has ended. Both functions are called on a thread of the process
+        handle."""
         self.words, self.own = words, own
         self._reached, self._lost = reached, lost
         self._told_at: float | None = None

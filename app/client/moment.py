@@ -1,4 +1,4 @@
-"""What the page shows: one instant of a run, now or up to a minute ago, with the ghost at that instant."""
+"""The data that the page shows: one instant of a run, at most a minute old, with the ghost at that time."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from app.client.simulation_client import SimulationClient
 from app.link.messages import Status
 
 TRACE_SECONDS = 6.0
-_FAR = 0.5  # s: the picture does not wait for a ghost that lags by more than this
+_FAR = 0.5  # s; the picture does not wait for a ghost that lags by more
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,13 +31,13 @@ class Moment:
 
     Attributes:
         t: s.
-        live: whether it is the present instant.
-        poses: (n + 1, 7) of joints and tip, position (m) and quaternion wxyz.
+        live: whether this is the present instant.
+        poses: (n + 1, 7) poses of joints and tip, position (m) and quaternion wxyz.
         status: the newest report at that instant.
         latest: the newest row of telemetry at that instant.
         window: the curves of the plots.
         way: (k, n + 1, 7) poses of the last TRACE_SECONDS, oldest first.
-        ghost: None if there is none.
+        ghost: the ghost at that instant; None if there is no ghost.
     """
 
     t: float
@@ -63,15 +63,15 @@ def moment_of(learner: SimulationClient, past: float | None, curves: bool = True
     ghost = learner.ghost
     beside = None if ghost is None else ghost.look(curves)
     if ghost is not None and (ghost.ready is None or ghost.ready.choice != learner.choice):
-        beside = None  # the ghost still belongs to another scene
+        beside = None  # the ghost still shows another scene
     status = learner.status
     if t is None or status is None:
         return None
     if past is not None:
         t = past
     elif beside is not None and 0.0 < t - beside < _FAR:
-        t = beside  # a ghost shown later than the robot would look like one that tracks badly
-    # Within `read` no other scene can be loaded, so that all data belong to one scene.
+        t = beside  # a ghost that is shown late would seem to track badly
+    # Within `read` no other scene can be loaded: all data belong to one scene.
     shown = t
     found = learner.read(
         lambda _, history: (

@@ -10,8 +10,8 @@ if TYPE_CHECKING:
     from lessons.events import Event
 
 HOLD = 0.8
-"""Time, s, during which a control that was just used keeps its value, because the session may not have
-answered yet."""
+"""Time, s, for which a control keeps its value after it was used, because the session may not have answered
+yet."""
 
 Send = Callable[["Event"], None]
 """Puts an event into the session's mailbox."""
@@ -20,8 +20,8 @@ T = TypeVar("T")
 
 
 class PendingEdit(Generic[T]):
-    """The last edit that was sent, as long as the session may not have answered it. A second key press or
-    click within that time changes this edit instead of the old value that the page still shows."""
+    """The last edit that was sent, for the time in which the session may not have answered. A second key
+    press or click in this time changes the edit instead of the old value that the page still shows."""
 
     def __init__(self) -> None:
         self._asked: tuple[float, T] | None = None

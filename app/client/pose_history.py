@@ -12,7 +12,7 @@ from app.client.decimated import KEPT
 from app.link.messages import Status
 
 RATE = 30.0
-"""Frames that are kept per simulated second."""
+"""Number of frames that are stored per simulated second."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,14 +25,14 @@ class Frame:
 
 
 class PoseHistory:
-    """Frames in order of time, at most one minute of simulated time. A reset deletes them."""
+    """Frames in order of time, for at most one minute of simulated time. A reset deletes them."""
 
     def __init__(self) -> None:
         self._frames: list[Frame] = []
 
     def add(self, frame: Frame) -> None:
-        """Adds the newest frame. It replaces the previous frame if that one is closer than 1/RATE to its own
-        predecessor, so that slow motion needs no more memory."""
+        """Adds the newest frame. If the previous frame is closer than 1/RATE to the frame before it, the
+        newest frame replaces it. Thus slow motion needs no more memory."""
         frames = self._frames
         if frames and frame.t < frames[-1].t:
             frames.clear()
@@ -54,8 +54,8 @@ class PoseHistory:
         return max(self._frames[0].t, last - KEPT), last
 
     def at(self, t: float) -> Frame | None:
-        """The frame at time t: poses interpolated between the two nearest frames, with the report of the
-        earlier one."""
+        """Returns the frame at time t: poses interpolated between the two nearest frames, with the report of
+        the earlier frame."""
         if not self._frames:
             return None
         k = self._index(t)
@@ -67,7 +67,7 @@ class PoseHistory:
         return Frame(t, _between(before.poses, after.poses, share), before.status)
 
     def between(self, start: float, end: float) -> Iterator[Frame]:
-        """The frames from `start` to `end`, s."""
+        """Returns the frames from `start` to `end`, s."""
         return iter(self._frames[self._index(start) : self._index(end)])
 
     def _index(self, t: float) -> int:

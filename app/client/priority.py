@@ -6,10 +6,10 @@ import os
 from contextlib import suppress
 
 BEHIND = 10
-"""A simulation has a niceness that is higher than the server's by this: pages are served first."""
+"""The niceness of a simulation minus that of the server. Pages are thus served first."""
 
 
 def let_go_first(pid: int) -> None:
     """Gives a process a lower priority than this one."""
-    with suppress(OSError):  # it has ended, or may not be changed
+    with suppress(OSError):  # the process has ended, or its priority may not be changed
         os.setpriority(os.PRIO_PROCESS, pid, os.getpriority(os.PRIO_PROCESS, 0) + BEHIND)

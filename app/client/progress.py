@@ -9,7 +9,7 @@ from lessons.replay.progress import HandedIn, LearnerProgress, kept, written
 
 
 class Notebook:
-    """The progress of the learner at this page. It is stored in the browser whenever it grows."""
+    """The progress of the learner at this page. The browser stores it whenever it grows."""
 
     def __init__(
         self,
@@ -33,7 +33,7 @@ class Notebook:
             self._save(kept(progress, self._key, self.account))
 
     def to_hand_in(self, name: str, code: str) -> str:
-        """The progress so far as a text that can be handed in. code: state code of the setting on the
+        """Returns the progress so far as a text that can be handed in. code: state code of the setting on the
         page."""
         now = datetime.now(UTC).isoformat(timespec="seconds")
         return written(HandedIn(name, now, self.progress, code, self.account), self._key)

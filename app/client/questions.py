@@ -1,4 +1,4 @@
-"""Questions to a simulation, whose answers arrive in the order of the questions."""
+"""Questions to a simulation. The answers arrive in the order of the questions."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Questions:
         self._waiting: deque[Queue[Told | None]] = deque()
 
     def ask(self, process: Process) -> Queue[Told | None] | None:
-        """Asks for the run so far. Returns the queue that will get the answer; None if the process has
+        """Requests the run so far. Returns the queue that will get the answer; None if the process has
         ended."""
         answer: Queue[Told | None] = Queue()
         with self._lock:
@@ -30,13 +30,13 @@ class Questions:
         return answer
 
     def answer(self, told: Told) -> None:
-        """Gives an answer to the oldest question."""
+        """Passes an answer to the oldest question."""
         with self._lock:
             if self._waiting:
                 self._waiting.popleft().put(told)
 
     def forget(self) -> None:
-        """Ends all questions without an answer, as the process has ended."""
+        """Ends all questions without an answer; called when the process has ended."""
         with self._lock:
             while self._waiting:
                 self._waiting.popleft().put(None)

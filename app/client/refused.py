@@ -1,4 +1,4 @@
-"""The messages for commands of a learner that are refused."""
+"""The messages for a learner's commands that are refused."""
 
 from __future__ import annotations
 

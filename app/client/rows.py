@@ -1,4 +1,4 @@
-"""Telemetry rows that are kept for export: exact values at a reduced rate."""
+"""Telemetry rows that are stored for export: exact values at a reduced rate."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ if TYPE_CHECKING:
     from himpc.telemetry import Layout
 
 RATE = 100.0
-"""Rows that are kept per simulated second."""
+"""Number of rows that are stored per simulated second."""
 MOST = 12_000
-"""Largest number of rows kept of a whole run. A longer run keeps every second, fourth, … of them."""
+"""Largest number of rows that are stored of a whole run. Of a longer run, every second, fourth, … row is
+stored."""
 
 
 class RowHistory:
@@ -23,22 +24,22 @@ class RowHistory:
     def __init__(self, layout: Layout) -> None:
         self.layout = layout
         self._t = layout.fields["t"].start
-        # Two blocks are allocated once: separate arrays per row, which live for minutes among arrays that
-        # live for an instant, would fragment the memory. The blocks are not filled: the system provides a
-        # page of memory when a row is first written there, and most scenes are shown for less than a minute.
+        # Two blocks are allocated once. A separate array per row would live for minutes among arrays that
+        # live for an instant, and would fragment the memory. The blocks are not filled: the system provides a
+        # memory page at the first write, and most scenes are shown for less than a minute.
         self._recent = np.empty((round(KEPT * RATE), layout.size))
         self._whole = np.empty((MOST, layout.size))
         self._clear()
 
     def _clear(self) -> None:
         self._every = 1
-        self._kept = 0  # rows that were taken at RATE
-        self._thinned = 0  # rows of `_whole`
+        self._kept = 0  # number of rows that were stored at RATE
+        self._thinned = 0  # number of rows in `_whole`
         self._mark = -1
         self._last = -np.inf
 
     def under(self, layout: Layout) -> RowHistory:
-        """The same rows in the layout of another stack; the run continues with that stack."""
+        """Returns the same rows in the layout of another stack; the run continues with that stack."""
         from himpc.telemetry import relaid
 
         new = RowHistory(layout)
@@ -52,7 +53,7 @@ class RowHistory:
         return new
 
     def take(self, rows: np.ndarray) -> None:
-        """Takes rows in order of time; a time that is earlier than the last one begins a new run."""
+        """Adds rows in order of time. A time that is earlier than the last one begins a new run."""
         times = rows[:, self._t]
         if times[0] < self._last:
             self._clear()
@@ -74,10 +75,10 @@ class RowHistory:
         self._kept += 1
 
     def recent(self) -> np.ndarray:
-        """(k, size) rows of the last minute."""
+        """The rows of the last minute, (k, size)."""
         end = self._kept
         return self._recent[np.arange(max(0, end - len(self._recent)), end) % len(self._recent)]
 
     def whole(self) -> np.ndarray:
-        """(k, size) rows since the last reset."""
+        """The rows since the last reset, (k, size)."""
         return self._whole[: self._thinned].copy()

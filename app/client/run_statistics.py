@@ -1,4 +1,4 @@
-"""How well a run has gone since its last reset: running sums over every tick."""
+"""The figures of a run since its last reset, computed from running sums over every tick."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ class RunFigures:
     Attributes:
         seconds: duration of the run, simulated time.
         rmse: per task, RMS of ‖x̃‖, m or rad.
-        torque_share: largest ratio of a demanded |τ| to its bound; NaN if the controller demands no torque.
+        torque_share: largest ratio of a commanded |τ| to its bound; NaN if the controller commands no torque.
         unsolved: number of QPs without a solution.
-        step_ms, slow_ms: the control step's median and 99th percentile, to 3 %.
+        step_ms, slow_ms: median and 99th percentile of the control step's time, ms, to 3 %.
     """
 
     seconds: float
@@ -31,12 +31,12 @@ class RunFigures:
     slow_ms: float
 
 
-_PER_DECADE = 80  # bins of the histogram of step times
+_PER_DECADE = 80  # number of bins in the histogram of step times
 _DECADES = 8  # from 1 µs
 
 
 class RunStatistics:
-    """Takes portions of rows in order; `clear` begins a new run."""
+    """Adds up portions of rows in their order; `clear` begins a new run."""
 
     def __init__(self, layout: Layout) -> None:
         self._layout = layout
@@ -99,6 +99,6 @@ class RunStatistics:
         )
 
     def _quantile(self, share: float) -> float:
-        """The time in ms that the given share of the control steps stayed below."""
+        """Returns the time in ms below which the given share of the control steps stayed."""
         index = int(np.searchsorted(np.cumsum(self._times), share * self._ticks))
         return 1e-3 * float(10 ** ((index + 0.5) / _PER_DECADE))

@@ -1,4 +1,4 @@
-"""The page's handle of a simulation process, with everything that the process has reported."""
+"""The page's handle of a simulation process, with the data that the process has reported."""
 
 from __future__ import annotations
 
@@ -23,15 +23,16 @@ if TYPE_CHECKING:
     from lessons.settings.settings import SceneSettings
 
 T = TypeVar("T")
-_COMPLAIN = 2.0  # s between two notices that commands are lost
+_COMPLAIN = 2.0  # s between two notices about lost commands
 
 
 class Simulation(ABC):
-    """Owns a process and stores its reports. Reports arrive on the process' thread; the page reads the fields
-    from its own loop. `changed` counts scenes and restarts: the page rebuilds itself when it differs."""
+    """Owns a process and stores its reports. Reports arrive on the thread of the process handle; the page
+    reads the fields from its own loop. `changed` counts scenes and restarts: when it changes, the page is
+    rebuilt."""
 
     who: str
-    """The words with which sentences about this simulation begin."""
+    """The first words of sentences about this simulation."""
 
     def __init__(self, spares: Spares) -> None:
         self.ready: Ready | None = None
@@ -64,7 +65,7 @@ class Simulation(ABC):
         process.listen(hear)
 
     def _source(self) -> Process:
-        """A process to start with."""
+        """Returns the process that is used first."""
         return self._spares.take()
 
     @property
@@ -72,8 +73,8 @@ class Simulation(ABC):
         return self._process.pid
 
     def send(self, command: Command) -> None:
-        """Sends a command without waiting. A command that does not fit into the queue is dropped, with a
-        notice."""
+        """Sends a command without waiting. A command that does not fit into the queue is lost; a notice says
+        so."""
         process = self._process
         if process.send(command) or not process.alive or time.monotonic() < self._next_complaint:
             return
@@ -85,7 +86,7 @@ class Simulation(ABC):
 
     @property
     def quiet(self) -> float:
-        """Time since the process last reported anything, s."""
+        """Time since the last report of the process, s."""
         return time.monotonic() - self._process.heard_at
 
     def trouble(self) -> Trouble | None:
@@ -143,35 +144,36 @@ class Simulation(ABC):
             block.close()
 
     def take_messages(self) -> tuple[list[str], list[str]]:
-        """(refusals, notices) that arrived since the last call."""
+        """Returns (refusals, notices) that arrived since the last call."""
         with self._lock:
             refusals, self._refusals = self._refusals, []
             notices, self._notices = self._notices, []
             return refusals, notices
 
     def settings_of(self, ready: Ready) -> SceneSettings:
-        """The settings of a loaded scene: the newest ones, unless another scene was loaded since."""
+        """Returns the settings of a loaded scene: the newest settings, or those at its start if another scene
+        was loaded since."""
         with self._lock:
             return ready.settings if self.settings is None or self.ready is not ready else self.settings
 
     # ---------------------------------------------------------------- telemetry
 
     def read(self, look: Callable[[Block, History], T]) -> T | None:
-        """What `look` returns, with the shared memory locked against being freed; None before the first
-        scene."""
+        """Calls `look` and returns its result; the shared memory cannot be freed meanwhile. Returns None
+        before the first scene."""
         with self._lock:
             if self._block is None or self._history is None:
                 return None
             return look(self._block, self._history)
 
     def look(self, rows: bool = True) -> float | None:
-        """Reads new data, stores them so that they can be shown again, and returns the simulated time, s.
-        rows: whether to read the telemetry as well, which may wait for one of the next calls."""
+        """Reads new data, stores them for a later replay, and returns the simulated time, s. rows: whether to
+        read the telemetry too; otherwise one of the next calls reads it."""
 
         def take(block: Block, history: History) -> float:
             t, poses = block.moment()
             if rows:
-                history.pull()  # read after the moment, so that the rows reach up to it
+                history.pull()  # read after the moment: the rows then reach up to it
             self.tape.add(Frame(t, poses, self.status))
             return t
 
@@ -186,7 +188,7 @@ class Simulation(ABC):
 
 
 def aside(end: Callable[[], None]) -> None:
-    """Runs a task that may take a moment on a thread of its own."""
+    """Runs a task that may take some time on a separate thread."""
     threading.Thread(target=end, daemon=True).start()
 
 

@@ -1,4 +1,5 @@
-"""The simulations of one learner: a process and perhaps its ghost. They outlive page reloads."""
+"""The simulations of one learner: a process and perhaps its ghost. They continue when the page is
+reloaded."""
 
 from __future__ import annotations
 
@@ -45,13 +46,13 @@ SIMULATION = "simulation"
 
 @final
 class SimulationClient(Simulation):
-    """The simulation of one browser tab, and the ghost that follows it, if there is one."""
+    """The simulation of one browser tab, and its ghost, if there is one."""
 
     who = "The simulation"
 
     def __init__(self, token: str, choice: SceneChoice, spares: Spares, arm: Process | None = None) -> None:
-        """arm: the process that watches an arm, used in place of a simulation. It is never replaced, and its
-        ghost is the simulation that gets the same targets."""
+        """arm: the process that watches an arm, used in place of a simulation. This process is never
+        replaced. Its ghost is the simulation that gets the same targets."""
         self._arm = arm
         self.token = token
         self.choice = self._start_choice = choice
@@ -63,7 +64,7 @@ class SimulationClient(Simulation):
         self.lecture: Lecture | None = None
         self.kept_at: LessonPlace | None = None
         """The step at which a teacher keeps this learner; None: the learner may go anywhere."""
-        self.coming: Coming | None = None  # the class's step, until the robot is there
+        self.coming: Coming | None = None  # the class's step, until the robot has loaded it
         self._behind: int | None = None  # the process with the lower priority
         self._rest = Rest()
         self._questions = Questions()
@@ -83,8 +84,8 @@ class SimulationClient(Simulation):
         return found if found is None or self._arm is None else replace(found, offer=None)
 
     def load(self, choice: SceneChoice) -> None:
-        """Loads another scene, in a new process if the present one is in trouble. A learner who is kept at a
-        step gets a notice instead."""
+        """Loads another scene; uses a new process if the present one has a problem. A learner who is kept at
+        a step gets a notice instead."""
         if self.kept_at is not None and choice.exercise != self.kept_at:
             self._refuse(STAYING)
             return
@@ -104,15 +105,15 @@ class SimulationClient(Simulation):
         super().send(command)
 
     def announce(self, place: LessonPlace) -> None:
-        """Shows a step of the class at once, if the page can, and stops the robot until it loads the step,
-        see `load_for_class`."""
+        """Shows a step of the class at once, if possible, and pauses the robot until it loads the step, see
+        `load_for_class`."""
         with self._lock:
             self.coming = Coming.at(place, self.settings)
             if self.status is not None and self.status.running:
                 self.send(Play(False))
 
     def run_with_class(self) -> None:
-        """Runs the step of the lesson, also if the learner is kept at it."""
+        """Runs the step of the lesson, also if the learner is kept at this step."""
         super().send(RunStep())
 
     @property
@@ -137,12 +138,11 @@ class SimulationClient(Simulation):
                 super().send(command)
 
     def reset_all(self) -> None:
-        """Loads the scene again from its beginning, in a new process if the present one is in trouble."""
+        """Loads the scene again from its beginning; uses a new process if the present one has a problem."""
         self._begin_anew(ResetAll(), None, 0.0)
 
     def _begin_anew(self, command: Load | ResetAll, choice: SceneChoice | None, patience: float) -> None:
-        """Sends the command, or starts a new process if the present one is in trouble, also if that one has
-        just ended unnoticed."""
+        """Sends the command, or starts a new process if the present one has a problem or has just ended."""
         if self._arm is not None:
             self._refuse(ARM_AGAIN)
             return
@@ -155,8 +155,8 @@ class SimulationClient(Simulation):
             self.send(command)
 
     def restart(self, choice: SceneChoice | None = None) -> None:
-        """Starts a new process with another scene, or with the last one. The old process ends, by force if it
-        does not answer. Does not wait for either."""
+        """Starts a new process with another scene, or with the last one. The old process is ended, by force
+        if it does not answer. This call waits for neither process."""
         if self._arm is not None:
             self._refuse(ARM_AGAIN)
             return
@@ -176,19 +176,19 @@ class SimulationClient(Simulation):
             self._replace_ghost(ghost.words, ghost.own)
 
     def _enter(self, ready: Ready) -> None:
-        # The choice is stored first: a reader of the new settings then finds the choice that belongs to them.
+        # The choice is stored first, so that a reader of the new settings finds the matching choice.
         self.choice, self.lecture = ready.choice, None
         super()._enter(ready)
 
     def choice_of(self, ready: Ready) -> SceneChoice:
-        """The choice that belongs to a scene, as `settings_of`: it may be a later step of the lesson than the
-        one that was loaded."""
+        """Returns the choice of a scene (compare `settings_of`). It may be a later step of the lesson
+        than the loaded step."""
         with self._lock:
             return self.choice if self.ready is ready else ready.choice
 
     def lecture_of(self, ready: Ready) -> Lecture | None:
-        """The state of the lesson in a scene; None if another scene was loaded since. A page that will be
-        rebuilt must not show the next lesson first, as a button pressed there would have no effect."""
+        """Returns the state of the lesson in a scene; None if another scene was loaded since. A page that
+        will be rebuilt must not show the next lesson yet: a button pressed there would have no effect."""
         with self._lock:
             if self.ready is not ready:
                 return None
@@ -224,8 +224,8 @@ class SimulationClient(Simulation):
                 pass
 
     def give_way(self) -> None:
-        """Gives the robot's process a lower priority than the server's, once per process, and pauses the
-        robot if its learner does nothing, see `Rest`. Returns at once."""
+        """Gives each new process of the robot a lower priority than the server, and pauses the robot if its
+        learner does nothing, see `Rest`. Returns at once."""
         if self._rest.begins(self.lecture, self.status):
             super().send(Play(False))
         pid = self.pid
@@ -236,14 +236,14 @@ class SimulationClient(Simulation):
     # ---------------------------------------------------------------- questions
 
     def latest(self) -> Told | None:
-        """The run as it was last reported, without its events; None before the first scene. Unlike `ask`, it
-        does not wait for the simulation."""
+        """Returns the last reported run, without its events; None before the first scene. Unlike `ask`, this
+        call does not wait for the simulation."""
         ready = self.ready
         return None if ready is None else Told(self.choice_of(ready), self.settings_of(ready), (), 0.0)
 
     def ask(self, timeout: float = 10.0) -> Told | None:
-        """The run so far; None if the simulation does not answer within `timeout` seconds. This call blocks:
-        do not call it on the page's loop or on viser's."""
+        """Requests the run so far; returns None if the simulation does not answer within `timeout` seconds.
+        This call blocks: do not call it on the page's loop or on viser's."""
         with self._lock:
             answer = self._questions.ask(self._process)
         try:
@@ -254,9 +254,9 @@ class SimulationClient(Simulation):
     # ---------------------------------------------------------------- ghost
 
     def start_ghost(self, ghost: lesson.Ghost) -> None:
-        """Starts a ghost: a second robot with `ghost.set` on top of the present settings, in the same scene.
-        The scene starts again, so that both begin together. An existing ghost is replaced. If `ghost.set`
-        does not fit the scene, a notice says so and there is no ghost."""
+        """Starts a ghost: a second robot in the same scene, with the present settings and the changes in
+        `ghost.set`. The scene is reset, and both robots begin together. An existing ghost is replaced. If
+        `ghost.set` does not fit the scene, a notice says so and there is no ghost."""
         if self._arm is None:
             self._replace_ghost(ghost.words, ghost.set)
         else:

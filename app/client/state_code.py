@@ -1,4 +1,4 @@
-"""The setting of a page as a state and as a code."""
+"""The setting of a page as a state, and as a state code."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from robots import InputError
 
 
 def code_of(told: Told) -> str:
-    """The state code of the setting. Raises InputError if a state code cannot contain it."""
+    """Returns the state code of the setting. Raises InputError if a state code cannot contain the setting."""
     return encode(state_now(told))
 
 
 def state_now(told: Told) -> State:
-    """The setting on a page. Raises InputError for a robot that was uploaded."""
+    """Returns the state of the setting on a page. Raises InputError for a robot that was uploaded."""
     choice = from_a_name(told.choice)
     exercise = choice.exercise
     return state_of(
@@ -26,7 +26,7 @@ def state_now(told: Told) -> State:
 
 
 def from_a_name(choice: SceneChoice) -> SceneChoice:
-    """The choice itself. Raises InputError if its robot was uploaded."""
+    """Returns the choice unchanged. Raises InputError if its robot was uploaded."""
     if choice.urdf_text is not None:
         raise InputError(
             "a code cannot contain this robot, which was uploaded: save its file and "

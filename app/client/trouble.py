@@ -1,4 +1,4 @@
-"""The problem that a page shows, with a button, when its simulation does not run as it should."""
+"""The problem that a page shows, with a button, when its simulation does not run correctly."""
 
 from __future__ import annotations
 
@@ -9,15 +9,16 @@ from app.link.forkserver import FIRST_PATIENCE
 from app.link.process import Process
 
 SILENCE = 3.0
-"""Time without a report, s, after which a page says so: a simulation reports ten times per second."""
+"""Time without a report, s, after which a page shows this problem. A simulation reports ten times per
+second."""
 DEADLINE = 30.0
-"""Time that loading may take, s."""
+"""Largest time for loading a scene, s."""
 
 
 @dataclass(frozen=True)
 class Trouble:
     """state: a word for the badge; sentence: the problem; offer: label of the button that starts the scene
-    again, None if the learner can only wait."""
+    again; None if the learner can only wait."""
 
     state: Literal["STOPPED", "SILENT", "LOADING", "PREPARING", "YOUR CODE"]
     sentence: str
@@ -25,13 +26,13 @@ class Trouble:
 
 
 def trouble_of(process: Process, loading: bool, quiet: float, who: str = "The simulation") -> Trouble | None:
-    """The problem of a process that has not failed; None if there is none.
+    """Returns the problem of a process that has not failed; None if there is no problem.
 
     Args:
         process: the process.
         loading: whether its last report says that it loads a scene.
         quiet: time since its last report, s.
-        who: the words with which the sentence begins.
+        who: the first words of the sentence.
     """
     doing = process.preparing
     if quiet < SILENCE and not doing:

@@ -1,4 +1,4 @@
-"""A requested scene that the simulation has not reported yet."""
+"""A request for a scene that the simulation has not answered yet."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Unheard(NamedTuple):
     resets: int
 
     def after(self, report: Report) -> Unheard | None:
-        """Returns None if the report is about the requested scene, else this request."""
+        """Returns None if the report answers this request, else this request."""
         match report:
             case Status(resets=resets) if resets != self.resets:
                 return None

@@ -1,4 +1,4 @@
-"""Which internal data of a tick the page requests, and whether the simulation knows it."""
+"""The page's request for internal data of a tick, and whether the simulation has received it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from collections.abc import Callable
 from app.link.inside import Inside, InsideRequest
 
 _AGAIN = 0.4
-"""Time, s, after which an unanswered request is sent again: a simulation that restarted does not have it."""
+"""Time, s, after which an unanswered request is sent again. A simulation that was restarted has lost the
+request."""
 
 
 class Watching:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 SIMULATED = "simulated"
 _LONGEST_DELAY = 20
-_LONGEST = 600.0  # s: every row is kept
+_LONGEST = 600.0  # s; limited, as every row is stored in memory
 
 
 def arm(
@@ -45,26 +45,28 @@ def arm(
     port: int = 8080,
     no_browser: bool = False,
 ) -> int:
-    """Drive a Franka arm by a scene's exported controller, and watch it beside a simulated one.
+    """Drive a Franka arm by a scene's exported controller, and compare it with a simulated arm.
 
     Args:
-        scene: name of a scene whose robot is the arm, e.g. panda-hold. Its targets begin where the arm is.
-        robot: address of the arm, or "simulated" for one in MuJoCo behind the same interface.
+        scene: name of a scene with this arm as its robot, e.g. panda-hold. The targets begin at the arm's
+            pose.
+        robot: address of the arm, or "simulated" for an arm that is simulated in MuJoCo, with the same
+            interface.
         urdf: URDF file or catalog name, for the scene "hold".
         tip: end-effector frame, for the scene "hold".
         controller: himpc, hiqp, nhimpc or weighted; the scene's own by default.
         set: change a setting, e.g. --set M_bar_scale=2 --set limits.velocity_scale=0.3.
-        drag: after so many seconds, move the target of a task by so much, e.g. --drag 2:position=0,0.05,0.
-        duration: seconds; then the arm is stopped gently. 10 by default, 600 with --page.
-        distance: how far a joint may be from the simulated one, rad.
-        missed: how many periods may be missed one after another.
-        missed_share: which share of the periods may be missed within about a second, 1 for all.
-        delay: after how many periods a torque acts; 0 believes the arm's own word for what acted.
-        real_time: refuse to run where the kernel has no real-time scheduling.
+        drag: move the target of a task at a time in seconds, e.g. --drag 2:position=0,0.05,0.
+        duration: seconds after which the arm is stopped gently; 10 by default, 600 with --page.
+        distance: largest distance of a joint from the simulated joint, rad.
+        missed: number of periods that may be missed one after another.
+        missed_share: share of the periods that may be missed within about a second; 1: all of them.
+        delay: number of periods after which a torque acts; 0: use the torque that the arm reports.
+        real_time: refuse to run if the kernel has no real-time scheduling.
         npz: write one row per period to this file.
-        plot: draw arm and model over each other, errors and torques, as arm.png in this folder.
-        page: open the page: it shows the arm and, as a ghost, the simulated one; Run begins, dragged targets
-            move both, and closing the page stops the arm gently.
+        plot: draw the motion of arm and model, errors and torques as arm.png in this folder.
+        page: open the page, which shows the arm and, as a ghost, the simulated arm. Run starts the drive,
+            dragged targets move both arms, and closing the page stops the arm gently.
         port: port of the page, on this machine only.
         no_browser: do not open a browser.
     """
@@ -124,10 +126,10 @@ def arm(
 
 
 def _finish(driven: Driven, image: Image, npz: str | None, plot: str | None, how: dict[str, Any]) -> int:
-    """Tells how a drive ended, writes its files, and returns the exit code."""
+    """Prints the reason of a drive's end, writes its files, and returns the exit code."""
     from app.arm.recorded import arrays
 
-    rest = "it came to rest under control" if driven.gently else "it was not brought to rest by us"
+    rest = "it came to rest under control" if driven.gently else "it did not come to rest under control"
     print(f"ended: {driven.why}; {rest}", flush=True)
     data = arrays(driven, image)
     if npz is not None:
@@ -139,7 +141,7 @@ def _finish(driven: Driven, image: Image, npz: str | None, plot: str | None, how
 
 
 def _arm(scene: TorqueScene, robot: str, real_time: bool, start: Any) -> Arm:
-    """The arm, not yet under control."""
+    """Returns the arm, which is not yet under control."""
     from robots import Plant
     from robots.arms.franka import Franka
     from robots.arms.simulated_arm import SimulatedArm
@@ -152,14 +154,14 @@ def _arm(scene: TorqueScene, robot: str, real_time: bool, start: Any) -> Arm:
 
 
 def _found(scene: TorqueScene, robot: str, real_time: bool) -> tuple[Any, Any]:
-    """The limits of the arm, and where it is."""
+    """Returns the limits of the arm and its joint positions."""
     from robots.arms.arm import ArmLost
     from robots.arms.franka import Franka
 
     if robot == SIMULATED:
         return _arm(scene, robot, real_time, scene.q_0).limits, scene.q_0
     if scene.settings.T_s != 1e-3:
-        raise InputError(f"T_s is {scene.settings.T_s} s: a Franka arm takes a torque every 0.001 s")
+        raise InputError(f"T_s is {scene.settings.T_s} s: a Franka arm needs a torque every 0.001 s")
     there = Franka(robot, real_time)
     try:
         return there.limits, there.at_rest(scene.robot)

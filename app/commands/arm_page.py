@@ -20,7 +20,8 @@ from app.server.server import PageServer
 from app.server.serving import serve
 
 _PRIORITY = 10
-"""Real-time priority, below the loop's. A watcher without it may get a core too late and count as silent."""
+"""Real-time priority, below the loop's. A watcher without real-time priority may get a core too late and
+count as silent."""
 
 
 def drive_on_a_page(
@@ -36,10 +37,10 @@ def drive_on_a_page(
 
     Args:
         choice: the run that the page shows.
-        ready, plan, model: of the drive, which begins when Run is pressed on the page.
-        finish: tells how the drive ended, writes its files and returns the exit code.
-        port: to listen on.
-        open_browser: whether to open the page here.
+        ready, plan, model: the data of the drive, which begins when Run is pressed on the page.
+        finish: prints the reason of the drive's end, writes its files and returns the exit code.
+        port: the port on which the server listens.
+        open_browser: whether to open the page in a browser of this machine.
     """
 
     def watch(wire: Wire) -> None:

@@ -1,4 +1,4 @@
-"""`himpc-lab grade --autograder`: the folder of an autograder as Gradescope's containers need it."""
+"""`himpc-lab grade --autograder`: writes the folder of an autograder for Gradescope's containers."""
 
 from __future__ import annotations
 
@@ -41,11 +41,11 @@ _OWN = "exercise.py"
 
 
 def write_autograder(exercise: str, folder: Path) -> int:
-    """Writes the folder: `setup.sh`, `run_autograder`, what it installs, and himpc-lab itself.
+    """Writes the folder: `setup.sh`, `run_autograder`, the list of packages to install, and himpc-lab itself.
 
     Args:
-        exercise: name of an exercise, or path of the file of a teacher's own.
-        folder: a folder that does not exist yet.
+        exercise: name of an exercise, or path of the file of a teacher's own exercise.
+        folder: path of the folder, which must not exist yet.
 
     Raises:
         InputError: there is no such exercise, or the folder exists already or cannot be written.
@@ -59,7 +59,7 @@ def write_autograder(exercise: str, folder: Path) -> int:
         folder.mkdir(parents=True)
     except OSError as error:
         raise InputError(
-            f"--out {folder}: cannot be made ({error.strerror}); give a folder that does not exist yet"
+            f"--out {folder}: cannot be created ({error.strerror}); give a folder that does not exist yet"
         ) from None
     for name, text in (("setup.sh", _SETUP), ("run_autograder", _RUN)):
         (folder / name).write_text(text.replace("EXERCISE", _OWN if own else exercise), encoding="utf-8")
@@ -70,21 +70,21 @@ def write_autograder(exercise: str, folder: Path) -> int:
     for name in PACKAGES:
         shutil.copytree(_ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
     print(
-        f"{folder} is written. Zip what is in it, not the folder itself, and upload it to Gradescope:\n"
+        f"{folder} is written. Zip its content, not the folder itself, and upload the file to Gradescope:\n"
         f"  cd {folder} && zip -r ../autograder.zip ."
     )
     return 0
 
 
 def requirements() -> list[str]:
-    """The packages that himpc-lab needs, with the versions that are installed here."""
+    """Returns the packages that himpc-lab needs, with the versions that are installed here."""
     found: dict[str, str] = {}
     left = ["himpc-lab"]
     while left:
         name = left.pop()
         try:
             installed = distribution(name)
-        except PackageNotFoundError:  # another system needs it
+        except PackageNotFoundError:  # needed on another system
             continue
         if name != "himpc-lab":
             found[name] = installed.version
@@ -93,6 +93,6 @@ def requirements() -> list[str]:
         left += sorted(names - found.keys() - {"himpc-lab"})
     if not found:
         raise InputError(
-            f"the packages of himpc-lab are not known to {sys.executable}: install it with pip first"
+            f"{sys.executable} does not know the packages of himpc-lab: install himpc-lab with pip first"
         )
     return [f"{name}=={version}" for name, version in sorted(found.items())]

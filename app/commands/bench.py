@@ -14,9 +14,10 @@ if TYPE_CHECKING:
 
 
 def bench(ticks: int = 300, json: str | None = None) -> int:
-    """Time the control step: compiled route against the explicit one with DAQP and with ProxQP.
+    """Measure the time of the control step: compiled route, and explicit route with DAQP and with ProxQP.
 
-    Each time is that of the whole step from state to torque, kinematics included. The routes run in turns.
+    Each time is the time of the whole step from state to torque, kinematics included. The routes run in
+    turns.
 
     Args:
         ticks: number of timed ticks per route.
@@ -45,7 +46,7 @@ def bench(ticks: int = 300, json: str | None = None) -> int:
         ]
         write_json({**blocks[0], "dragged": blocks[1]}, json)
         return 0
-    columns = ("N", "route", "solver", "step ms, median", "p95", "p99", "of it QP solver, median")
+    columns = ("N", "route", "solver", "step ms, median", "p95", "p99", "QP solver alone, median")
     for scene, timings in found.items():
         rows = [
             [

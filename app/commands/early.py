@@ -1,7 +1,7 @@
-"""Imported first, so that Ctrl-C during the import of the other modules also ends without a traceback.
+"""The first module that is imported. With it, Ctrl-C during the other imports also ends without a traceback.
 
-Nothing has been started by then that would have to be ended. A Ctrl-C that arrives before the interpreter
-imports this module cannot be handled here.
+At that time, nothing is running that must be ended. A Ctrl-C before the import of this module cannot be
+handled here.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ import signal
 if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
     signal.signal(signal.SIGINT, lambda *_: os._exit(130))
 
-# Nothing here draws with MuJoCo. Its import would start processes that look for a window library. They take
-# half a second, and Ctrl-C reaches them before our code can handle it.
+# No command draws with MuJoCo's own renderer. Without this line, MuJoCo's import would start processes that
+# search for a window library. They take half a second, and Ctrl-C would reach them before our code.
 os.environ.setdefault("MUJOCO_GL", "disable")
 
 

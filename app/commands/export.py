@@ -27,12 +27,12 @@ def export(
     ticks: int = 1000,
     seed: int = 0,
 ) -> int:
-    """Write a scene's controller as C or WebAssembly: code, numbers, header, and a recorded run to replay.
+    """Write a scene's controller as C or WebAssembly: code, parameters, header, and a recorded run to replay.
 
     Args:
         scene: name of a scene (see himpc-lab scenes).
         target: wasm32, x86_64-linux, aarch64-linux, x86_64-macos, aarch64-macos or x86_64-windows.
-        out: folder for the files; it is made if it is not there.
+        out: folder for the files; it is created if it does not exist.
         urdf: URDF file or catalog name, for the scene "hold".
         tip: end-effector frame, for the scene "hold".
         controller: himpc, hiqp, nhimpc or weighted; the scene's own by default.
@@ -60,7 +60,7 @@ def export(
     for each in (scene, controller or ""):
         if is_file(each):
             raise InputError(
-                f"{each} is Python, which export cannot translate: name a scene and a controller of ours"
+                f"{each} is Python, which export cannot translate: give a scene and a controller of the lab"
             )
     assignments = (*([f"stack={stack}"] if stack is not None else ()), *set)
     spec = RunSpec(scene, urdf, tip, controller=controller, seed=seed).but(*assignments)
@@ -85,8 +85,8 @@ def export(
 
 
 def recorded(scene: TorqueScene, ticks: int, seed: int) -> Recorded:
-    """Runs a scene in closed loop with the simulated robot. After a tenth of the time the first position
-    target that can be dragged moves by 5 cm, then the first orientation target turns by 0.2 rad."""
+    """Runs a scene in closed loop with the simulated robot. After a tenth of the time, the first position
+    target that can be dragged moves by 5 cm. Then the first orientation target turns by 0.2 rad."""
     import numpy as np
 
     from himpc.export.folder import Move, Recorded
@@ -131,7 +131,7 @@ def _made(out: str) -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"--out {out}: cannot be made ({error.strerror}); give another folder") from None
+        raise InputError(f"--out {out}: cannot be created ({error.strerror}); give another folder") from None
     return folder
 
 

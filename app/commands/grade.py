@@ -37,32 +37,32 @@ def grade(
 ) -> int:
     """Run a solution of an exercise and grade its behaviour; without a file, list the exercises.
 
-    The name of an exercise instead of a file shows this exercise, with --hints N also its first N hints. For
-    an exercise of your own: himpc-lab grade EXERCISE.py SUBMISSIONS.
+    Give the name of an exercise instead of a file to show this exercise; --hints N also shows its first N
+    hints. For an exercise of your own: himpc-lab grade EXERCISE.py SUBMISSIONS.
 
-    Every file runs in a process of its own for at most a minute. A folder of submissions gives one table. If
-    the command was stopped, the same command continues it. Exit code 0: all points; 1: some are missing; 2:
-    it cannot be run.
+    Every file runs in a separate process for at most a minute. A folder of submissions gives one table. If
+    grading was stopped, the same command continues it. Exit code 0: all points; 1: some points are missing;
+    2: the solution cannot be run.
 
     Args:
-        file: Python file with the solution, or a folder of them; or the name of an exercise; or the text that
-            the page wrote about a learner's progress; or the file of an exercise of your own, followed by
-            the file or folder of solutions.
+        file: one of these: a Python file with a solution; a folder of such files; the name of an exercise; a
+            learner's progress, as the page exported it; the file of an exercise of your own, followed by the
+            file or folder of solutions.
         exercise: name of the exercise; by default the name that the file assigns to EXERCISE.
         hints: number of hints of the exercise to show.
         seed: seed of the disturbances.
         out: file for the table of a folder, grades.csv by default; an unfinished table is continued. With
-            --autograder the new folder, autograder by default.
-        scheduler: address of a Dask scheduler, e.g. tcp://10.0.0.1:8786, for a folder, instead of this
-            machine's cores.
-        key: file with the key of your lab, to check whether your lab signed the progress that was handed in.
+            --autograder: the new folder, autograder by default.
+        scheduler: address of a Dask scheduler, e.g. tcp://10.0.0.1:8786, which grades a folder instead of
+            this machine's cores.
+        key: file with the key of your lab, for checking whether your lab signed a learner's progress.
         json: write JSON to this file, or to standard output for "-".
-        format: write JSON as Gradescope or GitHub Classroom's reporter reads it, to results.json or --json;
+        format: write JSON for Gradescope or for GitHub Classroom's reporter, to results.json or --json. Only
             for one file, or a folder with one file.
-        visibility: when Gradescope shows the checks to students.
-        check: file of an exercise of your own: show it, and test that its solution gets all points, that
-            every mistake loses some, and that every check is failed by a mistake.
-        autograder: name or file of an exercise: write the folder that Gradescope's containers need.
+        visibility: time at which Gradescope shows the checks to students.
+        check: file of an exercise of your own: show the exercise and test it. Its solution must get all
+            points, every mistake must lose some, and every check must be failed by a mistake.
+        autograder: name or file of an exercise: write the folder for Gradescope's containers.
     """
     from lessons.exercises import EXERCISES
     from lessons.exercises.grade import grade as grade_file
@@ -97,7 +97,8 @@ def _code(found: Grade) -> int:
 
 
 def _is_own(first: Path, second: str) -> bool:
-    """Whether the first of two arguments is the file of an exercise and the second the solutions."""
+    """Whether the first of two arguments is the file of an exercise and the second argument is the
+    solutions."""
     from lessons.exercises import EXERCISES
     from lessons.own.files import is_file
 
@@ -112,7 +113,8 @@ def _formatted(
     visibility: Literal["visible", "hidden", "after_due_date", "after_published"],
     json: str | None,
 ) -> int:
-    """The grade of one file as another system reads it. Whatever was handed in, there is a grade."""
+    """Returns the grade of one file in the format of another system. Every submission gets a grade, also an
+    invalid one."""
     from lessons.exercises.formats import formatted
     from lessons.exercises.grade import grade_only
 
@@ -150,7 +152,7 @@ def _show(found: Grade, exercise: str | None, hints: int) -> None:
 
 
 def _kept(protection: tuple[str, ...]) -> str:
-    """A sentence about what isolated a submission."""
+    """Returns a sentence about the isolation of a submission."""
     if not protection:
         return "files, network and processes were refused by Python alone, which hostile code can bypass"
     return f"files, network and processes were refused by {' and '.join(protection)}, and by Python"

@@ -8,7 +8,7 @@ from app.commands.output import print_table, write_json
 from robots import InputError
 
 TEXTS = (".txt", ".text", "")
-"""Endings of files that may contain the text which the page wrote."""
+"""Extensions of files that may contain a learner's progress as text."""
 
 
 def handed_in(file: Path, key: str | None, json: str | None) -> int:
@@ -20,9 +20,7 @@ def handed_in(file: Path, key: str | None, json: str | None) -> int:
     try:
         text = file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError):
-        raise InputError(
-            f"{file}: cannot be read as text; give the file with the text that the page wrote"
-        ) from None
+        raise InputError(f"{file}: cannot be read as text; give the file that the page exported") from None
     try:
         handed, proof = read_handed_in(text, None if key is None else read_key(key))
     except InputError as error:

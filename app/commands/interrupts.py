@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM end a command soon and without a traceback, whatever it is doing."""
+"""With this module, Ctrl-C and SIGTERM end a command soon and without a traceback, at any moment."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from types import FrameType
 
 PATIENCE = 4.5
-"""Time, s, that a command has to end by itself."""
-_AGAIN = 0.05  # s after which an interrupt that a library ignored is raised again
-_LATER = 0.02  # s after which it is raised if that happens while the swallowed one is still being reported
+"""Time, s, within which a command must end by itself."""
+_AGAIN = 0.05  # s; after that, an interrupt that a library ignored is raised again
+_LATER = 0.02  # s; the same if Python is still reporting the ignored exception at that time
 
 Interrupted = threading.Event
 """Set once a signal has arrived."""
@@ -25,11 +25,12 @@ Interrupted = threading.Event
 
 @contextmanager
 def interruptible() -> Iterator[Interrupted]:
-    """Within this context both signals raise KeyboardInterrupt in the main thread, so that results are kept
-    and no process is left behind. A library (e.g. a compiler) may take long or swallow the exception: it is
-    then raised again, and after PATIENCE the process ends at once, with its children.
+    """Within this context both signals raise KeyboardInterrupt in the main thread: results are stored and no
+    process is left running. If a library (e.g. a compiler) takes long or swallows the exception, the
+    exception is raised again. After PATIENCE the process and its children are ended at once.
 
-    Yields a flag that says whether a signal has arrived: an interrupted import may then fail in any way.
+    Yields a flag that is set when a signal has arrived. An interrupted import may then fail with any
+    exception.
     """
     interrupted = Interrupted()
     if threading.current_thread() is not threading.main_thread():
@@ -40,7 +41,7 @@ def interruptible() -> Iterator[Interrupted]:
         interrupted.set()
         if frame is None or frame.f_code is not unraisable.__code__:
             raise KeyboardInterrupt
-        signal.setitimer(signal.ITIMER_REAL, _LATER)  # Python would report an exception raised in its hook
+        signal.setitimer(signal.ITIMER_REAL, _LATER)  # Python would report an exception of its hook
 
     def unraisable(report: UnraisableHookArgs) -> None:
         if interrupted.is_set():
@@ -65,8 +66,8 @@ def interruptible() -> Iterator[Interrupted]:
 
 @contextmanager
 def _deadline() -> Iterator[None]:
-    """A thread that receives signals even while the main thread is inside a library, and ends the process if
-    that lasts too long."""
+    """A thread that receives signals even while the main thread runs code of a library. It ends the process
+    if that code runs too long."""
     heard, told = os.pipe()
     os.set_blocking(told, False)
     done = threading.Event()

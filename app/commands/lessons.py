@@ -22,12 +22,12 @@ def lessons(
 ) -> int:
     """List the lessons, or run them headless and judge every claim.
 
-    The check runs the script of each lesson. Every claim must hold, and must fail under the wrong setting
-    that it names; every challenge must fail with its first settings and be passed with its solutions. If one
-    of these does not hold, the exit code is 1, with one sentence per fault.
+    The check runs the script of each lesson. Every claim must hold, and must fail with the wrong setting that
+    it names. Every challenge must fail with its first settings and be passed with its solutions. If there are
+    faults, one sentence per fault is printed, and the exit code is 1.
 
     Args:
-        check: names of the lessons to check, or Python files of your own; none after --check: all of them.
+        check: names of the lessons to check, or Python files of your own; --check without names: all lessons.
         json: write JSON to this file, or to standard output for "-".
     """
     from lessons.authoring.lesson import lesson_named
@@ -45,7 +45,7 @@ def lessons(
         return 0 if sound else 1
     for lesson in chosen:
         rows = [_row(verdict) for verdict in verdicts if verdict.lesson == lesson.name]
-        columns = ("", "step and what it states", "measured", "must be", "where it must fail")
+        columns = ("", "step and its statement", "measured", "must be", "where it must fail")
         print_table(f"{lesson.card.title} ({lesson.name})", columns, rows)
     for verdict in verdicts:
         if verdict.fault:
@@ -91,7 +91,7 @@ def _number(value: float) -> str:
 
 
 def _as_data(chosen: Sequence[Lesson], verdicts: Sequence[Verdict]) -> dict[str, Any]:
-    """Data for JSON: the verdicts per lesson; numbers that are not finite become null."""
+    """Returns data for JSON: the verdicts per lesson. Numbers that are not finite become null."""
     return {
         "sound": not any(verdict.fault for verdict in verdicts),
         "lessons": [

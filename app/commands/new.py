@@ -12,14 +12,15 @@ def new(
     file: tyro.conf.Positional[str],
     start: Annotated[str | None, tyro.conf.arg(name="from", metavar="NAME")] = None,
 ) -> int:
-    """Write a short, commented Python file that already runs and that you can change.
+    """Write a short, commented Python file that runs and that you can change.
 
     Args:
         kind: the kind of file.
-        file: where to write it.
-        start: copy an existing one: an example controller (pd, osf, one_level_qp, himpc_one_page), the file
-            with which students begin an exercise (its name, see himpc-lab grade, or the path of your own
-            exercise), a scene, a lesson, or a kind of task (com, plane_distance, …).
+        file: path of the new file.
+        start: copy an existing file instead of the template: an example controller (pd, osf, one_level_qp,
+            himpc_one_page), a scene, a lesson, a kind of task (com, plane_distance, …), or the file with
+            which students begin an exercise (give its name, see himpc-lab grade, or the path of your own
+            exercise).
     """
     from lessons.authoring.new import write_new
     from lessons.exercises import EXERCISES

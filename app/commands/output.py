@@ -11,7 +11,8 @@ from robots import InputError
 
 
 def write_json(data: Any, target: str) -> None:
-    """Writes JSON to a file, or to standard output for "-". Raises InputError if that fails."""
+    """Writes JSON to a file, or to standard output for "-". Raises InputError if the file cannot be
+    written."""
     text = json.dumps(data, indent=2, allow_nan=False, default=float)
     if target == "-":
         print(text)
@@ -25,7 +26,7 @@ def write_json(data: Any, target: str) -> None:
 
 
 def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Prints a table. Square brackets are printed as text, since names may come from a stranger's file."""
+    """Prints a table. Square brackets are printed as text, since names may come from other people's files."""
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text

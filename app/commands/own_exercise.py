@@ -1,4 +1,4 @@
-"""An exercise in the terminal, and the test of a teacher's own."""
+"""Shows an exercise in the terminal, and tests the exercise of a teacher's own file."""
 
 from __future__ import annotations
 

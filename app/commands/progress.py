@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def progress_bar(title: str, shown: bool = True) -> Iterator[Callable[[float], None]]:
-    """Yields a function that sets the completed share. The bar is on stderr, and only if that is a
+    """Yields a function that sets the completed share. The bar is printed on stderr, if stderr is a
     terminal."""
     if not shown or not sys.stderr.isatty():
         yield lambda share: None

@@ -25,7 +25,7 @@ def reproduce(
     store: bool = False,
     json: str | None = None,
 ) -> int:
-    """Reproduce tables and figures of the papers: every printed value beside ours.
+    """Reproduce tables and figures of the papers, and compare every printed value with ours.
 
     Writes report.md, disagreements.md, results.json and PNG plots. Every number of a paper gets a verdict:
     agrees, differs or opposite. Exit code 1 if a check does not hold, or a number differs from its stored
@@ -34,8 +34,8 @@ def reproduce(
     Args:
         items: names of tables and figures, e.g. himpc-table-2 himpc-fig-12; all of them by default.
         out: folder to write to.
-        quick: shorter and fewer runs.
-        stored: run nothing: judge the stored numbers and write disagreements.md only.
+        quick: do fewer and shorter runs.
+        stored: run nothing; only judge the stored numbers and write disagreements.md.
         store: store the measured numbers; later runs are compared with them.
         json: write the results also as JSON to this file, or to standard output for "-".
     """

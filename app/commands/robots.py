@@ -6,7 +6,7 @@ from app.commands.output import print_table, write_json
 
 
 def robots(check: str | None = None, json: str | None = None) -> int:
-    """List the robots of the catalog, or check a URDF file and report every repair, default value and
+    """List the robots of the catalog, or check a URDF file. The check reports every repair, default value and
     refusal.
 
     Args:

@@ -43,8 +43,8 @@ def run(
             --set stack=… this option is not needed.
         duration: simulated seconds; the scene's own by default.
         seed: seed of the run; 0, or the state's, by default.
-        state: a state code, as the page shows it: its scene, robot, settings and seed.
-        settings: list the settings that --set can change in this scene, and run nothing.
+        state: a state code, as the page shows it; the run gets its scene, robot, settings and seed.
+        settings: list the settings that --set can change in this scene; run nothing.
         set: change a setting, e.g. --set horizon=10 --set plant.payload_kg=2 --set levels.2.enabled=false.
         json: write the result as JSON to this file, or to standard output for "-".
         npz: write one row per control tick to this file.
@@ -54,7 +54,7 @@ def run(
     from lessons.recording.summary import summary
 
     spec = _given(scene, urdf, tip, state)
-    if controller is not None:  # replaces the seed of the state code
+    if controller is not None:  # if given, it replaces the seed of the state code
         told = (each for each in spec.set if not each.startswith("controller="))
         spec = replace(spec, controller=controller, set=tuple(told))
     seed = spec.seed if seed is None else seed
@@ -84,7 +84,7 @@ def run(
 
 
 def _given(scene: str | None, urdf: str | None, tip: str | None, code: str | None) -> RunSpec:
-    """The run to execute: the named scene, or the run of a state code."""
+    """Returns the run to execute: the named scene, or the run of a state code."""
     from lessons.replay.state import decode
     from lessons.scenes.run_spec import RunSpec
 
@@ -153,7 +153,7 @@ def _show(result: dict[str, Any]) -> None:
 
 
 def _ranks(result: dict[str, Any]) -> dict[str, str]:
-    """The rank of each level; empty if every level gets all directions of its tasks."""
+    """Returns the rank of each level; empty if every level gets all directions of its tasks."""
     levels = result.get("levels", ())
     if all(level["rank"] == level["rows"] for level in levels):
         return {}
@@ -169,10 +169,10 @@ def _leak(result: dict[str, Any]) -> str:
 
 
 def _mission(result: dict[str, Any]) -> dict[str, str]:
-    """The figures that only velocity-level scenes have."""
+    """Returns the figures that only velocity-level scenes have."""
     found = {
-        part["name"]: f"base error {_figure(part['normalised_base_error'])} of that at its start on average, "
-        f"{_figure(part['final_base_error'])} at its end; hand {_figure(part['ee_error_mm']['mean'])} mm "
+        part["name"]: f"base error {_figure(part['normalised_base_error'])} of the initial error on average, "
+        f"{_figure(part['final_base_error'])} at the end; hand {_figure(part['ee_error_mm']['mean'])} mm "
         f"on average, {_figure(part['ee_error_mm']['max'])} mm at most"
         for part in result.get("parts", ())
     }

@@ -44,44 +44,45 @@ def serve(
     """Open the page: a robot under HIMPC whose target you can drag.
 
     Args:
-        lesson: lesson to start with; himpc-lab lessons lists them. Or a Python file of your own.
-        scene: scene to start with; iiwa14-hold by default, hold with --urdf. Or a Python file of your own.
-        controller: controller to start with, or a Python file of your own, which runs anew whenever it is
-            saved.
-        task: Python file with a task of your own that can be added to the stack.
+        lesson: lesson to start with, see himpc-lab lessons, or a Python file of your own.
+        scene: scene to start with, or a Python file of your own; iiwa14-hold by default, hold with --urdf.
+        controller: controller to start with, or a Python file of your own; its code is used again whenever
+            you save it.
+        task: Python file with a task of your own, which can then be added to the stack.
         urdf: URDF file of your own robot.
-        tip: its end-effector frame.
-        state: a state code, as the page shows it: its scene, robot, settings, seed, lesson and step.
+        tip: end-effector frame of that robot.
+        state: a state code, as the page shows it; the page gets its scene, robot, settings, seed, lesson and
+            step.
         max_sessions: number of people who may use the page at once, each with a robot of their own.
         classroom: one robot for all pages; only a page with the printed token can control it.
-        class_: a teacher's page, from which a class is led through a lesson, and a page for phones that vote;
-            docs/instructors.md describes a lecture. With --classroom, all watch the teacher's robot.
-        class_of: address of another server with --class, e.g. http://lab-1.example.org:8080: the learners of
-            this server take part in its class. Both need the same --class-key.
-        class_key: file with a key by which the servers of one class know each other; the environment
-            variable HIMPC_LAB_CLASS_KEY does the same.
-        no_names: nobody in a class is asked for a name.
-        host: address to listen on; only this machine can reach the default. The page asks for the token of
-            the address that is printed.
+        class_: open a page from which a teacher leads a class through a lesson, and a page on which phones
+            vote; docs/instructors.md describes a lecture. With --classroom, all watch the teacher's robot.
+        class_of: address of another server with --class, e.g. http://lab-1.example.org:8080. The learners of
+            this server take part in that server's class. Both servers need the same --class-key.
+        class_key: file with the key that the servers of one class have in common; the environment variable
+            HIMPC_LAB_CLASS_KEY may contain the key instead.
+        no_names: do not ask people in a class for their names.
+        host: address to listen on; only this machine can reach the default. The page asks for a token; it is
+            part of the printed address.
         port: port to listen on.
         no_browser: do not open a browser.
         trusted_origin: address at which a reverse proxy serves the page, e.g. https://lab.example.org;
-            docs/serving.md describes a proxy with TLS.
-        embed_in: origin of a page that may show this one in a frame, e.g. https://course.example.org; no
-            other page may.
-        no_token: let everybody use the page who can reach it; this includes every user of this machine.
+            docs/serving.md describes such a proxy with TLS.
+        embed_in: origin of a page that may show the lab's page in a frame, e.g. https://course.example.org;
+            no other page may do so.
+        no_token: let everybody who can reach the page use it, including every user of this machine.
         token_file: file with a token of your own, for several servers behind one address; the environment
-            variable HIMPC_LAB_TOKEN does the same.
-        one_of_several: while all places are used, answer 503, so that the proxy in front tries the next
-            server; docs/serving.md describes one.
-        drain: time in s that open pages have after SIGTERM; newcomers are sent away meanwhile. Ctrl-C and a
-            second SIGTERM end the server at once.
-        proxy_only: let in only a proxy that sends the token in the header X-Himpc-Lab-Token, whatever it
-            calls this server; Jupyter's launcher starts himpc-lab so.
-        own_files: folder of the Python and URDF files that you can open from the page, by default the folder
-            in which himpc-lab is started. Only the page of the first printed address can open them.
-        no_own_files: no page can open files of this machine.
-        key: file with a key of yours, 16 characters or more, which signs the progress that learners hand in.
+            variable HIMPC_LAB_TOKEN may contain the token instead.
+        one_of_several: answer 503 while all places are used, so that the reverse proxy tries the next server;
+            docs/serving.md describes such a proxy.
+        drain: time in s for which open pages continue after SIGTERM; new visitors are refused meanwhile.
+            Ctrl-C and a second SIGTERM end the server at once.
+        proxy_only: admit only a proxy that sends the token in the header X-Himpc-Lab-Token; it may use any
+            name for this server. Jupyter's launcher uses this option.
+        own_files: folder of the Python and URDF files that you can open from the page; by default the folder
+            in which himpc-lab is started. Only the page at the first printed address can open them.
+        no_own_files: let no page open files of this machine.
+        key: file with a key of 16 characters or more, which signs the progress that learners hand in.
     """
     from app.link.choice import SceneChoice
     from app.server.passes import CLASS_VARIABLE, given_token
@@ -101,7 +102,7 @@ def serve(
         )
     if class_of is not None and of_class is None:
         raise InputError(
-            "--class-of ADDRESS needs the key of the class: add --class-key FILE, with the same key as there"
+            "--class-of ADDRESS needs the key of the class: add --class-key FILE, with the key of that server"
         )
     if class_key is not None and class_of is None and not class_:
         raise InputError("--class-key is for a class: add --class or --class-of ADDRESS, or leave it out")

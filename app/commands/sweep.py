@@ -28,8 +28,8 @@ def sweep(
 ) -> int:
     """Run a grid of settings of a scene on all cores and draw it as a map.
 
-    Ctrl-C stops the sweep, and the same command continues it. Runs that fail or lose control are marked
-    in the map.
+    Ctrl-C stops the sweep; the same command continues it later. Runs that fail or lose control are marked in
+    the map.
 
     Args:
         scene: name of a scene (see himpc-lab scenes), or a Python file of your own.
@@ -43,7 +43,7 @@ def sweep(
         set: change a setting in all runs, e.g. --set plant.payload_kg=2.
         duration: simulated seconds per run; the scene's own by default.
         seed: seed of the runs.
-        metric: quantity that the map shows; by default the RMSE of level 1 after the first second.
+        metric: quantity that the map shows; the RMSE of level 1 after the first second by default.
         scheduler: address of a Dask scheduler, e.g. tcp://10.0.0.1:8786, instead of this machine's cores.
     """
     from lessons.cluster import on_cluster
@@ -90,7 +90,7 @@ def _conclude(definition: Sweep, cells: list[Cell], metric: str, out: Path) -> N
     if best is not None:
         point = zip(definition.axes, definition.points[best.index], strict=True)
         at = ", ".join(f"{axis.path} = {value:g}" for axis, value in point)
-        print(f"least {metric}: {best.value(metric):.3g} at {at}")
+        print(f"smallest {metric}: {best.value(metric):.3g} at {at}")
     first = next((cell.error for cell in cells if cell.error), None)
     if first:
         print(f"first failure: {first}")

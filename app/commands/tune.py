@@ -21,15 +21,17 @@ def tune(
     set: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="PATH=VALUE")] = (),
     json: str | None = None,
 ) -> int:
-    """Find M̄ as Remark 4 of the HIMPC paper says: begin small, increase until tracking is satisfactory or the
-    torque becomes noisy. Every step is printed. Exit code 1 if no step kept control.
+    """Find M̄ as Remark 4 of the HIMPC paper says: begin small, and increase M̄ until tracking is
+    satisfactory or the torque becomes noisy. Every step is printed. Exit code 1 if no step kept control.
 
     Args:
         scene: name of a scene; its M̄ gives the proportions between the joints.
-        start: first factor on the scene's M̄.
+        start: first factor by which the scene's M̄ is multiplied.
         factor: factor from one step to the next.
-        accuracy: a level-1 error (RMS of the second half of the run) below this is satisfactory, m or rad.
-        noise: a torque whose step from tick to tick is above this share of its limit (RMS) is noisy.
+        accuracy: level-1 error (RMS over the second half of the run) below which tracking is satisfactory, m
+            or rad.
+        noise: step of the torque from tick to tick (RMS), as a share of its limit, above which the torque is
+            noisy.
         duration: simulated seconds per step; the scene's own by default.
         seed: seed of the runs.
         set: change a setting in all runs, e.g. --set plant.encoder_resolution_deg=0.001.
@@ -57,7 +59,7 @@ def tune(
     if json is not None:
         write_json({"steps": [asdict(step) for step in steps], "chosen": found and asdict(found)}, json)
     elif found is None:
-        print("no step kept control: take a smaller --start, or look at the scene with himpc-lab run")
+        print("no step kept control: give a smaller --start, or check the scene with himpc-lab run")
     else:
         listed = ",".join(f"{value:g}" for value in found.M_bar)
         print(f"M̄ = diag({listed.replace(',', ', ')}) kg·m²: --set M_bar=[{listed}]")

@@ -1,4 +1,5 @@
-"""Where Jupyter's page is, and from which address it can show a server of this kernel in a frame."""
+"""Finds the address of Jupyter's page, and the address at which this page can show a server of this kernel in
+a frame."""
 
 from __future__ import annotations
 
@@ -20,8 +21,9 @@ class Surroundings:
     """The Jupyter server of this kernel.
 
     Attributes:
-        address: what its user opens, e.g. http://localhost:8888/user/zoe/; only the path if it is not known.
-        proxied: whether it passes on requests for other ports, with jupyter-server-proxy.
+        address: the address that the user opens, e.g. http://localhost:8888/user/zoe/; only the path if the
+            host is not known.
+        proxied: whether the server passes on requests for other ports, with jupyter-server-proxy.
     """
 
     address: str
@@ -29,13 +31,13 @@ class Surroundings:
 
     @property
     def origin(self) -> str | None:
-        """Its origin as browsers write it; None if only the path is known."""
+        """The origin of the address as browsers write it; None if only the path is known."""
         parts = urlsplit(self.address)
         return as_origin(f"{parts.scheme}://{parts.netloc}") if parts.netloc else None
 
     def source(self, port: int, query: str) -> str:
-        """The address of a frame with the server at a port of this machine. Through Jupyter it needs no name
-        of a host: it works whatever the user calls the machine."""
+        """Returns the address of a frame that shows the server at a port of this machine. Through Jupyter,
+        the address contains no host name: it works under any name of the machine."""
         parts = urlsplit(self.address)
         if self.proxied:
             return f"{parts.path.rstrip('/')}/proxy/{port}/?{query}"
@@ -43,14 +45,15 @@ class Surroundings:
 
     @property
     def embedders(self) -> tuple[str, ...]:
-        """The pages that may show the frame: through Jupyter, those of the same origin."""
+        """Returns the origins of the pages that may show the frame: through Jupyter, the frame's own
+        origin."""
         if self.proxied:
             return (SELF,)
         return () if self.origin is None else (self.origin,)
 
 
 def surroundings(environment: Mapping[str, str]) -> Surroundings | None:
-    """The Jupyter server that started this process; None if there is none."""
+    """Returns the Jupyter server that started this process; None if there is none."""
     proxied = find_spec(_PROXY) is not None
     prefix = environment.get("JUPYTERHUB_SERVICE_PREFIX")
     if prefix is not None:

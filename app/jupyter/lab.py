@@ -1,4 +1,4 @@
-"""A robot in a notebook: the page in the cell, and the same robot in Python."""
+"""A robot in a notebook: its page is shown in the cell, and Python code controls the same robot."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ from robots import InputError
 from robots.errors import unknown_name
 
 _PATIENCE = 120.0
-"""Time, s, within which the simulation must answer: the first start of an installation compiles."""
+"""Time, s, within which the simulation must answer. It is long, since the first start of an installation
+compiles."""
 _PERIOD = 0.2  # s between two readings of the telemetry
 
 
@@ -41,11 +42,12 @@ def show(
     """Starts a robot and shows its page in the cell.
 
     Args:
-        scene: name of a scene, as `himpc-lab scenes` lists them; lesson: instead, the name of a lesson.
+        scene: name of a scene, see `himpc-lab scenes`; lesson: name of a lesson, instead of a scene.
         set: settings as assignments, e.g. "horizon=10".
-        height: of the frame in the cell, pixels.
-        embed_in: the origin of the notebook's page, e.g. https://hub.example.org, if it cannot be found out:
-            behind a hub that does not tell its public address, or for a Jupyter opened under another name.
+        height: height of the frame in the cell, pixels.
+        embed_in: the origin of the notebook's page, e.g. https://hub.example.org, if it cannot be detected.
+            This is so behind a hub whose public address is unknown here, or if Jupyter is opened under
+            another name.
 
     Raises:
         InputError: there is no such scene, lesson or setting, or the origin is not valid.
@@ -62,7 +64,7 @@ def show(
 
 @final
 class Lab:
-    """A robot with its server, which runs in this process until `stop`, or until the program ends."""
+    """A robot with its server. The server runs in this process until `stop` is called or the program ends."""
 
     def __init__(self, choice: SceneChoice, embed_in: Sequence[str] = ()) -> None:
         """embed_in: origins of the pages that may show the robot's page in a frame."""
@@ -83,7 +85,7 @@ class Lab:
 
     @property
     def address(self) -> tuple[int, str]:
-        """Port and query of `url`."""
+        """The port and the query of `url`."""
         parts = urlsplit(self.url)
         return parts.port or 0, parts.query
 
@@ -98,15 +100,16 @@ class Lab:
         return tuple(task.name for task in self._ready().tasks if task.raw is not None)
 
     def set(self, path: str, value: Any) -> None:
-        """Changes a setting while the robot moves, and returns when it is in force. path: as in `himpc-lab
-        run SCENE --set PATH=VALUE`. Raises InputError if there is no such setting or value."""
+        """Changes a setting while the robot moves, and returns when the setting is in force. path: as in
+        `himpc-lab run SCENE --set PATH=VALUE`. Raises InputError if there is no such setting or value."""
         self.settings.changed(path, value)
         self._learner.send(Post(Set(path, value)))
         self._until(lambda: _has(self.settings, path, value), f"'{path}' is not in force")
 
     def move(self, task: str, to: Sequence[float]) -> None:
-        """Moves a task's target, and returns when the controller has it. to: position in m, quaternion (x y z
-        w) or joints in rad. Raises InputError for an unknown task and for wrong numbers."""
+        """Moves a task's target, and returns when the controller has received it. to: position in m,
+        quaternion (x y z w) or joints in rad. Raises InputError for an unknown task and for invalid
+        numbers."""
         ready = self._ready()
         target = next((each.raw for each in ready.tasks if each.name == task and each.raw is not None), None)
         if target is None:
@@ -115,13 +118,13 @@ class Lab:
         if len(value) != target.size or not np.isfinite(value).all():
             raise InputError(f"the target of '{task}' has {target.size} finite numbers, and {to} were given")
         self._learner.send(Post(MoveTarget(task, value)))
-        asked = self._learner.ask(_PATIENCE)  # it answers in order, so the target is in the mailbox then
+        asked = self._learner.ask(_PATIENCE)  # answers come in order: the target is then in the mailbox
         ticks = self._ticks()
         self._until(lambda: asked is not None and self._ticks() != ticks, "the target did not arrive")
 
     def rows(self) -> dict[str, Any]:
-        """The run since the last reset as arrays with the names of `himpc-lab run --npz`, 100 rows per
-        simulated second: `t` (k,) in s, `q` and `tau` (k, n) in rad and N·m, `error/TASK` (k, m), and so
+        """Returns the run since the last reset as arrays with the names of `himpc-lab run --npz`, 100 rows
+        per simulated second: `t` (k,) in s, `q` and `tau` (k, n) in rad and N·m, `error/TASK` (k, m), and so
         on."""
         ready = self._ready()
         self._learner.look()
@@ -134,7 +137,7 @@ class Lab:
         return named(ready.robot, self.settings, record.layout, rows, how)
 
     def stop(self) -> None:
-        """Ends the robot and its page; a second call does nothing."""
+        """Ends the robot and its page. A second call does nothing."""
         self._end()
 
     def __enter__(self) -> Self:
@@ -153,7 +156,8 @@ class Lab:
         return self._learner.ready
 
     def _until(self, condition: Any, otherwise: str) -> None:
-        """Waits for a condition. Raises InputError if the simulation has ended or does not reach it."""
+        """Waits until a condition is true. Raises InputError if the simulation has ended or takes too
+        long."""
         if not self._end.alive:
             raise InputError("the lab was stopped: call show again")
 
@@ -181,7 +185,7 @@ def _end(server: PageServer, ended: threading.Event, reader: threading.Thread) -
 
 
 def _display(source: str, height: int) -> None:
-    """Shows the page in the cell, or a link to it if the height is 0; does nothing where there is no
+    """Shows the page in the cell, or a link to the page if the height is 0. Does nothing outside a
     notebook."""
     with contextlib.suppress(ImportError):
         from IPython.core.getipython import get_ipython

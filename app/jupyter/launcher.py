@@ -13,19 +13,20 @@ from app.server.passes import HEADER, USER_HEADER, VARIABLE, new_token
 
 OPTIONS = "HIMPC_LAB_OPTIONS"
 """The environment variable with further options of the command."""
-_PATIENCE = 60.0  # s until the server must answer: a busy host may take long to import everything
+_PATIENCE = 60.0  # s within which the server must answer; a busy host may take long for the imports
 
 
 def launcher() -> dict[str, Any]:
-    """What jupyter-server-proxy needs to know: command, environment, request headers and icon.
+    """Returns the data that jupyter-server-proxy needs: command, environment, request headers and icon.
 
-    The token is new, and only this Jupyter server and the process that it starts have it: other users of the
-    machine can connect to the port, but are not let in. The user's name is the hub's; jupyter-server-proxy
-    replaces headers of that name which a browser sends.
+    The token is new. Only this Jupyter server and the process that it starts know it: other users of the
+    machine can connect to the port, but are refused. The user's name comes from the hub. If a browser sends a
+    header for this name, jupyter-server-proxy replaces it.
     """
     token = new_token()
     more = [_literal(option) for option in shlex.split(os.environ.get(OPTIONS, ""))]
-    # localhost: jupyter-server-proxy may ask for both of its addresses, so nobody else may listen at either.
+    # localhost has two addresses, and jupyter-server-proxy may use both: no other program may listen at
+    # either.
     serving = ["--no-browser", "--host", "localhost", "--port", "{port}", "--proxy-only", "--no-own-files"]
     return {
         "command": [sys.executable, "-P", "-m", "app", *serving, *more],
@@ -44,5 +45,5 @@ def launcher() -> dict[str, Any]:
 
 
 def _literal(option: str) -> str:
-    """An option in which jupyter-server-proxy replaces nothing."""
+    """Escapes an option: jupyter-server-proxy then replaces nothing in it."""
     return option.replace("{", "{{").replace("}", "}}")

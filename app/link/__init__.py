@@ -1,1 +1,1 @@
-"""The boundary between page and simulation: messages, the chosen scene, shared memory and processes."""
+"""The interface between page and simulation: messages, the chosen scene, shared memory and processes."""

@@ -1,5 +1,5 @@
-"""A child process as the page sees it: forked by the fork server, spawned where forking is not available, or
-a fork of this process."""
+"""A child process as the page sees it: forked by the fork server, spawned if forking is not available, or
+forked from this process."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Forked:
     """
 
     def __init__(self, status: socket.socket, doing: Callable[[], str]) -> None:
-        """doing: what the fork server is doing before the process can start, as a sentence."""
+        """doing: returns a sentence about the fork server's work before the process can start."""
         self._status, self._doing = status, doing
         self._ended = False
         self._alone: int | None = None
@@ -42,7 +42,7 @@ class Forked:
         return self._doing()
 
     def fileno(self) -> int:
-        """A descriptor that is readable when `look` has news; it may change after each `look`."""
+        """A descriptor that is readable when there is news for `look`. It may change after each `look`."""
         return self._status.fileno() if self._alone is None else self._alone
 
     def look(self) -> bool:
@@ -84,7 +84,7 @@ class Spawned:
     doing = ""
 
     def __init__(self, process: BaseProcess) -> None:
-        """process: to be started."""
+        """process: the process, which is then started."""
         self._process = process
         process.start()
         self.pid = process.pid
@@ -99,11 +99,11 @@ class Spawned:
         return True
 
     def kill(self) -> None:
-        with contextlib.suppress(ValueError):  # the process has ended and the handle is closed
+        with contextlib.suppress(ValueError):  # raised if the process has ended and the handle is closed
             self._process.kill()
 
     def close(self) -> None:
-        with contextlib.suppress(ValueError):  # the process was killed but has not ended yet
+        with contextlib.suppress(ValueError):  # raised if the process was killed but has not ended yet
             self._process.close()
 
 
@@ -111,18 +111,18 @@ Child = Forked | Spawned
 
 
 def spawned(worker: str, theirs: socket.socket) -> Spawned:
-    """Returns a new interpreter, which takes a second or two to import everything. worker: module name, as
-    for `ForkServer`."""
+    """Returns a new interpreter, which needs a second or two for the imports. worker: module name, as for
+    `ForkServer`."""
     return Spawned(mp.get_context("spawn").Process(target=_run, args=(worker, theirs), daemon=True))
 
 
 def forked_here(work: Callable[[Wire], object], theirs: socket.socket) -> Spawned:
     """Returns a fork of this process, which shares all loaded data. Call this before threads start. Unlike
-    other children it does not end with this process.
+    other children, the fork does not end with this process.
 
     Args:
-        work: what the child does with its end of the socket.
-        theirs: that end.
+        work: the function that the child runs with its end of the socket.
+        theirs: the child's end of the socket.
     """
     fork = mp.get_context("fork")
     return Spawned(fork.Process(target=lambda: work(Wire(theirs)), daemon=False))

@@ -1,4 +1,4 @@
-"""The choice of a page: a run, and its place in a lesson."""
+"""The choice of a page: a run, and its step in a lesson."""
 
 from __future__ import annotations
 
@@ -25,14 +25,15 @@ class SceneChoice:
     """A run, with the data that only a page needs.
 
     Attributes:
-        run: scene, robot, settings and seed. For a lesson these are the step's, with the step's script; the
-            scene is empty until the lesson's file has been read. The controller is given as an assignment in
-            `set`, not in `controller`; only the paths in `files` are opened.
+        run: scene, robot, settings and seed. For a lesson these are the values of the step, with the step's
+            script; the scene is empty until the lesson's file has been read. The controller is an assignment
+            in `set`, not in `controller`. Only the paths in `files` are opened.
         urdf_text: the text of an uploaded URDF, which replaces the robot of the run.
         exercise: the step of a lesson, if the choice is one.
-        mine: the learner's changes to that step, as assignments; applied once when it is loaded.
-        scenes: Python files that may be the scene. Only these and the run's `files` and `tasks` are ever
-            run: the person who started the program named them.
+        mine: the learner's changes to that step, as assignments; they are applied once when the step is
+            loaded.
+        scenes: Python files that may be the scene. Of all Python files, only these and the run's `files` and
+            `tasks` are executed: the person who started the program named them.
         within: the folder that must contain the URDF and its meshes, if the URDF was named on the page.
     """
 
@@ -52,7 +53,7 @@ class SceneChoice:
         controller: str | None = None,
         tasks: tuple[str, ...] = (),
     ) -> SceneChoice:
-        """The choice that the command line makes: scene and controller by name or file path, and files of
+        """Returns the choice of a command line: scene and controller by name or file path, and files of
         tasks."""
         files = (controller,) if controller is not None and is_file(controller) else ()
         begun = cls.of_run(RunSpec(scene, urdf, tip, controller, files=files, tasks=tasks))
@@ -60,20 +61,20 @@ class SceneChoice:
 
     @classmethod
     def opening(cls, lesson: str) -> SceneChoice:
-        """The first step of a lesson whose file has not been read yet. Raises InputError for an unknown
-        lesson."""
+        """Returns the first step of a lesson whose file has not been read yet. Raises InputError for an
+        unknown lesson."""
         if lesson not in COURSE and not is_file(lesson):
             raise unknown_name("lesson", lesson, COURSE)
         return cls(RunSpec(""), exercise=LessonPlace(lesson))
 
     @classmethod
     def of_lesson(cls, exercise: LessonPlace) -> SceneChoice:
-        """A step of a lesson. Raises InputError for an unknown lesson."""
+        """Returns a step of a lesson. Raises InputError for an unknown lesson."""
         return cls(exercise.run, exercise=exercise)
 
     @classmethod
     def of_run(cls, run: RunSpec) -> SceneChoice:
-        """The start of a run; a page ignores the run's script and its end."""
+        """Returns the start of a run, without the run's script and duration, which a page ignores."""
         run = replace(run, events=None, duration=None)
         if run.controller is None:
             return cls(run)
@@ -84,7 +85,8 @@ class SceneChoice:
 
     @classmethod
     def of_state(cls, state: State) -> SceneChoice:
-        """The choice that a state code describes. Raises InputError if it cannot be loaded."""
+        """Returns the choice that a state code describes. Raises InputError if the choice cannot be
+        loaded."""
         run = state.run
         if state.lesson is None:
             return cls.of_run(run)
@@ -101,23 +103,23 @@ class SceneChoice:
         return replace(lesson, run=own, mine=mine)
 
     def at(self, exercise: LessonPlace) -> SceneChoice:
-        """Another step of the lesson, with the same seed."""
+        """Returns another step of the lesson, with the same seed."""
         step = SceneChoice.of_lesson(exercise)
         return replace(step, run=replace(step.run, seed=self.run.seed)).admitting(self)
 
     def admitting(self, start: SceneChoice) -> SceneChoice:
-        """The same choice, also with the files that the program was started with."""
+        """Returns the same choice, with the files of `start` added."""
         files = _both(start.run.files, self.run.files)
         run = replace(self.run, files=files, tasks=_both(start.run.tasks, self.run.tasks))
         return replace(self, scenes=_both(start.scenes, self.scenes), run=run)
 
     def with_file(self, path: str) -> SceneChoice:
-        """The choice after a user's file was opened by path. The effect depends on the content of the file: a
-        lesson or a scene replaces the present one, a controller drives the robot, a task can be added to its
-        stack.
+        """Returns the choice after a user's file was opened by path. The effect depends on the content of the
+        file: a lesson or a scene replaces the present one, a controller drives the robot, and a task can then
+        be added to the stack.
 
         Raises:
-            InputError: the file cannot be used, with its line.
+            InputError: the file cannot be used; the message names the line.
         """
         from lessons.own.judge import judged
         from lessons.settings.assignments import assignment
@@ -148,14 +150,14 @@ class SceneChoice:
 
     @property
     def asked(self) -> frozenset[str]:
-        """The files that the user named: for a step of a lesson only the lesson's file, which may name
-        others."""
+        """The files that the user named. For a step of a lesson, this is only the lesson's file, which may
+        name other files."""
         if self.exercise is None:
             return self.paths
         return frozenset(filter(is_file, (self.exercise.lesson,)))
 
     def without_places(self, sentence: str) -> str:
-        """The sentence with file names instead of full paths, so that it does not reveal folders of the
+        """Returns the sentence with file names instead of full paths: it then reveals no folders of the
         machine."""
         for path in sorted(self.paths, key=len, reverse=True):
             sentence = sentence.replace(path, Path(path).name)
@@ -163,8 +165,8 @@ class SceneChoice:
 
     @property
     def known(self) -> bool:
-        """Whether names alone show that the choice can be loaded: it has no file, frame or setting of the
-        user's own."""
+        """Whether the names in the choice are enough to know that it can be loaded: it contains no file,
+        frame or setting of the user's own."""
         scene, seed = self.run.scene, self.run.seed
         if self.run.files or self.run.tasks or (self.exercise is not None and is_file(self.exercise.lesson)):
             return False
@@ -173,21 +175,21 @@ class SceneChoice:
         return self == SceneChoice(RunSpec(scene, seed=seed)) and scene in ALL_SCENES and scene != "hold"
 
     def resolved(self) -> SceneChoice:
-        """The same choice, completed by the lesson's file if it is a step. Raises InputError if there is no
-        such step."""
+        """Returns the same choice; the data of a step of a lesson are completed from the lesson's file.
+        Raises InputError if there is no such step."""
         if self.run.scene or self.exercise is None:
             return self
         return self.at(self.exercise)
 
     def scene(self) -> Scene:
-        """The scene with the settings chosen. Raises InputError for what cannot be loaded."""
+        """Returns the scene with the chosen settings. Raises InputError if it cannot be loaded."""
         choice = self.resolved()
         return choice.run.prepared(choice._bare())
 
     def fitted(self) -> tuple[SceneChoice, Scene, tuple[str, ...]]:
-        """Returns the choice without the tasks of files that its robot cannot have, its scene, and one reason
-        per omitted task. A file that was opened for one robot then does not prevent the use of others. Raises
-        InputError for what cannot be loaded; also if the stack names an omitted task."""
+        """Returns the choice without those tasks of files that the robot cannot have, the scene, and one
+        reason per omitted task. A file that was opened for one robot thus does not prevent the use of other
+        robots. Raises InputError if the choice cannot be loaded, or if the stack names an omitted task."""
         from lessons.runs.named import misfits
 
         choice = self.resolved()
@@ -197,11 +199,11 @@ class SceneChoice:
         try:
             scene = kept.prepared(bare)
         except InputError:
-            scene = run.prepared(bare)  # raises the error that names the task's problem
+            scene = run.prepared(bare)  # raises the error about the task
         return replace(choice, run=kept), scene, tuple(out.values())
 
     def _bare(self) -> Scene:
-        """The scene without any settings applied."""
+        """Returns the scene before any settings are applied."""
         from lessons.runs.named import scene_named
         from lessons.scenes.catalog import load_scene
 

@@ -1,4 +1,4 @@
-"""The step of a lesson that is active, and the state of its run: frozen and picklable data."""
+"""The active step of a lesson, and the state of its run, as frozen and picklable data."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ Answer = int | float | tuple[tuple[float, float], ...]
 """A prediction: the index of an option, a value, or the points (t in s, value) of a sketch."""
 
 Phase = Literal["waiting", "preparing", "running", "done"]
-"""Before the run ("waiting"); while the ghost is computed ("preparing"); while the script runs; after the run
-("done"), when the robot can be moved freely."""
+"""Before the run ("waiting"); while the ghost is computed ("preparing"); while the script runs ("running");
+after the run, when the robot can be moved freely ("done")."""
 
 
 @dataclass(frozen=True)
 class LessonPlace:
-    """A step of a lesson, or, at the place after the last step, its challenge.
+    """A step of a lesson. The place after the last step is the lesson's challenge.
 
     Attributes:
-        lesson: its name, or the path of a file of one's own.
-        place: 0-based.
+        lesson: name of the lesson, or path of the user's own file.
+        place: number of the step, 0-based.
     """
 
     lesson: str
@@ -40,7 +40,8 @@ class LessonPlace:
 
     @classmethod
     def at(cls, lesson: str, step: int) -> LessonPlace:
-        """A step by its number, 1 being the first. Raises InputError if there is no such lesson or step."""
+        """Returns a step by its number; 1 is the first step. Raises InputError if there is no such lesson or
+        step."""
         count = len(parts_of(_lesson(lesson)))
         if not 1 <= step <= count:
             raise InputError(f"lesson '{lesson}' has no step {step}: choose one from 1 to {count}")
@@ -89,12 +90,12 @@ def _lesson(name: str) -> Lesson:
 
 
 def parts_of(lesson: Lesson) -> tuple[Step | Challenge, ...]:
-    """The steps of a lesson, and its challenge if it has one."""
+    """Returns the steps of a lesson, and its challenge if it has one."""
     return lesson.steps if lesson.challenge is None else (*lesson.steps, lesson.challenge)
 
 
 def signals_of(part: Step | Challenge) -> tuple[Signal, ...]:
-    """The signals to plot during the run."""
+    """Returns the signals to plot during the run."""
     from lessons.teaching.lesson import Step
 
     if isinstance(part, Step):
@@ -104,8 +105,8 @@ def signals_of(part: Step | Challenge) -> tuple[Signal, ...]:
 
 @dataclass(frozen=True, eq=False)
 class SignalCurve:
-    """A signal over the run so far: t (k,) s, values (k,) in its unit, decimated so that every peak is
-    kept."""
+    """A signal over the run so far: t (k,) s, values (k,) in the signal's unit. The curve is decimated, but
+    keeps every peak."""
 
     t: np.ndarray
     values: np.ndarray
@@ -118,16 +119,17 @@ class Lecture:
     Attributes:
         exercise: the exercise.
         phase: see `Phase`.
-        attempt: counts runs since the exercise was opened.
+        attempt: number of runs since the exercise was opened.
         t: time up to which the claims have been evaluated, s; duration: length of the run, s.
         answer: the learner's prediction.
-        changed: one sentence if the run is not the lesson's own: settings differ, or the learner
-            interfered.
-        values: measured, per claim or goal; NaN while there is nothing to measure.
-        holds: whether each claim or goal holds so far; None while there is nothing to measure.
+        changed: one sentence if the run differs from the lesson's own run (other settings, or the learner
+            interfered); otherwise "".
+        values: measured value per claim or goal; NaN before there is a measurement.
+        holds: whether each claim or goal holds so far; None before there is a measurement.
         truth: the measured value of the predicted quantity.
         grade: the grade of the prediction, after the run.
-        curves: one per signal of the step; ghosts: the same for the second robot, if it was computed.
+        curves: one curve per signal of the step; ghosts: the same for the second robot, if its run was
+            computed.
         sketched: the curve that a sketch predicts.
         result, points_for: the result of a challenge and the value that decides its points; both are
             known after the run.

@@ -1,8 +1,9 @@
-"""A process that has imported everything and forks simulations: each starts at once and shares its memory.
+"""A server process that has imported all modules and forks simulations. Each simulation starts at once and
+shares the server's memory.
 
-The page sends requests over a socket and never waits. The server and all its children are one process group,
-tied to a pipe that only the page can write to: if the page's process ends for any reason, the kernel ends
-them too.
+The page sends requests over a socket and never waits. The server and all its children are one process group.
+The group is tied to a pipe to which only the page can write: if the page's process ends for any reason, the
+kernel also ends the group.
 """
 
 from __future__ import annotations
@@ -29,10 +30,10 @@ from robots.processes.isolation import is_stopped, threads, waited
 from robots.processes.orphans import end_with
 
 PATIENCE = 3.0
-"""Time, s, after which a server that is ready but does not fork counts as stuck, and also any server that was
-stopped (SIGSTOP). Time that it waits for a core of a busy machine does not count."""
+"""Time, s, after which a server counts as stuck if it is ready but does not fork, or if it was stopped
+(SIGSTOP). Time in which it waits for a core of a busy machine does not count."""
 FIRST_PATIENCE = 120.0
-"""Time without a message, s, while the server imports and compiles; after that it counts as stuck."""
+"""Time without a message, s, after which a server that still imports and compiles counts as stuck."""
 _LOOK = 0.25  # s between two checks whether the server is stuck
 
 
@@ -47,7 +48,7 @@ class Fork:
 
 @dataclass(frozen=True)
 class Preparing:
-    """What the server is doing before it can fork; the page shows the sentence."""
+    """The server's work before it can fork. The page shows the sentence."""
 
     sentence: str
 
@@ -58,11 +59,11 @@ class ForkReady:
 
 
 class ForkServer:
-    """The page's handle of the fork server. Raises OSError where processes cannot be forked."""
+    """The page's handle of the fork server. Raises OSError on systems where processes cannot be forked."""
 
     def __init__(self, worker: str) -> None:
-        """worker: a module with `warm(say)`, which loads everything that a simulation needs and may report
-        its progress with `say`, and `main(wire)`, which a child runs."""
+        """worker: a module with two functions. `warm(say)` loads everything that a simulation needs and may
+        report its progress with `say`. `main(wire)` is run by each child."""
         if sys.platform != "linux":
             raise OSError("only Linux has libraries that still work after a fork")
         ours, theirs = socket.socketpair()
@@ -87,7 +88,7 @@ class ForkServer:
             os.close(life)
         self.ready = False
         self.stopped = False
-        """Whether the server was given up because it had been stopped (SIGSTOP)."""
+        """Whether the server was ended because it had been stopped (SIGSTOP)."""
         self.doing = ""
         self._heard_at = time.monotonic()
         self._ended = False
@@ -129,7 +130,7 @@ class ForkServer:
             if not self._asked:
                 return False
             now, starved = time.monotonic(), waited(self.pid)
-            # A server that was stopped while it was getting ready sends no message.
+            # A server that was stopped during its preparation sends no message.
             patience = PATIENCE if self.ready or is_stopped(self.pid) else FIRST_PATIENCE
             return any(
                 now - max(since, self._heard_at) - (starved - before) > patience
@@ -143,8 +144,8 @@ class ForkServer:
             self.give_up()
 
     def fork(self, theirs: socket.socket) -> Forked:
-        """Requests a child that gets this end of its socket. Raises OSError if the server has ended or does
-        not read."""
+        """Requests a child, which gets the end `theirs` of a socket. Raises OSError if the server has ended
+        or does not read."""
         status, other = socket.socketpair()
         child = Forked(status, lambda: self.doing)
         try:
@@ -159,7 +160,7 @@ class ForkServer:
         return child
 
     def give_up(self) -> None:
-        """Ends the server alone; its children continue."""
+        """Ends the server only; its children continue."""
         self._ended = True
         self._process.kill()
 
@@ -175,13 +176,13 @@ class ForkServer:
 
 
 def serve(control: int, life: int, worker: str) -> NoReturn:
-    """The server's process: imports everything, then forks on request until the page ends."""
+    """Runs in the server's process: imports all modules, then forks on request until the page ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the page handles Ctrl-C
     end_with(life, group=True)
     wire = Wire(socket.socket(fileno=control))
     module = import_module(worker)
     module.warm(lambda sentence: wire.send(Preparing(sentence)))
-    # Children share the memory that exists now until somebody writes to it, so the garbage collector must not
+    # Children share the present memory as long as no process writes to it: the garbage collector must not
     # touch it.
     gc.collect()
     gc.freeze()

@@ -1,4 +1,4 @@
-"""Data about the inside of a tick: what the page requests, and what the simulation answers."""
+"""Data about the inside of a tick: the page's request and the simulation's answer."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 class InsideRequest:
     """The internal data of a tick that the page shows; the answer comes with every `Status`.
 
-    plane: the two joints whose increments span the plane of the cut, None: no plane; through: name of the
-    level through whose solution the plane goes, "" for the applied solution; shift: offset of the other
-    joints' increments from that solution, N·m; matrix: name of the level whose QP is shown as a picture,
-    None: no picture; spectrum: whether to send the eigenvalues of I − M⁻¹M̄.
+    plane: the two joints whose increments span the plane of the cut, None: no plane; through: name of a
+    level: the plane contains the solution of this level, "" for the applied solution; shift: offset of the
+    other joints' increments from that solution, N·m; matrix: name of the level whose QP is shown as a
+    picture, None: no picture; spectrum: whether to send the eigenvalues of I − M⁻¹M̄.
     """
 
     plane: tuple[int, int] | None = None
@@ -33,7 +33,7 @@ class InsideRequest:
 class Inside:
     """The requested internal data of the last tick; see `InsideRequest`.
 
-    why_not: a sentence if there is no tick to show; spectrum: (n,).
+    why_not: a sentence if there is no tick to show; spectrum: the eigenvalues, (n,).
     """
 
     plane: Plane | None = None

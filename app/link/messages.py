@@ -55,7 +55,7 @@ class Speed:
 
 @dataclass(frozen=True)
 class ResetAll:
-    """Reset the scene to the state in which it was first loaded, settings included."""
+    """Reset the scene, settings included, to the state in which it was first loaded."""
 
 
 @dataclass(frozen=True)
@@ -67,8 +67,8 @@ class Load:
 
 @dataclass(frozen=True)
 class Lead:
-    """Whether a ghost (another process) follows this one. When it is switched on, the scene is reset so that
-    both begin together, and `Script` reports describe what happens from then on."""
+    """Whether a ghost (another process) follows this simulation. When a ghost is switched on, the scene is
+    reset and both begin together; `Script` reports describe all later events."""
 
     on: bool
 
@@ -83,7 +83,7 @@ class WaitAt:
 @dataclass(frozen=True, eq=False)
 class Begin:
     """The start of a ghost: the leader's scene, and its settings at its last reset. q_0: (n,) rad, the
-    configuration in which the ghost begins at rest; None: that of the scene."""
+    configuration in which the ghost begins at rest; None: the scene's configuration."""
 
     choice: SceneChoice
     settings: SceneSettings
@@ -106,7 +106,7 @@ class Tell:
 
 @dataclass(frozen=True)
 class PageLeft:
-    """The last page was closed. An arm is then stopped gently; a simulation continues."""
+    """The last page was closed. A drive of an arm is then stopped gently; a simulation continues."""
 
 
 @dataclass(frozen=True)
@@ -140,10 +140,10 @@ Command = (
 class TaskView:
     """The data of a task that the page needs to draw it.
 
-    kind: a key of himpc.tasks.KINDS; frame: name of a link (tasks on frames only); axes: the controlled
-    axes; raw: the raw value of a draggable target, None for other references; path: (k, 3) closed curve of
-    a position reference, m; speed_cap: speed limit of the filtered target, m/s or rad/s; root: the link to
-    which the frame of a relative task is relative; normal, offset: the plane of a distance task.
+    kind: a key of himpc.tasks.KINDS; frame: name of a link (tasks on frames only); axes: the controlled axes;
+    raw: the raw value of a target that can be dragged, None for other references; path: (k, 3) closed curve
+    of a position reference, m; speed_cap: speed limit of the filtered target, m/s or rad/s; root: the
+    reference link of a relative task; normal, offset: the plane of a distance task.
     """
 
     name: str
@@ -163,7 +163,7 @@ class TaskView:
 @dataclass(frozen=True)
 class ArmView:
     """The status of an arm. missed: number of periods so far in which the controller gave no torque; begun:
-    whether the controller has taken it over; ended: why it was stopped, "" before that; behind: delay of its
+    whether the controller has taken control; ended: the reason of the stop, "" before; behind: delay of the
     ghost, s."""
 
     missed: int
@@ -174,8 +174,8 @@ class ArmView:
 
 @dataclass(frozen=True)
 class ContactPoint:
-    """A point at which the robot touches an object or itself: names of an object, or of another link, and
-    of the link that feels the force; position, m, and force on it, N, in the world."""
+    """A point at which the robot touches an object or itself. between: name of the object or of the other
+    link, and of the link on which the force acts; position, m, and force, N, in the world frame."""
 
     between: tuple[str, str]
     position: tuple[float, float, float]
@@ -185,9 +185,9 @@ class ContactPoint:
 @dataclass(frozen=True, eq=False)
 class Ready:
     """A scene is loaded and its first tick can run. room: (k, 3) points, m, that the camera should show
-    besides the robot; again: the same run continues with another stack; left_out: a sentence for each of
-    the user's own tasks that is not offered; world: the objects around the robot; arm: whether it is a
-    measured arm."""
+    besides the robot; again: the same run continues with another stack; left_out: a sentence for each of the
+    user's own tasks that is not offered; world: the objects around the robot; arm: whether the robot is a
+    real arm."""
 
     choice: SceneChoice
     block: Handle  # of the shared memory
@@ -204,17 +204,17 @@ class Ready:
 
 @dataclass(frozen=True, eq=False)
 class Status:
-    """Data that need not be sent every tick; it comes about ten times a second.
+    """Data that need not be sent every tick; sent about ten times a second.
 
     real_time_factor: simulated over real seconds; capped: simulated time had to be slowed down;
     over_budget: ticks whose control step took longer than T_s; late: ticks that missed their deadline;
-    resets: how often the scene was reset (the page then puts its gizmo back); targets: raw targets by task;
-    path: (N + 1, 3) predicted tip, m; settings: only after a change; gauge: norm and spectral radius of
-    I − M⁻¹M̄ while paused, when no row of telemetry contains them; mission: for scenes that have one;
-    lecture: of a lesson, when it has changed; inside: while the page requests it; own: of a controller from
-    a file; ranks: per level the number of directions that it gets, and the number of its rows; contacts: the
-    points of contact after the last tick; objects: (k, 7), the poses of the free objects of the world;
-    nearest: the names of the nearest pair, "" if none is measured; arm: only for an arm.
+    resets: number of resets of the scene (the page then puts its gizmo back); targets: raw targets by task;
+    path: (N + 1, 3) predicted tip, m; settings: sent only after a change; gauge: norm and spectral radius of
+    I − M⁻¹M̄ while paused, when no row of telemetry contains them; mission: only if the scene has a mission;
+    lecture: state of a lesson, sent after a change; inside: sent while the page requests it; own: state of a
+    controller from a file; ranks: per level its number of available directions and its number of rows;
+    contacts: the points of contact after the last tick; objects: (k, 7), the poses of the free objects;
+    nearest: the names of the nearest pair, "" if no distance is measured; arm: only for an arm.
     """
 
     t: float
@@ -245,7 +245,7 @@ class Status:
 
 @dataclass(frozen=True)
 class Loading:
-    """The simulation has received the command to load a scene; its next report may take a while."""
+    """The simulation has received the command to load a scene; the next report may come late."""
 
 
 @dataclass(frozen=True)
@@ -267,8 +267,8 @@ class SimulationFailed:
 class Script:
     """Data that a leader sends to its ghost.
 
-    events: new events in the leader's log; t: the time that the leader has reached, s; begin: if given,
-    the ghost starts again from there before it applies the events.
+    events: new events in the leader's log; t: the time that the leader has reached, s; begin: if not None,
+    the ghost starts again from this state before it applies the events.
     """
 
     events: tuple[tuple[float, Event], ...]
@@ -285,10 +285,10 @@ class Reached:
 
 @dataclass(frozen=True, eq=False)
 class Told:
-    """A description of a run with which it can be repeated.
+    """A description with which a run can be repeated.
 
-    choice: the scene, as it was loaded; settings: in force now; log: (time, event) of every event that took
-    effect since it was loaded; t: s since the last reset.
+    choice: the scene as it was loaded; settings: the settings in force; log: (time, event) of every event
+    that took effect since loading; t: time since the last reset, s.
     """
 
     choice: SceneChoice

@@ -10,9 +10,9 @@ import numpy as np
 
 @dataclass(frozen=True)
 class MissionRow:
-    """A task of a mission. goal: m, or x y z w of an orientation; None for a given trajectory; hold: time
-    to stay at the goal, s, None: until released; there_s: time at the goal so far, s; done_at: time of its
-    completion, s."""
+    """A task of a mission. goal: position, m, or quaternion x y z w; None for a trajectory; hold: time to
+    stay at the goal, s, None: until released; there_s: time at the goal so far, s; done_at: time at which the
+    task was completed, s."""
 
     name: str
     role: str
@@ -26,8 +26,8 @@ class MissionRow:
 
 @dataclass(frozen=True)
 class Person:
-    """hand: point at which a ball is handed over, m; place: position on the floor, m; balls: number of
-    balls received."""
+    """A person who receives balls. hand: point at which a ball is handed over, m; place: position on the
+    floor, m; balls: number of balls received."""
 
     hand: tuple[float, float, float]
     place: tuple[float, float]

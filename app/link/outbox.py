@@ -1,4 +1,4 @@
-"""A queue of commands to a simulation. Adding a command never waits, and the queue is bounded."""
+"""A bounded queue of commands to a simulation. Adding a command never waits."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from app.link.wire import Parcel, Wire, packed
 MOST = 256
 """Largest number of commands in the queue."""
 MOST_BYTES = 24_000_000
-"""Largest number of bytes in the queue; a single command is always accepted."""
+"""Largest number of bytes in the queue. If the queue is empty, a command of any size is accepted."""
 
 
 class Outbox:
-    """A bounded queue, and the one thread that writes from it to the wire."""
+    """A bounded queue, and the only thread that writes from this queue to the wire."""
 
     def __init__(self, wire: Wire) -> None:
         self._wire = wire
@@ -45,8 +45,8 @@ class Outbox:
             self._news.notify()
 
     def join(self) -> None:
-        """Waits until the thread has stopped writing; to be called after `close`, when the wire has been
-        closed."""
+        """Waits until the thread has stopped writing. Call this after `close`, when the connection has been
+        ended."""
         self._writer.join()
 
     def _write(self) -> None:
@@ -60,4 +60,4 @@ class Outbox:
             try:
                 self._wire.post(parcel)
             except OSError:
-                return  # the receiver has closed its end, which the receiving thread notices
+                return  # the receiver has closed its end; the receiving thread handles this

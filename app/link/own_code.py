@@ -1,4 +1,4 @@
-"""The state of a controller from the learner's own file, as the simulation reports it to the page."""
+"""The state of a controller from the user's own file, as the simulation reports it to the page."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ class OwnCode:
     """The state of a controller from the user's own file.
 
     Attributes:
-        file: its path.
-        fault: one sentence if the file as it is now cannot run.
-        saves: number of times that a saved version took effect.
+        file: path of the file.
+        fault: one sentence if the present content of the file cannot run.
+        saves: number of saved versions that took effect.
         at: simulated time at which the last saved version took effect, s.
     """
 

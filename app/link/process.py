@@ -13,17 +13,19 @@ from app.link.messages import Command, Quit, Report, SimulationFailed
 from app.link.outbox import Outbox
 from app.link.wire import Wire
 
-_END = 1.0  # s that a process gets to end by itself
+_END = 1.0  # s within which a process must end by itself
 
 Start = Callable[[socket.socket], Child]
-"""Starts a child that gets this end of the socket."""
+"""A function that starts a child, to which it passes this end of a socket."""
 
 
 class Process:
-    """A child process. Reports arrive on a thread of this handle, which passes them to the `listen`er."""
+    """A child process. A thread of this handle receives the reports and passes them to the listener, see
+    `listen`."""
 
     def __init__(self, start: Start, *instead: Start) -> None:
-        """instead: other ways to start the child, tried in order if it ended before it had started."""
+        """instead: other ways to start the child. They are tried in order if the child's fork server ends
+        before the child has started."""
         ours, self._theirs = socket.socketpair()
         self._wire = Wire(ours)
         self._instead = list(instead)
@@ -35,7 +37,7 @@ class Process:
         self._closed = False
         self._ended = threading.Event()
         self.heard_at = time.monotonic()
-        """Time of its last report or of its start."""
+        """Time of the child's last report or of its start."""
         self._hearing = threading.Thread(target=self._hear, daemon=True)
         self._hearing.start()
 
@@ -62,8 +64,8 @@ class Process:
             self._listener = listener
 
     def send(self, command: Command) -> bool:
-        """Queues a command; returns whether it was accepted. False if too many commands wait already, or the
-        process has ended."""
+        """Queues a command; returns whether it was accepted. Returns False if too many commands wait, or if
+        the process has ended."""
         return not self._closed and self._outbox.put(command)
 
     def kill(self) -> None:
@@ -73,12 +75,12 @@ class Process:
         self._wire.hang_up()  # a child that starts later finds the socket closed
 
     def close(self, patience: float = _END) -> None:
-        """Ends the child: it may end by itself within `patience`, s; otherwise it is killed."""
+        """Ends the child. If it does not end by itself within `patience`, s, it is killed."""
         if self._child.pid is not None and patience and self.send(Quit()):
             self._closed = True
             self._ended.wait(patience)
         self.kill()
-        # The last reports of the child are still read: they may name shared memory that must be freed.
+        # The last reports of the child must still be read: they may name shared memory that must be freed.
         if self._hearing is not threading.current_thread():
             self._hearing.join(2 * _END)
 
@@ -97,7 +99,7 @@ class Process:
         self._child.close()
 
     def _follow(self) -> bool:
-        """Reads reports until the child has ended; returns whether the last one was a failure."""
+        """Reads reports until the child has ended; returns whether the last report was a failure."""
         failed, over = False, 0.0
         while True:
             there, news = self._wait(None if not over else over - time.monotonic())
@@ -118,7 +120,7 @@ class Process:
                 return failed
 
     def _wait(self, timeout: float | None) -> tuple[bool, bool]:
-        """(whether the wire can be read, whether the child has news)."""
+        """Waits; returns (whether the wire can be read, whether the child has news)."""
         watched = select.poll()
         if timeout is None:
             watched.register(self._wire, select.POLLIN)
@@ -129,7 +131,7 @@ class Process:
     def _look(self) -> bool:
         ended = self._child.look()
         if self._child.pid is not None:
-            self._theirs.close()  # once the child ends, its socket is now closed
+            self._theirs.close()  # from now on, the socket is closed when the child ends
         elif ended and self._instead and not self._closed:
             self._child.close()
             self._child = self._instead.pop(0)(self._theirs)

@@ -1,7 +1,7 @@
 """Shared memory between the simulation (one writer) and the page (readers): telemetry rows and poses.
 
-Data are not pickled, and no process waits: the writer fills a row, then increments the count; readers read
-only rows below the count that are recent enough not to be overwritten meanwhile.
+Data are not pickled, and no process waits. The writer fills a row, then increments the count. Readers read
+only rows below the count. They leave out the oldest rows, which may be overwritten meanwhile.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 
 MAX_ROWS = 8192
 MIN_ROWS = 1024
-"""Rows of one second of ticks: with fewer, a page that is briefly late would miss some."""
+"""Number of rows of about one second of ticks. With fewer rows, a page that is briefly late would miss
+some."""
 _MAX_BYTES = 12_000_000  # of each session
 _MARGIN = 256  # rows the writer may add while a reader copies
 _HEAD = 64  # bytes
@@ -35,8 +36,8 @@ class Block:
     however that process ends."""
 
     def __init__(self, width: int, bodies: int, handle: Handle | None = None) -> None:
-        """Creates the memory, as large as the machine allows, or attaches to the memory of `handle`, which is
-        then closed. Raises InputError if there is not enough memory even for MIN_ROWS."""
+        """Creates the memory, as large as the machine allows, or attaches to the memory of `handle` and
+        closes the handle. Raises InputError if the memory is too small for MIN_ROWS."""
         row, rest = 8 * width, _HEAD + 8 * 7 * bodies
         if handle is None:
             self._file = _allocated(row, rest)
@@ -57,7 +58,7 @@ class Block:
 
     @property
     def handle(self) -> Handle:
-        """The handle for the other process; only the process that created the memory has it."""
+        """The handle for the other process. Only the process that created the memory has this handle."""
         return Handle(self._file)
 
     @property
@@ -82,8 +83,8 @@ class Block:
         return self.moment()[1]
 
     def moment(self) -> tuple[float, np.ndarray]:
-        """(simulated time in s, poses) of one instant. After three failed attempts the result may mix two
-        instants, which is unlikely."""
+        """Returns (simulated time in s, poses) of one instant. In the unlikely case of three failed attempts,
+        the result may mix two instants."""
         t, copy = float(self._time[0]), self._poses.copy()
         for _ in range(3):
             before = int(self._head[1])
@@ -93,8 +94,8 @@ class Block:
         return t, copy
 
     def since(self, count: int) -> tuple[int, np.ndarray]:
-        """(index of the first row, copies of the rows) from row `count` on, as far as they have not been
-        overwritten."""
+        """Returns (index of the first row, copies of the rows) from row `count` on, without the rows that may
+        have been overwritten."""
         end = self.count
         first = max(count, end - self.rows + _MARGIN, 0)
         return first, self._ring[np.arange(first, end) % self.rows]
@@ -112,8 +113,8 @@ class Block:
 
 
 def _allocated(row: int, rest: int) -> int:
-    """Creates an unnamed file in memory, with as many rows as fit into memory, and allocates all of it now:
-    if memory ran out at a later write, the process would end."""
+    """Creates an unnamed file in memory, with as many rows as fit into memory. All its memory is allocated
+    now: if memory ran out at a later write, the process would end."""
     rows = max(MIN_ROWS, min(MAX_ROWS, _MAX_BYTES // row))
     file = _unnamed()
     while True:

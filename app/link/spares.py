@@ -1,4 +1,4 @@
-"""Sources of simulation processes: the fork server, and a spare process that is ready for the next
+"""Provides simulation processes: from the fork server, or a spare process that is ready for the next
 browser."""
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ class Spares:
         """
         Args:
             worker: the module that a child runs, see `ForkServer`.
-            lent: a fork server of that worker that is shared with others; its creator ends it.
+            lent: a fork server of this worker that is shared with other objects; its creator ends it.
         """
         self._worker = worker
         self._lent = lent
@@ -32,7 +32,7 @@ class Spares:
 
     @property
     def server(self) -> ForkServer | None:
-        """The fork server; None if there is none."""
+        """The present fork server; None if there is none."""
         return self._server
 
     def refill(self) -> None:
@@ -51,7 +51,7 @@ class Spares:
         return Process(self._start, self._start_again, self._spawn)
 
     def _start_again(self, theirs: socket.socket) -> Child:
-        """Starts another fork server and a child, for a child whose fork server ended before the child had
+        """Starts another fork server and a child. Used if a fork server ended before its child had
         started."""
         with self._lock:
             return self._start(theirs)
@@ -81,7 +81,8 @@ class Spares:
         return spawned(self._worker, theirs)
 
     def close(self) -> None:
-        """Ends the spare, the fork server unless it is lent, and all remaining children of that server."""
+        """Ends the spare. Also ends the fork server and all its remaining children, unless this server is
+        lent."""
         with self._lock:
             self._closed = True
             spare, self._spare = self._spare, None

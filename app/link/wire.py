@@ -1,4 +1,4 @@
-"""Whole messages, with open files, over a socket between two processes of one machine."""
+"""Sends whole messages, with open files, over a socket between two processes of one machine."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ _MOST_FILES = 8
 
 @dataclass(frozen=True)
 class Handle:
-    """An open file, by its descriptor in this process. The receiver of a message gets a descriptor of its
-    own, which it must close."""
+    """An open file, identified by its descriptor in this process. The receiver of a message gets another
+    descriptor, which it must close."""
 
     number: int
 
@@ -54,7 +54,7 @@ class _Unpickler(pickle.Unpickler):
 
 
 def packed(message: object) -> Parcel:
-    """Serialises a message; later changes of the object do not change what is sent."""
+    """Serialises a message. Later changes of the object do not change the message."""
     target, files = io.BytesIO(), list[int]()
     _Pickler(target, files).dump(message)
     return Parcel(target.getvalue(), tuple(files))
@@ -79,8 +79,8 @@ class Wire:
         self.post(packed(message))
 
     def post(self, parcel: Parcel, wait: bool = True) -> None:
-        """As `send`. With `wait` False, which is for small messages only, raises BlockingIOError if the
-        socket is full."""
+        """As `send`, for a serialised message. If `wait` is False (for small messages only), raises
+        BlockingIOError when the socket is full."""
         head = _HEAD.pack(len(parcel.content), len(parcel.files))
         flags = 0 if wait else socket.MSG_DONTWAIT
         # The files are sent with the first byte. `socket.send_fds` ignores its flags.
@@ -95,7 +95,8 @@ class Wire:
         return bool(self._poll.poll(None if timeout is None else 1e3 * timeout))
 
     def takes(self) -> bool:
-        """Whether a message of up to 50 kB can be sent without waiting: most of the socket's room is free."""
+        """Whether a message of up to 50 kB can be sent without waiting, as most of the socket's buffer is
+        free."""
         return bool(self._room.poll(0))
 
     def recv(self) -> Any:
@@ -130,7 +131,7 @@ class Wire:
             view = view[count:]
 
     def hang_up(self) -> None:
-        """Ends sending and receiving on both ends, which wakes the threads that wait there."""
+        """Ends sending and receiving on both ends. Threads that wait there then continue."""
         try:
             self._end.shutdown(socket.SHUT_RDWR)
         except OSError:

@@ -17,7 +17,7 @@ _PAGE = (
 )
 
 NOT_OPEN = Answer(HTTPStatus.SERVICE_UNAVAILABLE, "Starting or stopping", "<p>Try again in a moment.</p>")
-CROWDED = Answer(HTTPStatus.SERVICE_UNAVAILABLE, "Too many pages", "<p>Close some of them and try again.</p>")
+CROWDED = Answer(HTTPStatus.SERVICE_UNAVAILABLE, "Too many pages", "<p>Close some pages and try again.</p>")
 FULL = Answer(
     HTTPStatus.SERVICE_UNAVAILABLE,
     "All places are taken",
@@ -33,7 +33,7 @@ NO_CLASS = Answer(
 
 
 def plain(status: HTTPStatus, kind: str, text: str, more: tuple[tuple[str, str], ...] = ()) -> Response:
-    """A response with a text, which browsers must not store. more: further headers."""
+    """Returns a response with a text, which browsers must not store. more: further headers."""
     body = text.encode()
     headers = Headers({"Content-Type": kind, "Content-Length": str(len(body)), "Cache-Control": "no-store"})
     for name, value in more:
@@ -43,7 +43,7 @@ def plain(status: HTTPStatus, kind: str, text: str, more: tuple[tuple[str, str],
 
 
 def as_response(answer: Answer) -> Response:
-    """The response as a complete HTML page."""
+    """Returns the response as a complete HTML page."""
     body = _PAGE.format(title=escape(answer.title), text=answer.text).encode()
     headers = Headers(answer.headers)
     headers["Content-Type"] = "text/html; charset=utf-8"

@@ -6,29 +6,30 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 MESSAGES = 200.0
-"""Messages per second, 1/s. A page sends each group of controls, each gizmo and the camera at most 20 to 50
-times per second; a page on which everything is moved at the same time sends fewer than 100."""
+"""Largest rate of messages, 1/s. A page sends each group of controls, each gizmo and the camera at most 20 to
+50 times per second. If all of them are moved at the same time, it sends fewer than 100 messages per
+second."""
 BURST = 400.0
 BYTES = 4e6
-"""Bytes per second, B/s, and the largest burst, B:"""
+"""Largest rate of bytes, B/s; below, the largest burst, B."""
 BYTES_BURST = 24e6
 UPLOADS = 10_000_000
 """Largest total size of incomplete uploads, B."""
 MESSAGE = 12 * 2**20
-"""Length of the longest message, B."""
+"""Largest size of a message, B."""
 PATIENCE = 10.0
 """Time, s, for which a connection may exceed its limits without a pause."""
 CONTROL_FRAMES = 20.0
-"""Control frames such as pings per second, 1/s. Pages send none; a program sends one every 20 s."""
+"""Largest rate of control frames such as pings, 1/s. Pages send no control frames; a program sends one every
+20 s."""
 WAITING = 2000
 """Largest number of frames that wait to be processed."""
-_ENTRY = 1024  # B of memory that each part of an upload needs in addition to its content
+_ENTRY = 1024  # B of memory for each part of an upload, in addition to its content
 
 
 @dataclass
 class Bucket:
-    """A token bucket that fills at `rate` up to `size`. `take` may take more than the content: it returns the
-    time until the bucket is no longer negative."""
+    """A token bucket that fills at `rate` up to `size`. Its content may become negative."""
 
     rate: float
     size: float
@@ -48,7 +49,7 @@ class Bucket:
 
 
 class Budget:
-    """The limits of one connection. They do not depend on the content of messages."""
+    """The limits of one connection. The limits do not depend on the content of messages."""
 
     def __init__(self, now: Callable[[], float]) -> None:
         self._now = now
@@ -59,8 +60,8 @@ class Budget:
         self._calm = now()
 
     def wait(self, size: int) -> float:
-        """Time, s, to wait before a message of `size` bytes is processed: a connection that sends too much is
-        read more slowly."""
+        """Returns the time, s, to wait before a message of `size` bytes is processed. A connection that sends
+        too much is thus read more slowly."""
         waiting = max(self._messages.take(1.0), self._bytes.take(float(size)))
         if not waiting:
             self._calm = self._now()
@@ -76,10 +77,10 @@ class Budget:
         return not self._control.take(1.0)
 
     def uploads(self, size: int, unfinished: Callable[[], int]) -> bool:
-        """Whether a part of `size` bytes may be accepted. unfinished: returns the bytes held by incomplete
-        files."""
+        """Whether a part of `size` bytes may be accepted. unfinished: returns the number of bytes of
+        incomplete files."""
         if self._held + size + _ENTRY > UPLOADS:
-            self._held = unfinished()  # files that were completed since then no longer count
+            self._held = unfinished()  # files that are complete now no longer count
         if self._held + size + _ENTRY > UPLOADS:
             return False
         self._held += size + _ENTRY

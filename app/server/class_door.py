@@ -31,9 +31,9 @@ class Served:
     """A response of a class.
 
     Attributes:
-        kind: of `text`.
+        kind: the media type of `text`.
         serve: serves the connection, if the request is an upgrade.
-        longest: the largest message on it, B.
+        longest: the largest size of a message on this connection, B.
     """
 
     status: HTTPStatus
@@ -46,20 +46,20 @@ class Served:
 
 @dataclass(frozen=True)
 class ClassDoor:
-    """The pages of a class and who may open them. key: the key of the class; None if no other server
-    takes part."""
+    """The pages of a class, and the rules for opening them. key: the key of the class; None if no other
+    server takes part."""
 
     hall: Hall
     sockets: Sockets
     key: str | None = field(default=None, repr=False)
 
     def is_for_servers(self, path: str) -> bool:
-        """Whether only other servers of the class, which have its key, may open an address."""
+        """Whether an address is only for other servers of the class, which have the class's key."""
         return urlsplit(path).path == _SERVERS
 
     def answer(self, door: Door, request: Request, who: str) -> Answer | Served:
-        """The response to a request that names this server and comes from one of its pages, or is for other
-        servers. who: identifies the sender, see `app.server.peers`."""
+        """Returns the response to a request. The request must name this server and come from one of its
+        pages, or be for other servers. who: identifies the sender, see `app.server.peers`."""
         if self.is_for_servers(request.path):
             return self._to_server(request)
         plain, host = urlsplit(request.path).path, request.headers["Host"]
@@ -104,6 +104,6 @@ _NO_SERVER = Answer(
 _NOT_THE_TEACHER = Answer(
     HTTPStatus.FORBIDDEN,
     "This is the teacher's page",
-    "<p>Open the whole address that himpc-lab printed behind <i>teacher</i> when it was started.</p>",
+    "<p>Open the whole address that himpc-lab printed after <i>teacher</i> when it was started.</p>",
     (_NOT_KEPT,),
 )

@@ -1,5 +1,5 @@
-"""The classroom: all pages show one session, and only pages with the instructor's token control it. It is
-also used for an arm, which every page controls."""
+"""The classroom: all pages show one session, and only pages with the instructor's token control it. The
+classroom is also used for an arm, which every page controls."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ from app.server.sessions import WORKER, Refuse
 RETURN = 5.0
 """Time, s, within which a reloaded page connects again."""
 _PATIENCE = 60.0
-"""Longest wait, s, for an arm to come to rest and for the files of its drive to be written."""
+"""Longest time, s, to wait until an arm has come to rest and the files of its drive are written."""
 STEERING = "Only the instructor can control the robot: enter the instructor's token on this page first."
 
 
 class Watcher:
-    """The view of the session for a page that only watches. It offers everything that pages use of a
-    `SimulationClient`; commands have no effect and are refused."""
+    """The view of the session for a page that only watches. It has all members of a `SimulationClient` that
+    pages use. Commands are refused and have no effect."""
 
     token = ""
     attached = True
 
     def __init__(self, shown: SimulationClient, refuse: Refuse) -> None:
-        """refuse: shows on the page a sentence with the reason why a command was refused."""
+        """refuse: shows a sentence on the page: the reason why a command was refused."""
         self._shown = shown
         self._refuse = refuse
 
     def take_messages(self) -> tuple[list[str], list[str]]:
-        """Returns no messages: they answer the instructor's commands."""
+        """Returns no messages, as the session's messages answer the instructor's commands."""
         return [], []
 
 
@@ -72,8 +72,8 @@ class Classroom:
     turns_away: ClassVar[bool] = False
 
     def __init__(self, choice: SceneChoice, all_steer: bool = False, arm: Process | None = None) -> None:
-        """all_steer: whether every page controls the robot, without the token; arm: watches an arm, in place
-        of a simulation. When the last page is closed, the arm is stopped gently."""
+        """all_steer: whether every page controls the robot, without the token; arm: the process that watches
+        an arm, used in place of a simulation. When the last page is closed, the arm is stopped gently."""
         self.all_steer, self._arm = all_steer, arm
         self._lock, self._pages, self._left_at = threading.Lock(), 0, 0.0
         self.token = secrets.token_urlsafe(16)
@@ -102,7 +102,7 @@ class Classroom:
         return cast(SimulationClient, Watcher(self._learner, refuse))
 
     def leave(self, learner: SimulationClient) -> None:
-        """Called when a page was closed; the session continues, but an arm stops."""
+        """Called when a page was closed. The session continues; an arm is stopped after the last page."""
         with self._lock:
             self._pages -= 1
             last, self._left_at = not self._pages, time.monotonic()
@@ -111,12 +111,12 @@ class Classroom:
 
     @property
     def deserted(self) -> bool:
-        """Whether all pages were closed, and none has come back after a reload."""
+        """Whether all pages were closed, and no page has connected again after a reload."""
         with self._lock:
             return not self._pages and 0.0 < self._left_at < time.monotonic() - RETURN
 
     def close(self) -> None:
-        """Ends the simulation process; an arm first comes to rest."""
+        """Ends the simulation process. An arm is first brought to rest."""
         arm = self._arm
         if arm is not None and arm.send(Quit()):
             wait_until(lambda: not arm.alive, _PATIENCE)

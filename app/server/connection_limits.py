@@ -1,5 +1,5 @@
-"""Limits on the number of connections. If there is no room, the oldest connection that has not sent anything
-is closed for a new one."""
+"""Limits on the number of connections. If there is no room for a new connection, the oldest connection that
+has sent no valid message is closed."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ PER_ADDRESS = 96
 address."""
 
 OF_A_CLASS = 1000, 800
-"""The same two for a class, whose phones may all be behind one address."""
+"""TOTAL and PER_ADDRESS for a class, whose phones may all be behind one address."""
 
 
 @dataclass
@@ -23,7 +23,7 @@ class _Guest:
 
 
 class ConnectionLimits:
-    """The open connections, oldest first, by a key that identifies each."""
+    """The open connections, oldest first. A key identifies each connection."""
 
     def __init__(self, total: int = TOTAL, per_address: int = PER_ADDRESS) -> None:
         self._total, self._per_address = total, per_address
@@ -33,8 +33,8 @@ class ConnectionLimits:
         return len(self._guests)
 
     def enter(self, key: object, address: str | None, leave: Callable[[], object]) -> bool:
-        """Adds a connection; returns whether there is room. address: None if unknown (behind a proxy). leave:
-        closes the connection."""
+        """Adds a connection; returns whether there was room. address: None if unknown (behind a proxy).
+        leave: closes the connection."""
         if not self._room(self._total, lambda _: True):
             return False
         self._guests[key] = _Guest(None, leave)
@@ -44,7 +44,7 @@ class ConnectionLimits:
         return False
 
     def comes_from(self, key: object, address: str | None) -> bool:
-        """Stores the address of a connection; returns whether there is room for one more from this
+        """Stores the address of a connection; returns whether there was room for another connection from this
         address."""
         guest = self._guests.get(key)
         if guest is None:
@@ -68,8 +68,8 @@ class ConnectionLimits:
         return False
 
     def spoke(self, key: object) -> None:
-        """Notes that this connection has sent a valid message, so that it is no longer closed to make
-        room."""
+        """Notes that this connection has sent a valid message. It will not be closed to make room for
+        others."""
         guest = self._guests.get(key)
         if guest is not None:
             guest.spoke = True

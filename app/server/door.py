@@ -20,9 +20,10 @@ _HOST = re.compile(r"(?P<name>\[[0-9a-fA-F:.]+\]|[A-Za-z0-9._-]+)(?::(?P<port>\d
 _PLAIN = re.compile(r"(/[A-Za-z0-9_~-][A-Za-z0-9._~@-]*)*/?")
 ELSEWHERE = frozenset({"websocket", "playbackPath"})
 NAME = "page"
-"""The page's name below a path of another site, see `app.server.prefix`."""
+"""The page's name if it is served below a path of another site, see `app.server.prefix`."""
 SELF = "'self'"
-"""Used in place of an origin: the origin of the page itself, for a proxy that also serves other pages."""
+"""Used in place of an origin. It means the origin of the page itself, for a proxy that also serves other
+pages."""
 _NO_FRAMES = {"Content-Security-Policy": "frame-ancestors 'none'", "X-Frame-Options": "DENY"}
 _ON_EVERY_ANSWER = {
     "X-Content-Type-Options": "nosniff",
@@ -33,7 +34,8 @@ _ON_EVERY_ANSWER = {
 
 @dataclass(frozen=True)
 class Answer:
-    """A response that replaces the requested one. `headers` are added to those of every response."""
+    """A response that replaces the requested page. `headers` are sent in addition to the headers of every
+    response."""
 
     status: HTTPStatus
     title: str
@@ -49,9 +51,9 @@ class Door:
         local: whether only this machine can connect.
         trusted: further allowed origins, as browsers write them, e.g. a reverse proxy's.
         passes: the secrets that a visitor must send in the URL or in the cookie.
-        names: the names under which other machines know this one.
-        proxy_only: whether only a proxy that sends the token in its header is let in. It may use any name for
-            this server, and it says who its visitor is.
+        names: the names by which other machines know this machine.
+        proxy_only: whether only a proxy that sends the token in its header is admitted. The proxy may use any
+            name for this server, and it sends its visitor's name.
         embedders: origins of the pages that may show this page in a frame.
     """
 
@@ -64,45 +66,47 @@ class Door:
 
     def judge(self, request: Request, who: str = "") -> Answer | None:
         """Returns None if the request is admitted, else the response to send. An admitted request names this
-        server as its host and, if the browser says which page sent it, that page is one of ours. who:
-        identifies the sender, see `app.server.peers`."""
+        server as its host. If the browser names the page that sent the request, this page must be one of
+        ours. who: identifies the sender, see `app.server.peers`."""
         return self.refuses(request) or self._ask_token(request, request.headers["Host"], who)
 
     def refuses(self, request: Request) -> Answer | None:
-        """As `judge`, but asks for no token."""
+        """As `judge`, but does not check the token."""
         headers = request.headers
         hosts, origins = headers.get_all("Host"), headers.get_all("Origin")
         if len(hosts) != 1 or len(origins) > 1:
-            return _foreign("It must name one host and at most one origin.")
+            return _foreign("The request must name one host and at most one origin.")
         if not self._is_ours(hosts[0]):
             return _foreign(
-                "It names a host that is not this server. If the name is right, start himpc-lab with "
-                "--trusted-origin and the whole address, e.g. --trusted-origin http://NAME:8080."
+                "The request names a host that is not this server. If the name is right, start himpc-lab "
+                "with --trusted-origin and the whole address, e.g. --trusted-origin http://NAME:8080."
             )
         if origins and not self._is_own_page(origins[0], hosts[0]):
-            return _foreign("It comes from a page of another site.")
+            return _foreign("The request comes from a page of another site.")
         if not is_upgrade(request) and _is_embedded(headers, bool(self.embedders)):
             return _foreign("A page of another site embeds this page.")
         if self.proxy_only and not _PLAIN.fullmatch(request.path.partition("?")[0]):
-            # A proxy may treat //v/x as /v/x, for which it asks no password, while this server treats them as
-            # different.
-            return _foreign("Its address is written in an unusual way.")
+            # A proxy may treat //v/x as /v/x, for which it asks no password. This server treats the two as
+            # different addresses.
+            return _foreign("The address of the request has an unusual form.")
         if _leads_away(request) and urlsplit(request.path).path != f"/{NAME}":
-            return _foreign("Its address would connect the page to another server.")
+            return _foreign("The address of the request would connect the page to another server.")
         return None
 
     def is_owner(self, request: Request, who: str = "") -> bool:
-        """Whether the person who started the server sent this upgrade, which must have been admitted."""
+        """Whether the person who started the server sent this upgrade. The upgrade must have been
+        admitted."""
         return self.role(request, who) == "owner" and not came_through_a_proxy(request.headers)
 
     def role(self, request: Request, who: str = "") -> Role | None:
-        """The role whose secret or cookie a request brings, from any machine; None if it brings none."""
+        """Returns the role whose secret or cookie a request contains, from any machine; None if it contains
+        none."""
         found = self.passes.in_address(request.path), self.passes.in_cookies(request.headers, who)
         return "owner" if "owner" in found else found[0] or found[1]
 
     def secure(self, headers: Headers) -> None:
-        """Adds the headers of every response: only the embedders may show it in a frame, and browsers may not
-        guess its type."""
+        """Adds the headers of every response: only the embedders may show the page in a frame, and browsers
+        must not guess its type."""
         framed = _NO_FRAMES
         if self.embedders:
             framed = {"Content-Security-Policy": f"frame-ancestors {' '.join(sorted(self.embedders))}"}
@@ -111,15 +115,15 @@ class Door:
                 headers[name] = value
 
     def not_by_the_proxy(self, request: Request) -> Answer | None:
-        """With a single permitted proxy, the response to a request that did not pass through it; else
+        """Returns a refusal if only a proxy is admitted and the request did not pass through it; else
         None."""
         if not self.proxy_only or self.passes.in_header(request.headers):
             return None
-        return Answer(HTTPStatus.FORBIDDEN, "Not by this way", _ELSEHOW, _NOT_KEPT)
+        return Answer(HTTPStatus.FORBIDDEN, "Not at this address", _ELSEHOW, _NOT_KEPT)
 
     def account(self, request: Request) -> str:
-        """The name with which the sender of an admitted request has signed in at the proxy; "" if there is no
-        proxy that nobody can pass by."""
+        """Returns the name with which the sender of an admitted request has signed in at the proxy; "" if
+        requests need not pass through a proxy."""
         return self.passes.account(request.headers) if self.proxy_only else ""
 
     def _is_ours(self, host: str) -> bool:
@@ -132,7 +136,7 @@ class Door:
         try:
             address = ipaddress.ip_address(name)
         except ValueError:
-            # Any name may resolve to this machine (DNS rebinding), so names that are not ours are refused.
+            # Any name may resolve to this machine (DNS rebinding): names that are not ours are refused.
             return name == "localhost" or (not self.local and name in self.names)
         return address.is_loopback or not self.local
 
@@ -157,8 +161,9 @@ class Door:
         return Answer(HTTPStatus.FORBIDDEN, "A token is needed", text, _NOT_KEPT)
 
     def _keep(self, request: Request, host: str, role: Role, who: str) -> Answer:
-        """A response that removes the secret from the address and puts a proof of it into the cookie. The
-        browser sends the cookie to the folder of this address and below, also behind a proxy's prefix."""
+        """Returns a response that removes the secret from the address and puts a proof of the secret into a
+        cookie. The browser sends the cookie to the folder of this address and below, also behind a proxy's
+        prefix."""
         secure = "; Secure" if f"https://{host.lower()}" in self.trusted else ""
         cookie = f"{self.passes.keep(role, who)}; HttpOnly; SameSite=Strict{secure}"
         kept = (("Set-Cookie", cookie), *_NOT_KEPT)
@@ -166,7 +171,7 @@ class Door:
         name = quote(urlsplit(request.path).path.rpartition("/")[2], safe="")
         page = f"./{name}?{rest}" if rest else f"./{name}"
         if request.headers.get("Referer") or request.headers.get("Sec-Fetch-Site") == "cross-site":
-            # A browser does not send a strict cookie with a redirect that began with a link on another site.
+            # A browser sends no strict cookie with a redirect that began with a link on another site.
             return Answer(HTTPStatus.OK, "himpc-lab", "Opening …", (*kept, ("Refresh", f"0; url={page}")))
         return Answer(HTTPStatus.SEE_OTHER, "himpc-lab", "Opening …", (*kept, ("Location", page)))
 
@@ -177,29 +182,30 @@ _FIELD = (
     "<button>Open the page</button></form>"
 )
 _NEEDED = (
-    "<p>Open the whole address that himpc-lab printed in the terminal where it was started; it ends in "
-    f"<code>?{QUERY}=…</code>. Or give the token here:</p>{_FIELD}"
-    '<p>Have you been here before? <a href="./">Open the page</a>.</p>'
+    "<p>Open the whole address that himpc-lab printed in its terminal. The address ends in "
+    f"<code>?{QUERY}=…</code>. Or enter the token here:</p>{_FIELD}"
+    '<p>If you have opened this page before: <a href="./">Open the page</a>.</p>'
 )
 _ELSEHOW = (
     "<p>This himpc-lab can only be opened through the site that started it, for example from the launcher of "
     "JupyterHub.</p>"
 )
 _WRONG = (
-    "<p>This is not the token of the himpc-lab that runs now; each start has a new token. It is printed in "
+    "<p>This token is not valid now: each start of himpc-lab has a new token. The token is printed in "
     f"the terminal where himpc-lab was started:</p>{_FIELD}"
 )
 
 
 def names_of_this_machine() -> frozenset[str]:
-    """The names under which other machines on the network know this one."""
+    """Returns the names by which other machines on the network know this machine."""
     name = socket.gethostname().lower()
     short = name.partition(".")[0]
     return frozenset({name, short, f"{short}.local"})
 
 
 def as_origin(text: str, option: str = "--trusted-origin") -> str:
-    """The origin as browsers write it. Raises InputError, naming the option, if it is not a valid origin."""
+    """Returns the origin as browsers write it. Raises InputError, which names the option, if `text` is not a
+    valid origin."""
     try:
         parts = urlsplit(text.strip())
         port = parts.port
@@ -208,7 +214,7 @@ def as_origin(text: str, option: str = "--trusted-origin") -> str:
     plain = parts.scheme in ("http", "https") and parts.hostname and parts.path in ("", "/")
     if not plain or parts.query or parts.fragment or "@" in parts.netloc or not _HOST.fullmatch(parts.netloc):
         raise InputError(
-            f"{option} '{text[:80]}' is not an origin: give scheme and host and, if it is not the "
+            f"{option} '{text[:80]}' is not an origin: give scheme, host and, if it is not the "
             "usual one, the port, e.g. https://lab.example.org"
         )
     host = parts.netloc.lower().rpartition(":")[0] if port is not None else parts.netloc.lower()
@@ -217,24 +223,24 @@ def as_origin(text: str, option: str = "--trusted-origin") -> str:
 
 
 def is_upgrade(request: Request) -> bool:
-    """Whether a request wants to open a web socket; the test is the same as in viser."""
+    """Whether a request opens a web socket. The test is the same as in viser."""
     return request.headers.get_all("Upgrade") == ["websocket"]
 
 
 def query_of(request: Request) -> dict[str, list[str]]:
-    """The parameters in the address of a request."""
+    """Returns the parameters in the address of a request."""
     return parse_qs(urlsplit(request.path).query, keep_blank_values=True)
 
 
 def _leads_away(request: Request) -> bool:
     """Whether the address makes viser's page connect to another server or play a recording. Messages from
-    there may contain scripts, which would run as a part of our page."""
+    another server or a recording may contain scripts, which would run as a part of our page."""
     return not ELSEWHERE.isdisjoint(query_of(request))
 
 
 def _is_embedded(headers: Headers, framed: bool) -> bool:
-    """Whether a page of another site loads a part of its content from here. A link from there is allowed.
-    framed: frames are allowed; the browser then checks whose they are."""
+    """Whether a page of another site loads a part of its content from this server. A link on such a page is
+    allowed. framed: frames are allowed; the browser then checks which page contains them."""
     site, mode, dest = (headers.get_all(f"Sec-Fetch-{name}") for name in ("Site", "Mode", "Dest"))
     if dest and set(dest) & {"iframe", "frame", "embed", "object"} and not (framed and dest == ["iframe"]):
         return True

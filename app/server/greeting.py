@@ -16,8 +16,8 @@ _INSTRUCTOR = "instructor's token:"
 
 
 def greeting(server: PageServer) -> Iterator[str]:
-    """One line for a user who works alone; otherwise a list of addresses, each with the people who should use
-    it."""
+    """Yields one line for a user who works alone; otherwise a list of addresses, each with the people who
+    should use it."""
     yield f"himpc-lab ready at {server.link}"
     shared = server.public or server.hall is not None or _has_an_instructor(server)
     if shared:
@@ -38,7 +38,7 @@ def _has_an_instructor(server: PageServer) -> bool:
 
 
 def _for_others(server: PageServer) -> Iterator[str]:
-    here = seen_from_outside(server.host, server.url)  # as numbers: few networks resolve a laptop's name
+    here = seen_from_outside(server.host, server.url)  # in numbers: few networks resolve a laptop's name
     by_proxy = [("through the proxy:", each) for each in server.proxies]
     for what, address in by_proxy if server.proxy_only else (("for others:", here), *by_proxy):
         link = address if server.proxy_only else server.passes.link(address, "guest")
@@ -48,7 +48,5 @@ def _for_others(server: PageServer) -> Iterator[str]:
 
 
 _KEEP = "Keep the first address secret: its page can run your Python files (not with --no-own-files)."
-_ALL = (
-    "everybody who can reach this address can open the page, run simulations on this machine, upload robots."
-)
+_ALL = "everybody who can reach this address can open the page, run simulations here and upload robots."
 _ALL_HERE = "every user of this machine can open the page, run simulations as you and upload robots."

@@ -32,13 +32,13 @@ if TYPE_CHECKING:  # loaded only for a class: the server listens before these mo
 HANDSHAKE = 5.0
 """Time, s, within which a request must be complete."""
 FIRST_WORD = 45.0
-"""Time, s, within which a page must send a message: the first picture may take long without a graphics
-card."""
+"""Time, s, within which a page must send its first message. The first picture may take long without a
+graphics card."""
 _SLICE = 4096  # B that are parsed between two checks of the limits
 
 
 class ConnectionGuard:
-    """The guard that `open_server` installs. It refuses every request until `open` is called."""
+    """The guard that `open_server` installs. Before `open` is called, it refuses every request."""
 
     def __init__(self, door: Door) -> None:
         self.crowd = ConnectionLimits()
@@ -59,8 +59,9 @@ class ConnectionGuard:
     ) -> None:
         """Admits requests according to `door` from now on.
 
-        places: the sessions, for /health and /metrics. refers: a newcomer is refused with status 503 while
-            every place is used, so that a proxy tries the next server; otherwise their page says so.
+        places: the sessions, for /health and /metrics.
+        refers: while every place is used, new visitors are refused with status 503, and a proxy tries the
+            next server; otherwise the page says that all places are used.
         class_door: the pages of a class, if there is one.
         """
         self._door, self._places, self._refers, self._open = door, places, refers, True
@@ -68,14 +69,14 @@ class ConnectionGuard:
 
     @property
     def load(self) -> Load:
-        """How busy the server is."""
+        """The present load of the server."""
         return load_of(self._places, len(self.crowd), self.refused, self.taken, not self._open)
 
     def close(self) -> None:
         self._open = False
 
     def __call__(self, given: Mapping[str, Any]) -> dict[str, Any]:
-        """The changed keywords for websockets' `serve`."""
+        """Returns the changed keywords for websockets' `serve`."""
         files: Callable[[ServerConnection, Request], Response | None] = given["process_request"] or _nothing
 
         def request(connection: ServerConnection, request: Request) -> Response | None:
@@ -87,7 +88,7 @@ class ConnectionGuard:
                 return self._to_class(self._class, connection, request)
             answer = self._judge(connection, request)
             if answer is None and of_a_class and is_upgrade(request):
-                answer = NO_CLASS  # a proxy may ask for no password there
+                answer = NO_CLASS  # at this address, a proxy may ask for no password
             if answer is not None:
                 self.refused += answer.status >= HTTPStatus.BAD_REQUEST
                 return as_response(answer)
@@ -125,7 +126,7 @@ class ConnectionGuard:
         return FULL if answer is None and self._refers and self.load.full else answer
 
     def _to_class(self, of: ClassDoor, connection: ServerConnection, request: Request) -> Response | None:
-        """The answer to a request for a page of the class; None for an upgrade that is let in."""
+        """Returns the response to a request for a page of the class; None for an upgrade that is admitted."""
         # Another server of the class sends the key instead, and may use any name for this server.
         refused = None if of.is_for_servers(request.path) else self._door.refuses(request)
         answer = self._not_open(connection, request) or refused
@@ -142,7 +143,8 @@ class ConnectionGuard:
         return None
 
     def _not_open(self, connection: ServerConnection, request: Request) -> Answer | None:
-        """The answer while the server is not open, or has no room for this connection."""
+        """Returns a refusal while the server is not open, or if it has no room for this connection; else
+        None."""
         if not self._open:
             return NOT_OPEN
         if not self.crowd.comes_from(connection, self.address(connection, request)):
@@ -150,12 +152,12 @@ class ConnectionGuard:
         return None
 
     def _is_owners(self, connection: ServerConnection, request: Request) -> bool:
-        """Whether this page was opened by the person who started the server, on the machine where it runs."""
+        """Whether this page was opened by the person who started the server, on the server's machine."""
         ends = ends_of(connection.transport)
         return ends is not None and ends.near and self._door.is_owner(request, ends.user)
 
     def address(self, connection: ServerConnection, request: Request | None) -> str | None:
-        """The address of the client. None if a proxy on this machine does not name it."""
+        """Returns the address of the client; None if a proxy on this machine does not name the client."""
         peer = connection.remote_address
         address = str(peer[0]) if isinstance(peer, tuple) and peer else None
         if address is None or not self._door.trusted or not ipaddress.ip_address(address).is_loopback:
@@ -165,16 +167,16 @@ class ConnectionGuard:
 
 
 class GuardedConnection(ServerConnection):
-    """A connection that counts messages before it decodes them. It passes on only the messages that a page
-    may send.
+    """A connection that counts messages before it decodes them. It passes on only messages that a page may
+    send.
 
     Attributes:
-        uploads: of the page.
+        uploads: the uploads of the page.
         refuse: shows a refusal to the user.
         is_owners: whether the person who started the server opened the page.
         teaches: whether the page was opened with the owner's secret, on any machine.
         account: the name with which the user signed in at the proxy.
-        serves: replaces viser for a page of a class.
+        serves: the function that serves a page of a class, in place of viser.
     """
 
     def __init__(self, *of: Any, guard: ConnectionGuard, **more: Any) -> None:
@@ -229,8 +231,8 @@ class GuardedConnection(ServerConnection):
         super().process_event(event)
 
     async def recv(self, decode: bool | None = None) -> Any:
-        """As websockets' `recv`, but a client that sends too much is read more slowly, and disconnected in
-        the end."""
+        """As websockets' `recv`, but a client that sends too much is read more slowly, and finally
+        disconnected."""
         while True:
             raw = await super().recv(decode)
             self._waiting = len(self.recv_messages.frames)
@@ -251,18 +253,18 @@ class GuardedConnection(ServerConnection):
             return raw
 
     def accept_short(self, longest: int) -> None:
-        """Ends the connection, with a reason, when a message is longer than this, B."""
+        """Sets the largest size of a message, B. A longer message ends the connection, with a reason."""
         self.protocol.max_message_size = longest
 
     async def recv_short(self) -> str | bytes:
-        """The next message of a page of a class."""
+        """Returns the next message of a page of a class."""
         raw = await super().recv()
         self._waiting = len(self.recv_messages.frames)
         self._guard.crowd.spoke(self)
         return raw
 
     async def _may_upload(self, raw: bytes) -> bool:
-        await asyncio.sleep(0)  # let viser process the messages that came before
+        await asyncio.sleep(0)  # viser first processes the earlier messages
         return self.uploads is not None and self.uploads.takes(raw, self._budget)
 
     async def _end(self, code: CloseCode, reason: str) -> NoReturn:
@@ -276,7 +278,7 @@ def _user(connection: ServerConnection) -> str:
 
 
 def _nothing_said(_: str) -> None:
-    """Used while no page can show the sentence."""
+    """Does nothing; used while no page can show the sentence."""
 
 
 def _nothing(_: ServerConnection, __: Request) -> Response | None:
@@ -284,7 +286,7 @@ def _nothing(_: ServerConnection, __: Request) -> Response | None:
 
 
 def _log() -> logging.Logger:
-    """A silent logger: malformed requests of strangers are not reported on the terminal."""
+    """Returns a silent logger: malformed requests from outside are not reported on the terminal."""
     log = logging.getLogger("himpc-lab.connections")
     log.propagate = False
     log.setLevel(logging.CRITICAL)

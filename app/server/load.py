@@ -1,4 +1,4 @@
-"""How busy a server is, for a proxy that spreads visitors and for Prometheus."""
+"""The load of a server, for a proxy that distributes visitors and for Prometheus."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Place(Protocol):
 
     @property
     def attached(self) -> bool:
-        """Whether a page uses it now."""
+        """Whether a page uses this session now."""
         ...
 
 
@@ -29,21 +29,21 @@ class Places(Protocol):
 
     @property
     def learners(self) -> Sequence[Place]:
-        """All sessions, also those that wait for their browser to come back."""
+        """All sessions, also those whose browser may come back."""
         ...
 
 
 @dataclass(frozen=True)
 class Load:
-    """What a server has to do now.
+    """The present load of a server.
 
     Attributes:
-        sessions: simulations that run, also those whose browser may come back.
-        attached: simulations that a page uses.
-        maximum: of sessions; 0 if nobody is turned away, as in a classroom.
-        connections: open connections.
-        refused: requests refused since the start.
-        messages: messages of pages since the start.
+        sessions: number of simulations that run, also those whose browser may come back.
+        attached: number of simulations that a page uses.
+        maximum: largest number of sessions; 0 if nobody is refused, as in a classroom.
+        connections: number of open connections.
+        refused: number of requests refused since the start.
+        messages: number of messages from pages since the start.
         stopping: whether the server is starting or stopping.
     """
 
@@ -57,8 +57,8 @@ class Load:
 
     @property
     def full(self) -> bool:
-        """Whether a new learner would have to wait, and no place is reserved for a learner who may come
-        back."""
+        """Whether pages use all places. Places that are reserved for learners who may come back are not
+        counted."""
         return 0 < self.maximum <= self.attached
 
     @property
@@ -67,7 +67,7 @@ class Load:
 
 
 def load_of(places: Places | None, connections: int, refused: int, messages: int, stopping: bool) -> Load:
-    """The load of a server; places: None before it is open."""
+    """Returns the load of a server. places: None before the server is open."""
     learners = () if places is None else places.learners
     attached = sum(each.attached for each in learners)
     most = places.max_sessions if places is not None and places.turns_away else 0
@@ -75,7 +75,7 @@ def load_of(places: Places | None, connections: int, refused: int, messages: int
 
 
 def report(path: str, load: Load) -> tuple[HTTPStatus, str, str] | None:
-    """Status, type and text of the answer to a request for a path; None for every other path."""
+    """Returns status, type and text of the response to /health or /metrics; None for every other path."""
     match urlsplit(path).path:
         case "/health":
             text = {"state": load.state, "sessions": load.sessions, "maximum": load.maximum}

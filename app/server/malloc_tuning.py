@@ -1,4 +1,4 @@
-"""Settings of the memory allocator in the server's process."""
+"""Changes settings of the memory allocator in the server's process."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ LARGE = 2**20
 def few_arenas() -> bool:
     """Limits glibc's allocator to two arenas instead of eight per core; returns whether that was done.
 
-    Every visit has its own threads. If each thread uses a different arena, memory that one page frees cannot
-    be used by the next page, and free memory accumulates (38 MB instead of 4 MB after 90 reloads). Two arenas
-    are enough: Python runs only one thread at a time, therefore no thread waits for an arena. Call this
-    before threads start.
-    A number in the environment variable MALLOC_ARENA_MAX is respected; other allocators are not changed.
+    Every visit has its own threads. If each thread uses a different arena, the next page cannot use memory
+    that one page frees. Free memory then accumulates (38 MB instead of 4 MB after 90 reloads). Two arenas are
+    enough: Python runs only one thread at a time, therefore no thread waits for an arena. Call this before
+    threads start. A number in the environment variable MALLOC_ARENA_MAX is respected; other allocators are
+    not changed.
     """
     return _set("MALLOC_ARENA_MAX", _M_ARENA_MAX, ARENAS)
 
@@ -28,17 +28,17 @@ def large_arrays_apart() -> bool:
     """Makes the allocator give every large array memory pages of its own, which return to the system when the
     array is freed. Returns whether that was done.
 
-    glibc does so by default, but only for arrays above a size that it raises to the size of the largest array
-    ever freed, up to 32 MB. The recordings of a scene are then in an arena among small objects of other
-    pages. When the scene ends, these objects keep the memory allocated: of 1.2 GB used by eight learners who
-    changed scenes, 0.5 GB were free and not returned. A number in the environment variable
+    By default, glibc does this only for arrays above a threshold. It raises the threshold to the size of the
+    largest array ever freed, up to 32 MB. The recordings of a scene are then in an arena among small objects
+    of other pages. When the scene ends, these objects keep the memory allocated: of 1.2 GB used by eight
+    learners who changed scenes, 0.5 GB were free and not returned. A number in the environment variable
     MALLOC_MMAP_THRESHOLD_ is respected.
     """
     return _set("MALLOC_MMAP_THRESHOLD_", _M_MMAP_THRESHOLD, LARGE)
 
 
 def give_back() -> None:
-    """Returns every free memory page of the arenas to the system, which takes some milliseconds; only with
+    """Returns every free memory page of the arenas to the system. This takes some milliseconds. Only with
     glibc."""
     if sys.platform == "linux":
         trim = getattr(ctypes.CDLL(None), "malloc_trim", None)

@@ -20,9 +20,9 @@ _LEADING = (
 
 @contextlib.contextmanager
 def opened_in_a_browser(link: str) -> Iterator[None]:
-    """Opens the link in a browser. The browser first loads a temporary file that leads to the link. Only this
-    user may read the file, and it is deleted afterwards: every user of the machine can see the arguments of a
-    program."""
+    """Opens the link in a browser. Every user of the machine can see the arguments of a program, but the link
+    is secret. The browser therefore first loads a temporary file that leads to the link. Only this user may
+    read the file, and it is deleted afterwards."""
     with tempfile.TemporaryDirectory(prefix="himpc-lab-", ignore_cleanup_errors=True) as folder:  # mode 0700
         file = Path(folder) / "open.html"
         with open(os.open(file, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600), "w", encoding="utf-8") as text:

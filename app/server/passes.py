@@ -17,32 +17,32 @@ from websockets.datastructures import Headers
 from robots import InputError
 
 QUERY = "himpc-token"
-"""The name of the parameter in the address. Jupyter, which may serve a lab, uses `token` for itself."""
+"""The name of the parameter in the address. The name `token` is used by Jupyter, which may serve a lab."""
 HEADER = "X-Himpc-Lab-Token"
 """The name of the header in which a proxy may send the token of its visitors."""
 USER_HEADER = "X-Himpc-Lab-User"
 """The header in which a proxy that asks for passwords sends its visitor's name, percent-encoded UTF-8."""
 VARIABLE = "HIMPC_LAB_TOKEN"
-"""The environment variable with a token of the user's own."""
+"""The environment variable with the user's own token."""
 CLASS_VARIABLE = "HIMPC_LAB_CLASS_KEY"
 """The environment variable with the key of a class."""
-LONGEST_ACCOUNT = 80  # characters
-SHORTEST = 16  # characters of a token of the user's own
+LONGEST_ACCOUNT = 80  # largest number of characters
+SHORTEST = 16  # smallest number of characters of a user's own token
 Role = Literal["guest", "owner"]
 _ROLES: tuple[Role, ...] = ("owner", "guest")
 
 
 def new_token() -> str:
-    """A random token of 128 bits, as text that can be part of an address."""
+    """Returns a random token of 128 bits, as text that can be part of an address."""
     return secrets.token_urlsafe(16)
 
 
 def given_token(
     file: str | None, environment: Mapping[str, str], option: str = "--token-file", variable: str = VARIABLE
 ) -> str | None:
-    """The token that the user gives, so that several servers have the same one: the first line of a file, or
-    the environment variable; None if neither is given. Raises InputError for a token that is too short or not
-    in letters, digits, - and _, naming the option or the variable."""
+    """Returns the user's own token, which several servers can have in common: the first line of a file, or
+    the environment variable; None if neither exists. Raises InputError, which names the option or the
+    variable, if the token is too short or has characters other than letters, digits, - and _."""
     text, place = environment.get(variable), variable
     kind = "key" if variable == CLASS_VARIABLE else "token"
     if file is not None:
@@ -62,21 +62,22 @@ def given_token(
 
 
 def shared(token: str, owner: str | None) -> Passes:
-    """The passes of a server whose token the user gave: the cookie of one such server opens all of them."""
+    """Returns the passes of a server with a user's own token. The cookie of one such server opens all servers
+    with this token."""
     key = hmac.new(token.encode(), b"cookie", hashlib.sha256).digest()
     return Passes(token, owner, "himpc-lab", key)
 
 
 @dataclass(frozen=True)
 class Passes:
-    """The secrets of one server; they are valid until it ends.
+    """The secrets of one server. They are valid until the server ends.
 
     Attributes:
         token: admits a visitor; None: no token is needed.
         owner: admits a visitor as the person who started the server; None: no page has this role.
-        cookie: the cookie's name. Browsers send cookies to all ports of a host, so each server uses
-            another name.
-        key: the key from which cookies are derived. They do not contain the secrets of the address.
+        cookie: the cookie's name. Each server uses another name, as browsers send cookies to all ports of a
+            host.
+        key: the key from which cookies are derived. A cookie does not contain the secrets of the address.
     """
 
     token: str | None = field(default=None, repr=False)
@@ -85,42 +86,43 @@ class Passes:
     key: bytes = field(default_factory=lambda: secrets.token_bytes(32), repr=False)
 
     def link(self, address: str, role: Role, page: str = "") -> str:
-        """The address of a page for a visitor with this role; "" is the page of a robot."""
+        """Returns the address of a page for a visitor with this role. page: "" is the page of a robot."""
         secret = (role == "owner" and self.owner) or self.token
         place = f"{address}/{page}" if page or secret else address
         return f"{place}?{urlencode({QUERY: secret})}" if secret else place
 
     def in_address(self, path: str) -> Role | None:
-        """The role whose secret is in an address; None if there is none."""
+        """Returns the role whose secret is in an address; None if there is none."""
         given = parse_qs(urlsplit(path).query).get(QUERY, [])
         known = (self.owner, self.token)
         return _first(any(_same(each, right) for each in given) for right in known)
 
     def in_header(self, headers: Headers) -> bool:
-        """Whether a proxy sent the token in its header; the owner's secret does not count there."""
+        """Whether a proxy sent the token in its header. The owner's secret is not accepted in the header."""
         given = headers.get_all(HEADER)
         return len(given) == 1 and _same(given[0], self.token)
 
     def account(self, headers: Headers) -> str:
-        """The name of the visitor that the proxy sent together with the token; "" if it sent none."""
+        """Returns the visitor's name that the proxy sent together with the token; "" if it sent none."""
         given = headers.get_all(USER_HEADER)
         if len(given) != 1 or not self.in_header(headers):
             return ""
         return "".join(sign for sign in unquote(given[0])[:LONGEST_ACCOUNT] if sign.isprintable())
 
     def in_cookies(self, headers: Headers, who: str) -> Role | None:
-        """The role whose cookie is in a request from `who`, see `app.server.peers`; None if there is none."""
+        """Returns the role whose cookie is in a request from `who`, see `app.server.peers`; None if there is
+        none."""
         given = list(self._cookies(headers))
         right = {"guest": self._value("guest", who), "owner": self.owner and self._value("owner", who)}
         return _first(any(_same(each, right[role]) for each in given) for role in _ROLES)
 
     def keep(self, role: Role, who: str) -> str:
-        """The name and value of a visitor's cookie. It is only valid for `who`: browsers send it to all
-        servers of the same host, whoever runs them."""
+        """Returns the name and value of a visitor's cookie. The cookie is valid for `who` only, since
+        browsers send it to all servers of the same host, also to servers of other users."""
         return f"{self.cookie}={self._value(role, who)}"
 
     def _value(self, role: Role, who: str) -> str:
-        # Guests may be able to derive the key from their token; the owner's secret is not known to them.
+        # Guests may be able to derive the key from their token, but they do not know the owner's secret.
         key = self.key + (self.owner or "").encode() if role == "owner" else self.key
         return hmac.new(key, f"{role} {who}".encode(), hashlib.sha256).hexdigest()
 
@@ -134,7 +136,8 @@ class Passes:
 
 
 def _first(brought: Iterable[bool]) -> Role | None:
-    """The first role whose secret or cookie was sent. All are compared, also after the first match."""
+    """Returns the first role whose secret or cookie was sent. All roles are compared, also after the first
+    match."""
     found: list[Role] = [role for role, there in zip(_ROLES, list(brought), strict=True) if there]
     return found[0] if found else None
 

@@ -25,7 +25,7 @@ def came_through_a_proxy(headers: Headers) -> bool:
 
 @dataclass(frozen=True)
 class Ends:
-    """The two ends of a connection: address and port here and at the other end."""
+    """The two ends of a connection: address and port of this end and of the other end."""
 
     ours: tuple[Address, int]
     theirs: tuple[Address, int]
@@ -51,13 +51,13 @@ class Ends:
 
 
 def ends_of(transport: asyncio.BaseTransport) -> Ends | None:
-    """The ends of a connection; None if it has no addresses."""
+    """Returns the ends of a connection; None if it has no addresses."""
     ours, theirs = (_end(transport.get_extra_info(name)) for name in ("sockname", "peername"))
     return None if ours is None or theirs is None else Ends(ours, theirs)
 
 
 def _end(found: object) -> tuple[Address, int] | None:
-    """Address and port; an IPv4 address that is mapped to IPv6 is converted back."""
+    """Returns address and port. An IPv4 address that is mapped to IPv6 is converted back."""
     if not isinstance(found, tuple) or len(found) < 2:
         return None
     address = ipaddress.ip_address(str(found[0]).partition("%")[0])
@@ -66,7 +66,7 @@ def _end(found: object) -> tuple[Address, int] | None:
 
 
 def _listed(address: Address, port: int) -> str:
-    """The form in which Linux lists an address: 32-bit words in native byte order."""
+    """Returns an address in the form in which Linux lists it: 32-bit words in native byte order."""
     packed = address.packed
     words = struct.unpack(f"={len(packed) // 4}I", packed)
     return "".join(f"{word:08X}" for word in words) + f":{port:04X}"

@@ -1,5 +1,5 @@
-"""The place of a page (its scene or step), stored in the browser. Another server at the same address
-continues from there.
+"""The place of a page (its scene or step), stored in the browser. Another server at the same address can
+continue from this place.
 
 Every tab has its own storage, which remains after a reload and after the end of the server. viser reads only
 the storage that all tabs share; a script copies the value there, under a key of this visit.
@@ -25,19 +25,20 @@ _KEY = "himpc-lab-place"
 
 
 def asking(key: str) -> str:
-    """The script that makes the tab's value readable under `key`."""
+    """Returns the script that makes the tab's value readable under `key`."""
     kept = f"sessionStorage.getItem({json.dumps(_KEY)})"
     return f'try {{ localStorage.setItem({json.dumps(STORED + key)}, {kept} ?? ""); }} catch {{}}'
 
 
 def keeping(text: str) -> str:
-    """The script that stores the value in the tab."""
+    """Returns the script that stores the value in the tab."""
     return f"try {{ sessionStorage.setItem({json.dumps(_KEY)}, {json.dumps(text)}); }} catch {{}}"
 
 
 def written(choice: SceneChoice, settings: SceneSettings, start: SceneChoice) -> str:
-    """The place of a page as text: the step of a lesson, or the code of its scene and settings. start: what
-    new pages of this server show; only servers with the same start go on from the place."""
+    """Returns the place of a page as text: the step of a lesson, or the code of the scene and its settings.
+    start: the choice that new pages of this server show; only servers with the same start continue from the
+    place."""
     place: dict[str, str | int] = {"start": _digest(start)}
     exercise = choice.exercise
     if exercise is not None:
@@ -51,7 +52,7 @@ def written(choice: SceneChoice, settings: SceneSettings, start: SceneChoice) ->
 
 
 def read(text: str | None, start: SceneChoice) -> SceneChoice | None:
-    """The choice that a tab stored; None if it cannot be loaded. The text is not trusted."""
+    """Returns the choice that a tab stored; None if it cannot be loaded. The text is not trusted."""
     try:
         found = json.loads(text or "{}")
         if not isinstance(found, dict) or found.get("start") != _digest(start):

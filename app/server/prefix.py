@@ -1,9 +1,10 @@
-"""The page below a path of another site.
+"""Serves the page below a path of another site.
 
-viser's page opens its web socket at its own address without the slash at the end. A proxy that serves it
-below a path redirects such an address to the one with the slash, and browsers do not follow redirects of web
-sockets. So below a path the page has a name. viser's page then also puts the address of its web socket into
-its own address, which a reload sends; it could be another server's, so it is taken out again.
+viser's page opens its web socket at its own address without the slash at the end. A proxy that serves the
+page below a path redirects this address to the address with the slash, but browsers do not follow redirects
+of web sockets. Therefore the page has a name below a path. viser's page then also writes the address of its
+web socket into its own address, which a reload sends. It could be the address of another server, and is
+removed.
 """
 
 from __future__ import annotations
@@ -16,12 +17,12 @@ from websockets.http11 import Request
 from app.server.door import ELSEWHERE, NAME, Answer, query_of
 
 PREFIX = "X-Forwarded-Prefix"
-"""The header in which a proxy tells the path that it removed; jupyter-server-proxy sends it."""
+"""The header in which a proxy, e.g. jupyter-server-proxy, sends the path that it removed."""
 
 
 def under_its_name(request: Request) -> Answer | None:
-    """Lets a request for the page's name open the page. Returns a redirect to that name for a request of the
-    folder below a path, and for one that names a server, else None."""
+    """Changes a request for the page's name so that it opens the page. Returns a redirect to this name if the
+    request is for the folder below a path or names another server, else None."""
     parts, given = urlsplit(request.path), query_of(request)
     rest = urlencode({name: values for name, values in given.items() if name not in ELSEWHERE}, True)
     query = f"?{rest}" if rest else ""

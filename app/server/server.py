@@ -27,7 +27,7 @@ from lessons.own.folder import Folder
 from lessons.scenes.run_spec import RunSpec
 from robots import InputError
 
-if TYPE_CHECKING:  # a class computes: the server listens before that is loaded
+if TYPE_CHECKING:  # needed for a class only, and loaded late
     from app.classes.hall import Hall
     from app.classes.link import Link
     from app.classes.room import Room
@@ -65,28 +65,29 @@ class PageServer:
         """Starts the server.
 
         Args:
-            choice: what the page shows first.
-            host, port: where it listens.
+            choice: the run that the page shows first.
+            host, port: address at which the server listens.
             max_sessions: number of pages with a robot of their own.
-            grace: time, s, that a session outlives its tab.
-            classroom: all pages show one session, and pages on which the token was typed control it.
+            grace: time, s, for which a session continues after its tab was closed.
+            classroom: all pages show one session; pages on which the token was typed control the session.
             trusted_origins: addresses of proxies that may serve the page.
             ask_token: whether the page asks for a token.
-            own_files: the page whose address contains the owner's secret may open and run files below this
-                folder by their paths; None: no page may.
+            own_files: folder whose files the owner's page may open and run by their paths; None: no page may
+                open files.
             key: signs the learners' progress.
-            token: replaces the random token.
-            refers: a full server answers 503, so that a proxy tries the next one.
+            token: used in place of a random token.
+            refers: a full server answers 503, so that a proxy tries the next server.
             class_names: whether a class is asked for names; None: there is no class.
-            proxy_only: only a proxy that sends the token in its header is let in.
+            proxy_only: only a proxy that sends the token in its header is admitted.
             embed_in: origins whose pages may show the page in a frame.
             all_steer: every page of a classroom controls the robot.
             room: all pages show the robot of this room.
             class_key: the key that the servers of one class have in common.
-            class_of: address of the server whose class this one takes part in.
+            class_of: address of the server in whose class this server takes part.
 
         Raises:
-            InputError: a scene, robot, host, port, origin or combination that cannot be used.
+            InputError: a scene, robot, host, port or origin cannot be used, or the options contradict each
+                other.
         """
         if max_sessions < 1:
             raise InputError(f"max-sessions is {max_sessions}: give 1 or more.")
@@ -96,12 +97,12 @@ class PageServer:
                 f"{VARIABLE}, and leave out --no-token"
             )
         self.host = host
-        """Where it listens."""
+        """The address at which the server listens."""
         self.proxies = tuple(map(as_origin, trusted_origins))
         """The addresses of the trusted proxies."""
         framing = frozenset(each if each == SELF else as_origin(each, "--embed-in") for each in embed_in)
         self.follows = "" if class_of is None else as_origin(class_of, "--class-of")
-        """The address of the server whose class this one takes part in; "" if there is none."""
+        """The address of the server in whose class this server takes part; "" if there is none."""
         _check_choice(choice)
         check_address(host, port)
         few_arenas()
@@ -110,14 +111,14 @@ class PageServer:
         warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
         local = host in LOOPBACK
         self.public = not local or bool(self.proxies)
-        """Whether other people than the users of this machine can reach the page."""
+        """Whether people other than the users of this machine can reach the page."""
         self.proxy_only = proxy_only
         self.guard = ConnectionGuard(Door())
         alone = Classroom(choice, all_steer) if classroom else None
         self.sessions = room or alone or Sessions(choice, max_sessions, grace)
         self._own_files, self._key, self._refers = own_files, key, refers
         self._visits: dict[int, Visit] = {}
-        self._closed = False  # once True, no visit begins
+        self._closed = False  # if True, no new visit begins
         self._lock = threading.Lock()
         self._sockets: Sockets | None = None
         self._link: Link | None = None
@@ -132,7 +133,7 @@ class PageServer:
             raise address_in_use(host, port)
         self.url = local_url(host, found)
         self.outside = self.proxies[0] if self.proxies else seen_from_outside(host, self.url)
-        """The address for other machines, as numbers: phones rarely find a machine by its name."""
+        """The address for other machines, in numbers: phones rarely find a machine by its name."""
         self._viser.gui.configure_theme(show_share_button=False, show_logo=False)
         self._viser.on_client_connect(self._connect)
         self._viser.on_client_disconnect(self._disconnect)
@@ -171,7 +172,8 @@ class PageServer:
 
     @property
     def first_link(self) -> str:
-        """The page that opens at the start: the teacher's of a class, else that of a robot."""
+        """The link to the page that opens at the start: the teacher's page of a class, else the page of a
+        robot."""
         return self.passes.link(self._entrance, "owner", "" if self.hall is None else TEACHER)
 
     @property
@@ -233,8 +235,8 @@ class PageServer:
             visit.leave()
 
     def drain(self, seconds: float, now: threading.Event) -> None:
-        """Lets nobody new in, tells the pages, and returns when all have left, after `seconds`, or when `now`
-        is set."""
+        """Admits no new visitors and informs the pages. Returns when all have left, after `seconds`, or when
+        `now` is set."""
         self.guard.close()
         until = time.monotonic() + seconds
         with self._lock:
@@ -262,16 +264,15 @@ class PageServer:
 
 
 _GO_ON = (
-    "This computer stops in {:.0f} s. Your page then goes on with another one: your browser keeps scene, "
-    "settings, step and progress; the robot begins anew."
+    "This computer stops in {:.0f} s. Your page then connects to another computer. Your browser keeps scene, "
+    "settings, step and progress; the robot starts again."
 )
-_HAND_IN = "The lab stops in {:.0f} s: save what you need, or hand in your progress (Export)."
+_HAND_IN = "The lab stops in {:.0f} s: save your data, or hand in your progress (Export)."
 
 
 def _check_choice(choice: SceneChoice) -> None:
-    """Checks a choice, so that a wrong name or file gives one sentence on the terminal instead of a page. If
-    the names are not enough for the check, it loads the scene, which takes a second before anybody can
-    connect."""
+    """Checks a choice before the server starts: a wrong name or file then gives one sentence on the terminal.
+    If the names are not enough for the check, the scene is loaded, which takes a second."""
     if not choice.known:
         from app.worker.reports.start import start
 
@@ -279,8 +280,8 @@ def _check_choice(choice: SceneChoice) -> None:
 
 
 def _load(choice: SceneChoice) -> None:
-    """Loads what pages need while the first page connects: the panels, then the meshes, whose simplification
-    takes a moment."""
+    """Loads the data of pages while the first page connects: the panels, then the meshes, whose
+    simplification takes some time."""
     import_module("app.page.layout")
     from robots.shapes.link_shapes import link_shapes
 

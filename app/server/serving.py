@@ -21,13 +21,14 @@ def serve(
     drain: float = 0.0,
     over: Callable[[], bool] = lambda: False,
 ) -> int:
-    """Serves the pages of a server until Ctrl-C, SIGTERM, or until `over` returns True; then closes it.
+    """Serves the pages of a server until Ctrl-C, SIGTERM, or until `over` returns True. Then closes the
+    server.
 
     Args:
-        server: just started.
-        open_browser: whether a browser opens its first page.
-        drain: time, s, that open pages have after SIGTERM.
-        over: called twice a second.
+        server: the server, which was just started.
+        open_browser: whether to open the first page in a browser.
+        drain: time, s, for which open pages continue after SIGTERM.
+        over: called twice a second; True ends the server.
     """
     stop, now = threading.Event(), threading.Event()
     try:
@@ -50,8 +51,8 @@ def serve(
 
 @contextlib.contextmanager
 def _ended_by_signals(stop: threading.Event, now: threading.Event) -> Iterator[None]:
-    """Lets Ctrl-C and SIGTERM set `stop`, and Ctrl-C and every further signal also `now`; the previous signal
-    handlers are restored afterwards."""
+    """Within this context, Ctrl-C and SIGTERM set `stop`. Ctrl-C and every further signal also set `now`. The
+    previous signal handlers are restored afterwards."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

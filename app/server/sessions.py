@@ -1,5 +1,5 @@
-"""The learners: one per browser tab. A page that reloads gets its learner back; a learner is removed some
-seconds after its tab closed."""
+"""The learners: one per browser tab. After a reload, a page gets its learner back. A learner is removed some
+seconds after its tab was closed."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from app.link.spares import Spares
 from app.server.malloc_tuning import give_back
 
 WORKER = "app.worker.entry"
-"""The module that a simulation process runs; it is given by name, as the server never imports it."""
+"""The name of the module that a simulation process runs. The server never imports this module."""
 Refuse = Callable[[str], object]
-"""Shows a sentence on the page that asked for something that is not allowed."""
+"""Shows a sentence on the page whose command is not allowed."""
 
-GRACE = 10.0  # s that a session outlives its tab: enough for a reload
-_PERIOD = 0.5  # s between two checks which learners have left
+GRACE = 10.0  # s for which a session continues after its tab was closed: enough for a reload
+_PERIOD = 0.5  # s between two checks for learners who have left
 _TIDY = 10.0
-"""Interval, s, at which free memory is returned to the system if scenes were changed since the last time."""
+"""Shortest time, s, after which free memory is returned to the system again, if scenes were changed."""
 
 
 class Sessions:
@@ -51,7 +51,7 @@ class Sessions:
             return tuple(self._learners.values())
 
     def guide(self) -> SimulationClient:
-        """The robot of a teacher, which takes no learner's place and lasts as long as the server."""
+        """Returns the robot of a teacher. It uses no learner's place and lasts as long as the server."""
         with self._lock:
             if self._guide is None:
                 self._guide = SimulationClient(secrets.token_urlsafe(16), self.start, self._spares)
@@ -60,9 +60,10 @@ class Sessions:
     def enter(
         self, tokens: Sequence[str], refuse: Refuse | None = None, account: str = ""
     ) -> SimulationClient | None:
-        """Returns the learner that this browser left, or a new one; None if all places are taken. A place
-        that was left a moment ago is reserved for the browser with its token. tokens: of the browser, latest
-        last; account: with which its user signed in, whose learners alone it gets."""
+        """Returns the learner that this browser left, or a new learner; None if all places are taken. A place
+        that was left a moment ago is reserved for the browser that has its token. tokens: the tokens of the
+        browser, latest last; account: the account with which the user signed in; a browser gets only learners
+        of this account."""
         with self._lock:
             if self._closed.is_set():
                 return None

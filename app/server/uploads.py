@@ -10,12 +10,12 @@ import msgspec
 from app.server.budget import UPLOADS, Budget
 
 TRANSFER = b"FileTransfer"
-"""Every message that begins or carries a file contains this."""
-_REMEMBERED = 64  # number of refused uploads that are remembered, since parts of them may still arrive
+"""Every message that begins or carries a file contains these bytes."""
+_REMEMBERED = 64  # number of refused uploads that are stored, since parts of them may still arrive
 
 
 class _Transfer(msgspec.Struct):
-    """The decoded fields of an upload message; the file's bytes are skipped."""
+    """The decoded fields of an upload message, without the file's bytes."""
 
     transfer_uuid: str = ""
     size_bytes: int = 0
@@ -25,7 +25,7 @@ class Uploads:
     """The uploads of one page.
 
     Args:
-        unfinished: returns the number of bytes of its incomplete files.
+        unfinished: returns the number of bytes of the page's incomplete files.
         forget: discards the received parts of a file.
         say: shows the user that a file was too large.
     """

@@ -35,23 +35,23 @@ from app.server.workers import Workers
 from lessons.own.folder import Folder
 from lessons.replay.progress import LearnerProgress, load_progress
 
-if TYPE_CHECKING:  # a class computes: the server listens before that is loaded
+if TYPE_CHECKING:  # needed for a class only, and loaded late
     from app.classes.room import Room
 
 STORAGE = 5.0
-"""Time, s, within which a browser must send the values that it has stored."""
+"""Time, s, within which a browser must send its stored values."""
 _TOKENS = "himpc-lab-sessions"
 _DARK = "himpc-lab-dark"
 _PROGRESS = "himpc-lab-lessons"
-_ELSEWHERE = 3.0  # s for which a page says that all places are taken, before it connects again
+_ELSEWHERE = 3.0  # s for which a full server's page waits before it connects again
 _PERIOD = 1.0  # s between two checks of the page's place
-_GOES_ON = ("You go on where you were", "Your robot begins anew, with the settings or the step that you had.")
-_LONGEST = 100_000  # characters that we read of each stored value
+_GOES_ON = ("Continued from before", "The robot starts again, with the settings or the step that you had.")
+_LONGEST = 100_000  # largest number of characters of a stored value
 
 
 class Visit:
-    """One visit of a browser. Each visit has a thread that admits and closes it. Callbacks run on a few other
-    threads. Therefore no visit blocks viser's loop."""
+    """One visit of a browser. Each visit has a thread that admits and closes the visit. Callbacks run on a
+    few other threads. Therefore no visit blocks viser's loop."""
 
     def __init__(
         self,
@@ -64,7 +64,7 @@ class Visit:
         refers: bool = False,
     ) -> None:
         """own_files: folder of the files that the owner's page may name; key: signs the learners' progress;
-        room: the class, if there is one; refers: a page for which there is no place connects again, perhaps
+        room: the class, if there is one; refers: if all places are taken, the page connects again, perhaps
         with another server."""
         self._server = server
         self._client = client
@@ -75,8 +75,8 @@ class Visit:
         self._seat = ""
         self._asking: asyncio.Future[tuple[str | None, ...]] | None = None
         self._dark = False
-        self._place: SceneChoice | None = None  # where this tab was, if another server showed it
-        self._seen: tuple[object, object] | None = None  # the scene and settings that were kept last
+        self._place: SceneChoice | None = None  # the tab's place on another server
+        self._seen: tuple[object, object] | None = None  # the last stored scene and settings
         self._notebook = Notebook(LearnerProgress(), lambda _: None)
         self._comfort = Comfort(client, reduced=False)
         self._workers = Workers()
@@ -89,7 +89,7 @@ class Visit:
             self._own_files = None
         self._teaches = isinstance(connection, GuardedConnection) and connection.teaches
         self._account = connection.account if isinstance(connection, GuardedConnection) else ""
-        # Pages of all accounts of a hub have one origin, so that a browser stores their values in one place.
+        # All accounts of a hub have one origin: a browser stores their values together, under different keys.
         self._progress_key, self._tokens_key = (
             f"{key}-{self._account}" if self._account else key for key in (_PROGRESS, _TOKENS)
         )
@@ -102,8 +102,8 @@ class Visit:
             )
 
     async def arrive(self) -> None:
-        """Starts the visit, on viser's loop, unless it has ended already. A browser that does not answer is
-        treated as a new one."""
+        """Starts the visit on viser's loop, unless the visit has ended already. A browser that does not
+        answer is treated as a new browser."""
         private.run_script(self._client, ASK_MOTION)
         here = f"himpc-lab-place-{secrets.token_hex(8)}"
         size = f"{here}-window"
@@ -143,14 +143,14 @@ class Visit:
             self._steps.shutdown(wait=False)
 
     def close(self) -> None:
-        """As `leave`, and waits until the visit has ended."""
+        """As `leave`, but waits until the visit has ended."""
         self.leave()
         self._steps.shutdown(wait=True)
 
     # ---------------------------------------------------------------- steps, on a thread of their own
 
     def _then(self, tokens: Sequence[str], kept: str | None = None) -> None:
-        """Tries to admit the page, for the first time or again. kept: the place that its tab stored."""
+        """Tries to admit the page, for the first time or again. kept: the place that the tab stored."""
         if not self._left:
             self._steps.submit(self._admit, tokens, kept).add_done_callback(print_exception)
 
@@ -201,7 +201,7 @@ class Visit:
     # ---------------------------------------------------------------- where the page is
 
     def _watch(self) -> None:
-        """Checks every _PERIOD s, on viser's event loop, whether scene or settings have changed; if so, the
+        """Checks every _PERIOD s, on viser's event loop, whether scene or settings have changed. If so, the
         tab stores the page's new place (see `app.server.place`)."""
         if self._left or not isinstance(self._sessions, Sessions):
             return
@@ -232,8 +232,8 @@ class Visit:
         self._keep(_DARK, "1" if on else "0")
 
     def _greet(self, learner: SimulationClient, leads: bool, gui: viser.GuiApi) -> None:
-        """Adds the field for the instructor's token to a page that can only watch, and the card of a class to
-        a page of the class."""
+        """Adds the field for the instructor's token to a page that can only watch. Adds the card of a class
+        to a page of the class."""
         room = self._room
         if room is not None and not leads:
             watches = isinstance(learner, Watcher)
@@ -259,7 +259,7 @@ class Visit:
     def _refuse_upload(self) -> None:
         self._client.add_notification(
             "Not uploaded",
-            f"Files that are being uploaded may have {UPLOADS // 1_000_000} MB in all: choose a smaller "
+            f"All uploads together may have at most {UPLOADS // 1_000_000} MB: choose a smaller "
             "file, or wait until the other uploads are complete.",
             color="red",
         )
@@ -291,7 +291,7 @@ class Visit:
             self._then(tokens, kept)
 
     def _send_on(self) -> None:
-        """Ends a connection for which all places were taken: the page then connects again by itself."""
+        """Ends a connection that got no place. The page then connects again by itself."""
         connection = private.connection_of(self._server, self._client)
         if self._page is None and connection is not None:
             connection.transport.abort()

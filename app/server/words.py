@@ -1,4 +1,5 @@
-"""The messages that a browser may send: their fields, types and bounds. Other messages never reach viser."""
+"""The messages that a browser may send: their fields, types and bounds. No other message is passed on to
+viser."""
 
 from __future__ import annotations
 
@@ -9,16 +10,16 @@ import msgspec
 from msgspec import Meta
 
 LONGEST = 2_000_000
-"""Largest size, B, of a message that contains no part of a file. A text that the page sends has at most
-200,000 characters."""
+"""Largest size, B, of a message without a part of a file. A text in a message of the page has at most 200,000
+characters."""
 _FILE = b"FileTransfer"  # in every message that begins or carries a file
 _CAMERA = b"ViewerCamera"  # in messages that pages send by themselves
-_LEAST = 1e-9  # m, or the norm of a quaternion: a shorter vector has no direction
+_LEAST = 1e-9  # m, or norm of a quaternion; a shorter vector has no direction
 
 Name = Annotated[str, Meta(max_length=1000)]
 Metres = Annotated[float, Meta(ge=-1e6, le=1e6)]
-"""A coordinate of a dragged object; beyond these bounds it is outside every scene. NaN does not satisfy
-them."""
+"""A coordinate of a dragged object. A point beyond these bounds is outside every scene. NaN does not satisfy
+the bounds."""
 Share = Annotated[float, Meta(ge=-1e6, le=1e6)]
 Place = tuple[Metres, Metres, Metres]
 Turn = tuple[Share, Share, Share, Share]
@@ -31,7 +32,7 @@ Modifier = (
 
 
 class ViewerCameraMessage(msgspec.Struct, forbid_unknown_fields=True, tag=True, tag_field="type"):
-    """The camera of the page. A canvas without a layout has no size."""
+    """The camera of the page. The size is 0 for a canvas without a layout."""
 
     wxyz: Turn
     position: Place
@@ -164,8 +165,8 @@ _SMALL, _FILES = msgspec.msgpack.Decoder(Small | File), msgspec.msgpack.Decoder(
 
 
 def refusal(raw: bytes) -> str | None:
-    """The sentence that says why a message is refused; "" if it is refused without a notice, None if it is
-    valid."""
+    """Returns the reason, as a sentence, why a message is refused; "" if it is refused without a notice, None
+    if it is valid."""
     decoder = _SMALL if len(raw) <= LONGEST else _FILES if _FILE in raw else None
     if decoder is None:
         return f"The message is too long: a page may send at most {LONGEST // 1000} kB at once."

@@ -1,4 +1,4 @@
-"""The threads of one page: its callbacks run here, so that they do not block other pages."""
+"""The threads of one page. The page's callbacks run on these threads, and do not block other pages."""
 
 from __future__ import annotations
 

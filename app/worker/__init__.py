@@ -1,1 +1,1 @@
-"""The simulation process: the session that runs, its pacing, leader and ghost."""
+"""The simulation process: the running session and its pacing, the leader and the ghost."""

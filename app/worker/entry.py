@@ -1,5 +1,5 @@
-"""The module with which simulation processes start. The server refers to it by its name. It imports little
-itself, so that it can report the progress of the other imports."""
+"""The module with which simulation processes start. The server refers to this module by its name. The module
+imports little: it can then report the progress of the other imports."""
 
 from __future__ import annotations
 
@@ -9,18 +9,20 @@ from app.link.wire import Wire
 
 
 def warm(say: Callable[[str], None]) -> None:
-    """Imports everything that simulations need. `say` receives sentences about the progress, for a waiting
-    page."""
+    """Imports everything that simulations need. say: called with sentences about the progress, for a page
+    that waits."""
     from himpc.compilation.compiling import compile_all
 
-    compile_all(lambda ready, of: say(f"compiling the controllers, this once: {ready} of {of} functions"))
+    compile_all(
+        lambda ready, of: say(f"compiling the controllers, only this time: {ready} of {of} functions")
+    )
     from app.worker.main import rehearse
 
     rehearse()
 
 
 def main(wire: Wire) -> None:
-    """Runs a simulation until the page sends Quit or has ended."""
+    """Runs a simulation until the page sends Quit or ends."""
     from app.worker.main import main as simulate
 
     simulate(wire)

@@ -1,4 +1,4 @@
-"""The process of a ghost: a simulation without a clock of its own that runs up to its leader's time."""
+"""The process of a ghost: a simulation without its own clock, which runs up to its leader's time."""
 
 from __future__ import annotations
 
@@ -23,10 +23,11 @@ _CHUNK = 0.01  # s: the longest run between two checks for commands
 
 @final
 class GhostBody:
-    """A simulation whose session follows another one."""
+    """A simulation whose session follows another session."""
 
     def __init__(self, begin: Begin, own: tuple[str, ...]) -> None:
-        """Raises InputError for a scene that cannot be loaded, or own settings that do not fit it."""
+        """Raises InputError if the scene cannot be loaded, or if `own` contains settings that do not fit the
+        scene."""
         scene = ghost_scene(begin.choice.scene(), begin.settings, own)
         if begin.q_0 is not None:
             rest = np.zeros(len(begin.q_0))
@@ -36,7 +37,8 @@ class GhostBody:
         self.driver = GhostDriver(self.body.session, begin.settings, own)
 
     def catch_up(self, until: float) -> bool:
-        """Runs all steps that are due, but stops at a time of `perf_counter`; returns whether it ran any."""
+        """Runs all steps that are due, but stops at the time `until` of `perf_counter`; returns whether it
+        ran any step."""
         ran = False
         while self.driver.due and (not ran or time.perf_counter() < until):
             self.body.tick()
@@ -59,7 +61,7 @@ def follow(wire: Wire, first: FollowLeader) -> None:
                 if isinstance(command, FollowLeader):
                     ghost = _hear(wire, ghost, command)
                     if command.script.begin is not None:
-                        reached = -1.0  # the leader waits until it hears that the ghost has started
+                        reached = -1.0  # the leader waits for the report that the ghost has started
             if ghost is None:
                 continue
             ran = ghost.catch_up(time.perf_counter() + _CHUNK)

@@ -10,7 +10,7 @@ from lessons.session.session import Session
 
 
 class Leader:
-    """The events for a ghost. There is no ghost until `begin`; afterwards the ghost receives all events that
+    """The events for a ghost. Before `begin` there is no ghost. Afterwards the ghost receives all events that
     took effect, in order."""
 
     def __init__(self) -> None:
@@ -21,8 +21,8 @@ class Leader:
         self._t = math.nan
 
     def begin(self, choice: SceneChoice, session: Session) -> None:
-        """Called when the session was just reset and the ghost begins. The simulation waits until the ghost
-        has started."""
+        """Called when the session has just been reset and the ghost begins. The simulation then waits until
+        the ghost has started."""
         self.on, self.until = True, 0.0
         self._begin = Begin(choice, session.settings)
         self._told = len(session.log)
@@ -36,7 +36,7 @@ class Leader:
         return t > self.until + 1e-9
 
     def script(self, session: Session) -> Script | None:
-        """The events since the last call; None if there are none."""
+        """Returns the events and the time reached since the last call; None if nothing has changed."""
         if not self.on:
             return None
         begin, self._begin = self._begin, None

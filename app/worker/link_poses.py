@@ -11,7 +11,7 @@ _WXYZ = [0, 1, 2, 6, 3, 4, 5]
 
 
 class LinkPoses:
-    """The poses of joints 1 … n and the tip: (n + 1, 7), position in m and quaternion wxyz."""
+    """Computes the poses of joints 1 … n and the tip: (n + 1, 7), position in m and quaternion wxyz."""
 
     def __init__(self, robot: Robot) -> None:
         self._model = robot.model
@@ -20,7 +20,7 @@ class LinkPoses:
         self._poses = np.zeros((robot.n + 1, 7))
 
     def at(self, q: np.ndarray) -> np.ndarray | None:
-        """The poses at joint positions q, in a buffer that the next call overwrites; None if they are not
+        """Returns the poses at joint positions q, in a buffer that the next call overwrites; None if q is not
         finite."""
         if not np.isfinite(q).all():
             return None

@@ -16,8 +16,8 @@ from lessons.settings.assignments import parse_assignment
 
 @dataclass(frozen=True, eq=False)
 class Loaded:
-    """A scene at its start, after all checks that could refuse it. mine: the learner's changes; left_out:
-    reasons why tasks of files are not offered."""
+    """A scene at its start, which has passed all checks. mine: the learner's changes; left_out: for each task
+    of a file that is not offered, the reason."""
 
     choice: SceneChoice
     scene: Scene
@@ -27,8 +27,8 @@ class Loaded:
     left_out: tuple[str, ...] = ()
 
     def looks_like(self, choice: SceneChoice, session: Session) -> bool:
-        """Whether this is another step of the lesson that runs and looks the same, so that the page need not
-        be rebuilt."""
+        """Whether this is a step of the running lesson and looks the same. The page need not be rebuilt
+        then."""
         then, now = choice.exercise, self.choice.exercise
         if then is None or now is None or then.lesson != now.lesson:
             return False
@@ -36,8 +36,8 @@ class Loaded:
 
 
 def loaded_from(choice: SceneChoice, scene: Scene | None, judged: bool) -> Loaded:
-    """Loads a scene. scene: replaces the one of the choice; judged: whether the claims of a lesson are
-    judged, if it is a step of one. Raises InputError for a scene or robot that cannot be loaded."""
+    """Loads a scene. scene: replaces the scene of the choice; judged: whether the claims are judged, if the
+    choice is a step of a lesson. Raises InputError for a scene or robot that cannot be loaded."""
     left_out: tuple[str, ...] = ()
     if scene is None:
         choice, scene, left_out = choice.fitted()

@@ -1,5 +1,5 @@
-"""The simulation process: one `SimulationRunner`, driven in real time. `rehearse` loads, in the fork server,
-everything that a simulation needs."""
+"""The simulation process: runs one `SimulationRunner` in real time. `rehearse` is called in the fork server
+and loads everything that a simulation needs."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ STATUS_PERIOD = 0.1  # s
 SCRIPT_PERIOD = 0.02  # s
 _CHUNK = 0.01  # s: the longest run between two checks for commands
 _BEAT = 0.004
-"""Time, s, between two checks for steps that are due. Waking up for each tick of a millisecond takes three
-times as much processor time, as the caches are cold each time. A command wakes the process at once."""
+"""Time, s, between two checks for steps that are due. If the process woke up for each tick of a millisecond,
+it would need three times as much processor time, as the caches are cold each time. A command wakes the
+process at once."""
 _IDLE = 0.02  # s: time between two checks while the simulation is idle
 _STIR = 0.3  # s: for this time after a command or a run, an idle simulation reports as often as a running one
 PULSE = 0.5
-"""Time, s, between two reports of a simulation that rests: it is idle, and the last command is long past."""
+"""Time, s, between two reports of a simulation that rests: it is idle, and received no command for _STIR."""
 
 
 _USUAL = ("iiwa14-hold", "ridgeback-ur10-square")
 
 
 def rehearse() -> None:
-    """Runs both kinds of controllers for a moment, so that everything that is loaded on first use is
-    loaded."""
+    """Runs both kinds of controllers for a moment. Everything that is loaded on first use is then loaded."""
     for scene in _USUAL:
         body = SimulationRunner(SceneChoice(RunSpec(scene)))
         body.tick(3)
@@ -47,8 +47,8 @@ def rehearse() -> None:
 
 
 def main(wire: Wire) -> None:
-    """Entry point of the process. Waits, with everything imported, for the first scene, then simulates it
-    until the page sends Quit or has ended."""
+    """Entry point of the process, called after all imports. Waits for the first scene, then simulates it
+    until the page sends Quit or ends."""
     # Ctrl-C in a terminal reaches the whole process group; the page itself ends its children.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     _let_ticks_end()
@@ -62,8 +62,8 @@ def main(wire: Wire) -> None:
 
 
 def _let_ticks_end() -> None:
-    """Lets a tick finish before another simulation gets the core. With eight simulations on two cores, a
-    third fewer ticks are late."""
+    """Lets a tick finish before another simulation gets the core. With eight simulations on two cores, this
+    reduces the number of late ticks by a third."""
     if hasattr(os, "SCHED_BATCH"):  # only on Linux
         with suppress(OSError):  # forbidden in some containers
             os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
@@ -143,7 +143,7 @@ def _simulate(wire: Wire, body: SimulationRunner) -> None:
             body.write_poses()
             next_pose = now + POSE_PERIOD
         if now >= next_status:
-            # A run at full speed never reaches the requested speed, so it does not count as slowed down.
+            # A run at full speed never reaches the requested speed, and does not count as slowed down.
             capped = pacer.capped(now) and body.pace == body.speed
             wire.send(body.status(pacer.real_time_factor(now), capped))
             next_status = now + (PULSE if rests else STATUS_PERIOD)
@@ -159,7 +159,7 @@ def _simulate(wire: Wire, body: SimulationRunner) -> None:
 
 
 def _run(body: SimulationRunner, pacer: Pacer, due: int, until: float) -> int:
-    """Runs at most `due` steps; returns how many were run."""
+    """Runs at most `due` steps; returns the number of steps that were run."""
     for ran in range(due):
         step_s = body.session.step_s
         if body.leader.waits(body.session.t + step_s):
@@ -172,7 +172,8 @@ def _run(body: SimulationRunner, pacer: Pacer, due: int, until: float) -> int:
 
 
 def _sentence(error: Exception) -> str:
-    """The exception and the line of our code that raised it, short enough for a page."""
+    """Returns the exception and the line of our code that raised it, in a text that is short enough for a
+    page."""
     frames = traceback.extract_tb(error.__traceback__)
     place = f" ({os.path.basename(frames[-1].filename)}, line {frames[-1].lineno})" if frames else ""
     return f"{type(error).__name__}: {error}{place}"[:600]

@@ -1,4 +1,4 @@
-"""The shared memory for a session's telemetry, as wide as its rows."""
+"""The shared memory for a session's telemetry, with the width of its rows."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ class Outlet:
 
     Attributes:
         block: the shared memory.
-        poses: computes the poses that are written there.
-        layout: of the rows.
-        step_us, late: numbers of these columns; None if a row has no such column.
+        poses: computes the poses that are written into the memory.
+        layout: the layout of the rows.
+        step_us, late: the indices of these columns; None if a row has no such column.
         told: whether the page has received the handle of this memory.
     """
 
@@ -36,7 +36,7 @@ class Outlet:
         return session.layout is self.layout
 
     def write_poses(self, session: Session) -> None:
-        """The plant's true link poses, for the 3D view."""
+        """Writes the true poses of the plant's links, for the 3D view."""
         poses = self.poses.at(np.asarray(session.plant.q))
         if poses is not None:
             self.block.write_poses(poses, session.t)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 BACKLOG = 0.1
-"""Largest debt, in s of real time or, if the simulation is slower than real time, of simulated time. Beyond
-it, simulated time slows down and no further work accumulates."""
+"""Largest debt, s: of real time if the simulation is faster than real time, otherwise of simulated time.
+Beyond this debt, simulated time slows down and no further work accumulates."""
 _MEMORY = 1.0
 """Time, s, over which the real-time factor is averaged and for which a slowdown is shown."""
 
 
 class Pacer:
-    """Keeps account of the simulated time that is due. Times are arguments, so that tests need no clock."""
+    """Computes the simulated time that is due. Times are arguments, so that tests need no clock."""
 
     def __init__(self, now: float) -> None:
         self.speed = 1.0
@@ -22,7 +22,7 @@ class Pacer:
         self._factor = 0.0
 
     def due(self, now: float, T_s: float) -> int:
-        """The number of ticks to run now."""
+        """Returns the number of ticks to run now."""
         self._debt += (now - self._last) * self.speed
         self._last = now
         most = BACKLOG * max(1.0, self.speed)
@@ -37,7 +37,7 @@ class Pacer:
         self._ran += ticks * T_s
 
     def rest(self, now: float) -> None:
-        """Called while the simulation is paused or loads a scene: this time does not count as due."""
+        """Called while the simulation is paused or loads a scene. This time does not count as due."""
         self._last = now
         self._debt = 0.0
         self._window = (now, self._ran)

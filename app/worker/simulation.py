@@ -1,4 +1,4 @@
-"""The simulation behind one page, without process and clock: the worker drives it in real time, tests step it
+"""The simulation behind one page, without process and clock. The worker runs it in real time; tests step it
 directly."""
 
 from __future__ import annotations
@@ -43,11 +43,11 @@ from robots import InputError
 
 @final
 class SimulationRunner:
-    """A session, its play state and speed, and the memory for its telemetry."""
+    """A session with its play state, its speed and the memory for its telemetry."""
 
     def __init__(self, choice: SceneChoice, scene: Scene | None = None, judged: bool = True) -> None:
-        """scene: replaces the one of the choice; judged: whether the claims of a lesson are judged, if it is
-        a step of one. Raises InputError for a scene or robot that cannot be loaded."""
+        """scene: replaces the scene of the choice; judged: whether the claims are judged, if the choice is a
+        step of a lesson. Raises InputError for a scene or robot that cannot be loaded."""
         self._judged = judged
         self.running, self.speed = True, 1.0
         self.resets, self.leader = 0, Leader()
@@ -58,7 +58,7 @@ class SimulationRunner:
         self._begin_anew(loaded)
 
     def _begin_anew(self, loaded: Loaded) -> None:
-        """Takes over a loaded scene; the robot of a lesson stands still until its script begins."""
+        """Begins a loaded scene. The robot of a lesson stands still until the lesson's script begins."""
         self.choice, self.scene, self.left_out = loaded.choice, loaded.scene, loaded.left_out
         self.run, self.lecturer = loaded.run, loaded.lecturer
         self.running, self.speed = self.lecturer is None, 1.0
@@ -86,7 +86,7 @@ class SimulationRunner:
         return self._outlet.block
 
     def _refit(self) -> None:
-        """Allocates other memory when a new stack changes the layout of the rows; `news` then returns the
+        """Allocates new memory when a new stack changes the layout of the rows. `news` then returns the
         message for the page."""
         if not self._outlet.fits(self.session):
             before, self._outlet = self._outlet, Outlet(self.session, told=False)
@@ -94,7 +94,8 @@ class SimulationRunner:
             self.write_poses()
 
     def news(self) -> Ready | None:
-        """The message about a changed telemetry layout; None if there is none since the last call."""
+        """Returns the message about a changed telemetry layout; None if there is no change since the last
+        call."""
         told, self._outlet.told = self._outlet.told, True
         return None if told else replace(self.ready(), again=True)
 
@@ -202,7 +203,8 @@ class SimulationRunner:
                 pass
 
     def advance(self) -> bool:
-        """Runs one step; returns whether it completed a control period, whose telemetry was then written."""
+        """Runs one step and returns whether it completed a control period. The period's telemetry is then
+        written."""
         row = self.session.advance()
         if row is None:
             return False
@@ -213,7 +215,7 @@ class SimulationRunner:
         self.over_budget += bool(row[outlet.step_us] > 1e6 * self.session.settings.T_s)
         self.late += outlet.late is not None and bool(row[outlet.late])
         if self.lecturer is not None and self.lecturer.follow(row):
-            # The run stops, so that the learner sees the pose at which control was lost.
+            # The run is paused if control was lost: the learner then sees the pose at that time.
             self.running = self.session.diverged_at is None
         return True
 
@@ -229,13 +231,13 @@ class SimulationRunner:
         return self.running or (self.lecturer is not None and self.lecturer.busy)
 
     def _finish_period(self) -> None:
-        # A pause falls between two control periods. Changes made meanwhile take effect at once, and a
-        # recording of the run with the same events gives the same result.
+        # A pause begins between two control periods. Changes during the pause take effect at once, and a
+        # replay of the run with the same events gives the same result.
         if not self.running and self.session.between:
             self.tick()
 
     def settle(self) -> None:
-        """While paused: lets requested changes take effect at once, although no time passes."""
+        """Called while paused: requested changes take effect at once, although no time passes."""
         self.session.drain()
         self._refit()
         if self.lecturer is not None and self.lecturer.idle():

@@ -29,7 +29,7 @@ def test_the_command_drives_and_records(tmp_path: Path, capsys: pytest.CaptureFi
     main([*words.split(), "--npz", str(path), "--plot", str(tmp_path)])
     assert (tmp_path / "arm.png").read_bytes()[:4] == b"\x89PNG"
     told = capsys.readouterr().out
-    assert "the loop has taken over" in told
+    assert "the loop controls the arm" in told
     assert "ended: " in told
     with np.load(path) as data:
         rows = len(data["t"])

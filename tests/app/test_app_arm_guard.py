@@ -57,7 +57,7 @@ def reading(v: float = 0.0, q: float = 0.0) -> Reading:
     [
         ({"missed": 11}, 1, "11 periods were missed one after another"),
         ({"missed": 1}, 1000, "% of the periods were missed during the last second"),
-        ({"hurried": True}, 26, "change too fast in 26 periods"),
+        ({"hurried": True}, 26, "changed too fast in 26 periods"),
         ({"fallback": 6}, 11, "no torque in 11 periods"),
         ({"reading": reading(v=2.4)}, 1, "joint 1 moves with 2.40 rad/s"),
         ({"reading": reading(q=float("nan"))}, 1, "not finite"),

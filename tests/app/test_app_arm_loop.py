@@ -108,7 +108,7 @@ def test_the_torque_that_acted_counts(bench: Bench) -> None:
         drags = {50: bench.order(0.03, 0.0, 0.03)}
         late = bench.plant(delay_ms=2.0)
         ended, rows, at, _ = bench.run(note, 2500, drags, late, commanded, delay)
-        assert ended.why == "the watcher asked for it"
+        assert ended.why == "the watcher requested it"
         speeds.append(np.abs(rows[2300:2500, at.v]).max())
     assert speeds[1] < 0.03 < 0.1 < speeds[0]
 
@@ -119,7 +119,7 @@ def test_a_drive_holds_drags_and_ends(bench: Bench) -> None:
     driven = bench.drive(tell=told.append, duration=0.6, drags=(Drag(0.1, bench.order(0.02, 0.0, 0.02)),))
     assert driven.why == "the 0.6 s are over"
     assert driven.gently
-    assert told[0] == "the loop has taken over"
+    assert told[0] == "the loop controls the arm"
     at = Columns.of(7, bench.make().view("error").size)
     running = driven.rows[:, at.ending] == 0
     q = driven.rows[running][:, at.q]

@@ -107,7 +107,7 @@ class Unborn(Process):
 
     @property
     def preparing(self) -> str:
-        return "compiling the controllers, this once: 3 of 40 functions"
+        return "compiling the controllers, only this time: 3 of 40 functions"
 
 
 def test_a_page_says_at_once_what_is_compiled() -> None:

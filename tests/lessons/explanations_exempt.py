@@ -159,7 +159,7 @@ TEXTS = (
         ("app/panels/run/hand_in.py", "This lab has no instructor's key"),
     )),
     Exempt("software", "tests/app/test_app_door.py::test_other_sites_are_refused", (
-        ("app/server/door.py", "It comes from a page of another site."),
+        ("app/server/door.py", "The request comes from a page of another site."),
     )),
 )
 # fmt: on

@@ -1,5 +1,5 @@
 "use strict";
-// What both pages share: the connection, and the bars of a vote.
+// The code that both pages share: the connection, and the bars of a vote.
 const ID = (name) => document.getElementById(name);
 const DARK = window.matchMedia("(prefers-color-scheme: dark)");
 const news = { all: null, class: null, pose: null };
@@ -25,7 +25,7 @@ function connect(opened, heard) {
   };
 }
 
-// Poses come five times a second; in between, the robot is drawn between the last two, a fifth of a second late.
+// Poses arrive five times a second. The robot is drawn between the last two poses, a fifth of a second late.
 const PERIOD = 200, STILL = window.matchMedia("(prefers-reduced-motion: reduce)");
 const moving = { from: null, to: null, began: 0, drawing: false };
 
@@ -78,7 +78,7 @@ function show(name, on) {
   ID(name).hidden = !on;
 }
 
-// The last round, with the round before it as a thin bar.
+// Draws the last round, with the round before it as a thin bar.
 function bars(rounds) {
   if (!rounds.length) return "";
   const last = rounds[rounds.length - 1], first = rounds.length > 1 ? rounds[0] : null;
@@ -93,7 +93,7 @@ function bars(rounds) {
   }).join("");
 }
 
-// Widths are set by script: the page allows no style in HTML.
+// The script sets the widths, as the page allows no style in HTML.
 function spread() {
   for (const each of document.querySelectorAll("[data-share]")) each.style.width = `${each.dataset.share}%`;
 }

@@ -6,7 +6,7 @@ function stored() {
 }
 
 function keep(seat) {
-  try { localStorage.setItem(SEAT, seat); } catch { /* a browser that stores nothing gets a new seat */ }
+  try { localStorage.setItem(SEAT, seat); } catch { /* a browser that cannot store the seat gets a new one */ }
 }
 
 function figure(value) {

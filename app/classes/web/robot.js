@@ -1,5 +1,5 @@
 "use strict";
-// Draws a robot of capsules, seen from the front right and slightly from above; what is nearer is drawn later.
+// Draws a robot of capsules, seen from the front right and slightly from above. Nearer capsules are drawn later.
 const VIEW = { turn: 2.5, tilt: 0.3 };
 
 function drawRobot(canvas, shape, pose, dark) {
@@ -70,7 +70,7 @@ function turned([x, y, z]) {
   return [right, -(ct * z + st * away), st * z - ct * away];
 }
 
-// The picture grows with what the robot reaches and never shrinks, so that it does not jump.
+// The frame grows with the robot's motion and never shrinks, so that the picture does not jump.
 function frameOf(canvas, parts, width, height) {
   const key = parts.length;
   let box = canvas.box;

@@ -66,7 +66,7 @@ function main(name) {
   for (const each of ["go", "open", "close", "run"]) ID(each).classList.toggle("main", each === name);
 }
 
-// The lists follow the class only when it moves, so that the teacher can choose in peace.
+// The lists change only when the class goes to another step: meanwhile the teacher can choose freely.
 function follow(place) {
   const key = JSON.stringify(place);
   if (key === chosen || !place) return;

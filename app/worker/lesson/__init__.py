@@ -1,1 +1,1 @@
-"""The lecturer: it knows which step of a lesson is active and judges its run."""
+"""The lecturer, which judges the run of the active step of a lesson."""

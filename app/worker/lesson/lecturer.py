@@ -1,5 +1,5 @@
-"""Follows the run of an exercise in the simulation process: records it, evaluates its claims, and reports its
-end.
+"""Follows the run of an exercise in the simulation process: records the run, evaluates the claims, and
+reports the end.
 
 A run lasts from t = 0 to the exercise's duration. Afterwards the robot can be moved freely, and the measured
 values stay.
@@ -26,16 +26,16 @@ from lessons.teaching.measure import Measure, Signal
 from lessons.teaching.prediction import Choice, PredictionResult, Sketch, Value
 from robots import InputError
 
-_JUDGE_EVERY = 5  # reports: twice a second
+_JUDGE_EVERY = 5  # reports; this is twice a second
 _CHUNK = 0.01  # s: the longest computation of the ghost between two checks for commands
 FAST = 50.0
-"""Simulation speed for a run that should end as soon as possible: more than any computer can reach."""
+"""Simulation speed for a run that should end as soon as possible. No computer can reach this speed."""
 
 Array = np.ndarray
 
 
 class Lecturer:
-    """The lecturer of one exercise. It gets a session at t = 0, before the first tick."""
+    """The lecturer of one exercise. session: at t = 0, before the first tick."""
 
     def __init__(self, exercise: LessonPlace, session: Session, seed: int = 0) -> None:
         self.exercise = exercise
@@ -80,7 +80,7 @@ class Lecturer:
 
     @property
     def pace(self) -> float | None:
-        """Simulated seconds per second that the run needs; None: the speed that the learner set."""
+        """Simulated seconds per second of the run; None: the speed that the learner set."""
         return FAST if self.fast and self._phase == "running" else None
 
     @property
@@ -94,14 +94,14 @@ class Lecturer:
         )
 
     def settings(self, own: bool) -> SceneSettings:
-        """The settings at the start of a run: the lesson's own, or the learner's. Changes that the script
-        made in the last run are undone in both cases."""
+        """Returns the settings at the start of a run: the lesson's settings, or the learner's. In both cases,
+        the changes by the script of the last run are undone."""
         if own and isinstance(self._part, Step):
             self._posted.clear()
         return settings_after(self._own, self._posted)
 
     def begin(self, session: Session, fast: bool) -> bool:
-        """Begins a run of a fresh session; returns False if the ghost must be computed first."""
+        """Begins a run of a new session; returns False if the ghost must be computed first."""
         self._enter(session)
         self.fast = fast
         self._attempt += 1
@@ -112,7 +112,7 @@ class Lecturer:
         return self._phase == "running"
 
     def idle(self) -> bool:
-        """Computes a part of the ghost; returns whether a run that waited for it begins now."""
+        """Computes a part of the ghost; returns whether a run that waited for the ghost begins now."""
         if self.waiting and self._ghost is not None:
             self._ghost.work(_CHUNK)
         if self._phase != "preparing" or self.busy:
@@ -128,7 +128,7 @@ class Lecturer:
             self._posted.append(event)
 
     def follow(self, row: Array) -> bool:
-        """Takes a row of telemetry; returns whether the run ended with it."""
+        """Adds a row of telemetry; returns whether the run ended with this row."""
         session = self._session
         if self._phase != "running":
             return False
@@ -147,8 +147,8 @@ class Lecturer:
         return True
 
     def _foreign_change(self) -> str:
-        """A sentence if an attempt at a challenge cannot count: a setting outside the challenge differs, or a
-        setting of the challenge is outside its range. "" otherwise."""
+        """Returns a sentence if an attempt at a challenge cannot count: another setting than those of the
+        challenge was changed, or a setting of the challenge is outside its range. Otherwise returns ""."""
         assert isinstance(self._part, Challenge)
         now = self._session.settings
         allowed = self._own
@@ -163,7 +163,7 @@ class Lecturer:
     # ---------------------------------------------------------------- reports
 
     def report(self) -> Lecture | None:
-        """The present state of the exercise; None if nothing has changed since the last report."""
+        """Returns the present state of the exercise; None if nothing has changed since the last report."""
         self._reports += 1
         due = self._phase == "running" and self._reports % _JUDGE_EVERY == 0
         if self._last is not None and self._last.answer == self.answer and not due:

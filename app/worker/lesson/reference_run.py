@@ -1,4 +1,5 @@
-"""The second robot of a step, computed headless while the learner reads: the reference for claims."""
+"""The run of a step's second robot, computed headless while the learner reads. Claims are compared with this
+run."""
 
 from __future__ import annotations
 
@@ -32,7 +33,7 @@ class GhostRun:
 
 
 def ghost_of(exercise: LessonPlace, seed: int) -> GhostRun | None:
-    """The second robot's run, if a claim or a prediction is compared with it; else None."""
+    """Returns the second robot's run if a claim or a prediction is compared with it; else None."""
     step = exercise.part
     if not isinstance(step, Step) or step.ghost is None:
         return None

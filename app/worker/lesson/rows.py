@@ -31,14 +31,14 @@ class LessonRows:
         self._count += 1
 
     def until(self, t: float) -> LessonRows:
-        """The rows up to a time, s."""
+        """Returns the rows up to a time, s."""
         count = int(np.searchsorted(self["t"][:, 0], t + 1e-9, "right"))
         return LessonRows(self._layout, count, self._rows[:count])
 
 
 def thinned(t: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Decimates a curve to at most 2 · BUCKETS points and its two ends: each bucket's minimum and maximum of
-    its finite values, each at its own time."""
+    """Decimates a curve to its two ends and at most 2 · BUCKETS points: the minimum and the maximum of the
+    finite values in each bucket, each at its own time."""
     if len(t) <= 2 * BUCKETS:
         return t.copy(), values.copy()
     starts = np.arange(BUCKETS + 1) * (len(t) - 1) // BUCKETS + 1

@@ -1,1 +1,1 @@
-"""The reports of a running session to the page, for torque level and velocity level."""
+"""The reports of a running session to the page, at torque level and at velocity level."""

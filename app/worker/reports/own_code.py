@@ -1,4 +1,4 @@
-"""The file of the user's own controller: its code takes effect when the file is saved."""
+"""The file of the user's own controller. Its code takes effect when the file is saved."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from lessons.session.torque import TorqueSession
 from robots import InputError
 
 Stamp = tuple[str, int, int]
-"""Path, time and size of the file; if they differ, the file was saved."""
+"""Path, time and size of the file. If the stamp changes, the file was saved."""
 
 
 class File:
-    """Checks the file from time to time. A new version is first tested on a thread, which takes a second, and
-    then replaces the running code without a jump in torque. If the new version has a fault, the running code
-    stays."""
+    """Checks the file at each call of `look`. A new version is first tested on a thread, which takes a
+    second. Then it replaces the running code without a jump in torque. If the new version has a fault, the
+    running code continues."""
 
     def __init__(self) -> None:
         self._stamp: Stamp | None = None
@@ -28,7 +28,7 @@ class File:
         self._judging: threading.Thread | None = None
 
     def look(self, session: TorqueSession) -> OwnCode | None:
-        """The state of the file; None if the controller is one of the lab's."""
+        """Checks the file and returns its state; None if the controller is one of the lab's own."""
         path = str(session.settings.controller)
         if not is_file(path):
             self._stamp = None
@@ -64,8 +64,8 @@ class File:
 
 
 def _stamp(path: str) -> Stamp | None:
-    """The stamp of a file; None while the file does not exist, which happens for a moment while it is
-    saved."""
+    """Returns the stamp of a file; None while the file does not exist. This happens for a moment while the
+    file is saved."""
     try:
         found = os.stat(path)
     except OSError:

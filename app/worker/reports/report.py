@@ -1,4 +1,4 @@
-"""The reports of the simulation process about a session of either kind."""
+"""The reports of the simulation process about a session of either level."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from himpc.plan import Binding
 from robots.world import World
 
 LISTED = 24
-"""Largest number of active constraints sent to the page: nobody can read more in a tenth of a second."""
+"""Largest number of active constraints sent to the page. Nobody can read more in a tenth of a second."""
 
 TOUCHING = 24
 """Largest number of contact points sent to the page."""
@@ -28,13 +28,13 @@ class SessionReport(ABC):
     """
 
     def __init__(self, session: Any) -> None:
-        """session: of the kind that the subclass handles."""
+        """session: a session of the kind that the subclass handles."""
         self.session = session
         self.watch = InsideRequest()
 
     def own(self) -> OwnCode | None:
-        """The state of a controller from a file; None for a controller of the lab. Code that was saved since
-        the last call takes effect."""
+        """Returns the state of a controller from a file; None for a controller of the lab. Code that was
+        saved since the last call takes effect."""
         return None
 
     @abstractmethod
@@ -50,7 +50,7 @@ class SessionReport(ABC):
         """The predicted path of the tip, (N + 1, 3) m; empty before the first tick."""
 
     def room(self) -> np.ndarray:
-        """Points (k, 3) that the camera should show besides the robot, m."""
+        """Points (k, 3), m, that the camera should show besides the robot."""
         return np.zeros((0, 3))
 
     def binding(self) -> tuple[Binding, ...]:
@@ -62,8 +62,8 @@ class SessionReport(ABC):
         return None
 
     def ranks(self) -> dict[str, tuple[int, int]]:
-        """Per level, the number of directions available to it at the present posture, and its number of rows;
-        empty without a stack."""
+        """Per level, the number of directions that are available at the present posture, and the number of
+        rows; empty without a stack."""
         return {}
 
     def world(self) -> World:
@@ -75,11 +75,12 @@ class SessionReport(ABC):
         return ()
 
     def objects(self) -> np.ndarray:
-        """(k, 7) position, m, and quaternion (w, x, y, z) of the free objects of the world."""
+        """The poses of the free objects of the world, (k, 7): position, m, and quaternion (w, x, y, z)."""
         return np.zeros((0, 7))
 
     def nearest(self) -> str:
-        """The names of the nearest pair of links, or of a link and an object; "" if none is measured."""
+        """The names of the nearest pair of links, or of a link and an object; "" if no distance is
+        measured."""
         return ""
 
     def mission(self) -> MissionView | None:
@@ -87,6 +88,5 @@ class SessionReport(ABC):
         return None
 
     def inside(self) -> Inside | None:
-        """The data of the last tick that `watch` requests; None if it requests nothing or there is no such
-        data."""
+        """The data of the last tick that `watch` requests; None if nothing is requested or available."""
         return None

@@ -1,4 +1,4 @@
-"""Starts a session, with the matching kind of report."""
+"""Starts a session together with the matching kind of report."""
 
 from collections.abc import Mapping
 

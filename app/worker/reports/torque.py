@@ -21,7 +21,7 @@ from robots.world import World
 
 @final
 class TorqueRun(SessionReport):
-    """See `app.worker.reports.report.SessionReport`."""
+    """The data of a torque-level session, see `app.worker.reports.report.SessionReport`."""
 
     session: TorqueSession
 
@@ -99,7 +99,7 @@ class TorqueRun(SessionReport):
         return Inside(plane, matrix, spectrum)
 
     def _mechanics(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """The plant's M and the controller's M̄; None where the state is not finite."""
+        """Returns the plant's M and the controller's M̄; None if the state is not finite."""
         session = self.session
         if not np.isfinite(session.plant.q).all():
             return None

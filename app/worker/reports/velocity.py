@@ -19,16 +19,16 @@ from lessons.session.velocity import VelocitySession
 _ABOVE = np.array([0.0, 0.0, 0.015])
 """Height of predicted paths above the floor, m, so that the floor does not hide them."""
 _ARM = 0.55
-"""Distance from a person's middle to the hand that takes the ball, m."""
+"""Distance from a person's middle to the hand that receives the ball, m."""
 _AROUND = 1.9
-"""Radius around a mobile base that the camera should show at least, m."""
+"""Smallest radius around a mobile base that the camera should show, m."""
 
 
 @final
 class VelocityRun(SessionReport):
-    """See `app.worker.reports.report.SessionReport`.
+    """The data of a velocity-level session, see `app.worker.reports.report.SessionReport`.
 
-    A target belongs to a role: it is the goal of the role's first open task, (m,) m or (3, 3).
+    Each role has one target: the goal of the role's first open task, (m,) m or (3, 3).
     """
 
     session: VelocitySession
@@ -113,8 +113,8 @@ class VelocityRun(SessionReport):
         )
 
     def _people(self) -> tuple[Person, ...]:
-        """The persons. Each stands behind its hand-over point, as seen from the place to which the base
-        drives for this hand-over."""
+        """Returns the persons. Each person stands behind the hand-over point, as seen from the place to which
+        the base drives for this hand-over."""
         options, progress = self.session.settings.options, self.session.progress
         visits: dict[int, list[tuple[MissionTask, bool]]] = {}
         beside: np.ndarray | None = None
@@ -143,7 +143,7 @@ class VelocityRun(SessionReport):
 
 
 def _goal(task: MissionTask) -> tuple[float, ...] | None:
-    """See `MissionRow`."""
+    """Returns the goal of a task, see `MissionRow`."""
     if isinstance(task.motion, Go):
         return task.motion.goal
     held = task.motion.rotation
@@ -151,5 +151,5 @@ def _goal(task: MissionTask) -> tuple[float, ...] | None:
 
 
 def _point(values: tuple[float, ...] | np.ndarray) -> np.ndarray:
-    """A point in space, m, from the coordinates of a hand (3) or of a base on the floor (2)."""
+    """Returns a point in space, m, from the coordinates of a hand (3) or of a base on the floor (2)."""
     return np.array([*values, 0.0][:3], float)
