@@ -49,8 +49,8 @@ class ActiveSetSolver:
         """Solves min ½xᵀHx + gᵀx under the rows; lower = upper is an equality.
 
         Args:
-            g: (k,), the gradient. rows: the constraints, with k columns. same: the number of rows, from the
-                first on, that are equal to those of the previous QP.
+            g: (k,), the gradient. rows: the constraints, with k columns.
+            same: the number of rows, from the first on, that are equal to those of the previous QP.
         """
         started = perf_counter_ns()
         if (self._held[0, : self._count] >= same).any():

@@ -26,7 +26,8 @@ a knot's position in one step."""
 class Avoidance:
     """The constraint sd(x_k) ≥ δ_safe.
 
-    Attributes: model: computes distances and gradients.
+    Attributes:
+        model: computes distances and gradients.
         margin: δ_safe, m.
     """
 

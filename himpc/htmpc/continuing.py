@@ -15,8 +15,8 @@ Array = NDArray[np.float64]
 
 
 def braking(start: Start, N: int, dt: float, period: float, bounds: MotionBounds) -> Array:
-    """Returns inputs (N, n) that bring every joint to rest as fast as its bounds allow, and then back into
-    its range.
+    """Returns inputs (N, n) that bring every joint to rest as fast as its bounds allow. A joint outside its
+    range returns into it.
 
     A joint beyond a position bound moves back at up to a fifth of its speed limit. If input and jerk bounds
     contradict each other (after a limit was tightened), the jerk bound is satisfied.

@@ -69,16 +69,16 @@ class Effort:
         return value, (T_v.T @ v + u + D.T @ d).ravel()
 
     def about(self, rest: tuple[float, Array], U: Array) -> tuple[float, Array]:
-        """Returns value and gradient of (10) at U. They follow from those at U = 0, since (10) is
-        quadratic."""
+        """Returns value and gradient of (10) at U. They are computed from value and gradient at U = 0: (10)
+        is quadratic."""
         value, slope = rest
         u = U.ravel()
         change = self.hessian @ u
         return value + float(u @ (slope + 0.5 * change)), slope + change
 
     def relative(self, U: Array, plan: Array) -> tuple[float, Array]:
-        """Returns value and gradient of the proximal effort: (10) applied to the deviation from a plan (N,
-        n)."""
+        """Returns value and gradient of the proximal effort: (10) applied to the deviation from a plan
+        (N, n)."""
         gap = (U - plan).ravel()
         slope = self.hessian @ gap
         return 0.5 * float(gap @ slope), slope

@@ -25,8 +25,9 @@ _PART = np.array([0, 1, 2, 0, 1, 2])
 class Placed(NamedTuple):
     """Placements and axes of all joints at K configurations.
 
-    Attributes: at: (K, n+1, 12), orientation in the world, row by row, then position in m. z: (K, n+1, 3),
-    axis of the joint.
+    Attributes:
+        at: (K, n+1, 12), orientation in the world, row by row, then position in m.
+        z: (K, n+1, 3), axis of the joint.
     """
 
     at: Array

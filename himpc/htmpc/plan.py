@@ -38,12 +38,12 @@ class LevelEvidence(NamedTuple):
             braking. "keep": there was no verified point, and the inputs of the level above were kept; on the
             first level the robot brakes.
         kkt_residual: largest scaled KKT residual of the applied QP solutions.
-        best: e* at knots 1 … N, (N, m); the level's tasks stacked. final: the same errors after all levels
-            were solved.
+        best: e* at knots 1 … N, (N, m); the level's tasks stacked.
+        final: the same errors after all levels were solved.
         cost: J of (8) at e*, without knot 0.
         steps: accepted step sizes, one per iteration; 0 if none was acceptable.
-        iterations: number of solved QPs; second attempts are not counted. unsolved: number of these QPs that
-            had no verified point.
+        iterations: number of solved QPs; second attempts are not counted.
+        unsolved: number of these QPs that had no verified point.
         time_us: wall time.
         felt: constraints with a nonzero multiplier in the last QP.
     """

@@ -38,13 +38,17 @@ class SharedStep:
     """Data that all levels of one step share.
 
     Attributes:
-        robot, data: used for kinematics. settings: the present settings.
+        robot, data: used for kinematics.
+        settings: the present settings.
         start: initial state of the prediction.
         desired: r per task name at knots 0 … N.
         effort: J_eff.
-        rows: (7d) on the inputs. bounds: the bounds that apply now. plan: the shifted previous plan, (N, n).
-            avoidance: (7c), None without obstacles. method: solves the QPs; it stores the active rows of a
-            level's last QP. table: has space for all rows; its first rows are `rows`.
+        rows: (7d) on the inputs.
+        bounds: the bounds that apply now.
+        plan: the shifted previous plan, (N, n).
+        avoidance: (7c), None without obstacles.
+        method: solves the QPs; it stores the active rows of a level's last QP.
+        table: has space for all rows; its first rows are `rows`.
     """
 
     robot: Robot
@@ -151,7 +155,8 @@ class Iterate:
 class Problem:
     """The problem of one level.
 
-    Attributes: tick: data that all levels share.
+    Attributes:
+        tick: data that all levels share.
         level: the level to optimise.
         guards: constraints (9c) of the levels above, highest first.
         absolute: whether the effort is (10) itself, or its proximal form.

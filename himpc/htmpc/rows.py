@@ -23,8 +23,10 @@ Array = NDArray[np.float64]
 class ConstraintRows(NamedTuple):
     """Constraint rows with labels.
 
-    Attributes: A: (r, N·n); lower, upper: (r,). kind: (r,) index into KINDS; knot: (r,) 1 … N (0 … N−1 for
-    inputs); part: (r,) index of the joint, of the coordinate or of the pair.
+    Attributes:
+        A: (r, N·n); lower, upper: (r,).
+        kind: (r,) index into KINDS; knot: (r,) 1 … N (0 … N−1 for inputs); part: (r,) index of the joint, of
+            the coordinate or of the pair.
     """
 
     A: Array

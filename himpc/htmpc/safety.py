@@ -24,7 +24,8 @@ def plausible(robot: Robot, q: Array, v: Array) -> bool:
     """Whether a measured state is a valid start of a plan: finite, and near the ranges of positions and
     velocities.
 
-    Args: robot: its limits define these ranges.
+    Args:
+        robot: its limits define these ranges.
         q, v: measured joint positions and velocities, (n,).
     """
     lower, upper, fastest = _believable(robot)
@@ -47,9 +48,11 @@ def commandable(v: Array, last: Array | None, bounds: MotionBounds) -> Array:
     The commands of a plan begin at this velocity. A robot that was pushed beyond its limit must not receive
     its measured velocity as a command.
 
-    Args: v: measured velocity, (n,). last: the last commanded velocity, None if there is none. It may exceed
-    bounds that were tightened later; the robot then brakes from this velocity. bounds: the bounds that apply
-    now.
+    Args:
+        v: measured velocity, (n,).
+        last: the last commanded velocity, None if there is none. It may exceed bounds that were tightened
+            later; the robot then brakes from this velocity.
+        bounds: the bounds that apply now.
     """
     most = bounds.v if last is None else np.maximum(bounds.v, np.abs(last))
     return np.minimum(np.maximum(v, -most), most)
@@ -63,8 +66,11 @@ def permitted(start: Start, U: Array, bounds: MotionBounds, period: float) -> Ar
     bound that was tightened, the robot brakes as slowly as its jerk bound requires, but its speed does not
     increase.
 
-    Args: start: the initial state of the plan. U: finite inputs, (N, n). bounds: the bounds that apply now.
-    period: the time in s for which the first input is commanded.
+    Args:
+        start: the initial state of the plan.
+        U: finite inputs, (N, n).
+        bounds: the bounds that apply now.
+        period: the time in s for which the first input is commanded.
     """
     fastest = np.maximum(bounds.v, np.abs(start.v))
     first = np.minimum(np.maximum(U[0], (-fastest - start.v) / period), (fastest - start.v) / period)

@@ -67,8 +67,9 @@ class HTMPCSettings:
         lexicographic: "per_coordinate" for constraint (12), "cost" for constraint (11).
         delta_m: δ of (13), m (or rad): the amount by which the error of a level at a knot may exceed its best
             value at this knot. For (11), δ is converted to the cost of an error δ at every knot.
-        max_iter: MAX_ITER, the largest number of QPs per level. limits: the bounds to impose. obstacles:
-            obstacles of the collision avoidance (7c).
+        max_iter: MAX_ITER, the largest number of QPs per level.
+        limits: the bounds to impose.
+        obstacles: obstacles of the collision avoidance (7c).
         margin_m: δ_safe of (7c), m.
         self_collision: whether the arm avoids collisions with the base.
         delay_s: delay of a command in s. The measured state is predicted forward by this time. The caller
@@ -76,7 +77,8 @@ class HTMPCSettings:
         hold: joints that stay at rest, by name.
         base: how the base moves; see `kinematics.G`.
         gains: used by HTIDKC only, 1/s: ẋ = ṙ + gain · (r − x) at each enabled level. The last gain applies
-            to all further levels. rho: used by HTIDKC only: ρ, the weight of ‖q̇‖² at every level.
+            to all further levels.
+        rho: used by HTIDKC only: ρ, the weight of ‖q̇‖² at every level.
         solver: the QP solver, see himpc.qp.Solver. HTIDKC uses it for every QP. HTMPC and its variants use a
             compiled method, and "daqp" if that method finds no solution. Any other value of `solver` replaces
             both.

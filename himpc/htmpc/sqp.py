@@ -130,9 +130,11 @@ def _solve(problem: Problem, H: Array, g: Array, rows: ConstraintRows, bought: i
     """Solves min ½dᵀHd + gᵀd under the rows. A penalty is added for the slacks, one per knot, which may relax
     the last rows.
 
-    Args: problem, H, g, rows: problem, Hessian, gradient and rows of the level. bought: number of rows, at
-    the end, that slacks may relax. own: whether the compiled active-set method has factored H. If not, or if
-    that method finds no verified point, the QP solver is used.
+    Args:
+        problem, H, g, rows: problem, Hessian, gradient and rows of the level.
+        bought: number of rows, at the end, that slacks may relax.
+        own: whether the compiled active-set method has factored H. If not, or if that method finds no
+            verified point, the QP solver is used.
     """
     solver = problem.tick.settings.solver
     if not bought:

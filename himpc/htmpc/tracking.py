@@ -82,7 +82,8 @@ class Guard:
     """The errors that a level above has reached: the constraint (9c) for the levels below.
 
     Attributes:
-        tracking: the level above. best: e* at knots 1 … N, (N, m).
+        tracking: the level above.
+        best: e* at knots 1 … N, (N, m).
     """
 
     tracking: Tracking

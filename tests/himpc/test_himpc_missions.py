@@ -309,7 +309,7 @@ def test_what_cannot_be_done_to_a_mission_is_refused_in_a_sentence() -> None:
         (lambda: move(progress, "ee2.0", (0.0, 1.0)), "needs 1 numbers, not 2"),
         (lambda: move(progress, "ee2.0", (math.nan,)), "not finite"),
         (lambda: move(insert(progress, wave), "wave", (0.0,)), "given trajectory"),
-        (lambda: insert(progress, delivery()[3]), "stands twice"),
+        (lambda: insert(progress, delivery()[3]), "occurs twice"),
         (lambda: insert(progress, wave, before="base1.0"), "is completed"),
         (lambda: release(progress, "ee2.0"), "waits 0 s by itself"),
         (lambda: reorder(progress, "ee2.0", 3), "places 0 to 2"),

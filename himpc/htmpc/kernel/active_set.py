@@ -26,7 +26,7 @@ SOLVED, CONTRADICTION, LIMIT = range(3)
 VECTORS = 8
 """Number of rows of the array `vectors` of `solve`."""
 _STEPS = 600
-"""Number of added or removed rows whose multiplications one QP may use. It bounds the computing time."""
+"""Budget of one QP, as a number of added or removed rows. It bounds the computing time."""
 _ROUGH = 1e-8
 """At a point that was not refined, a smaller violation may be a rounding error."""
 _CLOSE = 0.05
@@ -119,10 +119,12 @@ def solve(
 
     Args:
         L, H, g, A, lower, upper: the QP, H = LLᵀ (n, n).
-        held, normals, cholesky_factor, vectors: the `ActiveSet` and scratch, of the shapes (3, n + 1), (3, n
-            + 1, n), (n + 1, n + 1) and (VECTORS, n + 1). count: the number of active rows of the previous QP.
-            watched, value: scratch, one entry per row of A. x: (n,), the result. multipliers: the result, one
-            entry per row of A; zero at the call.
+        held, normals, cholesky_factor, vectors: the `ActiveSet` and scratch, of the shapes (3, n + 1),
+            (3, n + 1, n), (n + 1, n + 1) and (VECTORS, n + 1).
+        count: the number of active rows of the previous QP.
+        watched, value: scratch, one entry per row of A.
+        x: (n,), the result.
+        multipliers: the result, one entry per row of A; zero at the call.
     """
     n, rows = len(g), len(A)
     A, H, L, vectors = borrowed(A), borrowed(H), borrowed(L), borrowed(vectors)

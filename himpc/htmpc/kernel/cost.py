@@ -31,8 +31,8 @@ def model(
 
     Args:
         J, Q, e, T_q, effort, share, ridge: see `gauss_newton`.
-        weighted, pull: scratch for J_kᵀ Q_k J_k and J_kᵀ Q_k e_k, (N, n, n) and (N, n); zero at the call. H,
-            g: the result; g is zero at the call.
+        weighted, pull: scratch for J_kᵀ Q_k J_k and J_kᵀ Q_k e_k, (N, n, n) and (N, n); zero at the call.
+        H, g: the result; g is zero at the call.
     """
     N, m, n = J.shape
     for k in range(N):

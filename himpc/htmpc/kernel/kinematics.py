@@ -24,8 +24,8 @@ def place_all(
     placed: Array,
     z: Array,
 ) -> None:
-    """Applies `forward_kinematics` to configurations q (K, n). Results: placed (K, n+1, 12) and z (K, n+1,
-    3)."""
+    """Applies `forward_kinematics` to configurations q (K, n). Results: placed (K, n+1, 12) and z
+    (K, n+1, 3)."""
     rotation, translation, axis, q = borrowed(rotation), borrowed(translation), borrowed(axis), borrowed(q)
     placed, z = borrowed(placed), borrowed(z)
     for k in range(len(q)):

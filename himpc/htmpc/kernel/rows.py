@@ -72,8 +72,8 @@ def guard(
     Args:
         J, e: (N, m, n) and (N, m), the error of a level above at the iterate. best: e*, (N, m).
         strict: whether an error that exceeds e* must return to e*. Otherwise it may keep its size. If strict,
-            the rows of A must have been written before. T_q: (N, N), ∂q_k/∂u_s. A, room, labels: arrays of
-            the table.
+            the rows of A must have been written before.
+        T_q: (N, N), ∂q_k/∂u_s. A, room, labels: arrays of the table.
     """
     N, m, n = J.shape
     for k in range(N):
