@@ -1,5 +1,4 @@
-"""The catalog of robots that come with the project: one URDF per folder, and the data that a URDF cannot
-contain."""
+"""The catalog of the project's robots: one URDF per folder, and the data that a URDF cannot contain."""
 
 from __future__ import annotations
 
@@ -32,12 +31,12 @@ class CatalogEntry:
 
     @property
     def collision_path(self) -> Path:
-        """Its collision geometry, written by `python -m robots.loading.write`."""
+        """The file with the robot's collision geometry, written by `python -m robots.loading.write`."""
         return _HERE / self.name / "collision.json"
 
     @property
     def cover_path(self) -> Path:
-        """The capsules that distances use, written by the same command."""
+        """The file with the capsules that distances use, written by the same command."""
         return _HERE / self.name / "cover.json"
 
     @property

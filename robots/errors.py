@@ -14,7 +14,7 @@ class InputError(ValueError):
 
 
 def shortened(text: str, most: int = 60) -> str:
-    """Makes a name or path printable for a message and leaves out its middle if it is too long."""
+    """Returns a name or path in printable form for a message. If it is too long, its middle is left out."""
     if len(text) > most:
         head = (most - 3) // 3
         text = text[:head] + "..." + text[len(text) - (most - 3 - head) :]
@@ -29,8 +29,8 @@ def nearest_name(name: str, choices: Iterable[str], cutoff: float = 0.6) -> str 
 
 
 def unknown_name(what: str, name: str, choices: Iterable[str], hint: str = "") -> InputError:
-    """Builds the error for a name that is not among `choices`: the message names the nearest choice and lists
-    them all."""
+    """Returns the error for a name that is not among `choices`. The message contains the most similar choice
+    and the list of all choices."""
     names = [str(choice) for choice in choices]
     close = nearest_name(str(name), names, cutoff=0.4)
     nearest = f"did you mean '{shortened(close)}'? " if close else ""

@@ -23,14 +23,15 @@ _V = (2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61)  # rad/s
 _Q_LOWER = (-2.7437, -1.7628, -2.8973, -3.0421, -2.8065, 0.5445, -2.8973)  # rad
 _Q_UPPER = (2.7437, 1.7628, 2.8973, -0.1518, 2.8065, 3.7525, 2.8973)  # rad
 _ASIDE, _FARTHEST = 0.01, 0.2
-"""m: largest distance of the flange from the axis of the last joint, and largest distance along this axis, if
-the scene's robot is this arm. The flange is on the axis, 0.107 m along it (given: Franka's documentation)."""
+"""Largest distance of the flange from the axis of the last joint, and largest distance along this axis, m, if
+the scene's robot is this arm. The flange is on the axis, at 0.107 m along it (given by Franka's
+documentation)."""
 
 
 @final
 class Franka(Arm):
-    """A Franka arm under torque control. The arm adds the torques for gravity and for the load that is set;
-    `Reading.tau` is its `tau_J_d`, the torque without gravity that was commanded last."""
+    """A Franka arm under torque control. The arm adds the torques for gravity and for its configured load.
+    `Reading.tau` is the arm's `tau_J_d`, the last commanded torque without gravity."""
 
     def __init__(self, address: str, real_time: bool = False) -> None:
         """Connects; the arm does not move before the first `read`.
@@ -39,7 +40,7 @@ class Franka(Arm):
             address: host name or IP address.
             real_time: whether libfranka refuses a kernel without real-time scheduling.
 
-        Raises InputError if pylibfranka is missing, or there is no arm that answers.
+        Raises InputError if pylibfranka is missing or no arm answers.
         """
         self.limits = ArmLimits(
             np.array(_TAU), np.full(7, _TAU_RATE), np.array(_V), np.array(_Q_LOWER), np.array(_Q_UPPER)
@@ -54,8 +55,9 @@ class Franka(Arm):
         self._finished = False
 
     def at_rest(self, robot: Robot) -> Array:
-        """The joint positions, (7,) rad, without taking control. Raises ArmLost, and InputError if with these
-        positions a description of a robot has its last joint elsewhere than this arm."""
+        """Returns the joint positions, (7,) rad, without taking control. Raises ArmLost. Raises InputError if
+        the description of a robot has its last joint at another position than this arm, for the same joint
+        positions."""
         try:
             state = self._robot.read_once()
         except (RuntimeError, self._library.FrankaException) as error:
@@ -118,5 +120,5 @@ def _library() -> Any:
 
 
 def _told(error: Exception) -> str:
-    """The message of libfranka in one line."""
+    """Returns libfranka's error message in one line."""
     return " ".join(str(error).split()).removeprefix("libfranka: ").rstrip(".")
