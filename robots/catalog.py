@@ -22,7 +22,7 @@ class CatalogEntry:
     home_deg: tuple[float, ...]
     a_max: tuple[float, ...]  # rad/s²
     M_bar: tuple[float, ...]  # kg·m²
-    hollow: tuple[tuple[str, str], ...] = ()  # links whose hulls touch in postures in which the links do not
+    hollow: tuple[tuple[str, str], ...] = ()  # pairs of links; in some postures only their hulls touch
 
     @property
     def path(self) -> Path:
@@ -42,7 +42,7 @@ class CatalogEntry:
     @property
     def home(self) -> np.ndarray:
         """Home configuration, (n,) rad."""
-        import numpy as np  # imported here, which keeps NumPy out of programs that only list the catalog
+        import numpy as np  # imported here: programs that only list the catalog do not need NumPy
 
         return np.radians(self.home_deg)
 
@@ -96,7 +96,7 @@ CATALOG: dict[str, CatalogEntry] = {
                 59.0,
                 29.0,
             ),
-            a_max=(4.0, 2.0, 8.0, 8.0, 15.0, 15.0, 15.0) * 2,  # our estimate of what its torques can produce
+            a_max=(4.0, 2.0, 8.0, 8.0, 15.0, 15.0, 15.0) * 2,  # our estimate from the joints' torques
             M_bar=(0.046, 0.46, 0.0144, 0.0736, 0.0046, 0.0127, 0.0004) * 2,  # suggest_M_bar
             hollow=tuple(
                 (f"{side}_{first}", f"{side}_{second}")

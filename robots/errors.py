@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from difflib import get_close_matches
 
-_LISTED = 600  # largest number of characters that the list of choices takes: the whole catalog fits
-_COMPARED = 100  # number of characters of a name that are compared: the computing time grows with its square
+_LISTED = 600  # largest number of characters of the list of choices; the whole catalog fits
+_COMPARED = 100  # number of compared characters of a name; the computing time grows with its square
 
 
 class InputError(ValueError):
-    """An input cannot be used. The message is one sentence that says what to do next."""
+    """Raised if an input cannot be used. The message is one sentence that tells the user what to do next."""
 
 
 def shortened(text: str, most: int = 60) -> str:

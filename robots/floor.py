@@ -6,7 +6,7 @@ from robots.collision import Floor
 from robots.robot import Robot
 from robots.world import Thing, World
 
-_SUNK = 0.03  # m by which a base may stand above or below the floor
+_SUNK = 0.03  # largest distance of a standing base from the floor, m
 
 
 def standing_floor(robot: Robot) -> World:

@@ -15,8 +15,8 @@ from robots.robot import Robot
 
 Array = NDArray[np.float64]
 
-# Given by Franka's documentation of its control interface ("Robot limits"): torques and their rates; for
-# ranges and speeds the narrower ones of Panda and FR3.
+# Given by Franka's documentation of its control interface ("Robot limits"). Ranges and speeds are the
+# narrower ones of Panda and FR3.
 _TAU = (87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0)  # N·m
 _TAU_RATE = 990.0  # N·m/s; the arm stops itself above 1000
 _V = (2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61)  # rad/s

@@ -154,7 +154,7 @@ REFUSED = {
     "no joint": (robot(link("base")), "no joint"),
     "only fixed": (
         robot(link("base"), link("a"), joint("j", "base", "a", "fixed", "")),
-        "no joint of it moves",
+        "none of its joints moves",
     ),
     "two roots": (two_joint_arm(link("loose")), "2 root links"),
     "loop": (robot(link("a"), link("b"), joint("x", "a", "b"), joint("y", "b", "a")), "loop"),
