@@ -1,4 +1,4 @@
-"""`InputError`, which every invalid input raises, and the error message for an unknown name."""
+"""`InputError`, the exception for every invalid input, and the error message for an unknown name."""
 
 from __future__ import annotations
 

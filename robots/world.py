@@ -69,7 +69,7 @@ class Thing:
 
     @property
     def pose(self) -> tuple[float, ...]:
-        """Initial position of the middle, m, and initial quaternion (w, x, y, z)."""
+        """Position of the middle, m, and quaternion (w, x, y, z), both at the start."""
         yaw = 0.0
         match self.shape:
             case Ball(_, centre):

@@ -43,7 +43,8 @@ def sources_of(function: Callable[..., Any]) -> list[Path]:
 
 @lru_cache(maxsize=256)
 def _read(file: Path) -> tuple[bytes, tuple[str, ...]]:
-    """The digest of a file's content, and the dotted names that it imports; some of them are modules."""
+    """Returns the digest of a file's content, and the dotted names that the file imports: modules and other
+    names."""
     text = file.read_bytes() if file.is_file() else b""
     found = _IMPORTS.findall(text.decode(errors="replace"))
     names = [(module, f"{module}.{name}") for module, line in found for name in re.findall(r"\w+", line)]

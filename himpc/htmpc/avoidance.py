@@ -41,8 +41,8 @@ class Avoidance:
     def rows(
         self, near: Clearances, N: int, dt: float, table: ConstraintTable | None = None, place: int = 0
     ) -> ConstraintRows:
-        """Writes the linearised constraint on the change d of the inputs to a table, from row `place` on, and
-        returns it. It has one row per pair and knot."""
+        """Writes the linearised constraint on the change d of the inputs to a table, from row `place` on.
+        Returns these rows, one per pair and knot."""
         table = ConstraintTable(N * near.gradient.shape[1]) if table is None else table
         A = table.spread(place, near.knot, near.gradient, integrator(N, dt).T_q)
         room = self.margin - near.distance

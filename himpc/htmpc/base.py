@@ -19,7 +19,7 @@ UNICYCLE = (
 
 
 def G(robot: Robot, q: Array, base: Base = "holonomic") -> Array:
-    """G(q) of (4), q̇ = G(q) v, (n, n).
+    """Returns the matrix G(q) of (4), (n, n), with q̇ = G(q) v.
 
     Each joint of these robots has its own coordinate. A holonomic base consists of two prismatic joints along
     world axes and a revolute joint. Its velocities are world velocities, and G is the identity, as for an

@@ -77,7 +77,7 @@ class CollisionModel:
         return self.between(placed(self._tree, q), within, gradients)
 
     def between(self, where: Placed, within: float, gradients: bool = True) -> Clearances:
-        """Computes the same distances from known placements of the joints."""
+        """Returns the same distances as `clearances`, computed from known placements of the joints."""
         around, tree = self._around, self._tree
         K, S = len(where.at), len(around.radius)
         most = K * S * len(around.names)

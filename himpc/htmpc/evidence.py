@@ -17,7 +17,7 @@ from himpc.htmpc.tracking import Tracking
 Array = NDArray[np.float64]
 
 _FELT = 1e-6
-"""Smaller multipliers are rounding errors."""
+"""A multiplier whose magnitude is smaller than this is a rounding error."""
 
 
 def evidence(

@@ -86,7 +86,7 @@ class HTMPC:
         self._settings = settings
 
     def _chosen(self, enabled: Stack) -> Stack:
-        """Returns the levels to solve among the enabled ones."""
+        """Returns the enabled levels that are solved."""
         return enabled
 
     def _held(self, chosen: Stack, settings: HTMPCSettings) -> NDArray[np.int64]:

@@ -169,7 +169,7 @@ class Problem:
 
     @property
     def softened(self) -> bool:
-        """Whether states and inputs are softened by barriers, as the paper says."""
+        """Whether states and inputs are softened by barriers, as in the paper."""
         return self.tick.settings.formulation == "paper"
 
     @property

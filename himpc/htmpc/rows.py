@@ -107,8 +107,8 @@ class ConstraintTable:
         return end
 
     def spread(self, place: int, knot: NDArray[np.int64], slopes: Array, T_q: Array) -> Array:
-        """Writes rows of functions of q, from index `place` on, and returns them. The functions have slopes
-        (r, n) in q at knots (r,)."""
+        """Writes rows of functions of q, from index `place` on, and returns them. `slopes` (r, n) are the
+        derivatives of the functions with respect to q at the knots (r,)."""
         self.reserve(place + len(knot))
         spread(self.A, place, np.asarray(knot, np.intp), np.ascontiguousarray(slopes), T_q)
         return self.A[place : place + len(knot)]

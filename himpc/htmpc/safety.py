@@ -63,7 +63,7 @@ def permitted(start: Start, U: Array, bounds: MotionBounds, period: float) -> Ar
     bounds.
 
     If the QP's rows were hard and feasible, the commands already satisfy the bounds. If the speed exceeds a
-    bound that was tightened, the robot brakes as slowly as its jerk bound requires, but its speed does not
+    bound that was tightened, the robot may brake as slowly as its jerk bound requires, but its speed does not
     increase.
 
     Args:

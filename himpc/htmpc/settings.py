@@ -75,7 +75,7 @@ class HTMPCSettings:
         delay_s: delay of a command in s. The measured state is predicted forward by this time. The caller
             samples the references at t + delay_s.
         hold: joints that stay at rest, by name.
-        base: how the base moves; see `kinematics.G`.
+        base: how the base moves; see `himpc.htmpc.base.G`.
         gains: used by HTIDKC only, 1/s: ẋ = ṙ + gain · (r − x) at each enabled level. The last gain applies
             to all further levels.
         rho: used by HTIDKC only: ρ, the weight of ‖q̇‖² at every level.
@@ -112,7 +112,7 @@ class HTMPCSettings:
         if not self.gains or not all(gain <= self.rate_hz for gain in self.gains):
             raise InputError(f"gains are {list(self.gains)}: give numbers from 0 to rate_hz, e.g. 0.5, 0.3")
         if not is_installed(self.solver):
-            raise InputError(f"solver '{self.solver}' comes with CasADi: pip install casadi, or take daqp")
+            raise InputError(f"solver '{self.solver}' comes with CasADi: pip install casadi, or use daqp")
         if self.base == "unicycle":
             raise InputError(UNICYCLE)
         check_names(self.stack)

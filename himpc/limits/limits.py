@@ -61,7 +61,7 @@ further, by up to half of this distance."""
 
 @dataclass(frozen=True, eq=False)
 class LimitsInForce:
-    """The bounds of this tick, before any tightening; infinite where nothing is imposed.
+    """The bounds of this tick, before any tightening. Bounds that are not imposed are infinite.
 
     Attributes:
         tau_lower, tau_upper: (n,) N·m.

@@ -32,7 +32,7 @@ class Active:
     Attributes:
         task: the task.
         reference: its planned motion.
-        counts_from: time from which the point can reach the goal, s.
+        counts_from: earliest time at which the goal counts as reached, s.
         reached: time at which the point reached the goal while the task was the first in the window, s; None:
             the point is not at the goal.
     """
@@ -140,7 +140,7 @@ def release(progress: Progress, name: str) -> Progress:
     """
     task = progress.mission[find(progress.mission, name)]
     if task.hold is not None:
-        raise InputError(f"task '{name}' waits {task.hold:g} s at its goal: release one with hold null")
+        raise InputError(f"task '{name}' waits {task.hold:g} s at its goal: release tasks with hold null")
     return replace(progress, released=progress.released | {name})
 
 

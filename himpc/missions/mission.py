@@ -43,8 +43,8 @@ class Go:
             raise InputError("points on the way need a cruise speed: give one, e.g. 0.5 m/s")
 
     def planned(self, start: Array, t: float) -> tuple[Reference, float]:
-        """Returns the reference from a start (m,) at time t (s), and the time from which the goal can be
-        reached, s."""
+        """Returns the reference from a start (m,) at time t (s), and the earliest time at which the goal
+        counts as reached, s."""
         if self.cruise is None:
             return Hold(np.array(self.goal)), t
         path = Path(np.array([start, *self.via, self.goal], float), self.cruise, self.law, t)

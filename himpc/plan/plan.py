@@ -105,7 +105,7 @@ class Plan:
     behind: Behind | None = None
 
     def freeze(self) -> Plan:
-        """Returns a copy of the plan whose data stay valid."""
+        """Collects all results, which then stay valid, and returns the plan."""
         _ = self.evidence
         return self
 

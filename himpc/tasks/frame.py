@@ -26,8 +26,7 @@ class FrameTask(OnAxes):
     frame: str = ""
 
     first_row: ClassVar[int] = 0
-    """Index of the first row that the task uses of the 6 × n frame Jacobian (linear over angular, world
-    axes)."""
+    """Index of the task's first row in the 6 × n frame Jacobian (linear over angular, world axes)."""
 
     def jacobian(self, configuration: Configuration) -> Array:
         rows = slice(self.first_row, self.first_row + 3)

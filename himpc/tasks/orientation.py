@@ -88,7 +88,8 @@ class OrientationTask(OnAxes):
         return slope(E, self.axes) @ E
 
     def spread(self, motion: Array) -> Array:
-        """Returns a motion with components along all axes, (N+1, 3); it may contain the chosen axes only."""
+        """Returns a motion with components along all three axes, (N+1, 3). The given motion may contain the
+        chosen axes only."""
         if motion.shape[1] == len(AXES):
             return motion
         found = np.zeros((len(motion), len(AXES)))

@@ -1,4 +1,4 @@
-"""A task that points an axis of a frame at a point, such as a camera or a torch."""
+"""A task that points an axis of a frame at a point, for example the axis of a camera or a torch."""
 
 from __future__ import annotations
 

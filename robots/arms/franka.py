@@ -50,7 +50,7 @@ class Franka(Arm):
         try:
             self._robot = self._library.Robot(address, config.kEnforce if real_time else config.kIgnore)
         except (RuntimeError, self._library.FrankaException) as error:
-            raise InputError(f"--robot {address}: {_told(error)}; is this the address of the arm?") from None
+            raise InputError(f"--robot {address}: {_told(error)}; check the address of the arm") from None
         self._control: Any = None
         self._finished = False
 
@@ -75,7 +75,7 @@ class Franka(Arm):
             if not (max(abs(x), abs(y)) < _ASIDE and -_ASIDE < z < _FARTHEST):
                 raise InputError(
                     f"the scene's robot '{robot.name}' is not this arm: at the arm's joint positions the "
-                    "flange would be elsewhere; choose a scene of that arm, such as panda-hold"
+                    "flange would be elsewhere; choose a scene of your arm, such as panda-hold"
                 )
         return q
 

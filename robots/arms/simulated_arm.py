@@ -1,4 +1,4 @@
-"""A simulated arm behind the interface of a real one."""
+"""A simulated arm with the interface of a real arm."""
 
 from __future__ import annotations
 

@@ -23,8 +23,8 @@ _MOST = 250_000  # largest number of triangles of a robot
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """Triangles of a link in the axes of its joint, (F, 3, 3) m. They stand for all balls of the radius
-    `swell`, m, with middles on the triangles; 0 for a surface."""
+    """Triangles of a link in the axes of its joint, (F, 3, 3) m. The solid consists of all balls whose
+    middles are on the triangles; `swell` is the radius of the balls, m. It is 0 for a surface."""
 
     joint: int
     link: str

@@ -39,8 +39,8 @@ def made_cover(robot: Robot, meshes: bool = True, tries: int = 1) -> Cover:
     Args:
         robot: a robot that has its collision geometry.
         meshes: whether mesh files are read.
-        tries: with 2, a second cover has more capsules on bodies of which only the capsules touch; it is used
-            if it leaves out fewer pairs.
+        tries: with 2, a second cover is tried. It has more capsules on bodies whose capsules touch while
+            their solids do not. The cover that leaves out fewer pairs is returned.
     """
     surfaces = list(patches(robot, meshes))
     supports = robot.model.supports

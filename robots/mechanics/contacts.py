@@ -26,7 +26,7 @@ class Touch(NamedTuple):
 @dataclass(frozen=True, eq=False)
 class Contact:
     """One point of contact: the names of two links, or of an object and a link; the position in the world,
-    (3,) m; the force on the second of the two in world axes, (3,) N; and the depth, m."""
+    (3,) m; the force on the second link in world axes, (3,) N; and the depth, m."""
 
     between: tuple[str, str]
     position: np.ndarray

@@ -72,7 +72,7 @@ def touching_often(robot: Robot) -> list[set[Bodies]]:
 
 
 def _touches(robot: Robot, postures: np.ndarray, margin: float = 0.0) -> Iterator[set[Bodies]]:
-    # Each of two solids has half the margin: MuJoCo adds the margins of the two.
+    # Each solid has half the margin: MuJoCo adds the margins of both solids.
     model = compiled(robot, PlantSettings(contacts=True), margin=0.5 * margin)
     data = mujoco.MjData(model)
     joints = [solid.joint for solid in robot.collision.solids]
@@ -84,8 +84,8 @@ def _touches(robot: Robot, postures: np.ndarray, margin: float = 0.0) -> Iterato
 
 
 def lowest(robot: Robot) -> tuple[float | None, float | None]:
-    """Returns the heights, m, of two lowest points at home: that of the fixed or mobile base, and that of all
-    other bodies. A height is None if there is no solid."""
+    """Returns two heights at home, m: of the lowest point of the fixed or mobile base, and of the lowest
+    point of all other bodies. A height is None if there is no solid."""
     model = compiled(robot, PlantSettings(contacts=True))
     data = mujoco.MjData(model)
     data.qpos[:] = robot.home

@@ -36,7 +36,7 @@ def compiled(
     also: tuple[Excluded, ...] = (),
     margin: float = 0.0,
 ) -> mujoco.MjModel:
-    """Returns the model: body i carries joint i of Pinocchio's tree, site k is its frame k.
+    """Returns MuJoCo's model. Body i carries joint i of Pinocchio's tree, and site k is frame k of this tree.
 
     With contacts, geometry k is solid k of the robot. The robot's bodies are followed by one body for all
     solids that are fixed to the world, and by one body for each object of the world. The joints of free
@@ -115,7 +115,7 @@ def _body(joint: int) -> str:
 
 
 def _stop(joint: mujoco.MjsJoint, lower: float, upper: float) -> None:
-    """Sets the limits of a joint that has one. MuJoCo supports only joints with two limits or none."""
+    """Sets the limits of a joint that has one. In MuJoCo a joint has either two limits or no limits."""
     if np.isfinite(lower) or np.isfinite(upper):
         joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
         joint.range = (max(lower, -_FAR), min(upper, _FAR))

@@ -6,8 +6,8 @@ import numpy as np
 
 
 def simplify(vertices: np.ndarray, faces: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
-    """Returns (vertices, faces) with at most about `most` faces. If there are no more faces, they are
-    unchanged.
+    """Returns (vertices, faces) with at most about `most` faces. A mesh that already has few enough faces is
+    returned unchanged.
 
     All vertices in one cell of a grid move to their mean position. Vertices whose normals point to different
     sides stay separate, so edges stay sharp, but have the same position, so no gap opens. The size of the

@@ -20,8 +20,8 @@ def family(pid: int) -> list[psutil.Process]:
 
 
 def has_ended(pid: int, within: float) -> bool:
-    """Waits up to `within` seconds and returns whether a child process has ended. Nobody may have waited for
-    it yet."""
+    """Waits up to `within` seconds and returns whether a child process has ended. `wait` must not have been
+    called for this child."""
     end = time.monotonic() + within
     while True:
         try:
@@ -58,9 +58,9 @@ def end_family(pid: int, mark: tuple[str, str] | None = None) -> bool:
     """Ends a process, all its descendants, and its process group if it leads one.
 
     Args:
-        pid: process id. The process may have ended, but nobody may have waited for it yet.
-        mark: name and unique value of an environment variable. Every process that has this variable and value
-            is ended too, for any group and parent.
+        pid: process id. The process may have ended, but `wait` must not have been called for it.
+        mark: name and unique value of an environment variable. All processes with this variable and value are
+            ended too, whatever their group or parent is.
 
     Returns:
         whether there were other processes than the process itself.

@@ -252,15 +252,15 @@ def _answer(request: bytes, within: Allowance) -> bytes:
     except MemoryError:
         fault = within.too_much
     except RecursionError:
-        fault = "it is nested too deeply; give a flatter one"
+        fault = "it is nested too deeply; give a file with fewer nested elements"
     except Exception as error:
         fault = f"the import failed on it ({type(error).__name__}: {shortened(str(error), 100)})"
     return pickle.dumps((None, fault, None))
 
 
 def _restrict(within: Allowance, parent: int) -> None:
-    """Makes this process end with its parent, at the latest time and at the limit of memory, if the system
-    supports this."""
+    """Makes this process end with its parent, at the largest wall time and at the limit of memory, if the
+    system supports this."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent notices this and ends the process
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
     signal.alarm(int(PATIENCE * within.seconds) + 1)

@@ -35,8 +35,8 @@ def end_with(pipe: int, group: bool = False) -> None:
 
 
 def end_with_parent() -> None:
-    """Makes this process end when its parent ends, if it was started by `multiprocessing`. Otherwise does
-    nothing."""
+    """Makes this process end when its parent ends. Does nothing if the process was not started by
+    `multiprocessing`."""
     parent = mp.parent_process()
     if parent is not None:
         end_with(parent.sentinel)

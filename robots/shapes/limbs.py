@@ -76,7 +76,7 @@ def _farthest(model: pin.Model, joint: int) -> np.ndarray:
 
 def _foot(top: np.ndarray, radius: float) -> np.ndarray:
     """Returns the end, (3,) m, of a column from the floor to the first joint. If this joint is on the floor,
-    it is the end of a flat foot below the joint."""
+    returns the end of a flat foot below the joint."""
     return top if float(np.linalg.norm(top)) > 0.5 * radius else np.array([0.0, 0.0, -0.5 * radius])
 
 

@@ -46,7 +46,7 @@ def repair_inertials(root: Element) -> Iterator[Finding]:
 
 def nearest_physical(inertia: np.ndarray) -> tuple[np.ndarray, float]:
     """Returns (I', violation): the nearest physically possible inertia about the centre of mass, kg·m², and
-    the violation by the given one.
+    the violation of the condition by the given inertia.
 
     A body's inertia is I = tr(Σ)·1 − Σ with Σ = ∫ρ r rᵀ ⪰ 0, so Σ = ½ tr(I)·1 − I must be positive
     semidefinite. For the principal moments, this condition is A + B ≥ C; it implies I ⪰ 0 (Wensing, Kim,
@@ -88,7 +88,7 @@ def _repair_link(link: Element) -> Iterator[Finding]:
         return 0.0
     if inertia is None or float(np.abs(inertia).max()) < 1e-12 * mass:
         _write_inertia(inertial, np.eye(3) * _sphere(mass))
-        text = f"no rotational inertia; that of a solid sphere of {mass:.4g} kg was used"
+        text = f"no rotational inertia; the inertia of a solid sphere of {mass:.4g} kg was used"
         yield Finding("filled", label(link), text)
         return mass
     physical, violation = nearest_physical(inertia)

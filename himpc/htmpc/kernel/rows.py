@@ -36,8 +36,8 @@ STOP_STEPS = 40
 
 @kernel(MATRIX, WHOLE, INDICES, MATRIX, FIXED)
 def spread(A: Array, index: int, knot: NDArray[np.intp], slopes: Array, T_q: Array) -> None:
-    """Writes rows of functions of q to A (…, N·n), from `index` on: their slopes (r, n) in q at knots
-    (r,)."""
+    """Writes rows of functions of q to A (…, N·n), from `index` on. `slopes` (r, n) are the derivatives of
+    the functions with respect to q at the knots (r,)."""
     n = slopes.shape[1]
     for r in range(len(knot)):
         for s in range(len(T_q)):
