@@ -17,7 +17,7 @@ def standing_floor(robot: Robot) -> World:
 
 
 def no_floor(robot: Robot) -> str:
-    """Returns the reason why a robot does not stand on a floor; "" if it stands on one."""
+    """Returns the text for the report if a robot does not stand on a floor; "" if it stands on one."""
     from robots.mechanics.exclusions import lowest  # needs MuJoCo
 
     base, rest = lowest(robot)

@@ -31,7 +31,7 @@ mujoco.set_mju_user_warning(lambda _: None)
 
 class Plant:
     """A robot in MuJoCo under torque control, integrated with RK4. SI units, world axes, joints in
-    Pinocchio's order. The same calls give bitwise the same numbers.
+    Pinocchio's order. With the same calls, all numbers are bitwise the same.
 
     `broken`: whether the simulation has diverged since the last reset; the robot was then stopped. Queries
     (`mass_matrix`, `bias`, `jacobian`, `frame_pose`, `acceleration`, `holding_torque`) return properties of

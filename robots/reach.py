@@ -18,7 +18,7 @@ ROTATION_TOLERANCE = np.radians(1.0)  # rad
 _EVALUATIONS = 60
 _STARTS = 4
 _MARGIN = 1e-4
-"""Smallest distance of the result from the joint limits, rad or m."""
+"""Smallest distance between the configuration that is found and the joint limits, rad or m."""
 
 
 @dataclass(frozen=True)

@@ -74,7 +74,7 @@ class Robot:
             raise unknown_name(f"frame of robot '{self.name}' called", name, self.frames) from None
 
     def moving_body(self, name: str) -> int:
-        """Returns the Pinocchio index of the joint that moves a body. `body` is the name of the joint or of
+        """Returns the Pinocchio index of the joint that moves a body. `name` is that of the joint or of
         any frame on the body.
 
         Raises InputError for an unknown name and for a frame that is fixed to the world.

@@ -72,7 +72,7 @@ class VelocityPlantSettings:
 class VelocityPlant:
     """A robot that receives velocity commands. SI units, joints in Pinocchio's order.
 
-    The same settings, seed and calls result in bitwise the same numbers.
+    With the same settings, seed and calls, all numbers are bitwise the same.
     """
 
     def __init__(self, robot: Robot, settings: VelocityPlantSettings | None = None, seed: int = 0) -> None:

@@ -30,9 +30,9 @@ class Rows(NamedTuple):
         L: (r, N) lower-triangular Toeplitz blocks, the time profiles of the constraints.
         lower, upper: (r, n), ±inf where there is no bound.
         constraints: the constraint of each block of N rows.
-        stopping: (2, n), whether the lower, upper velocity bound of a joint comes from its position limit: it
-            is the velocity from which the joint can still stop, and is below the joint's velocity limit. None
-            if no row has such a bound.
+        stopping: (2, n), whether the lower, upper velocity bound of a joint belongs to its position limit.
+            Such a bound is the velocity from which the joint can still stop, and is below the joint's
+            velocity limit. None if no row has such a bound.
         rest: (N, n) N·m, the values of the velocity rows when the joints come to rest, see `coming_to_rest`.
             None means zeros: the velocities stay constant.
         directions: the directions of each block; None for a block whose column c is joint c. Empty if this

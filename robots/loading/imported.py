@@ -18,7 +18,7 @@ def with_collision(robot: Robot, meshes: bool = True) -> Robot:
     """Returns the robot with its collision geometry.
 
     meshes: whether mesh files are read; otherwise capsules replace bodies with meshes. If MuJoCo cannot use
-    the shapes, all shapes are left out. The report notes this, and the reason why a robot has no floor.
+    the shapes, all shapes are left out. The report notes this. It also notes why a robot has no floor.
     """
     try:
         found = collision_model(robot, collision_solids(robot, meshes))

@@ -109,7 +109,7 @@ def _robot(canonical: Canonical, tip: str | None) -> Robot | None:
 
 
 def _trial(robot: Robot) -> str | None:
-    """Simulates the robot briefly. Returns the reason if a simulation is impossible; otherwise None."""
+    """Simulates the robot briefly. Returns the problem if a simulation is impossible; otherwise None."""
     try:
         plant = Plant(robot)
         for _ in range(_TRIAL):

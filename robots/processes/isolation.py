@@ -64,7 +64,8 @@ class Allowance:
 
 
 class Fault(Exception):
-    """Raised if isolated work did not finish. The message is the end of a sentence that gives the reason."""
+    """Raised if isolated work did not finish. The message is the end of a sentence that describes the
+    problem."""
 
 
 def isolated(

@@ -96,7 +96,7 @@ def _drum(model: pin.Model, joint: int, radius: float) -> MeshPart:
 
 
 def _along(vertices: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """Returns vertices, modelled along z, after the rotation that turns z to `direction`."""
+    """Returns vertices that are modelled along z, rotated so that z points along `direction`."""
     unit = direction / np.linalg.norm(direction)
     turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), unit).toRotationMatrix()
     return vertices @ turn.T
