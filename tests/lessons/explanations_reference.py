@@ -23,7 +23,7 @@ REFERENCE = (
     )),
     Exempt("purpose", "", (
         ("robots/shapes/capsules.py", "Returns vertices that are modelled along z"),
-        ("robots/shapes/capsules.py", "Returns the mesh with separate vertices for the caps and the curved side"),
+        ("robots/shapes/capsules.py", "Returns the mesh with separate vertices for the caps"),
         ("himpc/formulation/forms.py", "All active levels, their rows stacked"),
         ("himpc/limits/rows.py", "All rows are in N·m"),
         ("himpc/references/square_wave.py", "A switch takes place earlier by this time"),
@@ -122,7 +122,7 @@ REFERENCE = (
         ("himpc/kinematics/configuration.py", "Only geometry is used, no inertia or gravity"),
     )),
     Exempt("software", HTMPC + "active_set.py::test_rows_that_contradict_each_other_are_found_out", (
-        ("himpc/htmpc/active_set.py", "A row that depends linearly on the active rows does not enlarge their basis, so"),
+        ("himpc/htmpc/active_set.py", "A row that depends linearly on the active rows does not enlarge"),
     )),
     Exempt("software", HTMPC + "loop.py::test_every_setting_changes_live_without_a_jump", (
         ("himpc/htmpc/htmpc.py", "`configure` changes settings and keeps these plans"),
