@@ -1,5 +1,4 @@
-"""The catalog of robots that come with the project: one URDF per folder, and the data that a URDF cannot
-contain."""
+"""The catalog of the project's robots: one URDF per folder, and the data that a URDF cannot contain."""
 
 from __future__ import annotations
 
@@ -23,7 +22,7 @@ class CatalogEntry:
     home_deg: tuple[float, ...]
     a_max: tuple[float, ...]  # rad/s²
     M_bar: tuple[float, ...]  # kg·m²
-    hollow: tuple[tuple[str, str], ...] = ()  # links whose hulls touch in postures in which the links do not
+    hollow: tuple[tuple[str, str], ...] = ()  # pairs of links; in some postures only their hulls touch
 
     @property
     def path(self) -> Path:
@@ -32,18 +31,18 @@ class CatalogEntry:
 
     @property
     def collision_path(self) -> Path:
-        """Its collision geometry, written by `python -m robots.loading.write`."""
+        """The file with the robot's collision geometry, written by `python -m robots.loading.write`."""
         return _HERE / self.name / "collision.json"
 
     @property
     def cover_path(self) -> Path:
-        """The capsules that distances use, written by the same command."""
+        """The file with the capsules that distances use, written by the same command."""
         return _HERE / self.name / "cover.json"
 
     @property
     def home(self) -> np.ndarray:
         """Home configuration, (n,) rad."""
-        import numpy as np  # imported here, which keeps NumPy out of programs that only list the catalog
+        import numpy as np  # imported here: programs that only list the catalog do not need NumPy
 
         return np.radians(self.home_deg)
 
@@ -97,7 +96,7 @@ CATALOG: dict[str, CatalogEntry] = {
                 59.0,
                 29.0,
             ),
-            a_max=(4.0, 2.0, 8.0, 8.0, 15.0, 15.0, 15.0) * 2,  # our estimate of what its torques can produce
+            a_max=(4.0, 2.0, 8.0, 8.0, 15.0, 15.0, 15.0) * 2,  # our estimate from the joints' torques
             M_bar=(0.046, 0.46, 0.0144, 0.0736, 0.0046, 0.0127, 0.0004) * 2,  # suggest_M_bar
             hollow=tuple(
                 (f"{side}_{first}", f"{side}_{second}")

@@ -48,7 +48,8 @@ class Box:
 
 @dataclass(frozen=True)
 class Floor:
-    """Everything below a height, m. A mobile base stands on the floor: its spheres are not checked."""
+    """Everything below a height, m. The spheres of a mobile base, which stands on the floor, are not
+    checked."""
 
     name: str = "floor"
     height: float = 0.0
@@ -66,8 +67,8 @@ def _check(name: str, numbers: tuple[float, ...], *sizes: float) -> None:
 
 
 class Surroundings(NamedTuple):
-    """Arrays of the capsules s of a robot (spheres, if their spans are 0) and of the shapes o that it must
-    not touch.
+    """Arrays of the capsules s of a robot (spheres, if their spans are 0) and of the shapes o that the robot
+    must not touch.
 
     Attributes:
         links: names of the links that carry the capsules.
@@ -76,10 +77,10 @@ class Surroundings(NamedTuple):
         names: names of the shapes.
         kind: (O,) FLOOR, BALL, BOX or CAPSULE.
         carrier: (O,) index of the joint that carries each shape, 0 for the world.
-        turn: (O, 3, 3) and middle: (O, 3) m, the shape's axes and middle in its carrier's; for a floor a
-            point of its surface, for a capsule the start of its segment.
-        half: (O, 3) m, half the edges of a box; a ball's radius comes first; a capsule's segment in its
-            carrier's axes. thickness: (O,) m, a capsule's radius.
+        turn: (O, 3, 3) and middle: (O, 3) m, axes and middle of the shape in the axes of its carrier. For a
+            floor, the middle is a point of its surface; for a capsule, the start of its segment.
+        half: (O, 3) m, half the edges of a box; for a ball, the first number is its radius; for a capsule,
+            its segment in the axes of its carrier. thickness: (O,) m, a capsule's radius.
         meets: (O, S) whether the distance of a pair is checked.
     """
 
@@ -109,8 +110,8 @@ class _Shape(NamedTuple):
 
 
 def surroundings(robot: Robot, obstacles: tuple[Obstacle, ...], self_collision: bool = False) -> Surroundings:
-    """Collects the spheres of a robot and the shapes that they must not touch: obstacles, and for the arm its
-    own base."""
+    """Collects the spheres of a robot and the shapes that they must not touch: the obstacles, and for the
+    arm's spheres the robot's own base."""
     spheres = covering_spheres(robot)
     frames = [robot.model.frames[robot.frame_id(sphere.link)] for sphere in spheres]
     joint = np.array([frame.parentJoint for frame in frames], np.intp)
@@ -156,7 +157,8 @@ def _shape(obstacle: Obstacle, joint: Indices, base: int) -> _Shape:
 
 
 def _own_base(base: int, joint: Indices, centre: Array, radius: Array) -> _Shape:
-    """Returns the base as the box around its own spheres; the links next to it are not checked against it."""
+    """Returns the base as a box around its spheres. The links next to the base are not checked against the
+    box."""
     own = joint == base
     low = (centre[own] - 0.6 * radius[own, None]).min(axis=0)
     high = (centre[own] + 0.6 * radius[own, None]).max(axis=0)

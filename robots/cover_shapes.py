@@ -20,16 +20,17 @@ WorldShape = Ball | Box | Post | Floor
 
 _POSTURES = 24
 _STILL = 1e-3
-"""m: a capsule whose height varies less over all postures cannot be kept away from the floor."""
+"""A capsule whose height varies by less than this, m, over all postures cannot be kept away from the
+floor."""
 
 
 def cover_surroundings(robot: Robot, cover: Cover, shapes: Sequence[WorldShape]) -> Surroundings:
-    """Collects the capsules of a robot's cover, and as shapes the objects of the world, in this order, and
-    after them the same capsules again.
+    """Collects the capsules of a robot's cover and the shapes. The shapes are first the objects of the world,
+    in their order, and then the same capsules again.
 
-    Every pair of capsules is checked once, but those of one body and those of bodies that the cover leaves
-    out. Capsules that do not move are not checked against the world, nor are those against a floor whose
-    height never changes, or that stand in it at home.
+    Every pair of capsules is checked once, except pairs on one body and pairs of bodies that the cover leaves
+    out. Capsules that do not move are not checked against the world. A capsule is not checked against a floor
+    if its height never changes, or if it reaches into the floor at home.
     """
     capsules = cover.capsules
     joint = np.array([each.joint for each in capsules], np.intp)
@@ -66,7 +67,8 @@ def cover_surroundings(robot: Robot, cover: Cover, shapes: Sequence[WorldShape])
 
 
 def placements(shapes: Sequence[WorldShape]) -> tuple[Array, Array]:
-    """The rows of `Surroundings.turn` and `middle` of objects of the world, (B, 3, 3) and (B, 3) m."""
+    """Returns the rows of `Surroundings.turn` and `middle` for objects of the world, (B, 3, 3) and (B, 3)
+    m."""
     tables = [_table(shape) for shape in shapes]
     turns = [pin.rpy.rpyToMatrix(0.0, 0.0, yaw) for _, yaw, *_ in tables]
     middles = [middle for _, _, middle, *_ in tables]
@@ -74,7 +76,8 @@ def placements(shapes: Sequence[WorldShape]) -> tuple[Array, Array]:
 
 
 def _table(shape: WorldShape) -> tuple[int, float, Array, Array, float]:
-    """Kind, yaw, middle, half and thickness, see `Surroundings`. A post is the capsule that contains it."""
+    """Returns kind, yaw, middle, half and thickness, see `Surroundings`. For a post, they describe the
+    capsule that contains the post."""
     none = np.zeros(3)
     match shape:
         case Floor(_, height):

@@ -1,20 +1,20 @@
-"""`InputError`, which every invalid input raises, and the error message for an unknown name."""
+"""`InputError`, the exception for every invalid input, and the error message for an unknown name."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from difflib import get_close_matches
 
-_LISTED = 600  # largest number of characters that the list of choices takes: the whole catalog fits
-_COMPARED = 100  # number of characters of a name that are compared: the computing time grows with its square
+_LISTED = 600  # largest number of characters of the list of choices; the whole catalog fits
+_COMPARED = 100  # number of compared characters of a name; the computing time grows with its square
 
 
 class InputError(ValueError):
-    """An input cannot be used. The message is one sentence that says what to do next."""
+    """Raised if an input cannot be used. The message is one sentence that tells the user what to do next."""
 
 
 def shortened(text: str, most: int = 60) -> str:
-    """Makes a name or path printable for a message and leaves out its middle if it is too long."""
+    """Returns a name or path in printable form for a message. If it is too long, its middle is left out."""
     if len(text) > most:
         head = (most - 3) // 3
         text = text[:head] + "..." + text[len(text) - (most - 3 - head) :]
@@ -29,8 +29,8 @@ def nearest_name(name: str, choices: Iterable[str], cutoff: float = 0.6) -> str 
 
 
 def unknown_name(what: str, name: str, choices: Iterable[str], hint: str = "") -> InputError:
-    """Builds the error for a name that is not among `choices`: the message names the nearest choice and lists
-    them all."""
+    """Returns the error for a name that is not among `choices`. The message contains the most similar choice
+    and the list of all choices."""
     names = [str(choice) for choice in choices]
     close = nearest_name(str(name), names, cutoff=0.4)
     nearest = f"did you mean '{shortened(close)}'? " if close else ""

@@ -6,17 +6,18 @@ from robots.collision import Floor
 from robots.robot import Robot
 from robots.world import Thing, World
 
-_SUNK = 0.03  # m by which a base may stand above or below the floor
+_SUNK = 0.03  # largest distance of a standing base from the floor, m
 
 
 def standing_floor(robot: Robot) -> World:
-    """Returns the floor on which a robot stands, at the height 0; nothing for a robot that hangs, or whose
-    home or base is below that height, as for an arm that moves in a horizontal plane."""
+    """Returns the floor at the height 0 on which a robot stands. Returns nothing for a robot that hangs, or
+    whose base or home posture is below this height, for example for an arm that moves in a horizontal
+    plane."""
     return () if no_floor(robot) else (Thing(Floor()),)
 
 
 def no_floor(robot: Robot) -> str:
-    """Says why a robot does not stand on a floor; "" if it does."""
+    """Returns the text for the report if a robot does not stand on a floor; "" if it stands on one."""
     from robots.mechanics.exclusions import lowest  # needs MuJoCo
 
     base, rest = lowest(robot)

@@ -1,5 +1,5 @@
-"""M̄ of time-delay estimation: a suggested value for any robot, and a measure of convergence for a given
-M̄."""
+"""M̄ of time-delay estimation: suggests a value for any robot, and computes a measure of convergence for a
+given M̄."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import numpy as np
 import pinocchio as pin
 
 LARGEST_EIGENVALUE = 1.5
-"""λ_max(M⁻¹M̄) of a suggested M̄ over the sampled configurations; 2 is the edge of stability."""
+"""λ_max(M⁻¹M̄) of a suggested M̄ over the sampled configurations; the limit of stability is 2."""
 
-_WIDEST = 40.0  # rad or m: the widest range that is sampled; further turns repeat the same configurations
+_WIDEST = 40.0  # widest sampled range, rad or m; further turns repeat the same configurations
 
 
 def finite_range(q_lower: np.ndarray, q_upper: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the limits to sample within: ±π for an unbounded joint, and one turn from the finite limit of a
-    joint that is bounded on one side."""
+    """Returns the limits between which configurations are sampled: ±π for an unbounded joint, and one turn
+    from the finite limit of a joint with only one limit."""
     turn = 2.0 * np.pi
     from_above = np.where(np.isfinite(q_upper), q_upper - turn, -np.pi)
     from_below = np.where(np.isfinite(q_lower), q_lower + turn, np.pi)
@@ -29,7 +29,8 @@ def finite_range(q_lower: np.ndarray, q_upper: np.ndarray) -> tuple[np.ndarray, 
 def sample_configurations(
     q_lower: np.ndarray, q_upper: np.ndarray, samples: int, seed: int = 0
 ) -> np.ndarray:
-    """Samples configurations (samples, n) uniformly inside the limits, and within ±π for unbounded joints."""
+    """Returns configurations (samples, n), uniformly distributed inside the limits and, for unbounded joints,
+    within ±π."""
     lower, upper = finite_range(q_lower, q_upper)
     return np.random.default_rng(seed).uniform(lower, upper, size=(samples, len(lower)))
 
@@ -40,7 +41,7 @@ def mass_matrix(model: pin.Model, data: pin.Data, q: np.ndarray) -> np.ndarray:
 
 
 def _symmetric(M: np.ndarray) -> np.ndarray:
-    """Completes upper triangular matrices (…, n, n) to symmetric ones."""
+    """Returns the symmetric matrices that have the given upper triangles, (…, n, n)."""
     return np.where(np.tri(M.shape[-1], k=-1, dtype=bool), M.swapaxes(-1, -2), M)
 
 
@@ -49,12 +50,13 @@ def suggest_M_bar(
 ) -> np.ndarray:
     """Returns a constant diagonal M̄, (n,) kg·m², for which time-delay estimation converges on all samples.
 
-    The estimation error is multiplied by I − M⁻¹M̄ from one period to the next, so its spectral radius has to
-    be below 1 (HIMPC, T-RO 2024, Remark 4). M⁻¹M̄ is similar to S = M̄^½ M⁻¹ M̄^½, symmetric and positive
-    definite, so its eigenvalues are real and positive, and the radius is below 1 iff λ_max(S) < 2. Steps:
+    From one period to the next, the estimation error is multiplied by I − M⁻¹M̄, so the spectral radius of
+    this matrix must be below 1 (HIMPC, T-RO 2024, Remark 4). M⁻¹M̄ is similar to S = M̄^½ M⁻¹ M̄^½, which is
+    symmetric and positive definite, so the eigenvalues are real and positive. The radius is below 1 iff
+    λ_max(S) < 2. Steps:
 
     1. shape: D_i = min over samples of 1/(M⁻¹)_ii, the least inertia of joint i while the other joints are
-       free, so joints of very different size each get their own scale;
+       free, so each joint gets its own scale, also if the joints have very different sizes;
     2. size: M̄ = LARGEST_EIGENVALUE · D / max over samples of λ_max(D^½ M⁻¹ D^½). Between the samples
        λ(S) is larger: the page of the lesson *Your robot* finds 1.74 on its lamp, which is still stable for a
        plant that is 13 % lighter than the model.
@@ -74,24 +76,25 @@ def convergence_gauge(M: np.ndarray, M_bar: np.ndarray) -> tuple[float, float]:
     """Returns (‖I − M⁻¹M̄‖₂, spectral radius of I − M⁻¹M̄) for a mass matrix M (n, n) and a diagonal M̄ (n,),
     kg·m².
 
-    If the norm is below 1, every error shrinks at every step (the paper's condition). If only the radius is
-    below 1, errors vanish, but may grow first. Raises LinAlgError if M is singular.
+    If the norm is below 1, every error becomes smaller at every step (the paper's condition). If only the
+    radius is below 1, errors decay in the end, but may grow first. Raises LinAlgError if M is singular.
     """
     diagonal = np.asarray(M_bar, dtype=float)
     inverse, root = np.linalg.inv(M), np.sqrt(diagonal)
     error = np.eye(len(diagonal)) - inverse * diagonal
     largest = float(np.abs(error).max()) or 1.0
-    error /= largest  # scaled, which keeps its squares finite
+    error /= largest  # scaled: the squares of its elements stay finite
     squares, values = np.linalg.eigvalsh(np.array((error.T @ error, root[:, None] * inverse * root)))
     return largest * math.sqrt(max(float(squares[-1]), 0.0)), float(np.abs(1.0 - values).max())
 
 
 def convergence_eigenvalues(M: np.ndarray, M_bar: np.ndarray) -> np.ndarray:
-    """Returns the eigenvalues of I − M⁻¹M̄, (n,), the largest first: the factors by which a step multiplies
-    each mode of the error.
+    """Returns the eigenvalues of I − M⁻¹M̄, (n,), the largest first. They are the factors by which a step
+    multiplies the modes of the error.
 
-    All are real, for M⁻¹M̄ is similar to a symmetric matrix: near 1 an error decays slowly, below 0 it
-    changes its sign at every step, below −1 it grows. Arguments and errors as in `convergence_gauge`.
+    All eigenvalues are real: M⁻¹M̄ is similar to a symmetric matrix. With an eigenvalue near 1 the error
+    decays slowly. Below 0, the error changes its sign at every step, and below −1 it grows. Arguments and
+    exceptions are those of `convergence_gauge`.
     """
     root = np.sqrt(np.asarray(M_bar, dtype=float))
     return 1.0 - np.linalg.eigvalsh(root[:, None] * np.linalg.inv(M) * root[None, :])

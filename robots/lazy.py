@@ -1,4 +1,5 @@
-"""Lazy packages: a public name is visible at once, and its module is imported on first use (PEP 562)."""
+"""Lazy packages: all public names are visible, and the module of a name is imported on first use (PEP
+562)."""
 
 from __future__ import annotations
 

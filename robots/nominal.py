@@ -1,4 +1,4 @@
-"""The nominal dynamic model of model-based controllers: the robot's model with given modelling errors."""
+"""The nominal dynamic model of model-based controllers: the robot's model with specified modelling errors."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ class NominalSettings:
     """Parameters of the nominal model of a model-based controller; `PlantSettings` describes the plant
     separately.
 
-    payload_kg, damping, armature, mass_scale, inertia_scale, gravity: as in `PlantSettings`, for the nominal
-        model; the defaults are the robot as its URDF describes it, without armature or friction.
+    payload_kg, damping, armature, mass_scale, inertia_scale, gravity: as in `PlantSettings`, but for the
+    nominal model. The defaults describe the robot of the URDF, without armature and friction.
 
-    Raises InputError, naming the field, for values that are not allowed.
+    Raises InputError, which names the field, for values that are not allowed.
     """
 
     payload_kg: Annotated[float, Range(0.0, 1e3)] = 0.0

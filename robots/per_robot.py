@@ -17,8 +17,8 @@ def per_robot(compute: Callable[Concatenate[Robot, P], Result]) -> Callable[Conc
     """Stores the results of a function of a robot and other hashable arguments for as long as the robot
     exists.
 
-    A server builds a new robot for every page that opens a scene: `functools.lru_cache` would keep hundreds
-    of robots that are no longer used. The results must not refer to the robot.
+    A server builds a new robot for every page that opens a scene. With `functools.lru_cache`, hundreds of
+    unused robots would stay in memory. The results must not refer to the robot.
     """
     results: WeakKeyDictionary[Robot, dict[Any, Result]] = WeakKeyDictionary()
 

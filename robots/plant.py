@@ -1,9 +1,9 @@
 """The plant: MuJoCo's simulation of a robot, built from its Pinocchio model (`robots.mechanics.model`).
 
-Building it this way, not from the URDF, makes the joint order Pinocchio's and M, C·v + g, kinematics and
-accelerations equal to 1e-9. With `contacts` the robot touches itself and the objects of the world, with
-`joint_stops` a joint stops at its limits. Without, there are no geometries: links pass through each other,
-and a joint that is pushed past its limit continues to move, and the run shows it.
+The model is not built from the URDF: its joints are in Pinocchio's order, and M, C·v + g, kinematics and
+accelerations equal Pinocchio's to 1e-9. With `contacts` the robot touches itself and the objects of the
+world; otherwise links pass through each other. With `joint_stops` a joint stops at its limits; otherwise a
+joint that is pushed past its limit continues to move.
 """
 
 from __future__ import annotations
@@ -25,24 +25,24 @@ from robots.world import World, check_world
 
 _ZERO = (0.0, 0.0, 0.0)
 _BROKEN = 1e6  # rad/s or m/s
-# MuJoCo would print and leave a log file in the user's folder.
+# By default MuJoCo prints warnings and writes a log file to the user's folder.
 mujoco.set_mju_user_warning(lambda _: None)
 
 
 class Plant:
     """A robot in MuJoCo under torque control, integrated with RK4. SI units, world axes, joints in
-    Pinocchio's order. The same calls give bitwise the same numbers.
+    Pinocchio's order. With the same calls, all numbers are bitwise the same.
 
-    `broken`: since the last reset the simulation diverged, and the robot was stopped where it was.
-    Queries (`mass_matrix`, `bias`, `jacobian`, `frame_pose`, `acceleration`, `holding_torque`) are about
-    the plant as its settings make it, and never disturb the simulation.
+    `broken`: whether the simulation has diverged since the last reset; the robot was then stopped. Queries
+    (`mass_matrix`, `bias`, `jacobian`, `frame_pose`, `acceleration`, `holding_torque`) return properties of
+    the plant with its settings, and never change the simulation.
     """
 
     def __init__(
         self, robot: Robot, settings: PlantSettings | None = None, timestep: float = 1e-3, world: World = ()
     ) -> None:
-        """timestep: s, the longest internal step; world: objects that the robot touches if the settings have
-        contacts. Raises InputError for an invalid setting, timestep or world."""
+        """timestep: s, the longest internal step; world: objects that the robot can touch with `contacts`.
+        Raises InputError for an invalid setting, timestep or world."""
         if not (math.isfinite(timestep) and 0.0 < timestep <= 0.01):
             raise InputError(f"plant timestep is {timestep} s; give a value above 0 and at most 0.01.")
         self.robot = robot
@@ -91,7 +91,7 @@ class Plant:
 
     @property
     def tau(self) -> np.ndarray:
-        """(n,) N·m, the torque acting on the joints, after saturation, delay and lag."""
+        """(n,) N·m, the torque that acts on the joints, after saturation, delay and lag."""
         return self._motors.torque.copy()
 
     @property
@@ -109,10 +109,10 @@ class Plant:
         return contacts(self._model, self._probe, self.robot, self.world)
 
     def reset(self, q: np.ndarray, v: np.ndarray | None = None, tau: np.ndarray | None = None) -> None:
-        """Puts the robot at q (rad) with velocity v (default 0); t = 0, without push; free objects return.
+        """Sets the state q (rad), v (default 0), t = 0 without a push; free objects return to their start.
 
-        tau: N·m, the torque the motors were giving before; default: `holding_torque`, as when the brakes
-        open. Raises ValueError for vectors of the wrong length or with non-finite entries.
+        tau: N·m, previous torque of the motors; default: `holding_torque`, as when brakes are released.
+        Raises ValueError for vectors of the wrong length or with non-finite entries.
         """
         position = as_vector("q", q, self.n)
         velocity = np.zeros(self.n) if v is None else as_vector("v", v, self.n)
@@ -126,8 +126,8 @@ class Plant:
         self._encoders = Encoders(position, velocity, 0.0)
 
     def measure(self, period: float) -> PlantState:
-        """The state as the sensors see it. With ideal encoders that is the true one; else q is rounded and
-        v is its backward difference over `period` (s, the control period). Calling it changes nothing.
+        """Returns the measured state. With ideal encoders it is the true state; otherwise q is rounded and v
+        is its backward difference over `period` (s, the control period). The call changes nothing.
         """
         if not self._rounds:
             return PlantState(self.t, self.q, self.v)
@@ -135,9 +135,9 @@ class Plant:
         return PlantState(self.t, q, np.where(self._resolution > 0.0, v, self.v))
 
     def step(self, tau: np.ndarray, period: float) -> np.ndarray:
-        """Holds the command tau (n,), N·m, for `period` (s), in equal internal steps no longer than the
-        timestep; returns the torque (n,) acting at the end. Raises ValueError for a command that is not n
-        finite numbers: nothing is simulated then.
+        """Simulates `period` (s) with the command tau (n,), N·m, in equal internal steps, at most the
+        timestep long. Returns the torque (n,) that acts at the end. Raises ValueError, and simulates nothing,
+        if the command is not n finite numbers.
         """
         if not (math.isfinite(period) and period > 0.0):
             raise ValueError(f"the period is {period} s; it must be positive")
@@ -162,9 +162,9 @@ class Plant:
         force: tuple[float, float, float] | np.ndarray = _ZERO,
         torque: tuple[float, float, float] | np.ndarray = _ZERO,
     ) -> None:
-        """Applies a force (N) and torque (N·m), world axes, at the centre of mass of a moving body until
-        changed; None ends it. body: the joint that moves it, or any frame on it. Raises InputError for an
-        unknown body or one fixed to the world, ValueError for a wrench that is not finite.
+        """Applies a force (N) and a torque (N·m) in world axes at the centre of mass of a moving body, until
+        the next call; None ends the push. body: the joint that moves the body, or any frame on it. Raises
+        InputError for an unknown or fixed body, ValueError for a wrench that is not finite.
         """
         wrench = np.concatenate([np.asarray(force, dtype=float), np.asarray(torque, dtype=float)])
         if wrench.shape != (6,) or not np.all(np.isfinite(wrench)):
@@ -177,13 +177,13 @@ class Plant:
         self._fresh = False
 
     def configure(self, settings: PlantSettings) -> None:
-        """Changes the plant while it runs: t, q, v, push, and the motors' and encoders' memory stay."""
+        """Changes the plant while it runs. t, q, v, push and the states of motors and encoders are kept."""
         old, (body, wrench) = self._data, self._push
         self._build(settings)
         self._motors.limit(self._tau_lower, self._tau_upper)
         self._data.time = old.time
         for name in ("qpos", "qvel", "qacc_warmstart"):
-            # The robot's part comes first; objects appear or vanish with the contacts.
+            # The robot's part comes first. Objects exist only with contacts.
             now, before = getattr(self._data, name), getattr(old, name)
             k = self.n if len(now) != len(before) else len(now)
             now[:k] = before[:k]
@@ -200,7 +200,7 @@ class Plant:
         return self._look().qfrc_bias[: self.n].copy()
 
     def holding_torque(self) -> np.ndarray:
-        """(n,) N·m that keeps the plant at q: inverse dynamics with v = 0, q̈ = 0 (no push, no friction)."""
+        """(n,) N·m, torque that holds the plant at q: inverse dynamics, v = q̈ = 0, no push or friction."""
         probe = self._probe
         probe.qpos[:], probe.qvel[:] = self._data.qpos, 0.0
         mujoco.mj_fwdPosition(self._model, probe)
@@ -209,36 +209,36 @@ class Plant:
         return probe.qfrc_bias[: self.n].copy()
 
     def jacobian(self, frame: str) -> np.ndarray:
-        """(6, n) linear over angular velocity of a frame's origin, world axes; m/rad and rad/rad."""
+        """(6, n) Jacobian of a frame's origin, linear over angular, world axes; m/rad and rad/rad."""
         J = np.zeros((6, self._model.nv))
         mujoco.mj_jacSite(self._model, self._look(), J[:3], J[3:], self._site(frame))
         return J[:, : self.n].copy()
 
     def frame_pose(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
-        """(R (3, 3), p (3,) m) of a frame in the world."""
+        """Orientation R (3, 3) and position p (3,) m of a frame in the world."""
         site, probe = self._site(frame), self._look()
         return probe.site_xmat[site].reshape(3, 3).copy(), probe.site_xpos[site].copy()
 
     def acceleration(self, tau: np.ndarray) -> np.ndarray:
-        """(n,) rad/s² if the torque tau (N·m) acted on the joints now: friction, damping and push included,
-        saturation, delay and lag not."""
+        """(n,) rad/s², the acceleration if the torque tau (N·m) acted on the joints now: with friction,
+        damping and push, without saturation, delay and lag."""
         found = self._accelerate(self._data.qpos, self._data.qvel, as_vector("tau", tau, self.n))
         self._fresh = True
         return found[: self.n].copy()
 
     def objects(self) -> np.ndarray:
-        """(k, 7) m and quaternion (w, x, y, z): where the free objects of the world are, in their order."""
+        """(k, 7) m and quaternion (w, x, y, z), poses of the free objects of the world, in their order."""
         if self.settings.contacts:
             return self._data.qpos[self.n :].reshape(-1, 7).copy()
         return np.array([thing.pose for thing in self.world if thing.free]).reshape(-1, 7)
 
     def object_velocities(self) -> np.ndarray:
-        """(k, 3) m/s: the velocities of the middles of the free objects, world axes, in their order."""
+        """(k, 3) m/s, velocities of the middles of the free objects in world axes, in their order."""
         return self._data.qvel[self.n :].reshape(-1, 6)[:, :3].copy()
 
     def carry(self, place: int, position: np.ndarray, velocity: np.ndarray) -> None:
-        """Moves the free object with this index in `objects` to a position, (3,) m, with a velocity, (3,)
-        m/s, as if a hand carried it; it needs `contacts`."""
+        """Sets position, (3,) m, and velocity, (3,) m/s, of the free object with this index in `objects`, as
+        if somebody carried it; requires `contacts`."""
         q, v = self._data.qpos[self.n :].reshape(-1, 7), self._data.qvel[self.n :].reshape(-1, 6)
         q[place, :3], v[place, :3], self._fresh = position, velocity, False
 
@@ -255,7 +255,7 @@ class Plant:
             self.broken = True
 
     def _accelerate(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> np.ndarray:
-        """q̈ at q and v under tau and the push, from the probe."""
+        """Returns q̈ at q and v for the torque tau and the push, computed with `_probe`."""
         model, data, probe = self._model, self._data, self._probe
         probe.qpos[:], probe.qvel[:], probe.ctrl[:] = q, v, tau
         probe.xfrc_applied[:], probe.qacc_warmstart[:] = data.xfrc_applied, data.qacc_warmstart
@@ -264,7 +264,7 @@ class Plant:
         return probe.qacc.copy()
 
     def _place(self, data: mujoco.MjData) -> None:
-        """Kinematics and M(q). An altered diagonal is an armature made for this very q."""
+        """Computes kinematics and M(q). A scaled diagonal of M is represented by an armature for this q."""
         mujoco.mj_fwdPosition(self._model, data)
         if self._altered:
             M = self._inertia(data)

@@ -1,4 +1,4 @@
-"""Allowed ranges of numbers in settings, written once: in the type annotation of the field."""
+"""Allowed ranges of numbers in settings. A range is written once, in the type annotation of the field."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ ANY = Range()
 
 
 def plain(hint: Any) -> tuple[Any, Range]:
-    """Splits a type annotation into the type without its range, and the range."""
+    """Splits a type annotation into the type and the range."""
     if get_origin(hint) is not Annotated:
         return hint, ANY
     inner, *extras = get_args(hint)
@@ -65,8 +65,8 @@ def field_types(owner: type) -> dict[str, Any]:
 
 
 def check_fields(owner: Any, prefix: str = "") -> None:
-    """Raises InputError, naming the field and the allowed values, if a number of a dataclass is outside its
-    range or a word is not in its Literal. Fields without range and Literal are not checked.
+    """Raises InputError if a number of a dataclass is outside its range or a word is not in its Literal. The
+    message names the field and the allowed values. Fields without range and Literal are not checked.
 
     Args:
         owner: the dataclass.

@@ -1,4 +1,4 @@
-"""Decides which targets the robot can reach: inverse kinematics as bounded nonlinear least squares."""
+"""Computes whether the robot can reach a target, by inverse kinematics as bounded nonlinear least squares."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ ROTATION_TOLERANCE = np.radians(1.0)  # rad
 _EVALUATIONS = 60
 _STARTS = 4
 _MARGIN = 1e-4
-"""rad or m: the distance that is kept to joint limits."""
+"""Smallest distance between the configuration that is found and the joint limits, rad or m."""
 
 
 @dataclass(frozen=True)
 class ReachResult:
-    """The best configuration found.
+    """The best configuration that was found.
 
     Attributes:
         q: (n,) rad, inside the limits.
@@ -53,13 +53,13 @@ class ReachJudge:
         q_seed: Array | None = None,
         frame: str = "",
     ) -> ReachResult:
-        """Finds a configuration that brings `frame` (default: the tip) to a world position (3,), m, and, if
-        given, to a world rotation (3, 3).
+        """Returns a configuration with `frame` (default: the tip) at a position (3,), m, in the world. If a
+        rotation (3, 3) in the world is given, the frame also has this rotation.
 
-        For a target out of reach the result is the configuration with the least sum of squares of position
-        error, m, and rotation error, rad. The search starts at `q_seed` (default: home), then at a few other
-        fixed configurations. Raises InputError for an unknown frame, ValueError for a target that is not
-        finite.
+        If the target is out of reach, the result is the configuration with the least sum of squares of
+        position error, m, and rotation error, rad. The search starts at `q_seed` (default: home), and then at
+        a few other fixed configurations. Raises InputError for an unknown frame and ValueError for a target
+        that is not finite.
         """
         index = self.robot.frame_id(frame or self.robot.tip)
         target = np.asarray(position, dtype=float)
@@ -78,7 +78,7 @@ class ReachJudge:
         return best
 
     def _starts(self, seed: Array) -> list[Array]:
-        """The configurations from which the search starts, inside the limits."""
+        """Returns the configurations, inside the limits, from which the search starts."""
         rng, home = np.random.default_rng(0), self.robot.home
         spread = 0.25 * (np.minimum(self._upper, np.pi) - np.maximum(self._lower, -np.pi))
         others = [home + rng.uniform(-1, 1, self.robot.n) * spread for _ in range(_STARTS - 1)]
@@ -103,7 +103,7 @@ class ReachJudge:
             return np.vstack([R @ J[:3], pin.Jlog3(rotation.T @ R) @ J[3:]])
 
         bounds = self._lower, self._upper
-        jac: Any = slopes  # SciPy does not say that it may be a function
+        jac: Any = slopes  # SciPy's type annotation does not allow a function
         q = least_squares(errors, start, jac, bounds, "dogbox", 1e-4, 1e-5, 1e-6, max_nfev=_EVALUATIONS).x
         left = errors(q)
         distance, angle = float(np.linalg.norm(left[:3])), float(np.linalg.norm(left[3:]))

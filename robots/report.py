@@ -13,9 +13,9 @@ Kind = Literal["repaired", "filled", "fixed", "refused", "note"]
 class Finding:
     """One finding of an import: something that it changed, noted or refused.
 
-    kind: `repaired` (a value was wrong and was changed), `filled` (a value was missing), `fixed` (a joint
-    was frozen), `refused` (the description cannot be used), `note` (worth knowing, nothing was changed).
-    where: the element, e.g. ``joint 'elbow'``. text: one sentence.
+    kind: `repaired` (a value was wrong and was changed), `filled` (a value was missing), `fixed` (a joint was
+    made fixed), `refused` (the description cannot be used), `note` (information; nothing was changed). where:
+    the element, e.g. ``joint 'elbow'``. text: one sentence.
     """
 
     kind: Kind

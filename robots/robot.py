@@ -19,15 +19,15 @@ from robots.report import ImportReport
 class Robot:
     """A fixed-base robot whose joints all have one degree of freedom (nq = nv = n).
 
-    All vectors are in Pinocchio's joint order, all frames are URDF links. SI units; angles in rad,
-    prismatic joints in m. The arrays are read-only: derive a changed robot with `dataclasses.replace`.
-    Picklable: it can be sent to a spawned child.
+    All vectors are in Pinocchio's joint order, and all frames are URDF links. Units are SI: rad for angles, m
+    for prismatic joints. The arrays are read-only; `dataclasses.replace` creates a changed robot. A robot can
+    be pickled and sent to a spawned child process.
     """
 
     name: str
     model: pin.Model
     joint_names: tuple[str, ...]
-    tip: str  # the frame of tasks that name no frame
+    tip: str  # default frame of tasks
     home: np.ndarray  # (n,) rad, inside the limits
     q_lower: np.ndarray  # (n,) rad, −inf where unbounded
     q_upper: np.ndarray  # (n,) rad, +inf where unbounded
@@ -38,7 +38,7 @@ class Robot:
     urdf_text: str  # canonical URDF
     report: ImportReport
     collision: CollisionModel = field(default_factory=CollisionModel)  # solids, and excluded pairs
-    cover: Cover | None = None  # made by `cover_of` if it is not given
+    cover: Cover | None = None  # made by `cover_of` if it is None
 
     def __post_init__(self) -> None:
         for name in ("home", "q_lower", "q_upper", "v_limit", "tau_limit", "a_max", "M_bar"):
@@ -66,7 +66,7 @@ class Robot:
     def frame_id(self, name: str) -> int:
         """Returns the index of a frame in `model.frames`.
 
-        Raises InputError, with the nearest name and the full list, for a name that is not a link.
+        For a name that is not a link, it raises InputError with the most similar name and the full list.
         """
         try:
             return self._frame_ids[name]
@@ -74,8 +74,8 @@ class Robot:
             raise unknown_name(f"frame of robot '{self.name}' called", name, self.frames) from None
 
     def moving_body(self, name: str) -> int:
-        """Returns the Pinocchio index of the joint that moves a body; the body is named by that joint or by
-        any frame on it.
+        """Returns the Pinocchio index of the joint that moves a body. `name` is that of the joint or of
+        any frame on the body.
 
         Raises InputError for an unknown name and for a frame that is fixed to the world.
         """

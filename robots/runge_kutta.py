@@ -15,7 +15,7 @@ def rk4(q: Array, v: Array, h: float, acceleration: Callable[[Array, Array], Arr
     """Returns (q, q̇) after a step of h (s) from q (n,) and v (n,). `acceleration` computes q̈ (n,) from q
     and q̇.
 
-    The same stages and weights as MuJoCo's RK4, for joints of one degree of freedom.
+    Stages and weights are those of MuJoCo's RK4, for joints with one degree of freedom.
     """
     slopes = [np.array((v, acceleration(q, v)))]
     for share in (0.5, 0.5, 1.0):

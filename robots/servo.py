@@ -25,21 +25,19 @@ class VelocityPlantSettings:
     """Parameters of a velocity-controlled plant. The defaults describe ideal kinematics without noise.
 
     Attributes:
-        mode: "ideal": the velocity moves linearly from its present value to the command within each step, so
-            a sampled double integrator is met exactly; "servo": MuJoCo's mechanics under velocity servos
-            τ = M(q) · bandwidth · (command − v) + C v + g, clipped at the torque limits.
+        mode: "ideal": within each step, the velocity changes linearly from its present value to the command,
+            so the plant is exactly a sampled double integrator; "servo": MuJoCo's mechanics under velocity
+            servos τ = M(q) · bandwidth · (command − v) + C v + g, clipped at the torque limits.
         bandwidth: bandwidth of the servos, 1/s.
         lag_ms: time constant of a first-order lag between command and servo.
         delay_ms: delay of the command.
         position_noise: standard deviation of white Gaussian noise on the measured q, rad (m).
-        velocity_noise: the same on the measured v, rad/s (m/s).
-        payload_kg: payload of the mechanics as in `PlantSettings`, in "servo" mode only; the servo's model
-            does not contain it.
-        friction: the same for friction.
-        damping: the same for damping.
-        saturate: clip at the torque limits.
+        velocity_noise: standard deviation of white Gaussian noise on the measured v, rad/s (m/s).
+        payload_kg, friction, damping: as in `PlantSettings`, in "servo" mode only. The servo's model does not
+            contain them.
+        saturate: whether torques are clipped at the torque limits.
 
-    Raises InputError, naming the field, for values that are not allowed.
+    Raises InputError, which names the field, for values that are not allowed.
     """
 
     mode: Mode = "ideal"
@@ -65,16 +63,16 @@ class VelocityPlantSettings:
 
     @property
     def latency_ms(self) -> float:
-        """Delay of the motion behind a steadily changing command, ms: the sum of delay, lag and the servos'
+        """Delay of the motion after a steadily changing command, ms: the sum of delay, lag and the servos'
         own delay."""
         own = 1e3 / self.bandwidth if self.mode == "servo" else 0.0
         return self.delay_ms + self.lag_ms + own
 
 
 class VelocityPlant:
-    """A robot that takes velocity commands. SI units, joints in Pinocchio's order.
+    """A robot that receives velocity commands. SI units, joints in Pinocchio's order.
 
-    The same settings, seed and calls give bitwise the same numbers.
+    With the same settings, seed and calls, all numbers are bitwise the same.
     """
 
     def __init__(self, robot: Robot, settings: VelocityPlantSettings | None = None, seed: int = 0) -> None:
@@ -107,11 +105,11 @@ class VelocityPlant:
 
     @property
     def tau(self) -> np.ndarray | None:
-        """(n,) N·m (N) acting on the joints; None in "ideal" mode, which has no forces."""
+        """(n,) N·m (N), the torque that acts on the joints; None in "ideal" mode, which has no forces."""
         return self._plant.tau if self.settings.mode == "servo" else None
 
     def reset(self, q: np.ndarray, v: np.ndarray | None = None) -> None:
-        """Puts the robot at q with velocity v (default 0), as if v had been commanded for a long time; t = 0.
+        """Sets the state q, v (default 0) and t = 0, as if v had been commanded for a long time.
 
         Raises ValueError for vectors of the wrong length or with non-finite entries.
         """
@@ -134,15 +132,15 @@ class VelocityPlant:
         self.settings = settings
 
     def measure(self) -> PlantState:
-        """Returns the measured state. Calling it changes nothing; the noise is new after every step."""
+        """Returns the measured state. The call changes nothing; the noise changes at every step."""
         settings = self.settings
         q = self._q + settings.position_noise * self._noise[0]
         return PlantState(self._t, q, self._v + settings.velocity_noise * self._noise[1])
 
     def step(self, command: np.ndarray, period: float) -> np.ndarray:
-        """Applies the velocity command (n,) for `period` s; returns the velocity (n,) at its end.
+        """Applies the velocity command (n,) for `period` s; returns the velocity (n,) at the end.
 
-        Raises ValueError for a command that is not n finite numbers: nothing is simulated then.
+        Raises ValueError, and simulates nothing, if the command is not n finite numbers.
         """
         if not (math.isfinite(period) and period > 0.0):
             raise ValueError(f"the period is {period} s; it must be positive")

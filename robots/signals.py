@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-_MEMORY_S = 1.5  # s of commands kept, more than the largest delay
-_SAMPLES_S = 0.3  # s of positions kept, more than any control period
+_MEMORY_S = 1.5  # s; commands are stored for this time, which exceeds the largest delay
+_SAMPLES_S = 0.3  # s; positions are stored for this time, which exceeds every control period
 
 
 class PlantState(NamedTuple):
@@ -22,24 +22,24 @@ class PlantState(NamedTuple):
 
 
 class Motors:
-    """Command → torque on the joints: saturation, then pure delay, then first-order lag.
+    """Converts commands to torques on the joints: saturation, then pure delay, then first-order lag.
 
-    Commands are stored with their times and not by steps, so the internal step may change between commands.
+    Commands are stored with their times, so the internal step may change between commands.
     """
 
     def __init__(self, tau: np.ndarray, t: float) -> None:
         self._commands: deque[tuple[float, np.ndarray]] = deque([(t - _MEMORY_S, tau)])
-        self.torque = tau.copy()  # (n,) N·m acting on the joints
+        self.torque = tau.copy()  # (n,) N·m, the torque that acts on the joints
 
     def command(self, tau: np.ndarray, t: float) -> None:
-        """Stores a (clipped) command given at time t, s."""
+        """Stores a clipped command with its time t, s."""
         commands = self._commands
         commands.append((t, tau))
         while len(commands) > 1 and commands[1][0] < t - _MEMORY_S:
             commands.popleft()
 
     def limit(self, lower: np.ndarray, upper: np.ndarray) -> None:
-        """Clips the delayed commands when the torque limits change."""
+        """Clips the delayed commands and the present torque to changed torque limits."""
         self._commands = deque((t, np.clip(tau, lower, upper)) for t, tau in self._commands)
         self.torque = np.clip(self.torque, lower, upper)
 
@@ -76,9 +76,10 @@ class Encoders:
             samples.popleft()
 
     def read(self, period: float, resolution: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Returns (q, v) as measured: q rounded to multiples of `resolution` (n,), rad; 0 means no rounding.
+        """Returns the measured (q, v). q is rounded to multiples of `resolution`, (n,) rad; 0 means no
+        rounding.
 
-        v is the difference to the rounded position one `period` (s) ago; for times before the reset, the
+        v is the backward difference of the rounded positions over one `period` (s). Before the reset, the
         joints are assumed to have moved with the velocity of the reset. Reading changes nothing.
         """
         now, q = self._samples[-1]
@@ -105,7 +106,7 @@ def quantise(q: np.ndarray, resolution: np.ndarray) -> np.ndarray:
 
 
 def as_vector(name: str, value: np.ndarray, n: int) -> np.ndarray:
-    """Returns a copy of n finite numbers. Raises ValueError, with the name, for any other value."""
+    """Returns a copy of n finite numbers. Raises ValueError, which contains the name, for any other value."""
     array = np.array(value, dtype=float)
     if array.shape != (n,) or not (math.isfinite(array.dot(array)) or np.isfinite(array).all()):
         raise ValueError(f"{name} must be {n} finite numbers, not {array}")

@@ -33,17 +33,17 @@ _RIDGEBACK_UR10 = (
 )
 _BY_ROBOT = {"ridgeback-ur10": _RIDGEBACK_UR10}
 _SLENDER = 0.05
-"""Radius divided by the length of the whole chain, for robots without spheres placed by hand."""
+"""Radius divided by the length of the whole chain, for robots whose spheres are generated."""
 
 
 def covering_spheres(robot: Robot) -> tuple[Sphere, ...]:
-    """Returns the spheres of a robot: given by hand for the mobile manipulator of the catalog, generated
-    along the links for other robots.
+    """Returns the spheres of a robot. Those of the catalog's mobile manipulator were placed by hand; for
+    other robots they are generated along the links.
 
-    The generated ones follow the straight lines from each joint to the next and to the tip, in steps of their
-    radius, a twentieth of the chain's length. They approximate the links, as in the HTMPC paper, and parts of
-    the links stand out of them. Distances at torque level use the capsules of `robots.covering.cover_of`,
-    which contain the links.
+    Generated spheres follow the straight lines from each joint to the next one and to the tip. Their distance
+    equals their radius, which is a twentieth of the chain's length. They approximate the links, as in the
+    HTMPC paper: parts of the links stand out of the spheres. Distances at torque level use the capsules of
+    `robots.covering.cover_of`, which contain the links.
     """
     return _BY_ROBOT.get(robot.name) or _along_links(robot)
 

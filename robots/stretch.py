@@ -11,13 +11,13 @@ _STARTS = 8
 
 
 def horizontal_reach(robot: Robot, first: int) -> float:
-    """Returns the largest horizontal distance of the tip from the base's own axis, m, within the joints'
-    range.
+    """Returns the largest horizontal distance of the tip from the base's vertical axis, m, within the joints'
+    ranges.
 
     Args:
         robot: the robot.
-        first: index of the arm's first joint; the joints before it are the base's. 0: the robot has no
-            base, and the axis is that of the first joint.
+        first: index of the arm's first joint; the joints before it belong to the base. 0: the robot has no
+            base, and the axis is the axis of the first joint.
     """
     from scipy.optimize import minimize  # its import takes long, and few programs need it
 

@@ -12,8 +12,8 @@ from robots.settings import PlantSettings
 def true_model(robot: Robot, settings: PlantSettings) -> pin.Model:
     """Returns a copy of the robot's model with the plant's masses, inertias, payload, armature and gravity.
 
-    Each joint's body is scaled first; then the payload, a point mass at the tip, is added to the body that
-    carries the tip. Raises InputError for a per-joint list of the wrong length.
+    First, the body of each joint is scaled. Then the payload, a point mass at the tip, is added to the body
+    that carries the tip. Raises InputError for a per-joint list of the wrong length.
     """
     model: pin.Model = robot.model.copy()
     scales = zip(
@@ -34,8 +34,8 @@ def true_model(robot: Robot, settings: PlantSettings) -> pin.Model:
 
 
 def joint_axis(model: pin.Model, joint: int) -> tuple[bool, np.ndarray]:
-    """Returns (prismatic, unit axis in the joint's frame) of a one-axis joint, which is the same in every
-    pose."""
+    """Returns whether a one-axis joint is prismatic, and its unit axis in the joint's frame, which is the
+    same in every pose."""
     motion = np.asarray(model.joints[joint].createData().S, dtype=float).reshape(6)
     prismatic = bool(np.abs(motion[:3]).max() > 0.5)
     return prismatic, motion[:3] if prismatic else motion[3:]
@@ -49,7 +49,7 @@ def encoder_resolution(robot: Robot, settings: PlantSettings) -> np.ndarray:
 
 
 def pose(placement: pin.SE3) -> dict[str, np.ndarray]:
-    """Returns the position (3,) m and unit quaternion (w, x, y, z) under the names of MuJoCo's
+    """Returns the position (3,) m and the unit quaternion (w, x, y, z), by their names in MuJoCo's
     specification."""
     # The quaternion is built from a vector: each pin.Quaternion of a matrix leaks 80 bytes.
     x, y, z, w = pin.Quaternion(pin.SE3ToXYZQUAT(placement)[3:]).normalized().coeffs()
@@ -57,6 +57,7 @@ def pose(placement: pin.SE3) -> dict[str, np.ndarray]:
 
 
 def inertial(inertia: pin.Inertia) -> tuple[float, np.ndarray, list[float]]:
-    """Returns the mass (kg), centre of mass (3,) m, and Ixx, Iyy, Izz, Ixy, Ixz, Iyz (kg·m²) about it."""
+    """Returns the mass (kg), the centre of mass (3,) m, and Ixx, Iyy, Izz, Ixy, Ixz, Iyz (kg·m²) about this
+    centre."""
     I = inertia.inertia
     return inertia.mass, inertia.lever, [I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]]

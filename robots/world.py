@@ -23,13 +23,14 @@ __all__ = [
 ]
 
 MOST = 50
-"""Largest number of objects of a world: each costs time in every step of the plant."""
+"""Largest number of objects of a world: each object increases the computing time of every step of the
+plant."""
 _TABLE_TOP = 0.04  # m, thickness
 
 
 @dataclass(frozen=True)
 class Post:
-    """An upright cylinder: the middle of its foot, height and radius, m."""
+    """An upright cylinder: the middle of its lower end, its height and its radius, m."""
 
     name: str
     foot: Point
@@ -47,9 +48,9 @@ class Thing:
     """An object of a world.
 
     Attributes:
-        shape: where it stands at the start, and its name, which is unique in its world.
-        mass_kg: kg, of an object that moves freely; None: it is static. A floor is static.
-        friction: coefficient of sliding friction between it and the robot.
+        shape: the object's shape, initial position and name, which is unique in the world.
+        mass_kg: mass of an object that moves freely, kg; None: the object is static. A floor is static.
+        friction: coefficient of sliding friction between the object and the robot.
     """
 
     shape: Ball | Box | Post | Floor
@@ -63,12 +64,12 @@ class Thing:
 
     @property
     def free(self) -> bool:
-        """Whether it moves."""
+        """Whether the object moves freely."""
         return self.mass_kg is not None
 
     @property
     def pose(self) -> tuple[float, ...]:
-        """Position of the middle, m, and quaternion (w, x, y, z) at the start."""
+        """Position of the middle, m, and quaternion (w, x, y, z), both at the start."""
         yaw = 0.0
         match self.shape:
             case Ball(_, centre):
@@ -95,7 +96,7 @@ def check_world(world: World) -> None:
 
 
 def table(name: str, centre: tuple[float, float], size: tuple[float, float], height: float) -> Thing:
-    """Returns a static table: the middle and the edge lengths of its top, and the height of its surface,
+    """Returns a static table, from the middle and the edge lengths of its top and the height of its surface,
     m."""
     (x, y), (length, width) = centre, size
     return Thing(Box(name, (x, y, height - 0.5 * _TABLE_TOP), (length, width, _TABLE_TOP)))

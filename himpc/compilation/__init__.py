@@ -4,10 +4,11 @@ Other packages import `compiled` (decorators and types) and `views` (arrays); Nu
 package only. These two modules use one of two tool chains:
 
 - the usual one, `private`, links all parts of a function into one piece of machine code, stores it in checked
-  files and loads it without the compiler. It uses names of Numba that a new release may change: those in
-  `private`, `private_views`, `pieces`, `keeping` and `loading`.
-- with `HIMPC_LAB_NUMBA=public` in the environment, `public` uses `njit(cache=True)` alone. The numbers agree
-  to rounding; compilation and each later start take longer, and the progress of compilation is not reported.
+  files and loads it without the compiler. It uses internal names of Numba, which a new release may change.
+  These names occur only in `private`, `private_views`, `pieces`, `keeping` and `loading`.
+- with `HIMPC_LAB_NUMBA=public` in the environment, `public` uses `njit(cache=True)` alone. Both tool chains
+  compute the same numbers to rounding. With `public`, compilation and each later start take longer, and the
+  progress of compilation is not reported.
 """
 
 import os

@@ -24,22 +24,22 @@ GIVEN_MATRIX, GIVEN_MATRICES = float64[:, :], float64[:, :, :]
 """Arrays from callers, which may be slices."""
 
 clock_gettime: Any = types.ExternalFunction("clock_gettime", types.int32(types.int32, types.uintp))
-"""`clock_gettime` of the C library, if it has one: (clock, address of two whole numbers for s and ns)."""
+"""`clock_gettime` of the C library: (clock, address of two integers for s and ns). Some systems lack it."""
 
 inline_kernel = chain.inline_kernel
 """Compiles a function as a part of every `kernel` that calls it, in any module."""
 always_inline_kernel = chain.always_inline_kernel
-"""The same for a function with many array arguments, which is always inlined; otherwise LLVM would pass all
-arrays through memory."""
+"""Like `inline_kernel`, but the function is always inlined. It is meant for functions with many array
+arguments, which LLVM would otherwise pass through memory."""
 kernel = chain.kernel
-"""(*argument types): compiles a function, with every `inline_kernel` that it calls, when its module is first
-imported, for arguments of these types only."""
+"""(*argument types): compiles a function, with every `inline_kernel` that the function calls, for arguments
+of these types only. Compilation takes place when the function's module is first imported."""
 on_compiled = chain.on_compiled
-"""(tell): a context; while it is open, `tell` is called with the dotted name of each function that is
-compiled."""
+"""(tell): returns a context manager. In its context, `tell` is called with the dotted name of each function
+that is compiled."""
 intermediate = chain.intermediate
-"""(function, argument types): the function and all that it calls as LLVM's text, for targets other than this
-processor."""
+"""(function, argument types): returns the function and all functions that it calls as LLVM code in text form,
+for targets other than this processor."""
 kept = chain.kept
-"""(function, key, make): bytes that depend on the function's sources, from disk if they have been made
-before."""
+"""(function, key, make): returns bytes that depend on the function's sources. They are read from disk if an
+earlier call has made them."""

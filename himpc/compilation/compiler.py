@@ -1,6 +1,6 @@
 """Compiles functions in a process of its own, so that all other processes run the code that is on disk.
 
-A process that compiles links the parts once more before it writes them to disk. Its own code in memory
+A compiling process links the parts once more before it writes the code to disk. The code in its own memory
 therefore gives results that differ in the last digit. All processes that load the code from disk run the same
 code.
 """
@@ -24,13 +24,13 @@ def compiles_here() -> bool:
 
 
 def compile_apart(module: str, tell: Callable[[str], None]) -> None:
-    """Compiles the functions of a module in a new process; of this package, all functions. Returns after that
-    process has ended, whether it succeeded or not. If an exception is raised here meanwhile, or this process
-    ends, the new process ends too.
+    """Compiles the functions of a module in a new process. If the module belongs to this package, all
+    functions of the package are compiled. The call returns after the new process has ended, with or without
+    success. The new process also ends if an exception is raised here or if this process ends.
 
     Args:
         module: its dotted name.
-        tell: called with the dotted name of every function that was compiled.
+        tell: called with the dotted name of every compiled function.
     """
     code = (
         f"import sys; sys.path[:] = {sys.path!r}; "

@@ -15,8 +15,8 @@ def compile_all(tell: Callable[[int, int], None]) -> None:
     """Loads all compiled functions, and compiles those that are not on disk.
 
     Args:
-        tell: called with (number of compiled functions, number of all) after each function that was compiled;
-            never called if all were on disk.
+        tell: called with (number of compiled functions, number of all functions) after each compilation; not
+            called if all functions were on disk.
     """
     from himpc.compilation.compiled import on_compiled
 
@@ -36,8 +36,8 @@ def compile_all(tell: Callable[[int, int], None]) -> None:
 
 
 def compiled_functions() -> dict[str, frozenset[str]]:
-    """Returns the dotted names of the functions that a decorator of `himpc.compilation.compiled` compiles, by
-    module. They are read from the sources, because importing the modules takes long."""
+    """Returns, for each module, the dotted names of the functions that have a decorator of
+    `himpc.compilation.compiled`. They are read from the sources, because importing the modules takes long."""
     found = {}
     for path in sorted(_PACKAGE.rglob("*.py")):
         text = path.read_text()

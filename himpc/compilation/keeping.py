@@ -1,9 +1,10 @@
 """Stores compiled functions on disk: one file each, in a folder to which no other user can write.
 
-Numba's own cache trusts every file in its folder: a truncated or damaged file ends every start, a file of
-another user is executed, and a full disk ends the program. Here a file begins with a digest of its content,
-and names its sources and its target. A file that is incomplete, belongs to another user or has other sources
-is compiled anew and replaced. Code that cannot be written is used from memory.
+Numba's own cache trusts every file in its folder. A truncated or damaged file stops every start of the
+program, a file of another user is executed, and a full disk stops the program. This cache writes a digest of
+the content, of the sources and of the target at the beginning of each file. If a file is incomplete, belongs
+to another user or has other sources, the function is compiled again and the file is replaced. Code that
+cannot be written to disk is used from memory.
 """
 
 from __future__ import annotations
@@ -26,11 +27,12 @@ from numba.core.serialize import dumps
 
 _POSIX = os.name == "posix"
 _PLAIN = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
-"""Symbolic links are not followed, and line ends are not converted."""
+"""Flags for opening a file: symbolic links are not followed, and line ends are not converted."""
 _ROOM = 8 << 20
-"""Bytes that must be free besides the stored code: more than all compiled code takes."""
+"""Free disk space that is required before code is written, in bytes: more than the size of all compiled
+code."""
 _FOLDER = "NUMBA_CACHE_DIR"
-"""An environment variable that names another folder."""
+"""Name of an environment variable; its value is the folder to use instead of the default ones."""
 
 
 class Kept:
@@ -39,7 +41,7 @@ class Kept:
     Args:
         source: the file that contains the function.
         name: the function's name.
-        digest: digest of all sources that its code depends on.
+        digest: digest of all source files that the function's code depends on.
     """
 
     def __init__(self, source: Path, name: str, digest: bytes) -> None:
@@ -51,12 +53,12 @@ class Kept:
         return next((str(folder) for folder in self._folders(make=True)), None)
 
     def has_room(self) -> bool:
-        """Whether there is space to write code."""
+        """Whether a folder has enough free disk space for the code."""
         return any(_written(folder / "room", bytes(_ROOM), keep=False) for folder in self._folders(make=True))
 
     def load_overload(self, signature: Any, context: Any) -> Any:
-        """Returns the compiled function for these types; None if no complete and current file of this user
-        exists."""
+        """Returns the compiled function for these types, or None if this user has no complete and current
+        file."""
         name, made_for = self._file(signature, context.codegen())
         for folder in self._folders(make=False):
             body = _read(folder / name)
@@ -76,7 +78,8 @@ class Kept:
                 return
 
     def load_bytes(self, key: str) -> bytes | None:
-        """Returns what `save_bytes` wrote under this key for the same sources; None if it is not there."""
+        """Returns the bytes that `save_bytes` wrote with this key for the same sources; None without such a
+        file."""
         name, made_for = self._named(key)
         for folder in self._folders(make=False):
             body = _read(folder / name)
@@ -94,7 +97,7 @@ class Kept:
                 return
 
     def _named(self, key: str) -> tuple[str, bytes]:
-        """Returns the name of the file for a key, and its first bytes."""
+        """Returns the name of the file for a key, and the first bytes of the file after its digest."""
         version = f"{numba.__version__} {sys.version}".encode()
         return f"{self._source.stem}.{self._name}-{key}.code", sha256(self._digest + version).digest()
 
@@ -108,17 +111,17 @@ class Kept:
         """Does nothing: files are written at once."""
 
     def _file(self, signature: Any, codegen: Any) -> tuple[str, bytes]:
-        """Returns the name of the file with the code for these types and this processor, and its first
-        bytes."""
+        """Returns the name of the file with the code for these types and this processor, and the first bytes
+        of the file after its digest."""
         target = repr((signature, codegen.magic_tuple())).encode()
         version = f"{numba.__version__} {sys.version}".encode()
         made_for = sha256(b"\0".join((self._digest, target, version))).digest()
         return f"{self._source.stem}.{self._name}-{sha256(target + version).hexdigest()[:16]}.code", made_for
 
     def _folders(self, make: bool) -> Iterator[Path]:
-        """Yields the folders that may contain the file and to which only this user can write, in the order in
-        which they are tried: the folder in the environment variable, or one beside the source and then the
-        user's cache; at last a temporary one."""
+        """Yields the possible folders of the file, in the order in which they are tried. Only this user can
+        write to them. The first is the folder in the environment variable; without this variable, a folder
+        beside the source is the first and the user's cache the second. The last is a temporary folder."""
         own = f"{self._source.parent.name}-{sha256(bytes(self._source.parent)).hexdigest()[:16]}"
         named = os.environ.get(_FOLDER)
         if named:
@@ -150,7 +153,8 @@ def _users_cache() -> Path:
 
 
 def _make(folder: Path, above: bool) -> None:
-    """Creates a folder for this user alone, if possible; `above`: also creates all missing parents."""
+    """Creates a folder for this user alone, if possible. With `above`, all missing parents are created
+    too."""
     missing = [each for each in (folder, *folder.parents) if not os.path.lexists(each)]
     with suppress(OSError):
         for each in reversed(missing if above else missing[:2]):
@@ -184,8 +188,8 @@ def _read(file: Path) -> bytes | None:
 
 
 def _written(file: Path, data: bytes, keep: bool = True) -> bool:
-    """Whether a file could be written. It is written completely or not at all; others may neither read nor
-    write it."""
+    """Writes a file completely or not at all, and returns whether it was written. Other users can neither
+    read nor write the file."""
     part = file.with_name(f".{file.name}.{uuid4().hex}")
     try:
         with open(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL | _PLAIN, 0o600), "wb") as stream:

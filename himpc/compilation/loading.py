@@ -1,8 +1,8 @@
 """Loads a compiled function from disk without starting the compiler.
 
-When a function is requested, Numba first prepares to compile it: it reads its definitions of NumPy's
-functions, and imports SciPy. This takes a third of a second in every process, and is not needed if machine
-code is on disk.
+When a function is requested, Numba first prepares its compiler: it reads Numba's definitions of NumPy's
+functions, and imports SciPy. This preparation takes a third of a second in every process. It is not needed if
+the machine code is on disk.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from numba.core.runtime.nrt import rtsys
 
 
 def load(function: Any, arguments: tuple[Any, ...]) -> bool:
-    """Returns whether a function for arguments of these types was on disk; if so, calls with these types now
-    use it."""
+    """Loads the machine code of a function for arguments of these types, and returns whether it was on
+    disk."""
     with global_compiler_lock:
         rtsys.initialize(function.targetctx)  # functions that the machine code calls
         found = function._cache.load_overload(arguments, function.targetctx)

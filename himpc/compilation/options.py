@@ -8,5 +8,5 @@ from typing import Any
 Function = Callable[..., Any]
 
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"reassoc", "contract", "nsz"}}
-"""Sums may be computed in any order; NaN and infinity keep their meaning; a division by zero raises no
+"""Sums may be computed in any order. NaN and infinity are supported. A division by zero raises no
 exception."""

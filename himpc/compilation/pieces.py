@@ -1,8 +1,8 @@
-"""Compiles functions that only other compiled functions call: their intermediate code is linked into the
-callers, and only the callers become machine code.
+"""Compiles functions that are called only by other compiled functions. Their intermediate code is linked into
+the callers, and machine code is generated only for the callers.
 
-By default Numba optimises every function three times, generates machine code for it, and wraps it for callers
-in Python and in C; then it does the same again for each caller, which contains the function.
+By default Numba optimises every function three times, generates machine code for it, and adds wrappers for
+callers in Python and in C. For each caller, whose code contains the function, Numba repeats all this work.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from numba.core.compiler import Compiler
 
 
 class _Linking(JITCodeLibrary, ABC):
-    """Code that refers to the code of every function that it calls, once each."""
+    """Code of a function with one reference to the code of each function that it calls."""
 
     def add_linking_library(self, library: Any) -> None:
         """Adds a library whose functions this library calls."""
@@ -26,20 +26,20 @@ class _Linking(JITCodeLibrary, ABC):
 
 
 class _Linked(_Linking):
-    """Code together with that of all functions that it calls."""
+    """Code of one function, linked with the code of all functions that it calls."""
 
 
 class _Loose(_Linking):
-    """Code of one function, not optimised and without the functions that it calls, so that it cannot run
-    alone."""
+    """Code of one function, not optimised and without the code of the functions that it calls, so that it
+    cannot run alone."""
 
     @property
     def called(self) -> list[Any]:
-        """The libraries of all functions that it calls, and of those that they call."""
+        """The libraries of all functions that this function calls, directly or through others."""
         return self._linking_libraries
 
     def finalize(self) -> None:
-        """Ends the addition of code."""
+        """Marks the library as complete: no code can be added afterwards."""
         self._raise_if_finalized()
         self._finalize_dynamic_globals()
         self._finalized = True
@@ -50,8 +50,8 @@ class _Loose(_Linking):
 
     @property
     def codegen(self) -> Any:
-        """The object whose `set_env` is called for the function's environment: this library, which ignores
-        the call; `Whole` makes it later for all functions."""
+        """The object whose `set_env` Numba calls with the function's environment. It is this library, which
+        ignores the call; `Whole` sets the environments of all functions later."""
         return self
 
     def set_env(self, name: str, environment: Any) -> None:
@@ -90,7 +90,7 @@ class Piece(_Compiling):
 
 
 class Open(_Compiling):
-    """Compiles a function for other targets than this processor: nothing is optimised or becomes machine
-    code."""
+    """Compiles a function for other targets than this processor: the code is not optimised, and no machine
+    code is generated."""
 
     library = _Loose

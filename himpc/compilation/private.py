@@ -1,5 +1,5 @@
 """Loads compiled functions from disk when their module is first imported. Functions that are not on disk are
-compiled first, in a process of its own, see `compiler`."""
+first compiled in a separate process, see `compiler`."""
 
 from __future__ import annotations
 
@@ -30,16 +30,16 @@ except ImportError:  # on a system without fcntl, two processes may compile the 
 _OPTIONS: dict[str, Any] = {**OPTIONS, "no_cfunc_wrapper": True}
 _PIECE = {**_OPTIONS, "no_cpython_wrapper": True, "pipeline_class": Piece}
 _OPEN = {**_OPTIONS, "no_cpython_wrapper": True, "_nrt": False, "pipeline_class": Open}
-"""Without reference counts: nothing is allocated."""
+"""Options without reference counts, which are not needed: these functions allocate nothing."""
 
 
 class _Inline(CPUDispatcher):
-    """A function that only compiled functions call. A call from Python raises TypeError, also after its code
-    has been compiled here as a part of another function: alone it has no address."""
+    """A function that only compiled functions can call. It has no address of its own, and a call from Python
+    raises TypeError, also after the function was compiled as a part of another function."""
 
     def __call__(self, *_: Any, **__: Any) -> Any:  # pyright: ignore[reportIncompatibleMethodOverride]
         name = self.py_func.__qualname__
-        raise TypeError(f"{name} is a piece of compiled functions: nobody else can call it")
+        raise TypeError(f"{name} can be called by compiled functions only")
 
 
 def inline_kernel(function: Function) -> Any:
@@ -60,10 +60,10 @@ def _as_inline(found: Any) -> Any:
 def kernel(*arguments: Any) -> Callable[[Function], Any]:
     """Compiles a function, with every `inline_kernel` that it calls, for arguments of these types only.
 
-    If it were compiled at the first call, each new layout of an array would stop a running robot for the
-    seconds that compilation takes.
+    Compilation at the first call would stop a running robot for several seconds at each new layout of an
+    array.
 
-    A file on disk is valid until a source file changes that the function depends on, see `sources`.
+    A file on disk is valid until a source file of the function changes, see `sources`.
     """
 
     def compile_now(function: Function) -> Any:
@@ -94,15 +94,15 @@ def _compiled_now(fast: Any, arguments: tuple[Any, ...]) -> Any:
 
 
 def intermediate(function: Function, arguments: tuple[Any, ...]) -> tuple[str, list[str]]:
-    """Returns a function and all functions that it calls as LLVM's text, which is not optimised for any
-    processor.
+    """Returns a function and all functions that it calls as LLVM code in text form, which is not optimised
+    for any processor.
 
     Args:
         function: a Python function whose callees are inline kernels.
         arguments: types of its arguments.
 
     Returns:
-        the name of the function in the text, and the modules.
+        the name of the function in the LLVM code, and the code of each module.
     """
     fast: Any = njit(**_OPEN)(function)
     fast.compile(arguments)
@@ -112,8 +112,8 @@ def intermediate(function: Function, arguments: tuple[Any, ...]) -> tuple[str, l
 
 
 def kept(function: Function, key: str, make: Callable[[], bytes]) -> bytes:
-    """Returns bytes that depend on the sources of a function. They are read from disk; if they are not there,
-    they are made and stored.
+    """Returns bytes that depend on the sources of a function. They are read from disk, or made and stored if
+    the file is missing.
 
     Args:
         function: a Python function.
@@ -133,7 +133,8 @@ def kept(function: Function, key: str, make: Callable[[], bytes]) -> bytes:
 
 @contextmanager
 def _one_at_a_time(folder: str | None, what: str) -> Iterator[None]:
-    """Processes that need the same code wait for the first one, and then find it on disk."""
+    """Holds a lock: only the first of several processes makes the same code. The other processes wait, and
+    then find the code on disk."""
     lock = None
     if fcntl is not None and folder is not None:
         with suppress(OSError):  # for example a full disk
@@ -158,7 +159,7 @@ class _FirstWord(event.Listener):
         if not self._said:
             self._said = True
             getLogger(__name__).warning(
-                "compiling the controller's inner loops: about half a minute, this once"
+                "compiling the controller's inner loops once: this takes about half a minute"
             )
 
     def on_start(self, event: Any) -> None:
@@ -180,7 +181,7 @@ class _Compiled(event.Listener):
         self._tell = tell
 
     def on_start(self, event: Any) -> None:
-        """Does nothing: a function is reported when it is compiled."""
+        """Does nothing: a function is reported at the end of its compilation."""
 
     def on_end(self, event: Any) -> None:
         if event.kind == _APART:
@@ -192,8 +193,8 @@ class _Compiled(event.Listener):
 
 @contextmanager
 def on_compiled(tell: Callable[[str], None]) -> Iterator[None]:
-    """A context; while it is open, `tell` is called with the dotted name of every function that is
-    compiled."""
+    """Returns a context manager. In its context, `tell` is called with the dotted name of every function that
+    is compiled."""
     heard = _Compiled(tell)
     with event.install_listener("numba:compile", heard), event.install_listener(_APART, heard):
         yield

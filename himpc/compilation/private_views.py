@@ -1,4 +1,4 @@
-"""The arrays of `views` without reference counting: slices of them need no time."""
+"""The arrays of `views` without reference counting, which would take time at every slice."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def _matrices(_: Any, data: Any, start: Any, count: Any, rows: Any, columns: Any
 
 
 def _view(data: Any, dimensions: int) -> Found:
-    """Returns a view of `data` from an index on, as an array of this many dimensions."""
+    """Returns a view of `data` that begins at an index, as an array with this number of dimensions."""
     array = types.Array(data.dtype, dimensions, "C")
 
     def generate(context: Any, builder: Any, _: Any, arguments: Any) -> Any:

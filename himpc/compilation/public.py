@@ -1,4 +1,4 @@
-"""Compiles with Numba's documented interface alone; see the package."""
+"""The tool chain that uses Numba's documented interface only; see the package."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def borrowed(array: Any) -> Any:
 
 
 def intermediate(function: Function, arguments: tuple[Any, ...]) -> tuple[str, list[str]]:
-    """See `compiled`; this tool chain has no such text.
+    """See `compiled`; this tool chain cannot return LLVM code.
 
     Raises:
         InputError: always.

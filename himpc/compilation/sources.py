@@ -1,5 +1,5 @@
-"""Finds the source files that a compiled function depends on; when one of them changes, it is compiled
-anew."""
+"""Finds the source files that a compiled function depends on. When one of these files changes, the function
+is compiled again."""
 
 from __future__ import annotations
 
@@ -12,20 +12,21 @@ from pathlib import Path
 from typing import Any
 
 _IMPORTS = re.compile(r"^from ([\w.]+) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
-"""Indented imports are for type annotations and do not change the code."""
+"""Pattern of imports at the beginning of a line. Indented imports serve type annotations only and do not
+change the code."""
 _PACKAGE = __name__.partition(".")[0]
 
 
 def digest_of(function: Callable[..., Any]) -> bytes:
-    """A digest of every file in `sources_of` a function."""
+    """Returns one digest of all files that `sources_of` returns for a function."""
     return sha256(b"".join(_read(file)[0] for file in sources_of(function))).digest()
 
 
 def sources_of(function: Callable[..., Any]) -> list[Path]:
     """Returns the file of a function and all files that it imports, directly or through others. These files
     define the inline kernels and constants that the function uses. Only files of this package, of the
-    function's package and of the packages of its inline kernels count. The files of the tool chain are
-    included: they set the compiler's options."""
+    function's package and of the packages of its inline kernels are included. The files of the tool chain are
+    included too: they set the compiler's options."""
     pieces = (getattr(each, "py_func", None) for each in function.__globals__.values())
     packages = {each.__module__.partition(".")[0] for each in (function, *filter(None, pieces))} | {_PACKAGE}
     files = {Path(function.__code__.co_filename)}
@@ -42,7 +43,8 @@ def sources_of(function: Callable[..., Any]) -> list[Path]:
 
 @lru_cache(maxsize=256)
 def _read(file: Path) -> tuple[bytes, tuple[str, ...]]:
-    """The digest of a file's content, and the dotted names that it imports; some of them are modules."""
+    """Returns the digest of a file's content, and the dotted names that the file imports: modules and other
+    names."""
     text = file.read_bytes() if file.is_file() else b""
     found = _IMPORTS.findall(text.decode(errors="replace"))
     names = [(module, f"{module}.{name}") for module, line in found for name in re.findall(r"\w+", line)]

@@ -1,4 +1,5 @@
-"""Array views for the compiled functions: parts of a larger array that the kernel's caller owns."""
+"""Array views for the compiled functions. A view is a part of a larger array, which the kernel's caller
+owns."""
 
 from __future__ import annotations
 
@@ -12,10 +13,10 @@ else:
     from himpc.compilation import private_views as chain
 
 vector: Any = chain.vector
-"""(data, start, n): a view of n numbers, from index start on."""
+"""(data, start, n): returns a view of n numbers; the first has the index `start`."""
 matrix: Any = chain.matrix
-"""(data, start, rows, columns): the same as a matrix, row by row."""
+"""(data, start, rows, columns): returns a view of a matrix, which is stored row by row."""
 matrices: Any = chain.matrices
-"""(data, start, count, rows, columns): the same as several matrices, one after the other."""
+"""(data, start, count, rows, columns): returns a view of several matrices, stored one after the other."""
 borrowed: Any = chain.borrowed
-"""(array): a view of the whole array."""
+"""(array): returns a view of the whole array."""

@@ -1,9 +1,10 @@
 """A dual active-set method (Goldfarb and Idnani) for min ½xᵀHx + gᵀx under lower ≤ Ax ≤ upper, compiled.
 
 With H = LLᵀ and z = Lᵀx the cost is ½‖z − z₀‖², and the coefficients of a row become L⁻¹a. The method starts
-at the unconstrained optimum and adds violated rows one by one, the most violated row first, by the steps that
-HIMPC takes at a level, `himpc.tick.kernel.goldfarb_idnani`. Equalities are never removed. A row that depends
-on those taken does not enlarge their basis, so it replaces one of them, or the rows contradict each other.
+at the unconstrained optimum and adds violated rows one by one, the most violated row first. HIMPC solves its
+levels by the same steps, see `himpc.tick.kernel.goldfarb_idnani`. Equalities are never removed. A row that
+depends linearly on the active rows does not enlarge their basis, so it replaces one of them, or the rows
+contradict each other.
 """
 
 from __future__ import annotations
@@ -20,12 +21,13 @@ from himpc.qp import QPSolution
 Array = NDArray[np.float64]
 
 CONTRADICTION = "contradiction"
-"""The status of a QP without a feasible point."""
+"""The status of a QP that has no feasible point."""
 _STATUS = ("optimal", CONTRADICTION, "limit")
 
 
 class ActiveSetSolver:
-    """One Hessian and the active rows of the last solution. The next QP begins with these rows."""
+    """A solver that stores one Hessian and the active rows of its last solution. The next QP begins with
+    these rows."""
 
     def __init__(self) -> None:
         self._room(0)
@@ -36,7 +38,7 @@ class ActiveSetSolver:
         self._normals, self._cholesky_factor = np.empty((3, n + 1, n)), np.empty((n + 1, n + 1))
 
     def begin(self, H: Array) -> bool:
-        """Factors a Hessian (k, k) and clears the active rows. Returns False if it is not positive
+        """Factors a Hessian (k, k) and clears the active rows. Returns False if the Hessian is not positive
         definite."""
         if len(H) != len(self._L):
             self._room(len(H))
@@ -47,8 +49,8 @@ class ActiveSetSolver:
         """Solves min ½xᵀHx + gᵀx under the rows; lower = upper is an equality.
 
         Args:
-            g: (k,). rows: of k columns.
-            same: number of the first rows that are equal to those of the previous QP.
+            g: (k,), the gradient. rows: the constraints, with k columns.
+            same: the number of rows, from the first on, that are equal to those of the previous QP.
         """
         started = perf_counter_ns()
         if (self._held[0, : self._count] >= same).any():

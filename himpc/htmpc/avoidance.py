@@ -16,18 +16,18 @@ from himpc.htmpc.rows import ConstraintRows, ConstraintTable
 Array = NDArray[np.float64]
 
 PENALTY = 1e3
-"""Penalty per metre of violation of the margin at one knot: more than any tracking gain."""
+"""Penalty per metre of violation of the margin at one knot; it exceeds every gain in tracking."""
 _LOOK = 0.35
-"""m beyond the margin: pairs that are farther apart get no row. It exceeds the change of a knot's position in
-one step."""
+"""A pair gets no row if its distance exceeds the margin by more than this, m. The value exceeds the change of
+a knot's position in one step."""
 
 
 @dataclass(frozen=True, eq=False)
 class Avoidance:
-    """sd(x_k) ≥ δ_safe.
+    """The constraint sd(x_k) ≥ δ_safe.
 
     Attributes:
-        model: distances and gradients.
+        model: computes distances and gradients.
         margin: δ_safe, m.
     """
 
@@ -41,8 +41,8 @@ class Avoidance:
     def rows(
         self, near: Clearances, N: int, dt: float, table: ConstraintTable | None = None, place: int = 0
     ) -> ConstraintRows:
-        """Returns the linearised constraint on the change d of the inputs, one row per pair and knot, and
-        writes it to a table from row `place` on."""
+        """Writes the linearised constraint on the change d of the inputs to a table, from row `place` on.
+        Returns these rows, one per pair and knot."""
         table = ConstraintTable(N * near.gradient.shape[1]) if table is None else table
         A = table.spread(place, near.knot, near.gradient, integrator(N, dt).T_q)
         room = self.margin - near.distance

@@ -19,13 +19,14 @@ UNICYCLE = (
 
 
 def G(robot: Robot, q: Array, base: Base = "holonomic") -> Array:
-    """G(q) of (4), q̇ = G(q) v, (n, n).
+    """Returns the matrix G(q) of (4), (n, n), with q̇ = G(q) v.
 
-    Each joint of these robots has its own coordinate: a holonomic base is two prismatic joints along world
-    axes and a revolute one, its velocities are world velocities, and G is the identity, as for an arm.
+    Each joint of these robots has its own coordinate. A holonomic base consists of two prismatic joints along
+    world axes and a revolute joint. Its velocities are world velocities, and G is the identity, as for an
+    arm.
 
     Raises:
-        InputError: a unicycle base, whose forward speed moves it along its heading.
+        InputError: the base is a unicycle, whose forward speed acts along its heading.
     """
     if base == "unicycle":
         raise InputError(UNICYCLE)
@@ -34,7 +35,7 @@ def G(robot: Robot, q: Array, base: Base = "holonomic") -> Array:
 
 @per_robot
 def base_joints(robot: Robot) -> tuple[int, ...]:
-    """Returns the columns of the joints of a mobile base: the unbounded ones at the root of the tree."""
+    """Returns the columns of the joints of a mobile base: the unbounded joints at the root of the tree."""
     count = 0
     for joint in range(1, robot.n + 1):
         chained = robot.model.parents[joint] == joint - 1

@@ -19,7 +19,7 @@ Indices = NDArray[np.intp]
 
 @dataclass(frozen=True, eq=False)
 class Clearances:
-    """Distances between pairs at knots, nearest pairs only.
+    """Distances of the nearest pairs at all knots.
 
     Attributes:
         knot: (r,) index of the configuration.
@@ -72,12 +72,12 @@ class CollisionModel:
         return f"{self.links[sphere]} – {self._around.names[shape]}"
 
     def clearances(self, q: Array, within: float, gradients: bool = True) -> Clearances:
-        """Returns all pairs nearer than `within`, m, at configurations q (K, n); without gradients, that
-        array is empty."""
+        """Returns all pairs nearer than `within`, m, at configurations q (K, n). If `gradients` is false, the
+        array of gradients is empty."""
         return self.between(placed(self._tree, q), within, gradients)
 
     def between(self, where: Placed, within: float, gradients: bool = True) -> Clearances:
-        """Computes the same distances from known placements of the joints."""
+        """Returns the same distances as `clearances`, computed from known placements of the joints."""
         around, tree = self._around, self._tree
         K, S = len(where.at), len(around.radius)
         most = K * S * len(around.names)

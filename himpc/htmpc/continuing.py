@@ -1,4 +1,4 @@
-"""Continuation of a motion: braking to rest, or shifting the previous plan."""
+"""Continuation of a motion: the robot brakes to rest, or follows the shifted previous plan."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ Array = NDArray[np.float64]
 
 
 def braking(start: Start, N: int, dt: float, period: float, bounds: MotionBounds) -> Array:
-    """Returns inputs (N, n) that bring every joint to rest as fast as its bounds allow, and back inside its
-    range.
+    """Returns inputs (N, n) that bring every joint to rest as fast as its bounds allow. A joint outside its
+    range returns into it.
 
-    A joint beyond a position bound moves back at up to a fifth of its speed limit. When input and jerk bounds
-    exclude each other (after a limit was tightened), the jerk bound holds.
+    A joint beyond a position bound moves back at up to a fifth of its speed limit. If input and jerk bounds
+    contradict each other (after a limit was tightened), the jerk bound is satisfied.
     """
     U = np.empty((N, len(start.v)))
     brake(*start, dt, period, bounds.q_lower, bounds.q_upper, bounds.v, bounds.a, bounds.j, U)
@@ -27,12 +27,13 @@ def braking(start: Start, N: int, dt: float, period: float, bounds: MotionBounds
 
 
 def shifted(before: Motion, s: float, N: int, dt: float, bounds: MotionBounds) -> Array:
-    """Returns the inputs (N, n) of the previous plan from s seconds after its start on, on a new grid of N
-    times dt.
+    """Returns the inputs (N, n) of the previous plan on a new grid of N intervals of dt, which begins s
+    seconds after the start of that plan.
 
     Each input is the mean of the old input over the new interval. Therefore the velocities at the new knots
     are those of the old plan at the same times, for every control rate, also after a change of N or dt.
-    After its end the old plan brakes: with constant velocity, hard limits would become infeasible.
+    After its end the old plan is continued by braking. With constant velocity, hard limits would become
+    infeasible.
     """
     reach = s + N * dt
     length = len(before.U) * before.dt

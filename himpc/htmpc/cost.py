@@ -24,8 +24,8 @@ ZETA = 5e-3
 def gauss_newton(
     J: Array, Q: Array, e: Array, T_q: Array, effort: Array, share: float, ridge: float
 ) -> tuple[Array, Array]:
-    """Returns the Hessian (k, k) and gradient (k,) of ½Σ eᵀQe with respect to the inputs, with a share of the
-    effort's Hessian and a ridge: blocks Σ_k T_q[k, s] T_q[k, r] J_kᵀ Q_k J_k.
+    """Returns the Hessian (k, k) and gradient (k,) of ½Σ eᵀQe with respect to the inputs. The blocks of the
+    Hessian are Σ_k T_q[k, s] T_q[k, r] J_kᵀ Q_k J_k; a share of the effort's Hessian and a ridge are added.
 
     Args:
         J: (N, m, n), ∂e_k/∂q_k. Q, e: (N, m). T_q: (N, N), ∂q_k/∂u_s. effort: (k, k).
@@ -38,7 +38,7 @@ def gauss_newton(
 
 @dataclass(frozen=True, eq=False)
 class Effort:
-    """J_eff of (10), of the inputs U or of their deviation from a reference plan.
+    """The effort J_eff of (10): of the inputs U, or of their deviation from a reference plan.
 
     Attributes:
         weights: S, R, W.
@@ -69,15 +69,16 @@ class Effort:
         return value, (T_v.T @ v + u + D.T @ d).ravel()
 
     def about(self, rest: tuple[float, Array], U: Array) -> tuple[float, Array]:
-        """Returns value and gradient of (10), which is quadratic, from its value and gradient at U = 0."""
+        """Returns value and gradient of (10) at U. They are computed from value and gradient at U = 0: (10)
+        is quadratic."""
         value, slope = rest
         u = U.ravel()
         change = self.hessian @ u
         return value + float(u @ (slope + 0.5 * change)), slope + change
 
     def relative(self, U: Array, plan: Array) -> tuple[float, Array]:
-        """Returns value and gradient of the same weights on the deviation from a plan (N, n): the proximal
-        effort."""
+        """Returns value and gradient of the proximal effort: (10) applied to the deviation from a plan
+        (N, n)."""
         gap = (U - plan).ravel()
         slope = self.hessian @ gap
         return 0.5 * float(gap @ slope), slope
@@ -86,7 +87,7 @@ class Effort:
 def barrier(rows: ConstraintRows, u: Array) -> tuple[float, Array, Array]:
     """Returns the relaxed log barrier of all bounds: value, gradient (k,), Hessian (k, k) with respect to u.
 
-    B(h) = −μ ln h for h ≥ ζ, and below ζ the parabola that continues it with two continuous derivatives.
+    B(h) = −μ ln h for h ≥ ζ. Below ζ, B is a parabola; value and two derivatives are continuous at ζ.
     """
     value = rows.A @ u
     above = np.isfinite(rows.upper)
@@ -102,7 +103,7 @@ def barrier(rows: ConstraintRows, u: Array) -> tuple[float, Array, Array]:
 
 
 def barrier_value(rows: ConstraintRows, u: Array) -> float:
-    """Returns only the value of `barrier`."""
+    """Returns the value of `barrier` without its derivatives."""
     value = rows.A @ u
     h = np.concatenate([rows.upper - value, value - rows.lower])
     h = h[np.isfinite(h)]

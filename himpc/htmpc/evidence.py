@@ -17,14 +17,14 @@ from himpc.htmpc.tracking import Tracking
 Array = NDArray[np.float64]
 
 _FELT = 1e-6
-"""Smaller multipliers are rounding errors."""
+"""A multiplier whose magnitude is smaller than this is a rounding error."""
 
 
 def evidence(
     level: Tracking, solved: Solved, final: Iterate, named: Callable[[int], str] | None = None
 ) -> LevelEvidence:
-    """Builds the evidence of a level from the result of `solve_level`; `final` holds the inputs after all
-    levels, and `named` gives the names of a pair, see `CollisionModel.named`."""
+    """Builds the evidence of a level from the result of `solve_level`. `final` contains the inputs after all
+    levels, and `named` returns the names of a pair, see `CollisionModel.named`."""
     best = solved.at.errors(level)
     return LevelEvidence(
         name=level.name,
@@ -43,7 +43,8 @@ def evidence(
 
 
 def _felt(rows: ConstraintRows, multipliers: Array, named: Callable[[int], str] | None) -> Felt:
-    """Returns the active rows without the bounds of the slacks, whose multipliers come last."""
+    """Returns the active rows. The bounds of the slacks, whose multipliers are the last ones, are left
+    out."""
     multipliers = multipliers[: len(rows.kind)]
     some = np.flatnonzero(np.abs(multipliers) > _FELT)
     kind, part = rows.kind[some], rows.part[some]

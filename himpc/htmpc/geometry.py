@@ -19,14 +19,15 @@ Indices = NDArray[np.intp]
 
 _TASK = np.array([[POSITION, 0, 0, 3], [ORIENTATION, 0, 3, 3]])
 _PART = np.array([0, 1, 2, 0, 1, 2])
-"""Linear and then angular rows of one frame, as tasks of the kernel."""
+"""The three linear and three angular rows of one frame, in the form of the kernel's tasks."""
 
 
 class Placed(NamedTuple):
-    """Joints at configurations k.
+    """Placements and axes of all joints at K configurations.
 
     Attributes:
-        at: (K, n+1, 12) orientation in the world, row by row, then position, m. z: (K, n+1, 3) axis.
+        at: (K, n+1, 12), orientation in the world, row by row, then position in m.
+        z: (K, n+1, 3), axis of the joint.
     """
 
     at: Array
@@ -43,8 +44,8 @@ def placed(tree: Geometry, q: Array) -> Placed:
 
 
 class Frames(NamedTuple):
-    """A frame at configurations k: orientation R (K, 3, 3), position p (K, 3) m, and J (K, 6, n), linear
-    over angular, world axes, at the frame's origin."""
+    """A frame at K configurations: orientation R (K, 3, 3), position p (K, 3) in m, and Jacobian J (K, 6, n)
+    at the frame's origin in world axes, three linear rows before three angular rows."""
 
     R: Array
     p: Array
@@ -52,7 +53,7 @@ class Frames(NamedTuple):
 
 
 def frame_at(robot: Robot, where: Placed, name: str) -> Frames:
-    """Returns a frame of the robot (the tip for an empty name) for given placements of the joints."""
+    """Returns a frame of the robot for given placements of the joints; an empty name means the tip."""
     tree, K = geometry(robot), len(where.at)
     found = Frames(np.empty((K, 3, 3)), np.empty((K, 3)), np.empty((K, 6, robot.n)))
     frame_along(_TASK, _PART, tree.parent, tree.is_revolute, *where, *_mounted(robot, name), *found)

@@ -32,12 +32,12 @@ class _Box(NamedTuple):
 
 class HTIDKC:
     """Computes one velocity per period by a cascade of regularised QPs. It uses these settings: the stack,
-    `gains`, `rho`, the limits (without the jerk limit, section V-C), the solver and the rate; the authors use
-    50 Hz.
+    `gains`, `rho`, the solver, the rate, and the limits without the jerk limit (section V-C). The authors use
+    a rate of 50 Hz.
 
-    Level 0 minimises the violation of the bounds. They form a box, one interval per joint, so its solution is
-    the nearest point of the box that the accelerations allow. Level l then solves min ½‖J_l q̇ − ẋ_l‖² +
-    ½ρ‖q̇‖² inside the intervals of level 0, with J_i q̇ = J_i q̇*_i for the levels i above.
+    Level 0 minimises the violation of the bounds. The bounds form a box, one interval per joint, so its
+    solution is the nearest point of the box that the accelerations allow. Level l then solves min ½‖J_l q̇ −
+    ẋ_l‖² + ½ρ‖q̇‖² inside the intervals of level 0, with J_i q̇ = J_i q̇*_i for the levels i above.
     """
 
     def __init__(self, robot: Robot, settings: HTMPCSettings) -> None:
@@ -57,8 +57,8 @@ class HTIDKC:
         self._last: Array | None = None
 
     def configure(self, settings: HTMPCSettings) -> None:
-        """Applies new settings immediately; the last command is kept. If they do not fit, it raises
-        InputError and changes nothing."""
+        """Applies new settings immediately; the last command is kept. If the settings do not fit, the method
+        raises InputError and changes nothing."""
         home = Configuration(self.robot, self._data, self.robot.home, self.robot.home)
         for level in settings.stack:
             for task in level.tasks:
@@ -70,15 +70,15 @@ class HTIDKC:
         self._settings = settings
 
     def step(self, q: Array, v: Array, previews: Mapping[str, Preview]) -> VelocityPlan:
-        """Computes one control period; only the first knot of each preview is used.
+        """Computes the command of one control period; only the first knot of each preview is used.
 
         Args:
             q, v: measured joint positions and velocities, (n,).
             previews: the reference of every task by its name.
 
         Returns:
-            the plan of one knot. It is finite and inside the bounds for every state; if the state is not
-            plausible, the command fades to zero.
+            the plan with one knot. It is finite and inside the bounds for every state. If the state is not
+            plausible, the command decreases to zero.
         """
         started = perf_counter_ns()
         settings, period = self._settings, self._settings.period
@@ -126,8 +126,8 @@ class HTIDKC:
         return task.asked(here, preview).velocity[0] - gain * task.error(task.value(here), preview.value)
 
     def _level_zero(self, q: Array, last: Array) -> _Box:
-        """Returns the velocities that are allowed in this period: those inside all bounds, or the nearest
-        reachable one."""
+        """Returns the box of velocities that are allowed in this period: inside all bounds, or the nearest
+        reachable velocity."""
         limits, T = self._bounds, self._settings.period
         reach = _Box(last - limits.a * T, last + limits.a * T)
         upper = np.minimum(limits.v, _approach(limits.q_upper - q, limits, T))
@@ -174,8 +174,8 @@ class HTIDKC:
 
 
 def _approach(room: Array, limits: MotionBounds, T: float) -> Array:
-    """Returns the velocity from which a joint can still stop within `room`, decided every T seconds; beyond a
-    bound, a velocity back of up to a fifth of the speed limit."""
+    """Returns the largest velocity from which a joint can still stop within `room`, with one command every T
+    seconds. Beyond a bound it is a velocity back to the bound, at most a fifth of the speed limit."""
     braking = np.where(np.isfinite(limits.a), limits.a, 1e9)
     inside = braking * (np.sqrt(T * T + 2.0 * np.maximum(room, 0.0) / braking) - T)
     return np.where(room >= 0.0, inside, np.maximum(room, -0.2 * limits.v))

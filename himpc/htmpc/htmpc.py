@@ -32,14 +32,15 @@ from robots import Robot
 Array = NDArray[np.float64]
 
 _MEMORY = 200
-"""Number of plans that are stored: enough for a delay of 1 s at 200 Hz."""
+"""Number of stored plans; it suffices for a delay of 1 s at 200 Hz."""
 
 
 class HTMPC:
     """Plans velocities by Algorithm 2: one STMPC (9) per level, from the highest priority down.
 
-    It uses geometry and limits of the robot. Call `step` once per control period; the only memory is the last
-    plan. `configure` changes settings and keeps that plan, so the commanded motion continues without a jump.
+    The controller uses geometry and limits of the robot. Call `step` once per control period. The controller
+    stores its last plans only. `configure` changes settings and keeps these plans, so the commanded motion
+    continues without a jump.
     """
 
     def __init__(self, robot: Robot, settings: HTMPCSettings) -> None:
@@ -61,8 +62,8 @@ class HTMPC:
         self._since = self._settings.period
 
     def configure(self, settings: HTMPCSettings) -> None:
-        """Applies new settings immediately and without a jump of the command. If they do not fit, it raises
-        InputError and changes nothing."""
+        """Applies new settings immediately and without a jump of the command. If the settings do not fit, the
+        method raises InputError and changes nothing."""
         robot = self.robot
         home = Configuration(robot, self._data, robot.home, robot.home)
         tasks = tuple(task for level in settings.stack for task in level.tasks)
@@ -85,7 +86,7 @@ class HTMPC:
         self._settings = settings
 
     def _chosen(self, enabled: Stack) -> Stack:
-        """Returns the levels to solve among the enabled ones."""
+        """Returns the enabled levels that are solved."""
         return enabled
 
     def _held(self, chosen: Stack, settings: HTMPCSettings) -> NDArray[np.int64]:
@@ -93,16 +94,16 @@ class HTMPC:
         return np.array(joint_indices(self.robot, settings.hold) if settings.hold else [], np.int64)
 
     def step(self, q: Array, v: Array, previews: Mapping[str, Preview]) -> VelocityPlan:
-        """Computes one control period: the motion and its evidence from the measured state.
+        """Plans one control period: computes the motion and its evidence from the measured state.
 
         Args:
             q, v: measured joint positions and velocities, (n,).
-            previews: the reference of every task by its name, sampled at this tick (later by `delay_s`) with
-                T_s = Δt and N.
+            previews: the reference of every task by its name, with N knots at distances T_s = Δt. The first
+                knot is the time of this tick plus `delay_s`.
 
         Returns:
-            the plan. It is finite and inside the bounds for every state; a state that is not plausible is
-            replaced by the prediction of the last plan.
+            the plan. It is finite and inside the bounds for every state. A measured state that is not
+            plausible is replaced by the prediction of the last plan.
         """
         started = perf_counter_ns()
         tick = self._tick(self._start(q, v), previews)
@@ -121,9 +122,10 @@ class HTMPC:
         return self._decided(tick, motion, levels, clearance(at.distances), started)
 
     def _start(self, q: Array, v: Array) -> Start:
-        """Returns the state from which to plan, predicted forward by the delay, and the input before it."""
-        # The control rate may have changed: the last plan was commanded for the period that was set at its
-        # time.
+        """Returns the initial state of the plan, predicted forward by the delay, and the input before that
+        state."""
+        # The control rate may have changed since: the last plan was followed for the period that was set
+        # then.
         period, past, still = self._since, self._past, np.zeros(self.robot.n)
         usable = plausible(self.robot, q, v)
         if not past and not usable:
@@ -137,7 +139,7 @@ class HTMPC:
         delay = self._settings.delay_s
         if delay == 0.0:
             return Start(np.array(q, float), commandable(v, last, self._bounds), acted)
-        # Commands that were sent but have not acted yet cannot be changed any more.
+        # Commands that were sent but do not act yet can no longer be changed.
         return Start(q + underway(past, period, delay), last, acted)
 
     def _tick(self, start: Start, previews: Mapping[str, Preview]) -> SharedStep:

@@ -17,14 +17,14 @@ from robots import Robot
 
 Array = NDArray[np.float64]
 Desired = list[Array] | Array
-"""r of (6) for each knot."""
+"""The references r of (6), one for each knot."""
 
 
 class Knots:
     """Frames and Jacobians at all knots of a prediction, knot 1 first."""
 
     def __init__(self, robot: Robot, data: pin.Data, q: Array) -> None:
-        """q: (K, n) configurations; data: Pinocchio's work space for tasks that need more than frames."""
+        """q: (K, n) configurations; data: Pinocchio's work space, for tasks that need more than frames."""
         self._robot, self._data, self._q = robot, data, q
         self._frames: dict[str, Frames] = {}
 

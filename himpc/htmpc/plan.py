@@ -18,8 +18,8 @@ Whole = NDArray[np.int64]
 
 
 class Felt(NamedTuple):
-    """Active constraint rows: kind, knot and part as in `ConstraintRows`, and the multipliers, all (r,); and
-    the name of each row that is the distance of a pair, "" for other rows."""
+    """Active constraint rows: kind, knot and part as in `ConstraintRows`, and the multipliers, all (r,).
+    `pairs` contains the names of the pair for each row of a distance, and "" for other rows."""
 
     kind: Whole
     knot: Whole
@@ -34,18 +34,18 @@ class LevelEvidence(NamedTuple):
     Attributes:
         name: name of the level.
         status: status of the solver at the last QP.
-        fallback: "solve", or the fallback that was needed: "widened" (limits moved out to contain full
-            braking) or "keep" (no verified point: the inputs stay as the level above left them; on the first
-            level the robot brakes).
+        fallback: "solve", or the fallback that was needed. "widened": limits were widened to contain full
+            braking. "keep": there was no verified point, and the inputs of the level above were kept; on the
+            first level the robot brakes.
         kkt_residual: largest scaled KKT residual of the applied QP solutions.
         best: e* at knots 1 … N, (N, m); the level's tasks stacked.
-        final: the same errors once all levels are solved.
+        final: the same errors after all levels were solved.
         cost: J of (8) at e*, without knot 0.
         steps: accepted step sizes, one per iteration; 0 if none was acceptable.
-        iterations: QPs solved, first attempts only.
-        unsolved: number of these QPs without a verified point.
+        iterations: number of solved QPs; second attempts are not counted.
+        unsolved: number of these QPs that had no verified point.
         time_us: wall time.
-        felt: constraints with a nonzero multiplier at the last QP.
+        felt: constraints with a nonzero multiplier in the last QP.
     """
 
     name: str
@@ -77,15 +77,15 @@ class VelocityPlan(NamedTuple):
     """The planned motion, and the solution of every level.
 
     Attributes:
-        command: v at the end of this control period, (n,), if the command is held; `motion.velocity(s)` gives
-            it at any time s after this step.
+        command: v at the end of this control period, (n,), for robots that hold one command per period.
+            `motion.velocity(s)` returns v at any time s after this step.
         motion: the plan as a function of time.
         q, v: predicted positions and velocities at knots 0 … N, (N+1, n).
         u: accelerations, (N, n).
         levels: one per active level, highest priority first.
         errors: e now, (m,), per task name.
         values: x now, per task name.
-        bounds: the bounds in force.
+        bounds: the bounds that apply now.
         clearance: m, the smallest signed distance to an obstacle along the plan; infinite if none is near.
         step_us: wall time from state to plan, microseconds, kinematics included.
     """
@@ -108,12 +108,13 @@ class VelocityPlan(NamedTuple):
 
     @property
     def unsolved(self) -> int:
-        """Number of QPs without a verified point at the first attempt."""
+        """Number of QPs that had no verified point at the first attempt."""
         return sum(level.unsolved for level in self.levels)
 
     @property
     def leak(self) -> float | None:
-        """max(|e_p| − |e_p*|) over levels above the last, coordinates and knots; None with fewer than two."""
+        """max(|e_p| − |e_p*|) over knots, coordinates and all levels but the last; None with fewer than two
+        levels."""
         above = self.levels[:-1]
         return max((float((np.abs(p.final) - np.abs(p.best)).max()) for p in above), default=None)
 

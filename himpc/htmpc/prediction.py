@@ -1,4 +1,5 @@
-"""The double integrator (4) with G = I, condensed: velocities and positions at the knots from the inputs.
+"""The condensed double integrator (4) with G = I: computes velocities and positions at the knots from the
+inputs.
 
 The input is constant between knots, so the prediction is exact:
 v_k = v_0 + Δt Σ_{s<k} u_s and q_k = q_0 + kΔt v_0 + Δt² Σ_{s<k} (k − s − ½) u_s.
@@ -18,12 +19,12 @@ Array = NDArray[np.float64]
 
 
 class Integrator(NamedTuple):
-    """Matrices of one (N, Δt), the same for every joint.
+    """Matrices of the double integrator for one pair (N, Δt); they are the same for every joint.
 
     Attributes:
         T_v: (N, N), velocities at knots 1 … N from the inputs.
         T_q: (N, N), positions at knots 1 … N from the inputs.
-        D: (N, N), Δu from the inputs; the first row lacks −u_{−1}.
+        D: (N, N), Δu from the inputs; the term −u_{−1} of the first row is not included.
         t: (N,) s, times of knots 1 … N.
     """
 
@@ -72,7 +73,7 @@ def coasting(start: Start, N: int, dt: float) -> Array:
 
 
 class Motion(NamedTuple):
-    """A plan as a function of time: velocities are linear between knots, which are dt apart.
+    """A plan as a function of time. Knots are dt apart; velocities are linear between them.
 
     Attributes:
         start: its first knot.
@@ -104,7 +105,7 @@ class Motion(NamedTuple):
 
 
 def underway(past: Sequence[Motion], period: float, delay: float) -> Array:
-    """Returns ∫ v ds over the last `delay` seconds of commands, (n,); each plan was followed for one period.
+    """Returns ∫ v ds, (n,), over the last `delay` seconds of commands. Each plan was followed for one period.
 
     Before the first stored plan the robot is assumed to have moved with that plan's initial velocity.
     """

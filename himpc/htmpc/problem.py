@@ -26,11 +26,11 @@ from robots import Robot
 Array = NDArray[np.float64]
 
 PROXIMAL = 0.03
-"""Factor on the effort weights in the proximal form, which is used for damping only. With the full weights a
-level would keep errors of centimetres late in its horizon, and (12) would then allow them to the levels
-below."""
+"""Factor on the effort weights in the proximal form, which serves damping only. With the full weights, a
+level would have errors of centimetres late in its horizon. By (12), the levels below would then be allowed
+the same errors."""
 _RIDGE = 1e-8
-"""Keeps the Hessian positive definite when effort weights are set to zero."""
+"""A ridge: keeps the Hessian positive definite when effort weights are zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,17 +38,17 @@ class SharedStep:
     """Data that all levels of one step share.
 
     Attributes:
-        robot, data: for kinematics.
-        settings: in use.
+        robot, data: used for kinematics.
+        settings: the present settings.
         start: initial state of the prediction.
         desired: r per task name at knots 0 … N.
         effort: J_eff.
         rows: (7d) on the inputs.
-        bounds: in force.
+        bounds: the bounds that apply now.
         plan: the shifted previous plan, (N, n).
         avoidance: (7c), None without obstacles.
         method: solves the QPs; it stores the active rows of a level's last QP.
-        table: has space for all rows; `rows` are its first.
+        table: has space for all rows; its first rows are `rows`.
     """
 
     robot: Robot
@@ -66,18 +66,18 @@ class SharedStep:
 
     @cached_property
     def brake(self) -> Array:
-        """Inputs (N, n) that stop the robot; used if bounds contradict each other."""
+        """Inputs (N, n) that stop the robot. They are used if bounds contradict each other."""
         settings = self.settings
         return braking(self.start, settings.horizon, settings.dt, settings.period, self.bounds)
 
     @cached_property
     def rest(self) -> tuple[float, Array]:
-        """Value and gradient (N·n,) of (10) without inputs."""
+        """Value and gradient (N·n,) of (10) for inputs of zero."""
         return self.effort.absolute(self.start, np.zeros_like(self.plan))
 
     @cached_property
     def coasting(self) -> Array:
-        """q at knots 1 … N without inputs, (N, n)."""
+        """q at knots 1 … N for inputs of zero, (N, n)."""
         return coasting(self.start, self.settings.horizon, self.settings.dt)
 
     @cached_property
@@ -130,7 +130,7 @@ class Iterate:
 
     @cached_property
     def near(self) -> Clearances | None:
-        """Distances with gradients; None without obstacles."""
+        """Distances and their gradients; None without obstacles."""
         avoidance = self.tick.avoidance
         return avoidance.near(self.knots.joints) if avoidance is not None else None
 
@@ -153,10 +153,10 @@ class Iterate:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """One level.
+    """The problem of one level.
 
     Attributes:
-        tick: shared data.
+        tick: data that all levels share.
         level: the level to optimise.
         guards: constraints (9c) of the levels above, highest first.
         absolute: whether the effort is (10) itself, or its proximal form.
@@ -169,7 +169,7 @@ class Problem:
 
     @property
     def softened(self) -> bool:
-        """Whether states and inputs are softened by barriers, as the paper says."""
+        """Whether states and inputs are softened by barriers, as in the paper."""
         return self.tick.settings.formulation == "paper"
 
     @property
@@ -191,8 +191,8 @@ class Problem:
         return value + PENALTY * float(at.depths.sum()) if tick.avoidance is not None else value
 
     def model(self, at: Iterate) -> tuple[Array, Array]:
-        """Returns the Hessian (k, k), Gauss-Newton for the errors, and the gradient (k,) with respect to the
-        inputs."""
+        """Returns the Hessian (k, k) and the gradient (k,) with respect to the inputs. The Hessian of the
+        errors is the Gauss-Newton approximation."""
         tick = self.tick
         H, g = gauss_newton(
             *(at.jacobian(self.level), self.level.Q, at.errors(self.level), tick.T_q),
@@ -208,9 +208,9 @@ class Problem:
         """Returns the QP's rows for the change d of the inputs, without rows that are softened by barriers or
         slacks.
 
-        With `slopes`, the rows correct a step that violated the guards: the guards' rows are strict, and have
-        the Jacobians of that iterate. The rows are in the step's table; the next call overwrites those behind
-        (7d).
+        With `slopes`, the rows correct a step that violated the guards. The guards' rows are then strict and
+        have the Jacobians of the iterate `slopes`. All rows are in the step's table; the next call overwrites
+        the rows after (7d).
         """
         tick, table = self.tick, self.tick.table
         first = place = len(tick.rows.A)
@@ -220,7 +220,7 @@ class Problem:
         for above in self.guards:
             place = self._guarded(above, place, at, slopes)
         if self.guards and not self.softened and at.near is not None and len(at.near.knot):
-            # Below the first level the present depth is allowed: the rows contain d = 0.
+            # Below the first level, the present violation is allowed: d = 0 satisfies the rows.
             rows = self._avoidance_rows(at, place)
             place = table.put(place, rows.widened(np.zeros(at.U.size)))
         return table.changes(first, place)
@@ -241,8 +241,8 @@ class Problem:
         return place + 1
 
     def with_slack(self, at: Iterate, rows: ConstraintRows) -> tuple[ConstraintRows, int]:
-        """Returns `rows` of an iterate, followed on the first level by the rows of (7c), which slacks may
-        relax; and the number of these rows."""
+        """Returns `rows` of an iterate and the number of rows of (7c). On the first level, the rows of (7c),
+        which slacks may relax, are appended to `rows`."""
         if not self.forced or at.near is None or not len(at.near.knot):
             return rows, 0
         slack, place = self._avoidance_rows(at, len(rows.A)), len(rows.A)
@@ -250,14 +250,15 @@ class Problem:
 
     @property
     def unchanging(self) -> int:
-        """How many of the first `rows` stay the same, except for their bounds, when a step is corrected."""
+        """The number of rows, from the first on, whose coefficients stay the same when a step is
+        corrected."""
         guarded = 0
         if self.tick.settings.lexicographic == "per_coordinate":
             guarded = sum(guard.best.size for guard in self.guards)
         return guarded + (0 if self.softened else len(self.tick.rows.A))
 
     def allowed(self, at: Iterate, share: float = 1.0) -> bool:
-        """(13): whether the error of every level above has grown by at most (a share of) its tolerance."""
+        """(13): whether the error of every level above has grown by at most `share` times its tolerance."""
         settings = self.tick.settings
         per_coordinate = settings.lexicographic == "per_coordinate"
         delta = share * settings.delta_m

@@ -1,8 +1,8 @@
 """The linear rows of (7d): velocity, position, input and jerk bounds on the condensed inputs.
 
-All rows have the form lower ≤ A u ≤ upper with u the inputs, knot by knot, (N·n,). Two groups of rows are
-about the time beyond the horizon, so that the next step's problem is feasible too: "ramp" rows make it
-possible to return the input to zero within the jerk bound, "stop" rows to stop before a position bound.
+All rows have the form lower ≤ A u ≤ upper with u the inputs, knot by knot, (N·n,). Two groups of rows concern
+the time beyond the horizon, so that the next step's problem is feasible too. With the "ramp" rows, the input
+can return to zero within the jerk bound. With the "stop" rows, a joint can stop before a position bound.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ Array = NDArray[np.float64]
 
 
 class ConstraintRows(NamedTuple):
-    """Rows with labels.
+    """Constraint rows with labels.
 
     Attributes:
         A: (r, N·n); lower, upper: (r,).
-        kind: (r,) index into KINDS; knot: (r,) 1 … N (0 … N−1 for inputs); part: (r,) joint,
-            coordinate or, of an obstacle, pair.
+        kind: (r,) index into KINDS; knot: (r,) 1 … N (0 … N−1 for inputs); part: (r,) index of the joint, of
+            the coordinate or of the pair.
     """
 
     A: Array
@@ -44,8 +44,8 @@ class ConstraintRows(NamedTuple):
         )
 
     def widened(self, u: Array, last: int = 0) -> ConstraintRows:
-        """Returns the rows with bounds widened just enough to contain u, except for the given number of last
-        rows."""
+        """Returns the rows with bounds widened just enough to contain u. The last `last` rows are not
+        widened."""
         value = self.A @ u
         lower, upper = np.minimum(self.lower, value), np.maximum(self.upper, value)
         end = len(value) - last
@@ -54,8 +54,8 @@ class ConstraintRows(NamedTuple):
 
 
 class ConstraintTable:
-    """Storage for all rows of a controller, filled at every step: the rows of (7d) first, then the rows of a
-    QP.
+    """Storage for all rows of a controller. Every step fills it again: first the rows of (7d), then the rows
+    of a QP.
 
     Attributes:
         A: rows on the inputs u, or on their change d.
@@ -71,7 +71,7 @@ class ConstraintTable:
         self.labels = np.zeros((3, 0), np.int64)
 
     def reserve(self, count: int) -> None:
-        """Allocates space for that many rows; existing rows are kept."""
+        """Allocates space for `count` rows in all; existing rows are kept."""
         missing = count - len(self.A)
         if missing > 0:
             self.A = np.vstack([self.A, np.zeros((missing + 100, self.A.shape[1]))])
@@ -81,34 +81,34 @@ class ConstraintTable:
             )
 
     def absolute(self, count: int) -> ConstraintRows:
-        """Returns the first rows, on u, as views."""
+        """Returns the first `count` rows, as rows on u, in views of the table."""
         return ConstraintRows(self.A[:count], *self.bounds[:, :count], *self.labels[:, :count])
 
     def changes(self, first: int, end: int) -> ConstraintRows:
-        """Returns the rows on d from index `first` to index `end`: views, except the labels, which are
-        copied."""
+        """Returns the rows on d from index `first` to index `end`. They are views of the table; only the
+        labels are copied."""
         return ConstraintRows(self.A[first:end], *self.room[:, first:end], *self.labels[:, first:end].copy())
 
     def about(self, u: Array, count: int) -> None:
-        """Sets the bounds on Ad of the first rows to those on Au, minus Au."""
+        """Sets the bounds on Ad of the first `count` rows: the bounds on Au, minus Au."""
         about(self.A, self.bounds, u, count, self.room)
 
     def outside(self, count: int) -> float:
-        """Returns the largest violation of the bounds of the first rows by the u of `about`."""
+        """Returns the largest violation of the bounds of the first `count` rows by the last u of `about`."""
         lower, upper = self.room[:, :count]
         return max(0.0, float(lower.max(initial=0.0)), -float(upper.min(initial=0.0)))
 
     def put(self, place: int, rows: ConstraintRows) -> int:
-        """Writes bounds and labels of rows on d whose A is already in the table; returns the index after
-        them."""
+        """Writes bounds and labels of rows on d to the table, which already contains their A. Returns the
+        index after the rows."""
         end = place + len(rows.A)
         self.room[:, place:end] = rows.lower, rows.upper
         self.labels[:, place:end] = rows.kind, rows.knot, rows.part
         return end
 
     def spread(self, place: int, knot: NDArray[np.int64], slopes: Array, T_q: Array) -> Array:
-        """Writes the rows from index `place` on whose values at knots (r,) have slopes (r, n) in q; returns
-        them."""
+        """Writes rows of functions of q, from index `place` on, and returns them. `slopes` (r, n) are the
+        derivatives of the functions with respect to q at the knots (r,)."""
         self.reserve(place + len(knot))
         spread(self.A, place, np.asarray(knot, np.intp), np.ascontiguousarray(slopes), T_q)
         return self.A[place : place + len(knot)]
@@ -117,7 +117,8 @@ class ConstraintTable:
 def limit_rows(
     start: Start, N: int, dt: float, period: float, bounds: MotionBounds, table: ConstraintTable | None = None
 ) -> ConstraintRows:
-    """Writes all rows that the bounds of this tick can make active to a table, from its beginning on.
+    """Writes the rows of this tick's bounds that can become active to the beginning of a table, and returns
+    them.
 
     A row is left out if no inputs inside the input bounds can reach its bound.
     """
@@ -136,8 +137,8 @@ def limit_rows(
 def held(
     rows: ConstraintRows, brake: Array, joints: NDArray[np.int64], table: ConstraintTable
 ) -> ConstraintRows:
-    """Writes rows that bring some joints to rest with the inputs of `brake` (N, n). These rows replace the
-    given ones at the beginning of the table."""
+    """Writes rows that bring some joints to rest with the inputs of `brake` (N, n). They replace the rows of
+    these joints in `rows`. All rows are written to the beginning of the table."""
     N, n = brake.shape
     chosen = (np.arange(N)[:, None] * n + joints).ravel()
     value = brake.ravel()[chosen]

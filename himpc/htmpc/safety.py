@@ -1,4 +1,4 @@
-"""Safety checks for any measurement: which states can be used, and which commands may be sent."""
+"""Safety checks: whether a measured state can be used, and which commands may be sent."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ Array = NDArray[np.float64]
 _FASTEST = 20.0
 """A joint speed above this multiple of the robot's limit is a measurement error."""
 _OUTSIDE = 10.0
-"""rad or m: a joint position farther outside its range is a measurement error."""
+"""A joint position that is farther outside its range than this, rad or m, is a measurement error."""
 _FARTHEST = 1e6
-"""rad or m: the same limit for a joint without a range, measured from zero."""
+"""The largest distance from zero, rad or m, of a valid position of a joint without a range."""
 
 
 def plausible(robot: Robot, q: Array, v: Array) -> bool:
-    """Whether a measured state is a valid start of a plan: finite, and neither absurdly far nor absurdly
-    fast.
+    """Whether a measured state is a valid start of a plan: finite, and near the ranges of positions and
+    velocities.
 
     Args:
-        robot: its limits define what is absurd.
+        robot: its limits define these ranges.
         q, v: measured joint positions and velocities, (n,).
     """
     lower, upper, fastest = _believable(robot)
@@ -45,35 +45,37 @@ def _believable(robot: Robot) -> tuple[Array, Array, Array]:
 def commandable(v: Array, last: Array | None, bounds: MotionBounds) -> Array:
     """Returns the measured velocity (n,), clipped to the velocities that may be commanded.
 
-    The commands of a plan begin at this velocity: a robot that was pushed beyond its limit must not receive
-    that velocity as a command.
+    The commands of a plan begin at this velocity. A robot that was pushed beyond its limit must not receive
+    its measured velocity as a command.
 
     Args:
-        v: measured, (n,).
-        last: the velocity commanded last, None if there is none. It may exceed bounds that were tightened
-            since: from there the robot brakes.
-        bounds: in force.
+        v: measured velocity, (n,).
+        last: the last commanded velocity, None if there is none. It may exceed bounds that were tightened
+            later; the robot then brakes from this velocity.
+        bounds: the bounds that apply now.
     """
     most = bounds.v if last is None else np.maximum(bounds.v, np.abs(last))
     return np.minimum(np.maximum(v, -most), most)
 
 
 def permitted(start: Start, U: Array, bounds: MotionBounds, period: float) -> Array:
-    """Returns the inputs (N, n) with the first one changed such that the commands of this period keep their
+    """Returns the inputs (N, n). The first input is changed such that the commands of this period satisfy the
     bounds.
 
-    They already keep them if the QP's rows were hard and feasible. From a speed above its bound (which was
-    tightened) the robot may brake as slowly as its jerk bound requires, but it does not become faster.
+    If the QP's rows were hard and feasible, the commands already satisfy the bounds. If the speed exceeds a
+    bound that was tightened, the robot may brake as slowly as its jerk bound requires, but its speed does not
+    increase.
 
     Args:
-        start: where the plan begins.
+        start: the initial state of the plan.
         U: finite inputs, (N, n).
-        bounds: in force.
-        period: s, how long the first input is commanded.
+        bounds: the bounds that apply now.
+        period: the time in s for which the first input is commanded.
     """
     fastest = np.maximum(bounds.v, np.abs(start.v))
     first = np.minimum(np.maximum(U[0], (-fastest - start.v) / period), (fastest - start.v) / period)
-    # An acceleration bound below the present input (it was tightened) is reached within the jerk bound.
+    # If a tightened acceleration bound is below the present input, the input reaches it within the jerk
+    # bound.
     most = np.maximum(bounds.a, np.abs(start.u) - bounds.j * period)
     U = U.copy()
     U[0] = np.minimum(np.maximum(first, -most), most)

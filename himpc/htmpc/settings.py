@@ -52,8 +52,8 @@ class HTMPCSettings:
     """Settings of HTMPC and of its variants with a single task or without preview.
 
     Attributes:
-        stack: levels, highest priority first; a level's Q weighs its stage costs in (8). Its R and horizon,
-            and its tasks' gains, are not used.
+        stack: levels, highest priority first. The Q of a level weighs its stage costs in (8). The R and the
+            horizon of a level, and the gains of its tasks, are not used.
         horizon: N, knots.
         dt: Δt between knots, s.
         rate_hz: control rate, 1/s; the plan is shifted by one control period at every step.
@@ -62,25 +62,26 @@ class HTMPCSettings:
         input_effort: R of (10); None: 0.1 for the base's joints, 0.02 for all others.
         change_effort: W of (10) on Δu; None: 0.1 for the base's joints, 0 for all others.
         formulation: "proximal" (the effort of upper levels is their deviation from the shifted previous plan;
-            hard rows) or "paper" (every level has the absolute effort (10), states and inputs softened by
-            relaxed log barriers).
+            the rows are hard) or "paper" (every level has the absolute effort (10); states and inputs are
+            softened by relaxed log barriers).
         lexicographic: "per_coordinate" for constraint (12), "cost" for constraint (11).
-        delta_m: δ of (13), m (or rad): by how much the error of a level at a knot may exceed its best value
-            there. For (11), δ is converted to a cost: that of an error δ at every knot.
-        max_iter: MAX_ITER, QPs per level.
-        limits: bounds.
+        delta_m: δ of (13), m (or rad): the amount by which the error of a level at a knot may exceed its best
+            value at this knot. For (11), δ is converted to the cost of an error δ at every knot.
+        max_iter: MAX_ITER, the largest number of QPs per level.
+        limits: the bounds to impose.
         obstacles: obstacles of the collision avoidance (7c).
         margin_m: δ_safe of (7c), m.
         self_collision: whether the arm avoids collisions with the base.
-        delay_s: s, delay of a command; the measured state is predicted forward by it. The caller
+        delay_s: delay of a command in s. The measured state is predicted forward by this time. The caller
             samples the references at t + delay_s.
         hold: joints that stay at rest, by name.
-        base: how the base moves; see `kinematics.G`.
-        gains: of HTIDKC only, 1/s: ẋ = ṙ + gain · (r − x) at each enabled level; the last gain applies to all
-            further levels.
-        rho: of HTIDKC only, ρ: weight of ‖q̇‖² in every level.
-        solver: the QP solver, see himpc.qp.Solver. HTIDKC uses it for every QP. HTMPC and its variants solve
-            by a compiled method, and by "daqp" where that finds no solution; another solver replaces both.
+        base: how the base moves; see `himpc.htmpc.base.G`.
+        gains: used by HTIDKC only, 1/s: ẋ = ṙ + gain · (r − x) at each enabled level. The last gain applies
+            to all further levels.
+        rho: used by HTIDKC only: ρ, the weight of ‖q̇‖² at every level.
+        solver: the QP solver, see himpc.qp.Solver. HTIDKC uses it for every QP. HTMPC and its variants use a
+            compiled method, and "daqp" if that method finds no solution. Any other value of `solver` replaces
+            both.
     """
 
     stack: Stack
@@ -111,7 +112,7 @@ class HTMPCSettings:
         if not self.gains or not all(gain <= self.rate_hz for gain in self.gains):
             raise InputError(f"gains are {list(self.gains)}: give numbers from 0 to rate_hz, e.g. 0.5, 0.3")
         if not is_installed(self.solver):
-            raise InputError(f"solver '{self.solver}' comes with CasADi: pip install casadi, or take daqp")
+            raise InputError(f"solver '{self.solver}' comes with CasADi: pip install casadi, or use daqp")
         if self.base == "unicycle":
             raise InputError(UNICYCLE)
         check_names(self.stack)
@@ -133,7 +134,7 @@ class Efforts:
 
 @dataclass(frozen=True, eq=False)
 class MotionBounds:
-    """The bounds in force, (n,) each; infinite for bounds that are not imposed."""
+    """The bounds that apply, (n,) each; infinite for bounds that are not imposed."""
 
     q_lower: Array
     q_upper: Array
@@ -154,7 +155,7 @@ def efforts(robot: Robot, settings: HTMPCSettings) -> Efforts:
 
 
 def bounds(robot: Robot, limits: MotionLimits) -> MotionBounds:
-    """Returns the robot's limits with switches and scales applied. Raises InputError for a wrong jerk
+    """Returns the robot's limits, scaled and switched by the settings. Raises InputError for a wrong jerk
     list."""
     free = np.full(robot.n, np.inf)
     jerk = _weights(robot, "limits.jerk_limit", limits.jerk_limit, base_joints(robot), 10.0, 80.0)

@@ -19,12 +19,13 @@ Array = NDArray[np.float64]
 SHRINK = 0.5
 """β of the backtracking line search (the HTMPC authors' value)."""
 DECREASE = 0.05
-"""The decrease of the merit must be at least this share of the predicted decrease (the authors' value)."""
+"""The merit must decrease by at least this share of the predicted decrease (the authors' value)."""
 BACKTRACKS = 10
 UNCORRECTED = 0.2
-"""Share of δ by which a step may worsen the levels above without a second-order correction."""
+"""Share of δ by which a step may increase the errors of the levels above without a second-order
+correction."""
 CORRECTIONS = 4
-"""This many of the longest steps are first corrected before they are shortened; see `_led_back`."""
+"""Number of the longest steps that are corrected before they are shortened; see `_led_back`."""
 
 _STILL = 1e-9
 _FEASIBLE = 1e-7
@@ -35,7 +36,7 @@ class Solved(NamedTuple):
     """The result of one level.
 
     Attributes:
-        at: the solution (inputs) with its kinematics.
+        at: the inputs of the solution, with their kinematics.
         status, fallback, kkt_residual, steps, unsolved, time_us: see `LevelEvidence`.
         rows, multipliers: rows and multipliers of the last QP.
     """
@@ -66,8 +67,8 @@ class _Direction(NamedTuple):
 
 
 def solve_level(problem: Problem, at: Iterate) -> Solved:
-    """Solves a level with at most MAX_ITER steps from an iterate; it ends early when the inputs no longer
-    change."""
+    """Solves a level with at most MAX_ITER steps from an iterate. The iteration ends early when the inputs no
+    longer change."""
     started = perf_counter_ns()
     steps: list[float] = []
     residual, fallback, unsolved = 0.0, "solve", 0
@@ -102,8 +103,8 @@ def solve_level(problem: Problem, at: Iterate) -> Solved:
 
 
 def _direction(problem: Problem, at: Iterate) -> _Direction:
-    """Computes the step by a QP; if its rows contradict each other, they are widened until full braking
-    satisfies them."""
+    """Computes the step by a QP. If the QP's rows contradict each other, they are widened such that full
+    braking satisfies them."""
     tick = problem.tick
     H, g = problem.model(at)
     rows, bought = problem.with_slack(at, problem.rows(at))
@@ -111,7 +112,8 @@ def _direction(problem: Problem, at: Iterate) -> _Direction:
     solution = _solve(problem, H, g, rows, bought, own)
     fallback = "solve"
     if not solution.solved:
-        # Below the first level d = 0 satisfies the remaining rows; on the first level full braking does.
+        # Below the first level, d = 0 satisfies the rows without slacks; on the first level, full braking
+        # does.
         safe = (tick.brake - at.U).ravel() if not problem.guards else np.zeros(at.U.size)
         fallback = "widened"
         solution = _solve(problem, H, g, rows.widened(safe, bought), bought, own)
@@ -125,14 +127,14 @@ def _direction(problem: Problem, at: Iterate) -> _Direction:
 
 
 def _solve(problem: Problem, H: Array, g: Array, rows: ConstraintRows, bought: int, own: bool) -> QPSolution:
-    """Solves min ½dᵀHd + gᵀd under the rows, plus a penalty on one slack per knot that may relax the last
-    rows.
+    """Solves min ½dᵀHd + gᵀd under the rows. A penalty is added for the slacks, one per knot, which may relax
+    the last rows.
 
     Args:
         problem, H, g, rows: problem, Hessian, gradient and rows of the level.
-        bought: number of rows (the last ones) that slacks may relax.
-        own: whether the compiled active-set method has factored H; otherwise, or if it finds no verified
-            point, the QP solver is used.
+        bought: number of rows, at the end, that slacks may relax.
+        own: whether the compiled active-set method has factored H. If not, or if that method finds no
+            verified point, the QP solver is used.
     """
     solver = problem.tick.settings.solver
     if not bought:
@@ -142,7 +144,7 @@ def _solve(problem: Problem, H: Array, g: Array, rows: ConstraintRows, bought: i
                 return solution
         return solve_qp(H, g, rows.A, rows.lower, rows.upper, solver)
     if own:
-        # The slacks are zero if the rows are feasible and their multipliers are below the penalty.
+        # If the rows are feasible and their multipliers are below the penalty, the slacks are zero.
         solution = problem.tick.method.solve(g, rows, 0)
         if solution.solved and _price(solution, rows, bought) <= PENALTY:
             return solution
@@ -167,11 +169,12 @@ def _price(solution: QPSolution, rows: ConstraintRows, bought: int) -> float:
 
 
 def _line_search(problem: Problem, at: Iterate, found: _Direction) -> tuple[float, Iterate]:
-    """Returns the largest step 1, β, β², … that satisfies (13) and lowers the merit enough, and its iterate;
-    step 0 if none does."""
+    """Returns the largest step of 1, β, β², … that satisfies (13) and sufficiently lowers the merit, and its
+    iterate. The step is 0 if none of them does."""
     tick = problem.tick
     merit = problem.merit(at)
-    # If the bounds of the first level are violated, the step must lead back to them, whatever the merit is.
+    # If the bounds of the first level are violated, the full step, which leads back to them, is always
+    # accepted.
     returning = problem.forced and tick.table.outside(len(tick.rows.A)) > _FEASIBLE
     alpha = 1.0
     for attempt in range(BACKTRACKS + 1):
@@ -190,11 +193,11 @@ def _line_search(problem: Problem, at: Iterate, found: _Direction) -> tuple[floa
 
 
 def _led_back(problem: Problem, at: Iterate, found: _Direction, trial: Iterate) -> Iterate:
-    """Returns the iterate after the smallest correction (in the Hessian's norm) that removes the errors which
-    a step has added to the levels above.
+    """Returns the iterate after a correction of a step. The correction is the smallest one, in the Hessian's
+    norm, that removes the errors which the step has added to the levels above.
 
-    The levels' errors are nonlinear: a step along their linear rows violates (13) by an amount that grows
-    with the square of its length, and without this second-order correction only short steps are accepted.
+    The levels' errors are nonlinear. A step along their linear rows violates (13) by an amount that grows
+    with the square of the step's length. Without this second-order correction only short steps are accepted.
     """
     solution = _solve(problem, found.H, np.zeros_like(found.g), problem.rows(trial, at), 0, found.own)
     return problem.tick.iterate(trial.U + solution.x.reshape(trial.U.shape)) if solution.solved else trial

@@ -17,15 +17,14 @@ Array = NDArray[np.float64]
 
 
 class STMPC(HTMPC):
-    """Single-task MPC: (9) for the first enabled level of the stack; the others are ignored."""
+    """Single-task MPC: (9) for the first enabled level of the stack. All other levels are ignored."""
 
     def _chosen(self, enabled: Stack) -> Stack:
         return enabled[:1]
 
 
 class HTMPC_WPT(HTMPC):
-    """HTMPC that receives waypoints: the preview of every reference is constant at its present value (section
-    V-C)."""
+    """HTMPC without a preview (section V-C): every reference is a waypoint, constant at its present value."""
 
     def step(self, q: Array, v: Array, previews: Mapping[str, Preview]) -> VelocityPlan:
         return super().step(q, v, {name: _frozen(preview) for name, preview in previews.items()})

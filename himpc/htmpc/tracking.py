@@ -24,8 +24,8 @@ class Tracking:
     Attributes:
         name: name of the level.
         tasks: tasks of the level.
-        Q: (N, m) diagonal weights at knots 1 … N; the last row is P. Knot 0 is measured: its cost is
-            constant.
+        Q: (N, m) diagonal weights at knots 1 … N; the last row is P. Knot 0 has no weights: it is measured,
+            and its cost is constant.
     """
 
     name: str
@@ -61,10 +61,11 @@ def tracking(robot: Robot, level: Level, settings: HTMPCSettings) -> Tracking:
 
 
 def check_dimensions(robot: Robot, levels: tuple[Level, ...]) -> None:
-    """Checks the rule of section III: the sum of the tasks' dimensions is less than the degrees of freedom.
+    """Checks the rule of section III: the sum of the tasks' dimensions must be less than the degrees of
+    freedom.
 
     Raises:
-        InputError: the sum is not less, so that no freedom is left for the last level.
+        InputError: the sum is too large, so that no freedom is left for the last level.
     """
     sizes = {level.name: sum(len(task.coordinates(robot)) for task in level.tasks) for level in levels}
     total = sum(sizes.values())
@@ -81,7 +82,7 @@ class Guard:
     """The errors that a level above has reached: the constraint (9c) for the levels below.
 
     Attributes:
-        tracking: that level.
+        tracking: the level above.
         best: e* at knots 1 … N, (N, m).
     """
 
@@ -96,7 +97,7 @@ class Guard:
     def excess(self, e: Array, per_coordinate: bool, delta: float) -> float:
         """Returns the largest h_i − δ_i of (13), which is ≤ 0 if a step is allowed.
 
-        (12): h = |e| − |e*| in every coordinate and knot. (11): h = J − J*, with δ_J = ½ Σ w δ².
+        For (12), h = |e| − |e*| in every coordinate and knot. For (11), h = J − J*, with δ_J = ½ Σ w δ².
         """
         if per_coordinate:
             return float((np.abs(e) - self.reached).max()) - delta
@@ -104,7 +105,7 @@ class Guard:
         return cost(e) - cost(self.best) - 0.5 * float(self.tracking.Q.sum()) * delta**2
 
     def gap(self, e: Array, strict: bool = False) -> float:
-        """Returns the amount by which (11) allows the cost to grow from that of e; at least zero unless
-        `strict`."""
+        """Returns the amount by which (11) allows the cost to grow from the cost of e. Unless `strict`, the
+        amount is at least zero."""
         gap = self.tracking.cost(self.best) - self.tracking.cost(e)
         return gap if strict else max(gap, 0.0)

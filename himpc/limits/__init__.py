@@ -1,4 +1,4 @@
-"""Limits: which are imposed, the constraints that they are, and the rows they become."""
+"""Limits: which of them are imposed, their constraints, and the rows of these constraints."""
 
 from himpc.limits.constraints import CONSTRAINTS
 from himpc.limits.limits import POSITION_MARGIN, Limits, LimitsInForce, in_force

@@ -1,5 +1,5 @@
-"""Increments for rows of distances that cannot be satisfied: their violation is minimised by least
-squares."""
+"""Computes increments if rows of distances cannot be satisfied: the violation of these rows is minimised by
+least squares."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ Array = NDArray[np.float64]
 _ITERATIONS = 100
 """Largest number of iterations of the QP, which has one unknown for each joint and each direction."""
 _FAINT = 1e-5
-"""Weight of the change of torque."""
+"""Weight of the change of torque in the cost of the QP."""
 
 
 def kept_apart(rows: Rows, joints: int, U: Array) -> Array:
-    """Returns U, (N, n) N·m, with a changed first increment. The change minimises the violation of the rows
-    that are not rows of joints, by least squares. Rows of joints that U satisfies stay satisfied.
+    """Returns U, (N, n) N·m, with a changed first increment. The change minimises, by least squares, the
+    violation of the rows whose columns are not the joints. Rows of joints that U satisfies stay satisfied.
 
-    A step of torque moves a row in proportion to L[:, 0]. With one number x per joint, the joints' own rows
-    are bounds on x, which 0 meets, and rows of a direction D_c are one bound on D_c·x: the tightest of all
-    knots.
+    A step of torque changes the value of a row in proportion to L[:, 0]. With one unknown x per joint, the
+    joints' own rows become bounds on x, which x = 0 satisfies. The rows of a direction D_c become one bound
+    on D_c·x: the tightest bound of all knots.
 
     Args:
         rows: all rows.
-        joints: number of rows, the first ones, whose columns are the joints.
-        U: the increments to begin with.
+        joints: number of rows, from the first on, whose columns are the joints.
+        U: the increments before the change.
     """
     N, n = U.shape
     profile, value = rows.L[:, :1], rows.values(U)

@@ -20,12 +20,12 @@ class Avoidance:
         on: whether distances have rows.
         d_safe: m, the distance that is kept.
         margin: m, added to d_safe, to compensate for the delay of time-delay estimation.
-        reaction: s before the robot brakes, which the bound allows for.
-        deceleration: m/s², of a distance's decrease, that the bound counts on.
-        pull: m, largest error on which tasks of positions act while `on`; other tasks act on up to TURN_PULL
-            times as many rad. A target that cannot be reached then pulls no harder than one that is this far
-            away. 0: no limit.
-        velocity_margin: share of the velocity limits that is kept free while `on`. Time-delay estimation
+        reaction: the time in s that passes before the robot brakes, as the bound assumes.
+        deceleration: the deceleration in m/s² of a pair that comes closer, as the bound assumes.
+        pull: m, the largest error on which tasks of positions act while `on`; for other tasks it is TURN_PULL
+            times as many rad. A larger error, for example of a target that cannot be reached, has the effect
+            of this one. 0: no limit.
+        velocity_margin: share of the velocity limits that is not used while `on`. Time-delay estimation
             reacts late when other joints accelerate a joint that is at its limit.
     """
 

@@ -28,13 +28,13 @@ def braking(rows: Rows) -> Array:
     also satisfy all other rows, except those that yield first.
 
     Rows of torque, velocity and position do not couple joints. Let τ_i be the torque gained up to knot i, and
-    w_j = Σ_{i≤j} τ_i. Torque rows bound w_j − w_{j−1}, and velocity rows bound w_j. A pass from the last knot
-    backwards computes the interval of w_j from which all later rows can still be met. A pass forwards puts
-    each w_j as close to `rows.rest` as these intervals allow. If no w_j meets all bounds, the velocity row of
-    an earlier knot has priority over later ones. Position rows bound sums of w_j: with them, the sequence
-    closest to `rows.rest` is the solution of a QP with N unknowns for each joint. Rows that yield first come
-    after these rows: they are met if one step of torque suffices, see `kept_apart`. If there are rows of
-    other constraints, see `closest_to_rest`.
+    w_j = Σ_{i≤j} τ_i. Torque rows bound w_j − w_{j−1}, and velocity rows bound w_j. A backward pass from the
+    last knot computes the interval of w_j from which all later rows can still be satisfied. A forward pass
+    chooses each w_j as close to `rows.rest` as these intervals allow. If no w_j satisfies all bounds, the
+    velocity row of an earlier knot has priority over those of later knots. Position rows bound sums of w_j.
+    With position rows, the sequence closest to `rows.rest` is the solution of a QP with N unknowns for each
+    joint. Rows that yield first are handled after all these rows: they are satisfied if one step of torque
+    suffices, see `kept_apart`. If there are rows of other constraints, see `closest_to_rest`.
     """
     N, n = rows.L.shape[1], rows.lower.shape[1]
     rest = np.zeros((N, n)) if rows.rest is None else rows.rest
@@ -55,14 +55,14 @@ def braking(rows: Rows) -> Array:
 
 
 def _own(rows: Rows) -> int:
-    """The number of constraints, counted from the first, whose rows couple no joints and can be handled
+    """The number of constraints, from the first on, whose rows do not couple joints and can be handled
     here."""
     known = list(map(is_, rows.constraints, (TORQUE, VELOCITY, POSITION)))
     return next((place for place, each in enumerate(known) if not each), len(known))
 
 
 def _first(rows: Rows, count: int) -> Rows:
-    """The rows of the first constraints."""
+    """Returns the rows of the first `count` constraints."""
     end = count * rows.L.shape[1]
     return rows._replace(
         L=rows.L[:end],
@@ -74,8 +74,8 @@ def _first(rows: Rows, count: int) -> Rows:
 
 
 def missed(rows: Rows, U: Array) -> Array:
-    """Returns the violation of rows by increments (N, n), (r, n) ≥ 0 N·m; 0 up to the rounding of the
-    sums."""
+    """Returns by how much increments (N, n) violate rows, (r, n) ≥ 0 N·m. Rounding errors of the sums count
+    as 0."""
     value, summed = rows.values(U), rows.sizes(U)
     excess = np.maximum(np.maximum(value - rows.upper, rows.lower - value), 0.0)
     excess[excess <= 1e-14 * len(rows.L) * summed] = 0.0
@@ -97,8 +97,8 @@ def least_slack(rows: Rows) -> Array:
 
 
 def _walk(rows: Rows, rest: Array) -> Array:
-    """Returns w that satisfies the torque and velocity rows, (N, n). Of the position rows only the next one
-    is used."""
+    """Returns w, (N, n), that satisfies the torque and velocity rows. At each knot, only the next position
+    row is used."""
     N = len(rest)
     least, most = rows.lower[:N], rows.upper[:N]
     low, high = viable(rows.lower[N : 2 * N], rows.upper[N : 2 * N], least, most)
@@ -127,7 +127,7 @@ def _closest(rows: Rows, joint: int, rest: Array) -> Array | None:
     met = bool(((value <= upper + MET) & (value >= lower - MET)).all())
     if not met:
         return None
-    # The torque rows hold exactly: violations by the solver are removed.
+    # Small violations of the torque rows by the solver are removed: these rows are satisfied exactly.
     w, before = np.empty(N), 0.0
     for j in range(N):
         before = w[j] = min(max(found.x[j], before + rows.lower[j, joint]), before + rows.upper[j, joint])

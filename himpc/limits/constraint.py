@@ -26,10 +26,10 @@ class Moment(NamedTuple):
         tau_0: torque applied last, (n,) N·m.
         M_bar: diagonal of M̄, (n,) kg·m².
         limits: which bounds are imposed.
-        force: their values.
+        force: the values of these bounds.
         N: horizon.
         T_s: control period, s.
-        near: the nearest pairs, if distances are kept.
+        near: the nearest pairs, if distances have rows.
     """
 
     state: JointState
@@ -46,7 +46,7 @@ class Directions(NamedTuple):
     """The directions D_c in joint space that the rows of a constraint bound.
 
     Attributes:
-        D: (n, n), one direction of length one per row; rows of zeros are not used, and are never bounded.
+        D: (n, n), one direction of length one per row. Rows of zeros are unused and have no bounds.
         names: (n,), the name of each direction.
     """
 
@@ -74,14 +74,15 @@ class Constraint:
     """A constraint on the increments: a time profile L times directions D in joint space, between two bounds.
 
     Attributes:
-        label: what it is called where it binds.
-        profile: L for a horizon N, (N, N), lower triangular Toeplitz: row j says how the increments of the
-            knots add up to what is bounded there.
-        first_knot: knot whose value the first row bounds: 0 for what acts at once, 1 for its consequences.
-        hard: whether it holds always. The others give way where they cannot be met.
-        is_on: whether settings impose it.
-        bounds: its bounds at a moment.
-        yields_first: whether it gives way before the others that are not hard.
+        label: name of the constraint where it is shown as active.
+        profile: L for a horizon N, (N, N), lower triangular Toeplitz. Row j contains the weights with which
+            the increments of the knots add up to the bounded value.
+        first_knot: knot whose value the first row bounds: 0 for torques, which act at once, 1 for quantities
+            that follow later.
+        hard: whether the constraint is always satisfied. All others give way if they cannot be satisfied.
+        is_on: whether settings impose the constraint.
+        bounds: computes the bounds of the constraint at one tick.
+        yields_first: whether the constraint gives way before the others that are not hard.
     """
 
     label: str
@@ -94,5 +95,5 @@ class Constraint:
 
 
 def lags(N: int) -> Array:
-    """Number of knots between increment s and row j, j − s, (N, N)."""
+    """Number of knots j − s between increment s and row j, (N, N)."""
     return np.subtract.outer(np.arange(N), np.arange(N)).astype(float)

@@ -21,7 +21,7 @@ CONSTRAINTS: tuple[Constraint, ...] = (
 
 
 def imposed(limits: Limits) -> tuple[Constraint, ...]:
-    """The constraints that have rows."""
+    """Returns the constraints that have rows under these limits."""
     return tuple(each for each in CONSTRAINTS if each.is_on(limits))
 
 

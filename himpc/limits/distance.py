@@ -17,14 +17,16 @@ Array = NDArray[np.float64]
 
 
 class Near(NamedTuple):
-    """The pairs of links, or of a link and an object, that could reach d_safe first, nearest first.
+    """The pairs of links, or of a link and an object, that could reach d_safe first; the nearest pair comes
+    first.
 
     Attributes:
         distance: d, (r,) m, negative inside.
         gradient: ∇d, (r, n) m/rad.
         moving: (r,) m/s, the speed at which the object's own motion reduces d.
-        share: (r,) of d_safe and the margin that is kept: below 1 for links that are close at home.
-        names: of each pair.
+        share: (r,), the share of d_safe and of the margin that is kept: below 1 for links that are close
+            together in the home posture.
+        names: the name of each pair.
     """
 
     distance: Array
@@ -41,8 +43,8 @@ def row_count(n: int) -> int:
 
 def least_rates(near: Near, avoidance: Avoidance) -> Array:
     """The least ∇d·q̇, (r,) m/s, from which d_safe can still be kept: −v_stop(d − d_safe), with the margin
-    added to d_safe. Within the margin d must not decrease, and below d_safe it must increase. The velocity of
-    an object is taken into account."""
+    added to d_safe. Within the margin, d must not decrease. Below d_safe, d must increase. The velocity of an
+    object is taken into account."""
     t, a = avoidance.reaction, avoidance.deceleration
     d_safe = near.share * avoidance.d_safe
     room = near.distance - d_safe - near.share * avoidance.margin

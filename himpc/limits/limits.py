@@ -1,4 +1,4 @@
-"""The limits of the robot: which of them a controller imposes, and the bounds in force."""
+"""The limits of the robot: which limits a controller imposes, and the bounds in force."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ class Limits:
         position: "viability" (the velocity bound from which the joint can still stop), "paper" (the rows
             (32d) as printed) or "off".
         torque_scale, velocity_scale: factors on the robot's limits, > 0.
-        velocity_approach: 1/s; how fast a velocity bound may be approached, as a share of the distance left
-            (a barrier: q̈ ≤ rate·(q̇_max − q̇)). Time-delay estimation needs tens of ticks to stop an
-            acceleration (M̄ < M), and a bound met at full acceleration is overrun: by 17 % on the iiwa's
-            circle with rate 0, which is (32e) as printed, by 0.2 % with 15 (`himpc-lab reproduce
-            himpc-limits`).
+        velocity_approach: 1/s; the rate at which a velocity bound may be approached, relative to the
+            remaining distance (a barrier: q̈ ≤ rate·(q̇_max − q̇)). Time-delay estimation needs tens of ticks
+            to stop an acceleration (M̄ < M). A bound that is reached at full acceleration is overrun: on the
+            iiwa's circle by 17 % with rate 0, which is (32e) as printed, and by 0.2 % with 15 (`himpc-lab
+            reproduce himpc-limits`).
         torque_rate: N·m/s; largest change of each joint's torque per second; 0: not imposed.
         avoidance: the distances that are kept.
     """
@@ -55,19 +55,19 @@ class Limits:
 
 
 POSITION_MARGIN = 0.007
-"""rad: distance before its limit at which a joint is stopped; the estimation error moves it up to half of
-this distance further."""
+"""The distance before its limit at which a joint is stopped, rad. The estimation error can move the joint
+further, by up to half of this distance."""
 
 
 @dataclass(frozen=True, eq=False)
 class LimitsInForce:
-    """The bounds of this tick, before any tightening; infinite where nothing is imposed.
+    """The bounds of this tick, before any tightening. Bounds that are not imposed are infinite.
 
     Attributes:
         tau_lower, tau_upper: (n,) N·m.
         v_limit: (n,) rad/s.
         q_lower, q_upper: (n,) rad.
-        a_max: (n,) rad/s², the deceleration that the viability bound counts on.
+        a_max: (n,) rad/s², the deceleration that the viability bound assumes.
     """
 
     tau_lower: Array
@@ -78,11 +78,11 @@ class LimitsInForce:
     a_max: Array
 
     def with_velocities(self, v_limit: Array) -> LimitsInForce:
-        """The same with other velocity limits, (n,) rad/s."""
+        """Returns the same bounds with other velocity limits, (n,) rad/s."""
         return LimitsInForce(self.tau_lower, self.tau_upper, v_limit, self.q_lower, self.q_upper, self.a_max)
 
     def differs_in_velocity_only(self, other: LimitsInForce) -> bool:
-        """Whether all arrays but `v_limit` are the same objects."""
+        """Whether all arrays except `v_limit` are the same objects."""
         return (
             self.tau_upper is other.tau_upper
             and self.tau_lower is other.tau_lower
@@ -98,7 +98,7 @@ class LimitsInForce:
 
     @cached_property
     def largest_torque(self) -> Array:
-        """The larger of both torque bounds, (n,) N·m."""
+        """The larger magnitude of the lower and the upper torque bound, (n,) N·m."""
         return np.maximum(self.tau_upper, -self.tau_lower)
 
     @cached_property
@@ -108,7 +108,7 @@ class LimitsInForce:
 
 
 def in_force(robot: Robot, limits: Limits) -> LimitsInForce:
-    """Returns the robot's limits with the scales and switches applied."""
+    """Returns the robot's limits, scaled and switched by the settings."""
     unbounded = np.full(robot.n, np.inf)
     tau = robot.tau_limit * limits.torque_scale if limits.torque else unbounded
     position = limits.position != "off"

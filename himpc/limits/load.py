@@ -1,4 +1,4 @@
-"""Lowers the velocity limits of joints that are carried by a motor with little torque left."""
+"""Lowers the velocity limits of joints that a motor close to its torque limit carries."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ def loaded(before: Array, tau: Array, limits: LimitsInForce, T_s: float) -> Arra
     """Returns the mean load of each joint one period later, (n,), as a share of its torque limit.
 
     Args:
-        before: one period ago.
+        before: the mean load one period ago, (n,).
         tau: torque that acts, (n,) N·m.
-        limits: in force.
-        T_s: s.
+        limits: the limits in force.
+        T_s: control period, s.
     """
     share = np.abs(tau) / limits.largest_torque
     return before + min(1.0, T_s / LOAD_SECONDS) * (share - before)
@@ -32,8 +32,8 @@ def spared(limits: LimitsInForce, load: Array, carried: NDArray[np.bool_]) -> Li
     slowly the robot approaches a posture that the motor cannot hold.
 
     Args:
-        limits: in force.
-        load: see `loaded`.
+        limits: the limits in force.
+        load: the result of `loaded`.
         carried: (n, n), entry [k, j]: whether the motor of joint j carries joint k; true for k = j.
     """
     if load.max() <= FREE_LOAD:

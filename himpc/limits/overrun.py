@@ -15,9 +15,9 @@ def followed(before: Array, v: Array, T_s: float) -> Array:
     """Returns the mean velocity of each joint one period later, (n,) rad/s.
 
     Args:
-        before: one period ago.
-        v: measured, (n,) rad/s.
-        T_s: s.
+        before: the mean velocity one period ago, (n,) rad/s.
+        v: measured velocity, (n,) rad/s.
+        T_s: control period, s.
     """
     return before + min(1.0, T_s / MEAN_SECONDS) * (v - before)
 
@@ -26,13 +26,14 @@ def anticipated(limits: LimitsInForce, v: Array, mean: Array) -> LimitsInForce:
     """Returns the limits in force, with lower velocity limits for joints that become faster. The rows of
     velocity assume that a joint's acceleration follows its torque at once. With time-delay estimation the
     acceleration follows with a time constant of T_s times the ratio of true to assumed inertia, 0.07 s for
-    the third joint of a panda. All rows are then satisfied, but a joint that the motion of others accelerates
-    overruns its limit by 36 %. Its limit is lowered here until its speed no longer increases.
+    the third joint of a panda. All rows are then satisfied, but a joint that is accelerated by the motion of
+    other joints overruns its limit by 36 %. This function lowers the limit of such a joint until its speed no
+    longer increases.
 
     Args:
-        limits: in force.
-        v: measured, (n,) rad/s.
-        mean: see `followed`.
+        limits: the limits in force.
+        v: measured velocity, (n,) rad/s.
+        mean: the result of `followed`.
     """
     speed = np.abs(v)
     gained = (LEAD / MEAN_SECONDS) * (speed - np.abs(mean))

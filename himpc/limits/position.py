@@ -11,8 +11,8 @@ Array = NDArray[np.float64]
 
 
 def summed_thrice(N: int) -> Array:
-    """Returns the (N, N) profile of position rows: the position at the next knot, scaled by M̄/T_s², is the
-    sum of the velocities before it. No increment changes the position at knot 1."""
+    """Returns the (N, N) profile of position rows. The position at the next knot, scaled by M̄/T_s², is the
+    sum of the velocities at the knots before. No increment changes the position at knot 1."""
     lag = lags(N)
     return np.where(lag >= 0, lag * (lag + 1.0) / 2.0, 0.0)
 

@@ -17,15 +17,15 @@ RAMP_SECONDS = 0.5
 def ramp(
     now: LimitsInForce, goal: LimitsInForce, tau: Array, q: Array, v: Array, T_s: float
 ) -> LimitsInForce:
-    """Moves the limits in force towards the wanted ones by one control period.
+    """Moves the limits in force towards the desired limits by one control period.
 
-    A loosened bound holds at once. A tightened one first falls to the present value (nothing is
-    violated there), then closes the rest with time constant RAMP_SECONDS, and no slower than 20 % of
-    the goal (positions: 0.2 rad) per second, so that it arrives.
+    A loosened bound applies at once. A tightened bound first moves to the present value, which violates
+    nothing. Then it moves to its goal with time constant RAMP_SECONDS, and at least at 20 % of the goal
+    (positions: 0.2 rad) per second, so that it arrives.
 
     Args:
         now: limits in force up to now.
-        goal: limits wanted.
+        goal: desired limits.
         tau: torque applied last, (n,) N·m.
         q, v: measured state, (n,).
         T_s: control period, s.

@@ -20,21 +20,23 @@ Array = NDArray[np.float64]
 
 
 class Rows(NamedTuple):
-    """lower ≤ L U Dᵀ ≤ upper, U = (N, n) increments: N rows per constraint, each with n columns, one per
-    direction of the constraint.
+    """The rows lower ≤ L U Dᵀ ≤ upper with U = (N, n) increments. Each constraint has N rows, and each row
+    has n columns, one per direction of the constraint.
 
-    All rows are in N·m: a velocity row is scaled by M̄/T_s, a position row by M̄/T_s², so that one
-    tolerance fits all.
+    All rows are in N·m: a velocity row is scaled by M̄/T_s, a position row by M̄/T_s², so that one tolerance
+    fits all.
 
     Attributes:
         L: (r, N) lower-triangular Toeplitz blocks, the time profiles of the constraints.
         lower, upper: (r, n), ±inf where there is no bound.
-        constraints: which one each block of N rows belongs to.
-        stopping: (2, n) where the lower, upper velocity row is the position limit's: below the joint's own
-            limit, the velocity from which it can still stop. None where no row is.
-        rest: (N, n) N·m, the values of the velocity rows when the joints come to rest, see `coming_to_rest`;
+        constraints: the constraint of each block of N rows.
+        stopping: (2, n), whether the lower, upper velocity bound of a joint belongs to its position limit.
+            Such a bound is the velocity from which the joint can still stop, and is below the joint's
+            velocity limit. None if no row has such a bound.
+        rest: (N, n) N·m, the values of the velocity rows when the joints come to rest, see `coming_to_rest`.
             None means zeros: the velocities stay constant.
-        directions: of each block; None for a block whose column c is joint c. Empty if all are so.
+        directions: the directions of each block; None for a block whose column c is joint c. Empty if this
+            applies to all blocks.
     """
 
     L: Array
@@ -50,8 +52,8 @@ class Rows(NamedTuple):
         return self._turned(self.L @ U, absolute=False)
 
     def sizes(self, U: Array) -> Array:
-        """The sums of the magnitudes of the terms of `values`, (r, n) N·m; the rounding error of `values` is
-        a share of these sums."""
+        """The sums of the magnitudes of the terms of `values`, (r, n) N·m. The rounding error of `values` is
+        proportional to these sums."""
         return self._turned(self.L @ np.abs(U), absolute=True)
 
     def _turned(self, value: Array, absolute: bool) -> Array:
@@ -65,7 +67,7 @@ class Rows(NamedTuple):
 
     @property
     def bits(self) -> NDArray[np.intp]:
-        """The bit in `at_bound` of each row, (r,)."""
+        """The bit of each row in `at_bound`, (r,)."""
         return np.repeat([bit_of(each) for each in self.constraints], self.L.shape[1])
 
     @property
@@ -74,7 +76,7 @@ class Rows(NamedTuple):
         return np.repeat([each.hard for each in self.constraints], self.L.shape[1])
 
     def directions_of(self, row: int) -> Directions | None:
-        """The directions of a row's columns; None if they are the joints."""
+        """The directions of a row's columns; None if the columns are the joints."""
         return self.directions[row // self.L.shape[1]] if self.directions else None
 
     def joints_of(self, row: int, column: int) -> tuple[int, ...]:
@@ -89,7 +91,7 @@ class Rows(NamedTuple):
         return POSITION if stops else constraint
 
     def knot(self, row: int) -> int:
-        """The knot (1 … N; torque: 0 … N−1) whose value a row bounds."""
+        """The knot whose value a row bounds: 1 … N, for torque 0 … N−1."""
         N = self.L.shape[1]
         return row % N + self.constraints[row // N].first_knot
 
@@ -99,7 +101,8 @@ class Rows(NamedTuple):
 
 
 BRAKING = 20.0
-"""1/s: decay rate of the velocity of a braking joint, which is almost at rest after a quarter of a second."""
+"""Decay rate of the velocity of a braking joint, 1/s. The joint is almost at rest after a quarter of a
+second."""
 
 
 @lru_cache(maxsize=64)
@@ -118,11 +121,11 @@ def build_rows(
     T_s: float,
     near: Near | None = None,
 ) -> Rows:
-    """The bounds of all constraints that `limits` impose, at every knot.
+    """Returns the bounds of all constraints that `limits` impose, at every knot.
 
-    With `limits.position == "viability"` the position limit enters through the velocity rows, all
-    knots using the measured q_k; with "paper" the rows are those of (32d): at knot 1 no Δτ can
-    influence them, and nothing foresees the distance that stopping takes.
+    With `limits.position == "viability"`, the position limit is a bound in the velocity rows, computed from
+    the measured q_k for all knots. With "paper", the position rows are those of (32d): at knot 1 no Δτ can
+    influence them, and they do not take into account the distance that a stop needs.
 
     Args:
         state, tau_0, M_bar, limits, force, N, T_s, near: see `Moment`.
@@ -143,7 +146,7 @@ def build_rows(
 
 
 def coming_to_rest(state: JointState, M_bar: Array, N: int, T_s: float) -> Array:
-    """Returns the values of the velocity rows (N, n), N·m, when velocities decay as e^{−BRAKING t}; arguments
-    as in `build_rows`."""
+    """Returns the values of the velocity rows, (N, n) N·m, for velocities that decay as e^{−BRAKING t}. The
+    arguments are those of `build_rows`."""
     t = T_s * np.arange(1.0, N + 1)[:, None]
     return (np.expm1(-BRAKING * t) * state.v - state.gained_velocity(N, T_s)) * (M_bar / T_s)

@@ -31,8 +31,8 @@ class Stall(NamedTuple):
 
     Attributes:
         share: 1 if it is not stalled, 0 if it is completely stalled.
-        due: (T,) the errors, m or rad, that its tasks should have reached by now.
-        least: the smallest error of the first task since then.
+        due: (T,) the errors, m or rad, that the tasks should have reached by now.
+        least: the smallest error of the first task after the robot was last free to move.
     """
 
     share: float
@@ -46,19 +46,19 @@ def going(tasks: int) -> Stall:
 
 
 def stalled(before: Stall, errors: Array, moves: bool, room: float, T_s: float) -> Stall:
-    """The stall one period later.
+    """Returns the stall one period later.
 
-    Without this, an arm that is dragged into the floor stops above it and goes on moving its joints near
-    their limits without end. The joints become slower while something is near, no reference moves, and no
-    task that is away from its target comes closer. A robot that has become slow stays so until a reference
-    moves, nothing is near any more, or its first task is disturbed.
+    Without this function, an arm that is dragged into the floor stops above the floor, but its joints
+    continue to move near their limits. The joints become slower while an obstacle is near, no reference
+    moves, and no task that is away from its target makes progress. A robot that has become slow stays slow
+    until a reference moves, no obstacle is near, or its first task is disturbed.
 
     Args:
-        before: one period ago.
+        before: the stall one period ago.
         errors: the length of each task's error, (T,) m or rad.
-        moves: whether a reference, or what is in the way, moves.
-        room: by how much the nearest distance exceeds d_safe, m; infinite without any.
-        T_s: s.
+        moves: whether a reference or the obstacle moves.
+        room: the amount by which the nearest distance exceeds d_safe, m; infinite without a near pair.
+        T_s: control period, s.
     """
     far, first = errors > CLOSE_ENOUGH, float(errors[0])
     free = moves or not INSIDE <= room <= BLOCKED or not far.any()
@@ -75,7 +75,7 @@ def stalled(before: Stall, errors: Array, moves: bool, room: float, T_s: float) 
 
 
 def slowed(limits: LimitsInForce, stall: Stall) -> LimitsInForce:
-    """Returns the limits in force with the velocity limits of the stall."""
+    """Returns the limits in force, with the lower velocity limits of a stalled robot."""
     if stall.share > 1.0 - 1e-6:
         return limits
     slow = np.minimum(limits.v_limit, SLOWEST)

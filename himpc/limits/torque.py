@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 
 
 def summed(N: int) -> Array:
-    """Returns the (N, N) profile of torque rows: the torque relative to τ₀ is the sum of the increments so
+    """Returns the (N, N) profile of torque rows. The torque relative to τ₀ is the sum of the increments so
     far."""
     return np.where(lags(N) >= 0, 1.0, 0.0)
 

@@ -1,4 +1,4 @@
-"""The velocity limits (32e), and the velocity from which a joint can still stop before its end."""
+"""The velocity limits (32e), and the velocity from which a joint can still stop before its position limit."""
 
 from __future__ import annotations
 
@@ -14,24 +14,25 @@ from himpc.limits.viability import viability_bounds
 Array = NDArray[np.float64]
 
 REACTION = 5.0
-"""Reaction time of the viability bound beyond one period, in time constants of the velocity barrier."""
+"""The viability bound assumes one period plus this number of time constants of the velocity barrier as
+reaction time."""
 
 
 def reaction(limits: Limits, T_s: float) -> float:
-    """Returns the reaction time before a joint brakes, as the viability bound assumes it, s; T_s: control
-    period, s."""
+    """Returns the reaction time, s, that the viability bound assumes before a joint brakes. T_s is the
+    control period, s."""
     return T_s + (REACTION / limits.velocity_approach if limits.velocity_approach else 0.0)
 
 
 @lru_cache(maxsize=64)
 def approached(N: int, share: float) -> Array:
-    """Largest share of the distance to a velocity bound that a joint may use up to knots 1 … N, (N, 1); 1 for
-    share 0."""
+    """Returns the largest share of the distance to a velocity bound that a joint may use up to knots 1 … N,
+    (N, 1). `share` is the share for one period; 0 means no limit, and the result is 1."""
     return 1.0 - np.asarray((1.0 - min(1.0, share or 1.0)) ** np.arange(1.0, N + 1)[:, None], np.float64)
 
 
 def summed_twice(N: int) -> Array:
-    """Returns the (N, N) profile of velocity rows: the velocity at the next knot, scaled by M̄/T_s, is the
+    """Returns the (N, N) profile of velocity rows. The velocity at the next knot, scaled by M̄/T_s, is the
     sum of the torques so far."""
     lag = lags(N)
     return np.where(lag >= 0, lag + 1.0, 0.0)

@@ -13,19 +13,21 @@ Array = NDArray[np.float64]
 def viability_bounds(
     q: Array, q_lower: Array, q_upper: Array, v_limit: Array, a_max: Array, reaction: float
 ) -> Array:
-    """Bounds on q̇_{k+1} that keep a stop with a_max before the position limit possible.
+    """Returns bounds on q̇_{k+1}. A joint inside these bounds can still stop with a_max before its position
+    limit.
 
-    q̇_{k+1} ≤ min(q̇_max, a(−t + √(t² + 2 max(0, q_max − q_k)/a))) and its mirror: the speed whose stop,
-    with t of reaction and then a, ends at the limit. t = T_s is enough for a joint that may brake at once;
-    velocity rows that bound the change of the speed delay it. Beyond a limit the joint must return: the bound
-    turns into −RETURN_RATE times the excess. Printed position rows
-    (32d) cannot do this: an N·T_s of 5 ms is far shorter than the time a joint needs to stop.
+    The upper bound is q̇_{k+1} ≤ min(q̇_max, a(−t + √(t² + 2 max(0, q_max − q_k)/a))); the lower bound is its
+    mirror image. A joint at this speed stops exactly at the limit, with the reaction time t and then the
+    deceleration a. t = T_s is enough for a joint that may brake at once. Velocity rows that bound the change
+    of the speed delay the braking. Beyond a limit the joint must return: the bound is then −RETURN_RATE times
+    the excess. The printed position rows (32d) cannot ensure a stop: an N·T_s of 5 ms is far shorter than the
+    time that a joint needs to stop.
 
     Args:
         q: measured positions, (n,) rad.
         q_lower, q_upper: position limits, (n,), ±inf where there is none.
         v_limit: velocity limit, (n,) rad/s, inf where there is none.
-        a_max: deceleration counted on, (n,) rad/s².
+        a_max: the assumed deceleration, (n,) rad/s².
         reaction: time t before the joint brakes, ≥ T_s, s.
 
     Returns:

@@ -1,5 +1,6 @@
-"""Increments for rows of any constraints, including rows that couple joints. They satisfy all rows if the
-rows are feasible. Otherwise they satisfy the hard rows, and the other rows give way by least squares."""
+"""Computes increments for rows of any constraints, including rows that couple joints. The increments satisfy
+all rows if the rows are feasible. Otherwise they satisfy the hard rows, and the other rows give way by least
+squares."""
 
 from __future__ import annotations
 
@@ -19,26 +20,27 @@ from himpc.qp import solve_qp
 Array = NDArray[np.float64]
 
 MET = 1e-7
-"""N·m: a row with a smaller violation counts as satisfied."""
+"""A row whose violation is smaller than this, N·m, counts as satisfied."""
 _ITERATIONS = 300
 """Largest number of iterations of one QP."""
 _WORK = 40_000
-"""Largest product of unknowns and rows, over all QPs. Longer plans move at fewer knots."""
+"""Largest product of unknowns and rows, over all QPs. If it is exceeded, the torque changes at fewer
+knots."""
 _ROWS = 1000
-"""Largest number of rows of coupled joints; with more rows, only torque and its rate are bounded while the
-joints brake."""
+"""Largest number of rows of a group of coupled joints. If the group has more rows, its joints brake with
+bounds on torque and torque rate only."""
 _FAINT = 1e-5
-"""Weight of coming to rest while rows give way by least squares."""
+"""Weight of the unknowns in the QP by which rows give way."""
 
 
 class _Part(NamedTuple):
-    """The rows of some joints: lower ≤ A x ≤ upper, and their increments (N, c) = T x.
+    """The rows lower ≤ A x ≤ upper of some joints, whose increments (N, c) are T x.
 
     Attributes:
         A: (k, p·c).
         lower, upper: (k,) N·m.
         T: (N, p).
-        G: (N, p), the values of velocity rows are G x.
+        G: (N, p); the values of velocity rows are G x.
         ranks: (k,) 0 for torque rows, 1 for other hard rows, 2 for soft rows, 3 for rows that give way first.
     """
 
@@ -51,14 +53,15 @@ class _Part(NamedTuple):
 
 
 def closest_to_rest(rows: Rows, rest: Array) -> Array:
-    """Returns increments (N, n), N·m, whose velocity rows are closest to `rest`, (N, n), among those that
-    meet all rows.
+    """Returns increments (N, n), N·m, that satisfy all rows. Among such increments, the values of their
+    velocity rows are closest to `rest`, (N, n).
 
-    Joints that share a direction are a group; each group is a strictly convex QP. If no increments meet all
-    rows, those that yield first give way by least squares. If none meet the others, those that are not hard
-    do, and if none meet the hard rows, those that do not bound the torque. Beyond _WORK the torque changes at
-    some knots only, the first among them, evenly spaced; beyond _ROWS there is no QP. Whatever the QP finds
-    within its iterations, rows of torque and of its rate hold if any increments meet them, see `_within`.
+    Joints that share a direction are a group; each group is a strictly convex QP. If no increments satisfy
+    all rows, the rows that yield first give way by least squares. If no increments satisfy the remaining
+    rows, all rows that are not hard give way too. If even the hard rows cannot be satisfied, only the torque
+    rows do not give way. Beyond _WORK the torque changes only at some evenly spaced knots, including the
+    first. Beyond _ROWS there is no QP. In all cases, rows of torque and of its rate are satisfied if any
+    increments satisfy them, see `_within`.
     """
     U = steps(steps(rest))
     for group in groups(rows, rest.shape[1]):
@@ -78,7 +81,7 @@ def closest_to_rest(rows: Rows, rest: Array) -> Array:
 
 
 def groups(rows: Rows, n: int) -> list[list[int]]:
-    """Groups of joints; joints are in one group if a bounded direction couples them."""
+    """Returns groups of joints. Two joints are in one group if a bounded direction couples them."""
     found = [{joint} for joint in range(n)]
     N = rows.L.shape[1]
     bounded = np.isfinite(rows.lower) | np.isfinite(rows.upper)
@@ -135,7 +138,7 @@ def _closest(part: _Part, rest: Array) -> Array | None:
 
 
 def _up_to(part: _Part, rank: int) -> _Part:
-    """The rows of this rank and of all ranks before it."""
+    """Returns the rows of this rank and of all lower ranks."""
     counted = part.ranks <= rank
     return part._replace(
         A=part.A[counted],
@@ -146,8 +149,8 @@ def _up_to(part: _Part, rank: int) -> _Part:
 
 
 def _given_way(part: _Part, rank: int) -> _Part:
-    """Returns the rows of a rank, widened by their violation in the sense of least squares. Rows of lower
-    ranks hold, and rows of higher ranks do not count."""
+    """Returns the part with the rows of a rank widened, by their smallest violation in the sense of least
+    squares. Rows of lower ranks are satisfied, and rows of higher ranks are ignored."""
     counted = _up_to(part, rank)
     A, lower, upper = counted.A, counted.lower, counted.upper
     yields = np.flatnonzero(counted.ranks == rank)
@@ -160,17 +163,15 @@ def _given_way(part: _Part, rank: int) -> _Part:
     value = A @ found.x[: A.shape[1]]
     missed = np.maximum(np.maximum(value - upper, lower - value), 0.0)
     missed[counted.ranks < rank] = 0.0
-    missed[missed > 0.0] += MET  # the widened rows have an interior to rounding
+    missed[missed > 0.0] += MET  # with rounding errors, the widened rows stay feasible
     wider = np.zeros(len(part.A))
     wider[part.ranks <= rank] = missed
     return part._replace(lower=part.lower - wider, upper=part.upper + wider)
 
 
 def _within(rows: Rows, wanted: Array) -> Array:
-    """Increments whose torques are close to `wanted`, (N, n), and that meet the rows of torque and of its
-    rate whenever any increments do; those of torque always.
-
-    See `viable`.
+    """Returns increments whose torques are close to `wanted`, (N, n). They always satisfy the rows of torque.
+    They also satisfy the rows of its rate whenever any increments satisfy both, see `viable`.
     """
     N = len(wanted)
     blocks = {each: slice(k * N, (k + 1) * N) for k, each in enumerate(rows.constraints)}

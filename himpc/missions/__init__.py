@@ -1,4 +1,4 @@
-"""Task sequences for hierarchical-task control: missions as data, and the task manager."""
+"""Task sequences for hierarchical-task control: the data of a mission, and the task manager."""
 
 from himpc.missions.manager import Active, Progress, advanced, insert, move, release, remove, reorder
 from himpc.missions.mission import Follow, Go, Mission, MissionTask

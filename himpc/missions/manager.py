@@ -2,9 +2,9 @@
 receives.
 
 At any time the controller receives the window [𝒯_{l₀}, …, 𝒯_{l₀+L−1}]; when 𝒯_{l₀} is completed, l₀ grows by
-one. A task is planned at the moment it enters the window, from the position of its point at that time. A task
-that is moved is planned again at the next call of `advanced`; an inserted task is planned when it enters the
-window.
+one. A task is planned when it enters the window, from the position of its point at that time. A task whose
+goal is changed is planned again at the next call of `advanced`. An inserted task is planned when it enters
+the window.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from robots import InputError
 Array = NDArray[np.float64]
 
 _CLOCK = 1e-9
-"""s: rounding error that a sum of control periods may have."""
+"""Largest rounding error of a sum of control periods, s."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,9 +32,9 @@ class Active:
     Attributes:
         task: the task.
         reference: its planned motion.
-        counts_from: time from which its goal counts, s.
-        reached: time at which its point reached its goal while the task was first in the window, s;
-            None: it is not at its goal.
+        counts_from: earliest time at which the goal counts as reached, s.
+        reached: time at which the point reached the goal while the task was the first in the window, s; None:
+            the point is not at the goal.
     """
 
     task: MissionTask
@@ -48,10 +48,10 @@ class Progress:
     """The progress of a mission.
 
     Attributes:
-        mission: all tasks, done ones included.
-        place: l₀, the index of the first task in the window; the number of tasks when all are done.
-        window: the tasks given to the controller, highest priority first.
-        released: names of tasks whose hold has been released.
+        mission: all tasks, including completed ones.
+        place: l₀, the index of the first task in the window; the number of tasks when all are completed.
+        window: the tasks that the controller receives, highest priority first.
+        released: names of tasks whose hold was ended by `release`.
         completed: (name, time in s) of every completed task, in order.
     """
 
@@ -73,14 +73,14 @@ class Progress:
 def advanced(
     progress: Progress, L: int, t: float, points: Mapping[str, Array], speeds: Mapping[str, float]
 ) -> Progress:
-    """Returns the progress at time t: completed tasks leave the window, later ones enter it and are planned.
+    """Returns the progress at time t: completed tasks leave the window, later tasks enter it and are planned.
 
-    When the mission is done, its last window is kept: the robot stays where it ended.
+    When the mission is completed, its last window is kept, and the robot stays at its last goals.
 
     Args:
         progress: progress up to now.
-        L: tasks in the window, ≥ 1.
-        t: s.
+        L: number of tasks in the window, ≥ 1.
+        t: present time, s.
         points: position of each role's point, (m,) m.
         speeds: speed of each role's point, m/s.
     """
@@ -133,23 +133,24 @@ def _completed(first: Active, released: frozenset[str], t: float) -> bool:
 
 
 def release(progress: Progress, name: str) -> Progress:
-    """Ends the hold of a task; a task that has not reached its goal yet will not wait there.
+    """Ends the hold of a task. If the task has not reached its goal yet, it will not wait at the goal.
 
     Raises:
-        InputError: no such task, or it does not wait for a release.
+        InputError: there is no such task, or the task does not wait for a release.
     """
     task = progress.mission[find(progress.mission, name)]
     if task.hold is not None:
-        raise InputError(f"task '{name}' waits {task.hold:g} s by itself: release one with hold null")
+        raise InputError(f"task '{name}' waits {task.hold:g} s at its goal: release tasks with hold null")
     return replace(progress, released=progress.released | {name})
 
 
 def move(progress: Progress, name: str, goal: Point) -> Progress:
-    """Changes a task's goal: m, or x y z w for an orientation task. Points on the way are dropped; law and
-    speed stay.
+    """Changes a task's goal: a point in m, or a quaternion x y z w for an orientation task. Points on the way
+    are removed; time law and speed are kept.
 
     Raises:
-        InputError: no such task, it is completed, it follows a given trajectory, or the goal does not fit.
+        InputError: there is no such task, the task is completed or follows a given trajectory, or the goal
+            does not fit.
     """
     place = _ahead(progress, name)
     task = progress.mission[place]
@@ -172,22 +173,23 @@ def insert(progress: Progress, task: MissionTask, before: str | None = None) -> 
     """Inserts a new task before another one, or at the end.
 
     Raises:
-        InputError: the other task is unknown or completed, or the name is taken.
+        InputError: the other task is unknown or completed, or the new task's name already exists.
     """
     place = len(progress.mission) if before is None else _ahead(progress, before)
     return replace(progress, mission=_spliced(progress.mission, place, place, task))
 
 
 def reorder(progress: Progress, name: str, to: int) -> Progress:
-    """Moves a task to another index among those that are not completed, 0 being the first; plans are kept.
+    """Moves a task to another index among the tasks that are not completed; the first has index 0. Plans are
+    kept.
 
     Raises:
-        InputError: no such task, it is completed, or there is no such index.
+        InputError: there is no such task, the task is completed, or there is no such index.
     """
     place = _ahead(progress, name)
     left = len(progress.mission) - progress.place
     if not 0 <= to < left:
-        raise InputError(f"task '{name}' cannot go to place {to}: there are places 0 to {left - 1}")
+        raise InputError(f"task '{name}' cannot move to index {to}: give an index from 0 to {left - 1}")
     mission = list(progress.mission)
     mission.insert(progress.place + to, mission.pop(place))
     return replace(progress, mission=tuple(mission))
@@ -197,7 +199,7 @@ def remove(progress: Progress, name: str) -> Progress:
     """Removes a task.
 
     Raises:
-        InputError: no such task, it is completed, or it is the only one.
+        InputError: there is no such task, the task is completed, or it is the only task.
     """
     place = _ahead(progress, name)
     return replace(progress, mission=_spliced(progress.mission, place, place + 1))
@@ -206,7 +208,7 @@ def remove(progress: Progress, name: str) -> Progress:
 def _ahead(progress: Progress, name: str) -> int:
     place = find(progress.mission, name)
     if place < progress.place:
-        raise InputError(f"task '{name}' is completed: choose one that is still ahead")
+        raise InputError(f"task '{name}' is completed: choose a task that is not completed")
     return place
 
 

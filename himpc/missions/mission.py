@@ -23,10 +23,10 @@ class Go:
     """A motion to a goal: a waypoint (x_d is the goal at once) or, with a cruise speed, a planned path.
 
     Attributes:
-        goal: m, world.
-        cruise: m/s; None: a waypoint.
+        goal: position in the world, m.
+        cruise: cruise speed, m/s; None: a waypoint.
         law: time law of the path.
-        via: points of the path on the way, m; they need a cruise speed.
+        via: points on the way to the goal, m; they need a cruise speed.
     """
 
     goal: Point
@@ -43,8 +43,8 @@ class Go:
             raise InputError("points on the way need a cruise speed: give one, e.g. 0.5 m/s")
 
     def planned(self, start: Array, t: float) -> tuple[Reference, float]:
-        """Returns the reference from a start (m,) at time t (s), and the time from which the goal counts,
-        s."""
+        """Returns the reference from a start (m,) at time t (s), and the earliest time at which the goal
+        counts as reached, s."""
         if self.cruise is None:
             return Hold(np.array(self.goal)), t
         path = Path(np.array([start, *self.via, self.goal], float), self.cruise, self.law, t)
@@ -56,8 +56,9 @@ class Follow:
     """A given trajectory.
 
     Attributes:
-        reference: its own time begins when the task enters the window.
-        duration: time after which its last point counts as the goal, s; infinite: it never ends.
+        reference: the trajectory; its time is zero when the task enters the window.
+        duration: time after which the last point of the trajectory is the goal, s; infinite: the trajectory
+            never ends.
     """
 
     reference: Reference
@@ -65,12 +66,12 @@ class Follow:
 
     @property
     def rotation(self) -> Array | None:
-        """The orientation (3, 3) if it is constant; None: the reference moves, or is a point."""
+        """The orientation (3, 3) if the reference is a constant orientation; None otherwise."""
         reference = self.reference
         return reference.value if isinstance(reference, Hold) and reference.value.ndim == 2 else None
 
     def turned(self, xyzw: Point) -> Follow:
-        """Returns the same trajectory with another constant orientation. Raises InputError if `xyzw` is no
+        """Returns the same trajectory with another constant orientation. Raises InputError if `xyzw` is not a
         quaternion x y z w."""
         if len(xyzw) != 4 or not all(math.isfinite(x) for x in xyzw) or not any(xyzw):
             raise InputError(f"an orientation is a quaternion x y z w, not {list(xyzw)}")
@@ -78,7 +79,7 @@ class Follow:
         return replace(self, reference=replace(self.reference, value=from_quaternion(np.array(xyzw))))
 
     def planned(self, start: Array, t: float) -> tuple[Reference, float]:
-        """Returns the reference from time t (s) on, and the time at which it ends, s."""
+        """Returns the reference, which starts at time t (s), and the time at which it ends, s."""
         return Started(self.reference, t), t + self.duration
 
 
@@ -86,16 +87,16 @@ class Follow:
 class MissionTask:
     """One tracking task 𝒯_l.
 
-    It is completed when its point has stayed within `tolerance` of the goal, no faster than `rest`, for
-    `hold` seconds while the task was the first one in the window.
+    The task is completed when its point has been at the goal for `hold` seconds: within `tolerance`, and not
+    faster than `rest`. Only the time in which the task is the first in the window counts.
 
     Attributes:
-        name: stable identity; events refer to it.
-        role: which point of the robot it moves, e.g. "ee" or "base".
+        name: the unique name of the task, which events refer to.
+        role: the point of the robot that the task moves, e.g. "ee" or "base".
         motion: motion to the goal, or a given trajectory.
-        tolerance: m.
-        hold: s; None: until an event releases the task.
-        rest: m/s; infinite: the goal may be passed at any speed.
+        tolerance: largest distance from the goal, m.
+        hold: time at the goal, s; None: until an event releases the task.
+        rest: largest speed at the goal, m/s; infinite: the goal may be passed at any speed.
     """
 
     name: str
@@ -125,11 +126,12 @@ def check_mission(mission: Mission) -> None:
     names = [task.name for task in mission]
     for name in names:
         if names.count(name) > 1:
-            raise InputError(f"task name '{name}' stands twice in the mission: rename one of them")
+            raise InputError(f"task name '{name}' occurs twice in the mission: rename one of the tasks")
 
 
 def find(mission: Mission, name: str) -> int:
-    """Returns the index of a task. Raises InputError, naming the nearest task, for an unknown name."""
+    """Returns the index of a task. For an unknown name it raises InputError, which suggests the most similar
+    name."""
     names = [task.name for task in mission]
     if name not in names:
         raise unknown_name("task of the mission called", name, names)

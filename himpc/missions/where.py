@@ -21,7 +21,8 @@ def where(at: Configuration, roles: Mapping[str, Task]) -> tuple[dict[str, Array
         roles: the task of each role.
 
     Returns:
-        position (m,), m, or rotation matrix (3, 3) of each role's point; its speed, m/s or rad/s.
+        the position (m,) in m, or the rotation matrix (3, 3), of each role's point, and the speed of each
+        point in m/s or rad/s.
     """
     points = {name: task.value(at) for name, task in roles.items()}
     speeds = {name: float(np.linalg.norm(task.jacobian(at)[0] @ at.v)) for name, task in roles.items()}

@@ -18,7 +18,8 @@ Array = NDArray[np.float64]
 
 
 class Binding(NamedTuple):
-    """An active constraint: its level, its joint (or the name of its direction), bound and multiplier."""
+    """An active constraint: the names of its level and of its joint or direction, its bound and its
+    multiplier."""
 
     level: str
     joint: str
@@ -30,7 +31,7 @@ class Binding(NamedTuple):
 
 
 class Evidence(NamedTuple):
-    """The results of a tick besides the torque; attributes as in `Plan`."""
+    """The results of a tick except the torque; for the attributes see `Plan`."""
 
     levels: tuple[LevelSolution, ...]
     q: Array
@@ -52,10 +53,11 @@ class AtOnce(NamedTuple):
 
 
 class Behind(NamedTuple):
-    """The effect of a filter behind the levels on their torque.
+    """The effect of a filter that follows the levels on their torque.
 
     Attributes:
-        solution: its step from τ₀, the bounds at which it stops, and its leak into the levels.
+        solution: the filter's step from τ₀, the bounds that stop this step, and the filter's leak into the
+            levels.
         rows: the rows that the solution's indices refer to.
     """
 
@@ -67,8 +69,8 @@ class Behind(NamedTuple):
 class Plan:
     """The first input, the prediction, and the solution of every level.
 
-    A plan refers to data of its controller that are valid until the next tick: call `freeze` to keep a plan
-    longer. Values that were read before are copies and stay valid.
+    A plan refers to data of its controller that are valid until the next tick. Call `freeze` to store a plan
+    longer. Results that were already read are copies and stay valid.
 
     Attributes:
         tau: torque to apply now, (n,) N·m: τ₀ + Δτ*_{r,k|k}, inside the torque bounds; for controllers
@@ -76,17 +78,17 @@ class Plan:
         tau_0: torque that was applied last, (n,) N·m.
         limits: the bounds in force.
         step_us: wall time from state to torque, microseconds, kinematics included.
-        unsolved: number of QPs without a verified point at the first attempt.
+        unsolved: number of QPs that had no verified point at the first attempt.
         find_evidence: collects the other results when they are read for the first time. Raises RuntimeError
             if the controller has computed another tick in between.
-        iterations: how many times the cascade was solved; always 1 except for NHIMPC.
-        notice: a sentence for the user if the user's own code failed at this tick; only the first failure has
-            one.
-        fill: writes all known fields, references included, into a row of telemetry in one operation; returns
-            False if it cannot. None: fields are written one by one.
-        at_once: increments of the levels at this tick without further computation; None: see `levels`.
+        iterations: number of times that the cascade was solved; always 1 except for NHIMPC.
+        notice: a sentence for the user after the first failure of the user's own code; None otherwise.
+        fill: writes all known fields, references included, into a row of telemetry in one operation. Returns
+            False if this is not possible. None: fields are written one by one.
+        at_once: returns the increments of the levels at this tick without further computation; None: see
+            `levels`.
         M_bar: diagonal of the M̄ of this plan, (n,) kg·m²; None: the M̄ of the settings.
-        behind: what a filter behind the levels did; None if there is none.
+        behind: the effect of a filter that follows the levels; None without a filter.
     """
 
     tau: Array
@@ -103,13 +105,13 @@ class Plan:
     behind: Behind | None = None
 
     def freeze(self) -> Plan:
-        """Returns a copy of the plan whose data stay valid."""
+        """Collects all results, which then stay valid, and returns the plan."""
         _ = self.evidence
         return self
 
     @cached_property
     def evidence(self) -> Evidence:
-        """The results besides the torque."""
+        """The results except the torque."""
         return self.find_evidence()
 
     @property
@@ -139,8 +141,8 @@ class Plan:
 
     @property
     def leak(self) -> float | None:
-        """The largest of all leaks: those between levels and, if a filter follows the levels, its leak into
-        them. None if there are fewer than two levels."""
+        """The largest leak between levels. If a filter follows the levels, its leak into the levels counts
+        too. None if there are fewer than two levels."""
         if len(self.levels) < 2:
             return None
         between = max(level.leak for level in self.levels)
@@ -152,8 +154,8 @@ class Plan:
         return max((level.kkt_residual for level in self.levels), default=0.0)
 
     def binding(self, joint_names: tuple[str, ...]) -> list[Binding]:
-        """Returns every active constraint, level by level and of a filter behind them, with names instead of
-        indices."""
+        """Returns all active constraints, with names instead of indices: level by level, then those of a
+        filter that follows the levels."""
         found = [(level, self.rows) for level in self.levels]
         return [
             Binding(

@@ -21,8 +21,8 @@ Array = NDArray[np.float64]
 
 
 def write_plan(row: Array, layout: Layout, plan: Plan, ahead: Mapping[str, Preview]) -> None:
-    """Writes the data of a plan and the references into a row; the session adds time, states and the fields
-    that need the plant's M. Fields without data in the plan become NaN."""
+    """Writes the data of a plan and the references into a row. The session adds the time, the states and the
+    fields that need the plant's M. Fields for which the plan has no data become NaN."""
     fields = layout.fields
     if plan.fill is None or not plan.fill(row, layout):
         row.fill(math.nan)
@@ -36,7 +36,7 @@ def write_plan(row: Array, layout: Layout, plan: Plan, ahead: Mapping[str, Previ
 
 
 def _write_behind(row: Array, layout: Layout, plan: Plan) -> None:
-    """Writes the data of a filter behind the levels into a row of the levels."""
+    """Writes the data of a filter that follows the levels into the row of the levels."""
     fields, behind = layout.fields, plan.behind
     assert behind is not None
     row[fields["tau_demand"]], row[fields["delta_tau"]] = plan.tau, plan.tau - plan.tau_0
@@ -59,8 +59,8 @@ def _write_references(row: Array, layout: Layout, ahead: Mapping[str, Preview]) 
 
 
 def on_axes(coordinates: Sequence[str], preview: Preview, motion: Array) -> Array:
-    """Returns ẋ_d or ẍ_d now; for a rotation, whose motion has components along all axes, those along the
-    task's axes."""
+    """Returns the present ẋ_d or ẍ_d. For a rotation, whose motion has components along all axes, it returns
+    the components along the task's axes."""
     now = motion[0]
     if preview.value.ndim == 1 or now.size == len(coordinates):
         return now

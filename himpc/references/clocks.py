@@ -1,4 +1,4 @@
-"""References with their own start of time."""
+"""References whose time starts later than the time of the simulation."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from himpc.references.preview import Preview, Reference
 
 @dataclass(frozen=True, eq=False)
 class Started:
-    """A reference whose own time begins at `start`, s."""
+    """A reference whose own time is zero at the time `start`, s."""
 
     reference: Reference
     start: float

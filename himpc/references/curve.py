@@ -1,4 +1,5 @@
-"""References that are described by a few coefficients; the compiled kernel evaluates them without Python."""
+"""References that are described by a few coefficients, from which the compiled kernel computes them without
+Python."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ class Circle:
 
     Attributes:
         centre: (m,) m.
-        u, w: (m,) half axes; a circle if they are orthogonal and of equal length.
+        u, w: (m,) half axes; the curve is a circle if they are orthogonal and of equal length.
         phase: time law φ(t).
     """
 
@@ -37,8 +37,8 @@ class Circle:
 
     @cached_property
     def _axes(self) -> tuple[Array, Array]:
-        """The matrices that are multiplied by (cos φ, sin φ) for the position and for its derivative with
-        respect to φ."""
+        """Two matrices. Their products with (cos φ, sin φ) are the position without the centre, and its
+        derivative with respect to φ."""
         return np.array((self.u, self.w)), np.array((self.w, -self.u))
 
 

@@ -15,12 +15,14 @@ def roll(samples: Array, known: int, raw: Array, caps: Array, T_s: float, out: A
     """Computes future states of the filter with the raw target constant, and writes them as a preview.
 
     Args:
-        samples: (…, w + 3m + 1) value, velocity, acceleration, displacement from the sample before, and
-            whether it rests at the raw target; a value has w = 9 numbers for a rotation, otherwise m.
-        known: number of samples that exist; further ones are computed up to the length of `out`.
+        samples: (…, w + 3m + 1), one row per sample: value, velocity, acceleration, displacement from the
+            sample before, and whether the value rests at the raw target. A value has w = 9 numbers for a
+            rotation, otherwise w = m.
+        known: number of samples that are already computed. Further samples are computed up to the length of
+            `out`.
         raw: the raw target, (w,).
-        caps: its first entries are the largest speed, acceleration and jerk.
-        T_s: s.
+        caps: the first three entries are the largest speed, acceleration and jerk.
+        T_s: control period, s.
         out: (3, N+1, m) displacement, velocity and acceleration at t … t + N·T_s.
     """
     count, m = out.shape[1:]
@@ -34,7 +36,7 @@ def roll(samples: Array, known: int, raw: Array, caps: Array, T_s: float, out: A
 
 
 def _following(now: Array, raw: Array, caps: list[float], T_s: float, m: int) -> Array:
-    """Returns the sample after this one: one period of constant acceleration within the caps."""
+    """Returns the sample that follows `now`, after one period of constant acceleration within the caps."""
     most_speed, most_acceleration, _ = caps
     w = raw.size
     value, velocity, acceleration = now[:w], now[w : w + m], now[w + m : w + 2 * m]
@@ -43,7 +45,7 @@ def _following(now: Array, raw: Array, caps: list[float], T_s: float, m: int) ->
     distance, speed = _norm(away), _norm(velocity)
     if rests or (distance < STILL and speed < 10.0 * STILL):
         return np.concatenate([raw, np.zeros(2 * m), np.zeros(m) if rests else away, [1.0]])
-    # The speed never exceeds the one from which half the acceleration cap can stop; near the goal it is
+    # The target can always stop at the goal with half the acceleration cap. Near the goal, the speed is
     # proportional to the distance.
     wanted = min(most_speed, APPROACH_RATE * distance, math.sqrt(most_acceleration * distance))
     goal = away * (wanted / distance) if distance > 0.0 else np.zeros(m)
@@ -58,9 +60,10 @@ def _following(now: Array, raw: Array, caps: list[float], T_s: float, m: int) ->
 def _jerked(velocity: Array, acceleration: Array, wish: Array, caps: list[float], T_s: float) -> Array:
     """Returns the change of the acceleration in one period towards the desired one, within the jerk cap.
 
-    The speed must not exceed its cap: along the motion the acceleration stays below √(jerk · speed left).
-    Motion along a straight line would allow twice that, but in a curve the speed also grows by itself. If the
-    acceleration is above this limit already, the jerk is used for its decrease first.
+    The speed must not exceed its cap. Along the motion the acceleration stays below √(jerk · (cap − speed)).
+    Motion along a straight line would allow twice this value, but along a curve other components of the
+    acceleration increase the speed too. If the acceleration already exceeds this limit, the jerk first
+    reduces the acceleration.
     """
     most_speed, _, most_jerk = caps
     budget, speed = most_jerk * T_s, _norm(velocity)
@@ -78,7 +81,7 @@ def _jerked(velocity: Array, acceleration: Array, wish: Array, caps: list[float]
 
 
 def _shortened(x: Array, cap: float) -> Array:
-    """Returns x, scaled down to the norm `cap` if it is longer."""
+    """Returns x, scaled down to the norm `cap` if its norm is larger."""
     length = _norm(x)
     return x * (cap / length) if length > cap else x
 

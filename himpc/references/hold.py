@@ -16,8 +16,8 @@ class Hold:
 
     Attributes:
         value: (m,) coordinates, or a rotation matrix (3, 3).
-        m: number of coordinates the task controls; needed only where it differs from the value's size
-            (an orientation task on fewer than three axes).
+        m: number of coordinates that the task controls. It is needed only if it differs from the size of the
+            value (an orientation task on fewer than three axes).
     """
 
     value: Array
@@ -30,7 +30,7 @@ class Hold:
 
 @lru_cache(maxsize=64)
 def still(N: int, m: int) -> Preview:
-    """Returns the preview of m coordinates at rest at zero."""
+    """Returns the preview of m coordinates that rest at zero."""
     zeros = np.zeros((N + 1, m))
     zeros.setflags(write=False)
     return Preview(zeros[0], zeros, zeros, zeros)

@@ -1,4 +1,4 @@
-"""References extrapolated by a short time."""
+"""References that are extrapolated by a short time."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ class Later(Mapping[str, Preview]):
     """Previews whose targets are extrapolated by `seconds` at constant velocity; only `value` changes.
 
     Attributes:
-        previews: by the names of their tasks.
-        seconds: s.
+        previews: the previews, by the names of their tasks.
+        seconds: the time of the extrapolation, s.
     """
 
     __slots__ = ("previews", "seconds")

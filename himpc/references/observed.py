@@ -13,11 +13,11 @@ Array = NDArray[np.float64]
 
 
 class Observed(NamedTuple):
-    """The objects around the robot, as a controller knows them at a tick; the truth may be different.
+    """The objects around the robot, as a controller knows them at a tick. The real objects may differ.
 
     Attributes:
-        shapes: the objects at their present places.
-        velocity: of their centres, (B, 3) m/s; None: they are at rest.
+        shapes: the objects at their present positions.
+        velocity: velocities of the objects' centres, (B, 3) m/s; None: the objects are at rest.
     """
 
     shapes: tuple[WorldShape, ...] = ()
@@ -25,4 +25,4 @@ class Observed(NamedTuple):
 
 
 NOTHING = Observed()
-"""A state without known objects."""
+"""No known objects."""

@@ -11,13 +11,13 @@ from himpc.references.preview import Preview, Reference
 
 @final
 class Outlook(Mapping[str, Preview]):
-    """The previews of all references at one tick. Each is sampled when it is first read; a controller that
-    knows the coefficients of a reference needs no samples.
+    """The previews of all references at one tick. Each preview is sampled when it is first read. A controller
+    that knows the coefficients of a reference needs no samples.
 
     Attributes:
-        references: by the names of their tasks.
-        t: s, now.
-        T_s, N: period (s) and knots of the samples.
+        references: the references, by the names of their tasks.
+        t: the present time, s.
+        T_s, N: the samples are at t, t + T_s, …, t + N·T_s (s).
         observed: the objects around the robot.
     """
 
@@ -49,5 +49,5 @@ class Outlook(Mapping[str, Preview]):
 
 
 def observed_by(previews: Mapping[str, Preview]) -> Observed:
-    """The objects that come with previews; none unless they are an `Outlook`."""
+    """Returns the objects of an `Outlook`; no objects for previews of another type."""
     return previews.observed if isinstance(previews, Outlook) else NOTHING

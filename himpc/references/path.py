@@ -17,22 +17,22 @@ Law = Literal["straight", "quintic"]
 LAWS: tuple[Law, ...] = get_args(Law)
 
 _PEAK = 1.875
-"""Largest rate of 10σ³ − 15σ⁴ + 6σ⁵: the mean speed of a quintic segment is its peak speed divided by this
-number."""
+"""Largest derivative of 10σ³ − 15σ⁴ + 6σ⁵. The mean speed of a quintic segment is its peak speed divided by
+this number."""
 _SAME = 1e-9
-"""m: points closer than this are one point."""
+"""Points that are closer than this, m, count as one point."""
 
 
 @dataclass(frozen=True, eq=False)
 class Path:
     """x_d follows the straight lines between points, at most at the cruise speed.
 
-    `straight` moves at the cruise speed all the way, corners included: the velocity jumps at the start, at
-    corners and at the end. `quintic` is at rest at every point, reaches the cruise speed in the middle of
-    each line, and has a continuous acceleration. Before `start` and after the end x_d is constant.
+    With `straight`, x_d moves at the cruise speed all the time: the velocity jumps at the start, at corners
+    and at the end. With `quintic`, x_d is at rest at every point and reaches the cruise speed in the middle
+    of each line; its acceleration is continuous. Before `start` and after the end x_d is constant.
 
     Attributes:
-        points: (P, m) m, P ≥ 1; the first one is where it starts.
+        points: (P, m) m, P ≥ 1; the motion starts at the first point.
         cruise: largest speed, m/s.
         law: "straight" or "quintic".
         start: start time of the motion, s.
@@ -54,7 +54,7 @@ class Path:
 
     @property
     def duration(self) -> float:
-        """Seconds from start to end."""
+        """Time from start to end, s."""
         return float(self._arrivals[-1])
 
     @cached_property
@@ -64,7 +64,7 @@ class Path:
 
     @cached_property
     def _arrivals(self) -> Array:
-        """Seconds after the start at which each corner is reached."""
+        """Times at which the corners are reached, in s after the start."""
         lengths = np.linalg.norm(np.diff(self._corners, axis=0), axis=1)
         slower = _PEAK if self.law == "quintic" else 1.0
         return np.append(0.0, np.cumsum(lengths)) * slower / self.cruise
@@ -82,5 +82,5 @@ class Path:
 
 
 def segment(start: Array, goal: Array, cruise: float, law: Law = "quintic", at: float = 0.0) -> Path:
-    """Returns the path from one point to another; `at`: its start time, s."""
+    """Returns the path from one point to another, which starts at the time `at`, s."""
     return Path(np.array([start, goal], float), cruise, law, at)

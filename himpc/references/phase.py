@@ -14,7 +14,8 @@ from himpc.references.preview import Array
 class Phase:
     """A phase φ(t), its rate and its acceleration.
 
-    `uniform` is φ = ωt + φ₀; `eased` is φ = ωt − sin ωt + φ₀, which starts and ends each turn at rest.
+    The law `uniform` is φ = ωt + φ₀. The law `eased` is φ = ωt − sin ωt + φ₀; each turn starts and ends at
+    rest.
 
     Attributes:
         omega: angular frequency ω, rad/s.
@@ -27,7 +28,7 @@ class Phase:
     offset: float = 0.0
 
     def at(self, t: Array) -> tuple[Array, Array | float, Array | float]:
-        """Returns (φ, φ̇, φ̈) at times t in seconds; constant rates are plain numbers."""
+        """Returns (φ, φ̇, φ̈) at times t in seconds; constant derivatives are plain numbers."""
         w, wt = self.omega, self.omega * t
         if self.law == "uniform":
             return wt + self.offset, w, 0.0
@@ -35,6 +36,6 @@ class Phase:
 
 
 def column(rate: Array | float) -> Array | float:
-    """Returns a rate per sample as a column, which can be multiplied by rows of coordinates; returns a plain
-    number unchanged."""
+    """Returns an array with one rate per sample as a column, which can be multiplied by rows of coordinates.
+    A plain number is returned unchanged."""
     return rate[:, None] if isinstance(rate, np.ndarray) else rate

@@ -1,5 +1,5 @@
-"""The preview of a task's desired motion: its value now and over the horizon, as the controller receives
-it."""
+"""The preview of a task's desired motion that the controller receives: the present value and the motion over
+the horizon."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ class Preview(NamedTuple):
     Attributes:
         value: x_d at k: (m,) or a rotation matrix (3, 3).
         displacement: x_d(k+j) ⊖ x_d(k), j = 0 … N, (N+1, m); for rotations the vector log₃(R_d(k+j) R_d(k)ᵀ),
-            (N+1, 3), or for a task on fewer axes only its components on these axes; the others are then zero.
+            (N+1, 3). For a task on fewer axes, it may contain only the components along these axes; the other
+            components are then zero.
         velocity: ẋ_d at k+j, (N+1, m); ω_d for rotations.
         acceleration: ẍ_d at k+j, (N+1, m).
     """
@@ -31,7 +32,7 @@ class Preview(NamedTuple):
 
 
 class Reference(Protocol):
-    """A desired motion in time."""
+    """A desired motion as a function of time."""
 
     def preview(self, t: float, T_s: float, N: int) -> Preview:
         """Returns the desired motion at t, t + T_s, …, t + N·T_s (seconds)."""
@@ -39,7 +40,7 @@ class Reference(Protocol):
 
 
 def previews(references: Mapping[str, Reference], t: float, T_s: float, N: int) -> dict[str, Preview]:
-    """Returns the argument `previews` of a controller's `step`: by task the preview of its reference at t
+    """Returns the argument `previews` of a controller's `step`: the preview of each task's reference at t
     (s)."""
     return {name: reference.preview(t, T_s, N) for name, reference in references.items()}
 

@@ -9,18 +9,19 @@ import numpy as np
 from himpc.references.preview import Array, Preview, sampled, times
 
 _EARLY = 1e-9
-"""s: a switch counts as reached this much earlier, so that the rounding error of a sum of periods cannot
-delay it by a sample."""
+"""A switch takes place earlier by this time, s, so that the rounding error of a sum of periods cannot delay
+the switch by a sample."""
 
 
 @dataclass(frozen=True, eq=False)
 class SquareWave:
-    """x_d is the peak for half a period, then the valley for half a period, and so on; ẋ_d = ẍ_d = 0.
+    """x_d is at the peak for half a period and then in the valley for half a period, repeatedly. ẋ_d = ẍ_d =
+    0.
 
     Attributes:
         peak, valley: (m,) m.
-        half_period: s.
-        waves: after this many periods x_d stays in the valley; None: the wave never ends.
+        half_period: duration of half a period, s.
+        waves: number of periods, after which x_d stays in the valley; None: the wave never ends.
     """
 
     peak: Array

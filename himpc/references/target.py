@@ -1,4 +1,4 @@
-"""A dragged target: filtered so that x_d, ẋ_d and ẍ_d are consistent and stay within caps."""
+"""A dragged target. It is filtered so that x_d, ẋ_d and ẍ_d are consistent and stay within caps."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ Roll = Callable[[Array, int, Array, Array, float, Array], None]
 class Target:
     """The filtered target and its preview.
 
-    The filter runs at the control period. The acceleration a is constant in each step, so x_d moves by T_s
-    ẋ_d + T_s² a/2 and ẋ_d by T_s a exactly. The preview computes future states of the same filter with the
-    raw target constant; these states are stored and become the reference of the next ticks if the raw target
-    does not change.
+    The filter computes one step per control period. The acceleration a is constant in each step, so x_d
+    changes by exactly T_s ẋ_d + T_s² a/2 and ẋ_d by exactly T_s a. The preview contains future states of the
+    same filter for a constant raw target. These states are stored. If the raw target does not change, they
+    become the reference of the next ticks.
 
     Attributes:
         raw: the raw target, before the filter: (m,) coordinates, or a rotation matrix (3, 3).
@@ -46,7 +46,7 @@ class Target:
     """
 
     def __init__(self, value: Array, caps: Caps = POSITION_CAPS, roll: Roll = roll) -> None:
-        """Starts at rest at `value`. Another `roll` computes the same filter, see
+        """The target starts at rest at `value`. `roll` computes the filter; for a compiled one see
         `himpc.controllers.dragged_target`."""
         value = np.array(value, float)
         self.raw = value
@@ -92,7 +92,7 @@ class Target:
         return self._gathered(motion)
 
     def stays(self, t: float, seen: object) -> bool:
-        """Whether the target is at rest, and its preview at t equals `seen`, the previous one."""
+        """Whether the target is at rest and its preview at t equals the previous preview `seen`."""
         if self._rest is None or self._rest[1] is not seen:
             return False
         self._time = t
@@ -102,12 +102,12 @@ class Target:
         """Writes the preview into an array, without creating objects, for callers at every period.
 
         Args:
-            t, T_s: s.
+            t, T_s: present time and control period, s.
             motion: output array for displacement, velocity and acceleration, (3, N+1, m).
 
         Returns:
-            x_d, its numbers row by row. None, and nothing is written, if the target rests, or if it is a
-            rotation and its task controls fewer than three axes.
+            the numbers of x_d, row by row. If the target rests, or is a rotation for a task on fewer than
+            three axes, nothing is written and the result is None.
         """
         if motion.shape[2] != self._m or self._rests_at(t, T_s):
             return None
@@ -128,7 +128,7 @@ class Target:
         return self._rests
 
     def _roll(self, motion: Array) -> None:
-        """Writes displacement, velocity and acceleration at knots 0 … N to (3, N+1, m) numbers."""
+        """Writes displacement, velocity and acceleration at knots 0 … N to `motion`, (3, N+1, m)."""
         count = motion.shape[1]
         if len(self._samples) < count + 1:
             samples = np.zeros((count + 1 + _ROOM, self._samples.shape[1]))

@@ -11,12 +11,12 @@ from himpc.references.preview import Array, Preview, sampled, times
 
 @dataclass(frozen=True, eq=False)
 class Waypoints:
-    """x_d moves through points, at rest at each one, with s(σ) = 10σ³ − 15σ⁴ + 6σ⁵ on every segment.
+    """x_d moves through points and is at rest at each point, with s(σ) = 10σ³ − 15σ⁴ + 6σ⁵ on every segment.
 
     Attributes:
         points: (P, m) waypoints, P ≥ 1.
-        arrivals: (P,) increasing times in seconds at which each point is reached; before the first and
-            after the last the reference is constant.
+        arrivals: (P,) increasing times in seconds at which the points are reached. Before the first and after
+            the last of these times, the reference is constant.
     """
 
     points: Array
@@ -24,7 +24,7 @@ class Waypoints:
 
     def __post_init__(self) -> None:
         if len(self.points) != len(self.arrivals) or (np.diff(self.arrivals) <= 0).any():
-            raise ValueError("waypoints need one strictly increasing arrival time each")
+            raise ValueError("each waypoint needs an arrival time, and the times must increase strictly")
 
     def preview(self, t: float, T_s: float, N: int) -> Preview:
         clock = times(t, T_s, N)

@@ -27,7 +27,7 @@ class OnAxes(Task):
     axes: str = AXES
 
     def __post_init__(self) -> None:
-        """Raises InputError for any other value of `axes`."""
+        """Raises InputError unless `axes` is a non-empty subset of "xyz"."""
         if (
             not self.axes
             or any(axis not in AXES for axis in self.axes)
@@ -39,16 +39,16 @@ class OnAxes(Task):
 
     @property
     def components(self) -> list[int] | slice:
-        """Indices of the components that the task controls; a slice, which avoids a copy, if it controls all
-        three."""
+        """Indices of the components that the task controls. If the task controls all three, this is a slice,
+        which avoids a copy."""
         return slice(0, 3) if self.axes == AXES else [AXES.index(axis) for axis in self.axes]
 
     def coordinates(self, robot: Robot) -> tuple[str, ...]:
         return tuple(self.axes)
 
     def asked(self, configuration: Configuration, preview: Preview) -> Preview:
-        """Returns the components of a reference along the task's axes; a rotation has components along all
-        three."""
+        """Returns the components of a reference along the task's axes. Only a rotation has components along
+        all three axes."""
         if preview.value.ndim == 1 or preview.velocity.shape[1] == len(self.axes):
             return preview
         on = self.components

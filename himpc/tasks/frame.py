@@ -16,7 +16,7 @@ __all__ = ["AXES", "FrameTask"]
 
 @dataclass(frozen=True, kw_only=True)
 class FrameTask(OnAxes):
-    """A task on some of the world axes of a frame.
+    """A task for the position or the orientation of a frame, along some of the world axes.
 
     Attributes:
         frame: name of a frame of the robot; empty means the robot's tip.
@@ -26,7 +26,7 @@ class FrameTask(OnAxes):
     frame: str = ""
 
     first_row: ClassVar[int] = 0
-    """First row of the task's part of the 6 × n frame Jacobian (linear over angular, world axes)."""
+    """Index of the task's first row in the 6 × n frame Jacobian (linear over angular, world axes)."""
 
     def jacobian(self, configuration: Configuration) -> Array:
         rows = slice(self.first_row, self.first_row + 3)

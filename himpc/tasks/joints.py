@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class OnJoints(Task):
-    """x = some joint positions. J is a constant selection matrix.
+    """x = the positions of some joints. J is a constant selection matrix.
 
     Attributes:
         joints: joint names; empty means all of them (a posture task).
@@ -59,11 +59,11 @@ class Posture(OnJoints):
 @final
 @dataclass(frozen=True, kw_only=True)
 class Damping(OnJoints):
-    """All joints, K_p = 0: the residual of (4) is q̈ + K_v q̇; motions that no other task controls come to
-    rest.
+    """Damps all joints, with K_p = 0: the residual of (4) is q̈ + K_v q̇. Motions that no other task controls
+    come to rest.
 
-    R in (31) weighs Δτ only: in a direction without a task the torque is constant, motion is not damped, and
-    a push accelerates the robot for ever. This task, as the last level, damps such motions.
+    R in (31) weighs Δτ only. In a direction without a task the torque is constant, the motion is not damped,
+    and after a push the robot accelerates for ever. This task, as the last level, damps such motions.
     """
 
     K_p: Gain = 0.0

@@ -1,4 +1,4 @@
-"""The kinds of tasks, by their name in settings and menus."""
+"""The kinds of tasks, by their names in settings and menus."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ class Kind:
 
     Attributes:
         says: description in one line.
-        makes: task classes of the kind; several classes give tasks of equal priority, named NAME_SUFFIX.
-        suffixes: suffixes of these names; empty for one class.
+        makes: task classes of the kind; several classes create tasks of equal priority, named NAME_SUFFIX.
+        suffixes: the suffix of each task's name; empty for a kind with one class.
     """
 
     says: str
@@ -32,20 +32,30 @@ class Kind:
 _BOTH = ("_position", "_orientation")
 
 KINDS: dict[str, Kind] = {
-    "position": Kind("a frame's origin in the world", (FramePosition,)),
-    "orientation": Kind("how a frame is turned in the world", (FrameOrientation,)),
-    "pose": Kind("both at once, with equal priority", (FramePosition, FrameOrientation), _BOTH),
-    "joints": Kind("some joints", (Joints,)),
-    "posture": Kind("all joints", (Posture,)),
-    "damping": Kind("all joints come to rest, wherever they are", (Damping,)),
-    "com": Kind("the centre of mass of what moves", (CentreOfMass,)),
-    "relative_position": Kind("where a frame is, seen from another frame", (RelativePosition,)),
-    "relative_orientation": Kind("how a frame is turned, seen from another frame", (RelativeOrientation,)),
-    "relative_pose": Kind("both, seen from another frame", (RelativePosition, RelativeOrientation), _BOTH),
-    "pointing": Kind("an axis of a frame toward a point", (Pointing,)),
+    "position": Kind("the position of a frame's origin in the world", (FramePosition,)),
+    "orientation": Kind("the orientation of a frame in the world", (FrameOrientation,)),
+    "pose": Kind(
+        "position and orientation of a frame in the world, with equal priority",
+        (FramePosition, FrameOrientation),
+        _BOTH,
+    ),
+    "joints": Kind("the positions of some joints", (Joints,)),
+    "posture": Kind("the positions of all joints", (Posture,)),
+    "damping": Kind("all joints come to rest, at any position", (Damping,)),
+    "com": Kind("the centre of mass of all moving links", (CentreOfMass,)),
+    "relative_position": Kind("the position of a frame relative to another frame", (RelativePosition,)),
+    "relative_orientation": Kind(
+        "the orientation of a frame relative to another frame", (RelativeOrientation,)
+    ),
+    "relative_pose": Kind(
+        "position and orientation of a frame relative to another frame, with equal priority",
+        (RelativePosition, RelativeOrientation),
+        _BOTH,
+    ),
+    "pointing": Kind("an axis of a frame points at a point", (Pointing,)),
     "plane_distance": Kind("a frame's distance from a plane", (PlaneDistance,)),
 }
-"""All kinds of tasks; the names are those of Pink and Mink where the meaning is the same (frame, com,
+"""All kinds of tasks. A kind that exists in Pink and Mink too has the same name as there (frame, com,
 relative frame, posture, damping)."""
 
 
@@ -54,7 +64,7 @@ OWN = "own"
 
 
 def word_of(task: Task) -> str:
-    """Returns the name of a task's kind; OWN for a class that is not built in."""
+    """Returns the name of a task's kind, or OWN for a class that is not built in."""
     return _WORDS.get(type(task), OWN)
 
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from himpc.kinematics.configuration import Configuration
 
 _UPRIGHT = 1e-12
-"""Sine of an angle: a direction within this angle of the desired one counts as equal to it, or as its
+"""Sine of an angle. A direction within this angle counts as equal to the desired direction, or to its
 opposite."""
 
 
@@ -28,16 +28,17 @@ class OrientationTask(OnAxes):
     """The value is a rotation matrix R (3, 3), x̃ in rad along the chosen axes; with E = R R_dᵀ:
 
     - three axes: x̃ = log₃ E, ẋ = ω;
-    - two axes: the free axis f, fixed to the frame, moves to E f; x̃ = φ (f × E f)/‖f × E f‖ is the rotation
-      between the two, ẋ = ω on the two axes (reduced attitude: a rotation about f of any angle is no error);
+    - two axes: E moves the free axis f, which is fixed to the frame, to E f. x̃ = φ (f × E f)/‖f × E f‖ is
+      the rotation from f to E f, and ẋ = ω on the two axes (reduced attitude: a rotation about f by any angle
+      is no error);
     - one axis a: x̃ = aᵀ log₃ E, ẋ = aᵀ J_l⁻¹(log₃ E) ω with the inverse of SO(3)'s left Jacobian.
 
-    On one axis ẋ is the derivative of x̃. On two or three axes this holds for the component along x̃, and for
-    the others to first order in x̃. The first is enough: d/dt ½‖x̃‖² = x̃ᵀ(ẋ − ẋ_d), so that (4) decreases
-    ½‖ẋ − ẋ_d‖² + ½ K_p‖x̃‖² at the rate K_v‖ẋ − ẋ_d‖² at every angle below 180°. (Single components of
-    log₃ E, with ẋ = ω on the same axes, do not have this property: if the free rotation is θ, the
-    characteristic polynomial is s² + K_v s + K_p (θ/2)(cot θ/2 ± i), which is unstable where
-    K_v² cot θ/2 < K_p θ/2.)
+    On one axis, ẋ is the derivative of x̃. On two or three axes, the component of ẋ along x̃ is exactly the
+    derivative of x̃, and the other components are to first order in x̃. Stability needs the component along
+    x̃ only: d/dt ½‖x̃‖² = x̃ᵀ(ẋ − ẋ_d), so that (4) decreases ½‖ẋ − ẋ_d‖² + ½ K_p‖x̃‖² at the rate K_v‖ẋ −
+    ẋ_d‖² at every angle below 180°. (Single components of log₃ E, with ẋ = ω on the same axes, do not have
+    this property: if the free rotation is θ, the characteristic polynomial is s² + K_v s + K_p (θ/2)(cot θ/2
+    ± i), which is unstable where K_v² cot θ/2 < K_p θ/2.)
     """
 
     K_p: Gain = 50.0
@@ -45,7 +46,7 @@ class OrientationTask(OnAxes):
 
     @abstractmethod
     def rotations(self, configuration: Configuration) -> list[Array]:
-        """Returns R at every knot, N of (3, 3)."""
+        """Returns R at every knot: N matrices (3, 3)."""
 
     @abstractmethod
     def angular_jacobian(self, configuration: Configuration) -> Array:
@@ -61,12 +62,13 @@ class OrientationTask(OnAxes):
         return self.slopes(self.rotations(configuration), [preview.value] * len(rows)) @ rows
 
     def slopes(self, rotations: list[Array], desired: list[Array]) -> Array:
-        """Returns ∂ẋ/∂ω at R and R_d of every knot, (N, m, 3)."""
+        """Returns ∂ẋ/∂ω, (N, m, 3), for R and R_d at every knot."""
         return np.array([slope(R @ R_d.T, self.axes) for R, R_d in zip(rotations, desired, strict=True)])
 
     def asked(self, configuration: Configuration, preview: Preview) -> Preview:
-        """Returns the desired motion of x̃'s coordinates. On fewer than three axes, a reference that rotates
-        with ω_d changes x̃ by −slope(E) E ω_d, which also holds after a rotation about the free axis."""
+        """Returns the desired motion in the coordinates of x̃. On fewer than three axes, a reference that
+        rotates with ω_d changes x̃ at the rate −slope(E) E ω_d. This is also true after a rotation about the
+        free axis."""
         if len(self.axes) == len(AXES):
             return preview
         if rests(preview):
@@ -86,7 +88,8 @@ class OrientationTask(OnAxes):
         return slope(E, self.axes) @ E
 
     def spread(self, motion: Array) -> Array:
-        """Returns (N+1, 3) of a motion that is given along all axes, or along the chosen ones only."""
+        """Returns a motion with components along all three axes, (N+1, 3). The given motion may contain the
+        chosen axes only."""
         if motion.shape[1] == len(AXES):
             return motion
         found = np.zeros((len(motion), len(AXES)))

@@ -21,8 +21,8 @@ class PlaneDistance(Task):
 
     Attributes:
         frame: name of a frame of the robot; empty means the robot's tip.
-        normal: direction of n in the world, of any length except zero.
-        offset: d, m from the world's origin along n.
+        normal: direction of n in the world; its length may be any number except zero.
+        offset: d, the distance of the plane from the world's origin along n, m.
     """
 
     frame: str = ""

@@ -1,4 +1,4 @@
-"""A task that points an axis of a frame at a point, such as a camera or a torch."""
+"""A task that points an axis of a frame at a point, for example the axis of a camera or a torch."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 
 DIRECTIONS = ("x", "y", "z", "-x", "-y", "-z")
 AHEAD = 0.5
-"""m from the frame's origin at which a target starts, on the axis."""
+"""Distance from the frame's origin, along the axis, at which a target starts, m."""
 _NEAREST = 0.02
-"""m: a nearer point is treated as if it had this distance; the direction to it could otherwise change
-arbitrarily fast."""
+"""A point that is nearer than this, m, is treated as if it had this distance. Otherwise the direction to the
+point could change arbitrarily fast."""
 _ASIDE = 1e-2
-"""Sine of the angle to the opposite direction below which ‖J‖ is constant (0.6°)."""
+"""If the sine of the angle to the opposite direction is below this value (0.6°), ‖J‖ is constant."""
 _STRAIGHT = 1e-9
-"""Sine of the angle below which the axis counts as pointing at the point."""
+"""If the sine of the angle is below this value, the axis counts as pointing at the point."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,9 +35,10 @@ class Pointing(Task):
     """x = φ ŝ⊥, rad: the angle φ between the axis a of the frame and the direction to a point c, and its
     side.
 
-    s = Rᵀ(c − p) is the point in the frame's coordinates, ŝ⊥ the direction of its component perpendicular to
-    a. x̃ = x, because the coordinates count from the target: x_d is the point c, (3,) m in the world. φ = π
-    is singular: exactly there ŝ⊥ is the first of the two axes perpendicular to a.
+    s = Rᵀ(c − p) is the point in the frame's coordinates, and ŝ⊥ is the direction of its component
+    perpendicular to a. x̃ = x, because the coordinates are relative to the target: x_d is the point c, (3,) m
+    in the world. φ = π is singular: at exactly this angle, ŝ⊥ is the first of the two axes perpendicular to
+    a.
 
     Attributes:
         frame: name of a frame of the robot; empty means the robot's tip.
@@ -116,8 +117,8 @@ class Pointing(Task):
         return found
 
     def asked(self, configuration: Configuration, preview: Preview) -> Preview:
-        """Returns the reference that compensates a moving point: a point with velocity ċ changes x at the
-        rate ∂x/∂c ċ."""
+        """Returns the reference that compensates the motion of the point: a velocity ċ of the point changes x
+        at the rate ∂x/∂c ċ."""
         if rests(preview):
             return at_rest(preview, 2)
         moved, c_dot, _ = preview[1:]
@@ -137,6 +138,6 @@ class Pointing(Task):
         return seen(preview, (moved, c_dot, preview.acceleration), G, change)
 
     def _back(self, R: Array, away: Array) -> Array:
-        """Returns −∂x/∂c, (2, 3), for a frame with orientation R; the point is at `away` from its origin,
-        world axes."""
+        """Returns −∂x/∂c, (2, 3), for a frame with orientation R. `away` is the vector from the frame's
+        origin to the point, in world axes."""
         return self._seen(R.T @ away)[1] @ -R.T

@@ -28,7 +28,7 @@ class RelativeTask(OnAxes):
     root: str = ""
 
     first_row: ClassVar[int] = 0
-    """First row of the task's part of the 6 × n relative Jacobian (linear over angular, axes of the root)."""
+    """Index of the task's first row in the 6 × n relative Jacobian (linear over angular, root's axes)."""
 
     def _frames(self, configuration: Configuration) -> tuple[str, str]:
         return self.frame or configuration.robot.tip, self.root or configuration.robot.frames[0]

@@ -1,4 +1,5 @@
-"""Converts a reference to the coordinates of a task, if they depend on the motion of robot and target."""
+"""Converts a reference to the coordinates of a task, if these coordinates depend on the motion of robot and
+target."""
 
 from __future__ import annotations
 
@@ -8,7 +9,7 @@ from himpc.references.preview import Preview
 from himpc.tasks.task import Array
 
 NUDGE = 1e-4
-"""s: time step to both sides for the central difference of G along the motion."""
+"""Time step of the central difference of G along the motion, to each side, s."""
 
 
 def rests(preview: Preview) -> bool:
@@ -17,7 +18,7 @@ def rests(preview: Preview) -> bool:
 
 
 def at_rest(preview: Preview, m: int) -> Preview:
-    """Returns the preview of a target at rest, in m coordinates."""
+    """Returns the preview of a target at rest, with m coordinates."""
     zero = np.zeros((len(preview.displacement), m))
     return Preview(preview.value, zero, zero, zero)
 
@@ -28,8 +29,8 @@ def seen(preview: Preview, motion: tuple[Array, Array, Array], G: Array, change:
 
     Args:
         preview: preview of the target.
-        motion: its displacement, velocity and acceleration, (N+1, 3) each.
-        G: (N+1, m, 3) at every knot.
+        motion: displacement, velocity and acceleration of the target, (N+1, 3) each.
+        G: (N+1, m, 3), the matrix at every knot.
         change: Ġ, (N+1, m, 3), along the motion of robot and target.
     """
     displacement, velocity, acceleration = (each[:, :, None] for each in motion)

@@ -28,7 +28,7 @@ class Task(ABC):
     The desired closed loop is (4) of the HIMPC paper: x̃'' + K_v x̃' + K_p x̃ = 0 with x̃ = x − x_d.
 
     Attributes:
-        name: stable identity; events, telemetry and references refer to it.
+        name: the unique name of the task, which events, telemetry and references refer to.
         K_p: stiffness, 1/s² (scalar or one per coordinate).
         K_v: damping, 1/s (scalar or one per coordinate).
     """
@@ -56,12 +56,12 @@ class Task(ABC):
         """Returns J_i of (3) at every knot, shape (N, m, n); knot 0 is the measured state."""
 
     def target(self, configuration: Configuration) -> Array:
-        """Returns the x_d for which the error is zero now: the start of a draggable target."""
+        """Returns the x_d for which the present error is zero. A draggable target starts at this value."""
         return self.value(configuration)
 
     def asked(self, configuration: Configuration, preview: Preview) -> Preview:
-        """Returns the reference in the task's coordinates. It differs from `preview` only if the target is
-        not given in these coordinates."""
+        """Returns the reference in the task's coordinates. It differs from `preview` only if the target has
+        other coordinates."""
         return preview
 
     def gains(self, m: int) -> tuple[Array, Array]:

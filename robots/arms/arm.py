@@ -21,7 +21,7 @@ class Reading(NamedTuple):
     Attributes:
         q, v: measured joint positions, (n,) rad, and velocities, (n,) rad/s.
         tau: the torque without gravity that acted during the last period, (n,) N·m.
-        t: the arm's clock, s. It moves on by more than one period if periods were missed.
+        t: the arm's clock, s. It increases by more than one period if periods were missed.
     """
 
     q: Array
@@ -49,7 +49,7 @@ class ArmLimits:
 
     def with_robot(self, robot: Robot) -> ArmLimits:
         """Returns the limits that this arm and the description of a robot have in common. Raises InputError
-        if the two differ in their number of joints, or have no common range of a joint."""
+        if arm and description have different numbers of joints, or no common range of a joint."""
         if len(self.tau) != robot.n:
             raise InputError(
                 f"the arm has {len(self.tau)} joints and the scene's robot '{robot.name}' has {robot.n}: "
@@ -67,13 +67,14 @@ class ArmLimits:
 
 
 class ArmLost(Exception):
-    """The arm no longer answers, or has stopped by itself. The message contains the arm's own message."""
+    """Raised if the arm no longer answers or has stopped by itself. The message contains the arm's own
+    message."""
 
 
 class Arm(ABC):
-    """An arm that compensates its own gravity: with a torque of zero it stays where it is, if its load is set
-    correctly. All torques exclude gravity. For an arm without compensation, g(q) must be added to written
-    torques and subtracted from torques that are read.
+    """An arm that compensates its own gravity: with a torque of zero it stays at rest, if its load is set
+    correctly. All torques exclude gravity. For an arm without compensation, g(q) must be added to torques
+    that are sent and subtracted from torques that are read.
     """
 
     limits: ArmLimits
@@ -88,4 +89,5 @@ class Arm(ABC):
 
     @abstractmethod
     def stop(self) -> None:
-        """Ends the control by torques: the arm holds its position by itself. Never raises."""
+        """Ends the control by torques: the arm then holds its position by itself. Never raises an
+        exception."""

@@ -15,22 +15,23 @@ from robots.robot import Robot
 
 Array = NDArray[np.float64]
 
-# Given by Franka's documentation of its control interface ("Robot limits"): torques and their rates; for
-# ranges and speeds the narrower ones of Panda and FR3.
+# Given by Franka's documentation of its control interface ("Robot limits"). Ranges and speeds are the
+# narrower ones of Panda and FR3.
 _TAU = (87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0)  # N·m
 _TAU_RATE = 990.0  # N·m/s; the arm stops itself above 1000
 _V = (2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61)  # rad/s
 _Q_LOWER = (-2.7437, -1.7628, -2.8973, -3.0421, -2.8065, 0.5445, -2.8973)  # rad
 _Q_UPPER = (2.7437, 1.7628, 2.8973, -0.1518, 2.8065, 3.7525, 2.8973)  # rad
 _ASIDE, _FARTHEST = 0.01, 0.2
-"""m: largest distance of the flange from the axis of the last joint, and largest distance along this axis, if
-the scene's robot is this arm. The flange is on the axis, 0.107 m along it (given: Franka's documentation)."""
+"""Largest distance of the flange from the axis of the last joint, and largest distance along this axis, m, if
+the scene's robot is this arm. The flange is on the axis, at 0.107 m along it (given by Franka's
+documentation)."""
 
 
 @final
 class Franka(Arm):
-    """A Franka arm under torque control. The arm adds the torques for gravity and for the load that is set;
-    `Reading.tau` is its `tau_J_d`, the torque without gravity that was commanded last."""
+    """A Franka arm under torque control. The arm adds the torques for gravity and for its configured load.
+    `Reading.tau` is the arm's `tau_J_d`, the last commanded torque without gravity."""
 
     def __init__(self, address: str, real_time: bool = False) -> None:
         """Connects; the arm does not move before the first `read`.
@@ -39,7 +40,7 @@ class Franka(Arm):
             address: host name or IP address.
             real_time: whether libfranka refuses a kernel without real-time scheduling.
 
-        Raises InputError if pylibfranka is missing, or there is no arm that answers.
+        Raises InputError if pylibfranka is missing or no arm answers.
         """
         self.limits = ArmLimits(
             np.array(_TAU), np.full(7, _TAU_RATE), np.array(_V), np.array(_Q_LOWER), np.array(_Q_UPPER)
@@ -49,13 +50,14 @@ class Franka(Arm):
         try:
             self._robot = self._library.Robot(address, config.kEnforce if real_time else config.kIgnore)
         except (RuntimeError, self._library.FrankaException) as error:
-            raise InputError(f"--robot {address}: {_told(error)}; is this the address of the arm?") from None
+            raise InputError(f"--robot {address}: {_told(error)}; check the address of the arm") from None
         self._control: Any = None
         self._finished = False
 
     def at_rest(self, robot: Robot) -> Array:
-        """The joint positions, (7,) rad, without taking control. Raises ArmLost, and InputError if with these
-        positions a description of a robot has its last joint elsewhere than this arm."""
+        """Returns the joint positions, (7,) rad, without taking control. Raises ArmLost. Raises InputError if
+        the description of a robot has its last joint at another position than this arm, for the same joint
+        positions."""
         try:
             state = self._robot.read_once()
         except (RuntimeError, self._library.FrankaException) as error:
@@ -73,7 +75,7 @@ class Franka(Arm):
             if not (max(abs(x), abs(y)) < _ASIDE and -_ASIDE < z < _FARTHEST):
                 raise InputError(
                     f"the scene's robot '{robot.name}' is not this arm: at the arm's joint positions the "
-                    "flange would be elsewhere; choose a scene of that arm, such as panda-hold"
+                    "flange would be elsewhere; choose a scene of your arm, such as panda-hold"
                 )
         return q
 
@@ -118,5 +120,5 @@ def _library() -> Any:
 
 
 def _told(error: Exception) -> str:
-    """The message of libfranka in one line."""
+    """Returns libfranka's error message in one line."""
     return " ".join(str(error).split()).removeprefix("libfranka: ").rstrip(".")

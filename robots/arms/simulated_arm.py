@@ -1,4 +1,4 @@
-"""A simulated arm behind the interface of a real one."""
+"""A simulated arm with the interface of a real arm."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from robots.plant import Plant
 Array = NDArray[np.float64]
 
 TAU_RATE = 1000.0
-"""N·m/s, the largest change of a torque."""
+"""Largest rate of change of a torque, N·m/s."""
 
 
 @final
 class SimulatedArm(Arm):
     """A robot in MuJoCo that compensates the gravity of its description. A payload that the description lacks
-    pulls it down, as it does with a real arm. With `in_step` the robot also moves if no torque arrives: for a
-    late caller several periods have passed, in which the last torque acted.
+    pulls the robot down, as with a real arm. With `in_step` the robot also moves if no torque arrives: if the
+    caller is late, the last torque acts for several periods.
     """
 
     def __init__(self, plant: Plant, period: float = 1e-3, in_step: bool = True) -> None:
-        """plant: the robot, where it starts; period: s; in_step: whether simulated time follows real time;
-        otherwise each read takes one period."""
+        """plant: the simulated robot at its initial state; period: control period, s; in_step: whether
+        simulated time follows real time; otherwise simulated time advances by one period per read."""
         robot = plant.robot
         rate = np.full(robot.n, TAU_RATE)
         self.limits = ArmLimits(
@@ -60,7 +60,7 @@ class SimulatedArm(Arm):
             raise ArmLost("the simulated arm was stopped")
 
     def _passed(self) -> int:
-        """Waits for the next period; returns how many have passed since the last read."""
+        """Waits for the next period; returns the number of periods since the last read."""
         now = time.monotonic()
         if self._due is None:
             self._due = now + self._period

@@ -1,4 +1,4 @@
-"""Small capsules around points, many at once."""
+"""Computes small capsules around points, for many groups of points at once."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-_ROUNDS = 12  # steps of the search for the middle of a circle
+_ROUNDS = 12  # number of steps of the search for the middle of a circle
 _DIGITS = 4  # decimal places of a coordinate in m
-_FEW, _MANY = 48, 100  # numbers of directions, of a quick and of a tight fit to the farthest points
+_FEW, _MANY = 48, 100  # numbers of directions in which a quick and a tight fit look for farthest points
 _FACTORS = np.array([1.0, 1.05, 1.1, 1.2, 1.3, 1.5])  # radii that are tried, as multiples of the smallest
 _AT_ONCE = 2_000_000  # largest number of elements of an array
 
@@ -35,18 +35,18 @@ class Fit(NamedTuple):
 
     @property
     def volume(self) -> Array:
-        """(…,) m³."""
+        """Volumes, (…,) m³."""
         return _volume(self.length, self.radius)
 
     @property
     def area(self) -> Array:
-        """(…,) m²."""
+        """Surface areas, (…,) m²."""
         return 2.0 * np.pi * self.radius * (self.length + 2.0 * self.radius)
 
 
 def reach(points: Array, swell: Array, fit: Fit) -> Array:
     """Returns the distance by which balls stand out of capsules, (…, V) m; negative inside. points: centres
-    of the balls (V, 3), m; swell: their radii (V,), m."""
+    of the balls, (V, 3) m; swell: radii of the balls, (V,) m."""
     axis = (fit.end - fit.start)[..., None, :]
     offset = points - fit.start[..., None, :]
     length = np.maximum((axis**2).sum(axis=-1), 1e-300)
@@ -56,15 +56,16 @@ def reach(points: Array, swell: Array, fit: Fit) -> Array:
 
 
 def quick_fits(points: Array, swell: Array, groups: Mask) -> Fit:
-    """Returns for each group of balls, a row of (B, V), about the smallest capsule around them whose axis is
-    one of their principal axes. No group is empty."""
+    """Returns a capsule around each group of balls, which is a row of (B, V). It is about the smallest
+    capsule whose axis is a principal axis of the group. Groups must not be empty."""
     rows = max(1, _AT_ONCE // (_FEW * len(points)))
     parts = [_quick(points, swell, groups[k : k + rows]) for k in range(0, len(groups), rows)]
     return Fit(*(np.concatenate(each) for each in zip(*parts, strict=True)))
 
 
 def tight_fit(points: Array, swell: Array) -> Fit:
-    """Returns a capsule that contains balls, with about the smallest volume and coordinates of 0.1 mm."""
+    """Returns a capsule that contains balls and has about the smallest volume. Its numbers are multiples of
+    0.1 mm."""
     rows = max(1, _AT_ONCE // _MANY)
     parts = range(0, len(points), rows)
     far = [_farthest(points[k : k + rows], swell[k : k + rows]) + k for k in parts]
@@ -81,7 +82,8 @@ def tight_fit(points: Array, swell: Array) -> Fit:
 
 
 def _rounded(points: Array, swell: Array, start: Array, end: Array) -> Fit:
-    """The capsule with rounded ends that contains balls, its radius rounded up."""
+    """Returns a capsule that contains balls. The coordinates of its ends are rounded, and its radius is
+    rounded up."""
     start, end = np.round(start, _DIGITS) + 0.0, np.round(end, _DIGITS) + 0.0
     needed = float(reach(points, swell, Fit(start, end, np.zeros(()))).max())
     return Fit(start, end, np.ceil((needed + 1e-9) * 10**_DIGITS) / 10**_DIGITS)
@@ -93,7 +95,7 @@ def _farthest(points: Array, swell: Array) -> NDArray[np.intp]:
 
 @lru_cache(maxsize=4)
 def sphere(count: int) -> Array:
-    """Unit vectors (count, 3), evenly spread on a spiral."""
+    """Returns unit vectors (count, 3) that are evenly spread on a spiral."""
     k = np.arange(count) + 0.5
     z, turn = 1.0 - 2.0 * k / count, np.pi * (1.0 + np.sqrt(5.0)) * k
     ring = np.sqrt(1.0 - z**2)
@@ -112,7 +114,7 @@ def _quick(points: Array, swell: Array, groups: Mask) -> Fit:
 
 
 def _principal(points: Array, groups: Mask) -> tuple[Array, Array]:
-    """The middles (B, 3), m, of groups, and their principal axes as columns (B, 3, 3)."""
+    """Returns the middles of groups, (B, 3) m, and their principal axes as columns, (B, 3, 3)."""
     share = groups / groups.sum(axis=1, keepdims=True)
     origin = points.mean(axis=0)
     offset = points - origin
@@ -122,8 +124,8 @@ def _principal(points: Array, groups: Mask) -> tuple[Array, Array]:
 
 
 def _on_axes(points: Array, swell: Array, middle: Array, axes: Array) -> Fit:
-    """The smallest capsules (B, 3) whose axes have the directions (B, 3, 3) and go through the middle of the
-    smallest circle around points (B, D, 3)."""
+    """Returns small capsules (B, 3) around points (B, D, 3). Their axes have the directions (B, 3, 3). Each
+    axis goes through the middle of the smallest circle around the points, seen along the axis."""
     local = (points - middle[:, None, :]) @ axes
     z = local.swapaxes(1, 2)
     flat = np.stack([local[:, :, [1, 2]], local[:, :, [2, 0]], local[:, :, [0, 1]]], axis=1)
@@ -150,9 +152,10 @@ def _on_axes(points: Array, swell: Array, middle: Array, axes: Array) -> Fit:
 
 
 def _closed(z: Array, rho: Array, swell: Array, factors: Array) -> tuple[Array, Array, Array]:
-    """(bottom, top, radius) of the smallest capsules on lines, radii one of the factors times the smallest.
+    """Returns (bottom, top, radius) of the smallest capsules on lines. Their radii are the smallest radius
+    times one of the factors.
 
-    z, rho: (…, D) positions of points along lines and their distances from them, m.
+    z, rho: (…, D) m, positions of points along the lines, and distances of the points from the lines.
     """
     radius = (rho + swell).max(axis=-1)[..., None] * factors + 1e-12
     slack = (radius[..., None] - swell[..., None, :]) ** 2 - rho[..., None, :] ** 2
@@ -166,7 +169,8 @@ def _closed(z: Array, rho: Array, swell: Array, factors: Array) -> tuple[Array, 
 
 
 def _refined(points: Array, swell: Array, fit: Fit, axis: Array) -> Fit:
-    """Improves direction, place and radius by Nelder and Mead."""
+    """Returns a capsule with improved direction, position and radius, found by the method of Nelder and
+    Mead."""
     across = np.linalg.svd(axis[None])[2][1:]
     size = float(np.ptp(points, axis=0).max()) + float(fit.radius)
     through = 0.5 * (fit.start + fit.end)

@@ -17,14 +17,14 @@ from robots.shapes.collision_shapes import FARTHEST, SHAPES_PER_LINK, primitive
 from robots.urdf.read import Refusal, placement
 
 Array = NDArray[np.float64]
-_SECTIONS = 24  # of a round solid
-_MOST = 250_000  # triangles of a robot
+_SECTIONS = 24  # number of sides of the polygon that replaces a circle
+_MOST = 250_000  # largest number of triangles of a robot
 
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """Triangles (F, 3, 3), m, of a link in the axes of its joint, and the radius, m, of the balls whose
-    middles fill them: 0 for a surface."""
+    """Triangles of a link in the axes of its joint, (F, 3, 3) m. The solid consists of all balls whose
+    middles are on the triangles; `swell` is the radius of the balls, m. It is 0 for a surface."""
 
     joint: int
     link: str
@@ -71,7 +71,7 @@ def _visuals(robot: Robot, meshes: bool) -> Iterator[Patch]:
 
 
 def _read(root: Element) -> dict[str, list[Array]]:
-    """The triangles of the visual meshes by their URI."""
+    """Returns the triangles of the visual meshes by their URI."""
     uris = [mesh.get("filename", "") for mesh in root.iterfind("link/visual/geometry/mesh")]
     if not uris:
         return {}
@@ -83,7 +83,7 @@ def _read(root: Element) -> dict[str, list[Array]]:
 
 
 def _of_solid(solid: Solid) -> Patch:
-    """The surface of a solid. Round solids lie inside their triangles."""
+    """Returns the surface of a solid. The triangles of a round solid contain the solid."""
     if solid.kind == "hull":
         corners, swell = _hull(np.array(solid.points)), 0.0
         return Patch(solid.joint, solid.link, corners, swell)
@@ -104,12 +104,12 @@ def _box(solid: Solid) -> Array:
 def _cylinder(solid: Solid) -> Array:
     radius, half = solid.size
     turns = 2.0 * np.pi * np.arange(_SECTIONS) / _SECTIONS
-    radius /= np.cos(np.pi / _SECTIONS)  # the polygon is around the circle
+    radius /= np.cos(np.pi / _SECTIONS)  # the circle is inside the polygon
     return np.array([(radius * np.cos(t), radius * np.sin(t), z) for t in turns for z in (-half, half)])
 
 
 def _hull(points: Array) -> Array:
-    """The triangles of the convex hull of points; none if the hull has no volume."""
+    """Returns the triangles of the convex hull of points; none if the hull has no volume."""
     from scipy.spatial import ConvexHull, QhullError  # their import takes long, and only hulls need them
 
     try:

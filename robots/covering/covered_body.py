@@ -1,4 +1,4 @@
-"""A body of a robot as triangles, and the distance by which capsules stand out of it."""
+"""A body of a robot as triangles, and the distance by which capsules stand out of the body."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
-_FINE = 15  # parts into which the edges of large triangles are cut, per largest extent of a body
-_LARGEST = 40_000  # triangles of a link, beyond which no more are cut
-_SAMPLE = 500  # triangles of a body by which groups are found
-_NEAR = 8_000  # points from which distances are measured
-_SURFACE = 80  # points of a capsule whose distances are measured
+_FINE = 15  # edges are cut if they are longer than the largest extent of a body divided by this
+_LARGEST = 40_000  # number of triangles of a body, beyond which no triangles are cut
+_SAMPLE = 500  # number of triangles of a body with which groups are found
+_NEAR = 8_000  # number of points of a body from which distances are measured
+_SURFACE = 80  # number of points of a capsule whose distances are measured
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,9 +29,9 @@ class Body:
     """The triangles of a body.
 
     Attributes:
-        joint: Pinocchio index of its joint. names: its links.
-        corners: (F, 3, 3), m. swells: (F,), m, radii of the balls whose middles fill the triangles.
-        links: (F,), the index of the link of each.
+        joint: Pinocchio index of the body's joint. names: names of the body's links.
+        corners: (F, 3, 3) m, corners of the triangles. swells: (F,) m, see `Patch.swell`.
+        links: (F,), index of each triangle's link.
     """
 
     joint: int
@@ -42,23 +42,23 @@ class Body:
 
     @cached_property
     def areas(self) -> Array:
-        """(F,), m², above 0."""
+        """Areas of the triangles, (F,) m², above 0."""
         a, b, c = self.corners.swapaxes(0, 1)
         return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1) + 1e-12
 
     @cached_property
     def sample(self) -> Indices:
-        """The triangles with which groups are found, evenly spread over the area."""
+        """The sample: indices of the triangles with which groups are found, evenly spread over the area."""
         return self._drawn(_SAMPLE)
 
     @cached_property
     def middles(self) -> Array:
-        """Middles of the sample, (S, 3), m."""
+        """Middles of the sample's triangles, (S, 3) m."""
         return self.corners[self.sample].mean(axis=1)
 
     @cached_property
     def swell(self) -> Array:
-        """Radii of balls at these middles that stand for the triangles, (S,), m."""
+        """Radii of the balls that represent the sample's triangles, (S,) m; `middles` are their centres."""
         corners = self.corners[self.sample] - self.middles[:, None, :]
         return self.swells[self.sample] + 0.5 * np.sqrt((corners**2).sum(axis=2)).max(axis=1)
 
@@ -69,17 +69,18 @@ class Body:
         return KDTree(self.corners[self._drawn(_NEAR)].mean(axis=1))
 
     def fits(self, group: Indices) -> Fit:
-        """Capsules around the groups of the sample, (K,)."""
+        """Returns capsules around the groups of the sample, (K,)."""
         return quick_fits(self.middles, self.swell, group == np.arange(group.max() + 1)[:, None])
 
     def excess(self, fits: Fit) -> float:
-        """The distance by which capsules stand out, m: the root mean square over their outer surface."""
+        """Returns the distance by which capsules stand out, m: the root mean square over their outer
+        surface."""
         gaps, areas = self.gaps(fits, _SURFACE)
         return float(np.sqrt(np.average(gaps**2, weights=areas)))
 
     def gaps(self, fits: Fit, count: int) -> tuple[Array, Array]:
-        """Returns distances to the triangles, m, of points on the outer surface of the capsules, and the area
-        for each point, m²."""
+        """Returns two arrays for points on the outer surface of the capsules: the distance of each point from
+        the triangles, m, and the area that it represents, m²."""
         every = [surface(fits.chosen(k), count) for k in range(len(fits.radius))]
         outer = np.concatenate(
             [
@@ -92,7 +93,7 @@ class Body:
         return np.maximum(self._nearby.query(points)[0] - self.swells.max(), 0.0), areas
 
     def name(self, mask: NDArray[np.bool_]) -> str:
-        """The link with the largest area of some triangles."""
+        """Returns the name of the link that has the largest area among some triangles."""
         return self.names[int(np.bincount(self.links[mask], weights=self.areas[mask]).argmax())]
 
     def _drawn(self, most: int) -> Indices:
@@ -103,7 +104,7 @@ class Body:
 
 
 def body_of(surfaces: list[Patch]) -> Body:
-    """Returns the body that patches of one joint make, its large triangles cut into small ones."""
+    """Returns the body that the patches of one joint form. Large triangles are cut into small ones."""
     names = tuple(dict.fromkeys(patch.link for patch in surfaces))
     corners = np.concatenate([patch.corners for patch in surfaces])
     swells = np.concatenate([np.full(len(patch.corners), patch.swell) for patch in surfaces])
@@ -113,7 +114,8 @@ def body_of(surfaces: list[Patch]) -> Body:
 
 
 def _cut(corners: Array, swells: Array, links: Indices, edge: float) -> tuple[Array, Array, Indices]:
-    """Halves the longest edges of triangles until they are short, or there are enough triangles."""
+    """Halves the longest edge of each triangle repeatedly, until all edges are short or there are enough
+    triangles."""
     done: list[tuple[Array, Array, Indices]] = []
     count = 0
     while len(swells):
@@ -135,7 +137,7 @@ def _cut(corners: Array, swells: Array, links: Indices, edge: float) -> tuple[Ar
 
 
 def surface(fit: Fit, count: int) -> Array:
-    """Points (count, 3), m, evenly on the surface of a capsule, in a spiral."""
+    """Returns points that are evenly spread on the surface of a capsule, (count, 3) m."""
     axis, radius = fit.end - fit.start, float(fit.radius)
     length = float(np.linalg.norm(axis))
     across = np.linalg.svd(axis[None])[2][1:]

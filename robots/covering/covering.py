@@ -1,5 +1,5 @@
-"""Covers the surfaces of a robot with few capsules: the triangles of each body are grouped, and each group
-gets a capsule."""
+"""Covers the surfaces of a robot with few capsules. The triangles of each body are divided into groups, and
+each group gets a capsule."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ PER_BODY = 2.6
 """Largest mean number of capsules per body of a robot."""
 MOST = 6
 """Largest number of capsules of a link, and of a body whose links are treated as one."""
-_LINKS = 4  # of a body: more are not told apart
-_CUTS = (0.25, 0.4, 0.6, 0.75)  # of the extent along a principal axis
-_SMALL = 0.03  # of a usual body's size: one whose cover stands out less gets no more capsules
-_WORK = 2_000_000  # triangles of bodies whose capsules are improved, counted each time
-_FIXED_WORK = 20_000  # of a body with few triangles
-_WORTH = 0.97  # more capsules have to stand out less by this factor
+_LINKS = 4  # if a body has more links than this, all its links are treated as one
+_CUTS = (0.25, 0.4, 0.6, 0.75)  # positions of a cut, as shares of the extent along a principal axis
+_SMALL = 0.03  # share of a usual body's size; a body whose capsules stand out less gets no more of them
+_WORK = 2_000_000  # largest sum of triangles over all improvements
+_FIXED_WORK = 20_000  # number of triangles that is added for each improvement
+_WORTH = 0.97  # largest ratio of the distances after and before an improvement
 
 
 class Cut(NamedTuple):
@@ -39,7 +39,7 @@ class Cut(NamedTuple):
 
 
 class Groups(NamedTuple):
-    """Cuts that make groups, and the distance, m, by which capsules around the groups of the sample stand
+    """Cuts that form groups, and the distance, m, by which capsules around these groups of the sample stand
     out."""
 
     cuts: tuple[Cut, ...]
@@ -59,7 +59,7 @@ class Found(NamedTuple):
 
 
 def grouped(points: Array, cuts: tuple[Cut, ...]) -> Indices:
-    """The group of each point."""
+    """Returns the index of each point's group."""
     group = np.zeros(len(points), np.intp)
     for k, cut in enumerate(cuts):
         group[(group == cut.group) & (points @ cut.axis >= cut.offset)] = k + 1
@@ -67,9 +67,9 @@ def grouped(points: Array, cuts: tuple[Cut, ...]) -> Indices:
 
 
 def covering(surfaces: Iterable[Patch], weights: Mapping[int, float]) -> tuple[Capsule, ...]:
-    """Returns capsules that contain surfaces: each triangle lies wholly in one capsule of its body.
+    """Returns capsules that contain surfaces. Each triangle is completely inside one capsule of its body.
 
-    weights: for each joint the weight of the distance by which its capsules stand out.
+    weights: for each joint, the weight of the distance by which the capsules of its body stand out.
     """
     ordered = sorted(surfaces, key=lambda patch: (patch.joint == 0, patch.joint))
     bodies = [body for _, own in groupby(ordered, lambda patch: patch.joint) for body in _parts(list(own))]
@@ -99,7 +99,7 @@ def covering(surfaces: Iterable[Patch], weights: Mapping[int, float]) -> tuple[C
 
 
 def _parts(surfaces: list[Patch]) -> list[Body]:
-    """The links of a body; all in one if they are many."""
+    """Returns one part per link of a body, or a single part if the body has many links."""
     names = dict.fromkeys(patch.link for patch in surfaces)
     if len(names) > _LINKS:
         return [body_of(surfaces)]
@@ -107,7 +107,7 @@ def _parts(surfaces: list[Patch]) -> list[Body]:
 
 
 def _inside(small: Capsule, large: Capsule) -> bool:
-    """Whether a larger capsule of the same body contains one."""
+    """Whether the first capsule is contained in the second one, which is larger and on the same body."""
     if small.joint != large.joint or small.radius >= large.radius:
         return False
     ends = np.array([small.start, small.end])
@@ -120,8 +120,8 @@ def _extent(capsule: Capsule) -> float:
 
 
 def _with_more(body: Body, before: Found, most: int) -> Found | None:
-    """Returns capsules for up to `most` additional groups that stand out less; None if no capsules stand out
-    less. Ways with the larger reduction per group, measured with the sample, are tried first."""
+    """Returns capsules for up to `most` additional groups, if these capsules stand out less; otherwise None.
+    Divisions with the largest reduction per group, measured with the sample, are tried first."""
     start = body.excess(body.fits(grouped(body.middles, before.cuts)))
     tried = [_divided(body, before, more) for more in range(1, most + 1)]
     ways = [each for each in tried if each is not None]
@@ -131,7 +131,8 @@ def _with_more(body: Body, before: Found, most: int) -> Found | None:
 
 
 def _divided(body: Body, before: Found, more: int) -> Groups | None:
-    """The best of several ways to add a number of groups; None if there is no way."""
+    """Returns the best of several divisions that add a number of groups; None if there is no such
+    division."""
     count = before.groups + more
     ways = [*_refinements(body, before, more), *_slabs(body.middles, count, 0, 0)]
     masks = np.array([grouped(body.middles, way) for way in ways])[:, None, :] == np.arange(count)[:, None]
@@ -147,7 +148,7 @@ def _divided(body: Body, before: Found, more: int) -> Groups | None:
 
 
 def _refinements(body: Body, groups: Found, more: int) -> Iterator[tuple[Cut, ...]]:
-    """Cuts one of the groups into slabs; two slabs may be unequal."""
+    """Yields divisions that cut one of the groups into slabs. If there are two slabs, they may be unequal."""
     labels = grouped(body.middles, groups.cuts)
     for k in range(groups.groups):
         points = body.middles[labels == k]
@@ -160,9 +161,10 @@ def _refinements(body: Body, groups: Found, more: int) -> Iterator[tuple[Cut, ..
 
 
 def _slabs(points: Array, count: int, group: int, last: int) -> Iterator[tuple[Cut, ...]]:
-    """A group is cut by planes at equal distances across a principal axis, or into two rows of such slabs.
+    """Yields the cuts of a group into slabs, by planes at equal distances across an axis, or into two rows of
+    slabs.
 
-    last: the largest number of a group before.
+    last: the largest index of a group before the cuts.
     """
 
     def slices(z: Array, axis: Array, parts: int) -> tuple[Cut, ...]:
@@ -185,14 +187,14 @@ def _slabs(points: Array, count: int, group: int, last: int) -> Iterator[tuple[C
 
 
 def _axes(points: Array) -> list[Array]:
-    """The axes of the joint, and principal axes that differ from them by more than 10°."""
+    """Returns the axes of the joint, and the principal axes that differ from these axes by more than 10°."""
     offset = points - points.mean(axis=0)
     principal = np.linalg.eigh(offset.T @ offset)[1].T
     return [*np.eye(3), *(axis for axis in principal if np.abs(axis).max() < np.cos(np.radians(10.0)))]
 
 
 def _made(body: Body, cuts: tuple[Cut, ...]) -> Found:
-    """Capsules that contain all triangles."""
+    """Returns capsules that contain all triangles of a body."""
     group = grouped(body.corners.mean(axis=1), cuts)
     parts = [group == k for k in np.unique(group)]
     tight = [tight_fit(body.corners[part].reshape(-1, 3), np.repeat(body.swells[part], 3)) for part in parts]

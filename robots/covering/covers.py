@@ -1,4 +1,4 @@
-"""Makes the cover of a robot, and finds the pairs of bodies whose distance is not kept."""
+"""Makes the cover of a robot, and finds the pairs of bodies whose distance is not checked."""
 
 from __future__ import annotations
 
@@ -17,27 +17,30 @@ from robots.per_robot import per_robot
 from robots.robot import Robot
 
 NEAR = 0.01
-"""m: bodies whose capsules are nearer than this at home are left out: a safe distance could not hold."""
+"""Pairs of bodies whose capsules are nearer than this at home, m, are left out: they cannot keep a safe
+distance."""
 USELESS = 0.5
-"""Share of the postures without contact in which two bodies are left out if their capsules touch."""
+"""Two bodies are left out if their capsules touch in more than this share of the postures without contact."""
 
 _TAPER = 0.4
-"""Reduction of the weight of capsules of the base: the weights grow from 0.6 to 1 at a last link."""
+"""Reduction of the weight of the base's capsules. The weights increase from 0.6 at the base to 1 at a last
+link."""
 _CLOSE = 2.5
-"""Factor on the weight of bodies whose capsules, but not their solids, are too near to each other."""
+"""Factor on the weight of bodies if their capsules are too near to each other and their solids are not."""
 
 
 @per_robot
 def made_cover(robot: Robot, meshes: bool = True, tries: int = 1) -> Cover:
     """Makes the cover of a robot from its URDF and its solids.
 
-    A pair is left out if the plant leaves it out, if its capsules are nearer than 10 mm at home, or if its
-    capsules touch in many postures in which the solids do not.
+    A pair is left out in three cases: the plant leaves it out, its capsules are nearer than 10 mm at home, or
+    its capsules touch in many postures in which its solids do not touch.
 
     Args:
-        robot: it has its collision geometry.
+        robot: a robot that has its collision geometry.
         meshes: whether mesh files are read.
-        tries: with 2, bodies whose capsules alone touch get more capsules, if fewer pairs are left out then.
+        tries: with 2, a second cover is tried. It has more capsules on bodies whose capsules touch while
+            their solids do not. The cover that leaves out fewer pairs is returned.
     """
     surfaces = list(patches(robot, meshes))
     supports = robot.model.supports
@@ -55,13 +58,13 @@ def made_cover(robot: Robot, meshes: bool = True, tries: int = 1) -> Cover:
 
 
 def _own_pairs(robot: Robot, cover: Cover) -> tuple[Excluded, ...]:
-    """The pairs that a cover leaves out and the plant does not."""
+    """Returns the pairs that a cover leaves out and the plant does not."""
     known = {(pair.first, pair.second) for pair in robot.collision.excluded}
     return tuple(pair for pair in cover.excluded if (pair.first, pair.second) not in known)
 
 
 def _checked(robot: Robot, capsules: tuple[Capsule, ...]) -> Cover:
-    """The cover with the pairs to leave out."""
+    """Returns the cover with these capsules and the pairs to leave out."""
     solids = tuple(map(as_solid, capsules))
     found = Cover(capsules, collision_model(robot, solids, near_home=NEAR).excluded)
     excluded = (*robot.collision.excluded, *_own_pairs(robot, found))
@@ -85,7 +88,7 @@ def _useless(robot: Robot, covered: Robot) -> list[Excluded]:
 
 
 def as_solid(capsule: Capsule) -> Solid:
-    """A capsule of a cover as a solid of the plant."""
+    """Returns a capsule of a cover as a solid of the plant."""
     start, end = np.array(capsule.start), np.array(capsule.end)
     length = float(np.linalg.norm(end - start))
     x, y, z = (float(value) for value in 0.5 * (start + end))

@@ -20,14 +20,15 @@ class Solid:
     """A convex solid that is fixed to a body of a robot.
 
     Attributes:
-        joint: Pinocchio index of the joint that carries it, 0 for the world.
-        link: the link that it belongs to, for messages.
-        kind: its shape. source: "collision", a collision shape of the URDF; "hull", the convex hull of the
+        joint: Pinocchio index of the joint that carries the solid, 0 for the world.
+        link: the link that the solid belongs to, for messages.
+        kind: the shape. source: "collision", a collision shape of the URDF; "hull", the convex hull of the
             link's visual shapes; "capsule", generated along the kinematics.
         size: m; half the edges of a box, (radius,) of a sphere, (radius, half the length of the straight
             part) of a cylinder or capsule along z, () for a hull.
-        position: its middle in the joint's axes, m. quaternion: its axes there, (w, x, y, z).
-        points: for a hull its corners in the joint's axes, m.
+        position: the middle in the joint's axes, m.
+        quaternion: orientation of the solid relative to the joint's axes, (w, x, y, z).
+        points: for a hull, the corners in the joint's axes, m.
     """
 
     joint: int
@@ -50,7 +51,7 @@ class Excluded:
     - "neighbours": a joint connects them;
     - "home": they touch at home;
     - "always": they touch in nearly every posture;
-    - "hollow": their hulls fill the hollows of the links and touch in postures in which the links do not;
+    - "hollow": their hulls fill hollows of the links, and touch in postures in which the links do not touch;
     - "cover": only their capsules touch, in many postures.
     """
 
@@ -62,14 +63,14 @@ class Excluded:
 
 @dataclass(frozen=True)
 class CollisionModel:
-    """The solids of a robot, in the order of their joints with those of the base last, and the pairs of
-    bodies that never touch. The default is a robot without solids."""
+    """The solids of a robot, in the order of their joints (those of the base come last), and the pairs of
+    bodies whose contact is left out. The default is a robot without solids."""
 
     solids: tuple[Solid, ...] = ()
     excluded: tuple[Excluded, ...] = ()
 
     def __str__(self) -> str:
-        """One line for the import report."""
+        """Returns one line for the import report."""
         if not self.solids:
             return "the robot has no shape: it touches nothing"
         words = {
@@ -94,7 +95,7 @@ _TOLD = (
 
 
 def excluded_pairs(excluded: tuple[Excluded, ...]) -> str:
-    """The end of a sentence of the import report: pairs that are left out, without neighbours."""
+    """Returns the end of a sentence of the import report: the pairs that are left out, except neighbours."""
     text = ""
     for why, said in _TOLD:
         pairs = [" – ".join(pair.names) for pair in excluded if pair.why == why]
@@ -113,7 +114,7 @@ def stored(path: Path) -> CollisionModel:
 
 
 def as_json(model: CollisionModel) -> str:
-    """The text of the file that `stored` reads, one line per solid and pair."""
+    """Returns the text of the file that `stored` reads, with one line per solid and per pair."""
     solids, pairs = ([json.dumps(asdict(each)) for each in some] for some in (model.solids, model.excluded))
     between = ",\n  "
     return f'{{"solids": [\n  {between.join(solids)}],\n"excluded": [\n  {between.join(pairs)}]}}\n'

@@ -12,11 +12,11 @@ from robots.geometry.collision_model import Excluded, Point, excluded_pairs, fro
 
 @dataclass(frozen=True)
 class Capsule:
-    """All points nearer than a radius to a segment; a ball if the segment is a point.
+    """A capsule: all points that are nearer to a segment than a radius; a ball if the segment is a point.
 
     Attributes:
-        joint: Pinocchio index of the joint that carries it, 0 for the world.
-        link: the link that it belongs to, for messages.
+        joint: Pinocchio index of the joint that carries the capsule, 0 for the world.
+        link: the link that the capsule belongs to, for messages.
         start, end: the ends of the segment in the joint's axes, m.
         radius: m.
     """
@@ -30,14 +30,14 @@ class Capsule:
 
 @dataclass(frozen=True)
 class Cover:
-    """The capsules of a robot, in the order of their joints with those of the base last, and the pairs of
-    bodies whose distance is not kept. The default is a robot without capsules."""
+    """The capsules of a robot, in the order of their joints (those of the base come last), and the pairs of
+    bodies whose distance is not checked. The default is a robot without capsules."""
 
     capsules: tuple[Capsule, ...] = ()
     excluded: tuple[Excluded, ...] = ()
 
     def __str__(self) -> str:
-        """One line for the import report."""
+        """Returns one line for the import report."""
         if not self.capsules:
             return "the robot has no capsules: no distance is kept"
         near = sum(pair.why == "neighbours" for pair in self.excluded)
@@ -55,7 +55,7 @@ def stored_cover(path: Path) -> Cover:
 
 
 def cover_as_json(cover: Cover) -> str:
-    """The text of the file that `stored_cover` reads, one line per capsule and pair."""
+    """Returns the text of the file that `stored_cover` reads, with one line per capsule and per pair."""
     capsules, pairs = (
         [json.dumps(asdict(each)) for each in some] for some in (cover.capsules, cover.excluded)
     )

@@ -16,7 +16,7 @@ _TIP_NAMES = re.compile(
 )
 _CANDIDATES = 300
 _STEPS = 60
-_PLAIN = 0.05  # loss of score that is accepted to put a joint at the middle of its range
+_PLAIN = 0.05  # accepted loss of score if a joint is put at the middle of its range
 
 
 def choose_tip(model: pin.Model, frames: dict[str, int]) -> str:
@@ -38,10 +38,11 @@ def find_home(
 ) -> np.ndarray:
     """Returns a configuration (n,), rad, inside the limits and away from singularities and from the limits.
 
-    Maximises log σ_min(J) + log(joint margin) − 0.1‖q − middle‖² over samples and then by random steps, with
-    the linear part of J divided by the reach; deterministic. Joints that do not move the frame are at the
-    middle of their range (unbounded ones at 0). A chain that reaches below the floor (z = 0, or the first
-    joint if lower) gets a lower score, an elbow above the tip a higher one.
+    The configuration maximises log σ_min(J) + log(joint margin) − 0.1‖q − middle‖², first over samples and
+    then by random steps; the linear part of J is divided by the reach. The result is deterministic. Joints
+    that do not move the frame are at the middle of their range (unbounded joints at 0). A chain that reaches
+    below the floor (z = 0, or the height of the first joint if lower) gets a lower score. An elbow above the
+    tip gets a higher score.
     """
     lower, upper = finite_range(q_lower, q_upper)
     middle, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
@@ -100,10 +101,10 @@ def find_home(
 def sensible_a_max(
     model: pin.Model, q_lower: np.ndarray, q_upper: np.ndarray, tau_limit: np.ndarray
 ) -> np.ndarray:
-    """Returns half the acceleration (n,), rad/s², that each joint's torque allows after gravity, within [1,
-    15].
+    """Returns acceleration limits (n,), rad/s², within [1, 15]: half the acceleration that each joint's
+    torque allows in addition to gravity.
 
-    a_i = ½ min over samples of (τ_i − |g_i|)/M_ii: the other half is for coupling and tracking.
+    a_i = ½ min over samples of (τ_i − |g_i|)/M_ii. The other half remains for coupling and tracking.
     """
     data = model.createData()
     accelerations = []

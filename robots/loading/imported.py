@@ -1,4 +1,4 @@
-"""Gives an imported robot its collision geometry and its cover, and lines about them in the report."""
+"""Adds collision geometry and cover to an imported robot, and notes about them to its report."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from robots.shapes.collision_shapes import collision_solids
 def with_collision(robot: Robot, meshes: bool = True) -> Robot:
     """Returns the robot with its collision geometry.
 
-    meshes: whether mesh files are read; without them their bodies become capsules. Shapes that MuJoCo
-    cannot use are all left out, and the report says so, and why a robot has no floor.
+    meshes: whether mesh files are read; otherwise capsules replace bodies with meshes. If MuJoCo cannot use
+    the shapes, all shapes are left out. The report notes this. It also notes why a robot has no floor.
     """
     try:
         found = collision_model(robot, collision_solids(robot, meshes))
@@ -32,10 +32,10 @@ def with_collision(robot: Robot, meshes: bool = True) -> Robot:
 
 
 def with_cover(robot: Robot, meshes: bool = True) -> Robot:
-    """Returns a robot that has its collision geometry with the capsules that distances use.
+    """Returns a robot with the capsules that distances use. The robot must have its collision geometry.
 
-    meshes: whether mesh files are read. A robot whose numbers no capsule can contain has none, and the report
-    says so.
+    meshes: whether mesh files are read. If capsules cannot contain the robot, it gets none, and the report
+    notes this.
     """
     try:
         found = made_cover(robot, meshes)
@@ -46,7 +46,7 @@ def with_cover(robot: Robot, meshes: bool = True) -> Robot:
 
 
 def with_geometry(robot: Robot, meshes: bool = True) -> Robot:
-    """Both."""
+    """Returns the robot with its collision geometry and its capsules."""
     return with_cover(with_collision(robot, meshes), meshes)
 
 

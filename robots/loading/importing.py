@@ -19,7 +19,7 @@ from robots.report import Finding, ImportReport
 from robots.robot import Robot
 from robots.urdf import UNBOUNDED, Canonical, canonicalise
 
-_TRIAL = 5  # periods of 1 ms
+_TRIAL = 5  # number of periods of 1 ms
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Import:
     robot: Robot | None = None
 
     def used(self) -> Robot:
-        """The robot. Raises InputError with the first reason when the description cannot be used."""
+        """Returns the robot. Raises InputError with the first reason if the description cannot be used."""
         if self.robot is not None:
             return self.robot
         source, refused = self.report.source, [*self.report.of_kind("refused")]
@@ -51,7 +51,7 @@ def import_robot(
     Args:
         data: the document.
         source: name of the document in messages.
-        folder: folder that its mesh paths are relative to; None: only meshes of installed packages are used.
+        folder: folder to which mesh paths are relative; None: only meshes of installed packages are used.
         tip: default end-effector frame; None: the end of the longest chain.
         within: folder that must contain all other meshes; None: meshes may be anywhere.
 
@@ -78,7 +78,7 @@ def bounds(model: pin.Model) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _robot(canonical: Canonical, tip: str | None) -> Robot | None:
-    """Builds the robot from a canonical description; None if the mass matrix is singular."""
+    """Returns the robot of a canonical description, or None if the mass matrix is singular."""
     model = canonical.model
     lower, upper = bounds(model)
     frames = {f.name: i for i, f in enumerate(model.frames) if f.type == pin.FrameType.BODY}
@@ -109,7 +109,7 @@ def _robot(canonical: Canonical, tip: str | None) -> Robot | None:
 
 
 def _trial(robot: Robot) -> str | None:
-    """Simulates the robot briefly and returns the problem that makes this impossible, or None."""
+    """Simulates the robot briefly. Returns the problem if a simulation is impossible; otherwise None."""
     try:
         plant = Plant(robot)
         for _ in range(_TRIAL):

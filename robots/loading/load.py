@@ -21,17 +21,18 @@ from robots.report import Finding, ImportReport
 from robots.robot import Robot
 from robots.urdf import canonicalise, load_bytes
 
-_SHORT = 200_000  # bytes: the robots of the last four files up to this size are kept
+_SHORT = 200_000  # bytes; the robots of the last four files up to this size stay in memory
 
 
 def load_robot(name_or_path: str | Path, tip: str | None = None, within: Path | None = None) -> Robot:
-    """Returns the robot with this catalog name, or the one that a URDF file describes.
+    """Returns the robot with this catalog name, or the robot that a URDF file describes.
 
-    tip: its default end-effector frame; None: the catalog's, or the end of the longest chain.
-    within: a folder, without symbolic links, that must contain the URDF file and its meshes (installed meshes
-    excepted); None: they may be anywhere.
-    Raises InputError, one sentence that says what to do, for an unknown name, a missing file, a
-    description that cannot be used, or an unknown tip.
+    tip: the default end-effector frame; None: the tip of the catalog, or the end of the longest chain.
+    within: a folder, given without symbolic links. It must contain the URDF file and its meshes, except
+    installed meshes. None: files may be anywhere.
+
+    Raises InputError for an unknown name, a missing file, a description that cannot be used, or an unknown
+    tip. The message is one sentence that tells the user what to do.
     """
     text = str(name_or_path)
     if text in CATALOG:
@@ -46,9 +47,10 @@ def load_robot(name_or_path: str | Path, tip: str | None = None, within: Path | 
 
 
 def load_urdf_text(text: str, tip: str | None = None) -> Robot:
-    """Returns the robot that a URDF string describes: an upload, or a canonical text that was stored.
+    """Returns the robot that a URDF string describes: an upload, or a stored canonical text.
 
-    The only files that the description can use are the meshes of installed packages, by `package://`.
+    The description can use the meshes of installed packages, by `package://`, and no other files.
+
     Raises InputError like `load_robot`.
     """
     return _import(text.encode(errors="replace"), "the URDF text", None, tip).used()
@@ -69,7 +71,7 @@ def _import_file(path: Path, tip: str | None, within: Path | None = None) -> Imp
 def _import(
     data: bytes, source: str, folder: Path | None, tip: str | None, within: Path | None = None
 ) -> Import:
-    # A file without meshes gives the same robot each time; the process that reads it takes 1.8 s of a core.
+    # A file without meshes always results in the same robot. The process that reads it uses a core for 1.8 s.
     keeps = folder is not None and len(data) < _SHORT and b"mesh" not in data
     try:
         found = (_kept if keeps else _read_apart)(data, source, folder, tip, within)

@@ -1,8 +1,8 @@
 """Writes the collision geometry and the cover of the robots of the catalog, from their meshes: python -m
 robots.loading.write
 
-It takes about a minute and needs the extra `meshes`. Stored geometry makes contacts and distances the same
-with and without that extra, and a robot loads in milliseconds."""
+The program takes about a minute and needs the extra `meshes`. With the stored geometry, contacts and
+distances are the same with and without this extra, and a robot loads in milliseconds."""
 
 from __future__ import annotations
 

@@ -14,9 +14,9 @@ from robots.world import World
 
 
 class Touch(NamedTuple):
-    """The contacts of a robot during a step of the plant, with itself or with objects. depth: m, the deepest
-    penetration. force: N, the largest force between two links, or a link and an object. Both are the largest
-    values at the last stages of all internal steps, and 0 without a contact.
+    """The contacts of a robot with itself or with objects during a step of the plant. depth: m, the deepest
+    penetration. force: N, the largest force between two links, or between a link and an object. The largest
+    values at the last stages of all internal steps are used; they are 0 without a contact.
     """
 
     depth: float = 0.0
@@ -25,8 +25,8 @@ class Touch(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """One point of contact: the names of two links, or of an object and a link; position (3,) m in the world;
-    force (3,) N on the second one, world axes; depth m."""
+    """One point of contact: the names of two links, or of an object and a link; the position in the world,
+    (3,) m; the force on the second link in world axes, (3,) N; and the depth, m."""
 
     between: tuple[str, str]
     position: np.ndarray
@@ -35,8 +35,8 @@ class Contact:
 
 
 def contacts(model: mujoco.MjModel, data: mujoco.MjData, robot: Robot, world: World) -> tuple[Contact, ...]:
-    """Returns the points at which the robot touches itself or an object. data: with accelerations, which
-    determine the forces. Contacts of objects with each other are left out."""
+    """Returns the points at which the robot touches itself or an object. `data` must contain the
+    accelerations, which determine the forces. Contacts between objects are left out."""
     own, found = len(robot.collision.solids), []
     force = np.zeros(6)
     for index in range(data.ncon):
@@ -54,8 +54,8 @@ def contacts(model: mujoco.MjModel, data: mujoco.MjData, robot: Robot, world: Wo
 
 
 def touch_of(model: mujoco.MjModel, data: mujoco.MjData, robot: Robot) -> Touch:
-    """Returns the deepest penetration, and the largest force between two things, the sum over their
-    points."""
+    """Returns the deepest penetration, and the largest force between two bodies. The force is the sum over
+    all points of contact of the two bodies."""
     own, depth = len(robot.collision.solids), 0.0
     forces: dict[tuple[int, int], list[np.ndarray]] = {}
     every, found = np.zeros((data.ncon, 6)), data.contact

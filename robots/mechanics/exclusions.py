@@ -18,11 +18,11 @@ from robots.robot import Robot
 from robots.settings import PlantSettings
 
 NEAR = 2e-3
-"""m: bodies that are nearer than this at home count as touching there."""
+"""Two bodies that are nearer than this at home, m, count as touching there."""
 SAMPLES = 300
 Bodies = tuple[int, int]
 OFTEN = 0.9
-"""Share of random postures in which a pair touches that is always excluded."""
+"""A pair is excluded if it touches in more than this share of random postures."""
 
 
 def collision_model(
@@ -59,20 +59,20 @@ def collision_model(
 
 
 def touching(robot: Robot, q: np.ndarray, margin: float = 0.0) -> set[Bodies]:
-    """Returns the pairs of bodies, excluded ones left out, that are nearer than a margin (m) at q (n,),
-    rad; 0 is the base."""
+    """Returns the pairs of bodies, except excluded pairs, that are nearer than a margin (m) at q (n,), rad.
+    The base has the index 0."""
     return next(_touches(robot, np.array([q]), margin))
 
 
 def touching_often(robot: Robot) -> list[set[Bodies]]:
-    """Returns the pairs of bodies, excluded ones left out, that touch in each of 300 random postures within
-    the joints' limits."""
+    """Returns, for each of 300 random postures within the joints' limits, the pairs of bodies that touch,
+    except excluded pairs."""
     lower, upper = np.maximum(robot.q_lower, -np.pi), np.minimum(robot.q_upper, np.pi)
     return list(_touches(robot, sample_configurations(lower, upper, SAMPLES, 0)))
 
 
 def _touches(robot: Robot, postures: np.ndarray, margin: float = 0.0) -> Iterator[set[Bodies]]:
-    # Both solids have the margin, and MuJoCo adds them.
+    # Each solid has half the margin: MuJoCo adds the margins of both solids.
     model = compiled(robot, PlantSettings(contacts=True), margin=0.5 * margin)
     data = mujoco.MjData(model)
     joints = [solid.joint for solid in robot.collision.solids]
@@ -84,8 +84,8 @@ def _touches(robot: Robot, postures: np.ndarray, margin: float = 0.0) -> Iterato
 
 
 def lowest(robot: Robot) -> tuple[float | None, float | None]:
-    """Heights, m, of the lowest points at home: of the base or the mobile base, and of all other bodies; None
-    without a solid."""
+    """Returns two heights at home, m: of the lowest point of the fixed or mobile base, and of the lowest
+    point of all other bodies. A height is None if there is no solid."""
     model = compiled(robot, PlantSettings(contacts=True))
     data = mujoco.MjData(model)
     data.qpos[:] = robot.home
@@ -99,7 +99,7 @@ def lowest(robot: Robot) -> tuple[float | None, float | None]:
 
 
 def _bottom(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> float:
-    """Height of the lowest point of the box around a geometry, m."""
+    """Returns the height of the lowest point of a geometry, or of the box around it, m."""
     R = data.geom_xmat[geom].reshape(3, 3)
     middle, half = model.geom_aabb[geom, :3], model.geom_aabb[geom, 3:]
     if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH:

@@ -14,8 +14,9 @@ from robots.settings import PlantSettings
 from robots.truth import inertial, joint_axis, pose, true_model
 from robots.world import Ball, Box, Floor, Post, Thing, World
 
-# MuJoCo models friction as a spring-damper. Its default lets a stuck light joint slide at tenths of
-# rad/s; this is the stiffest setting RK4 still integrates quietly, and creep falls by four decades.
+# MuJoCo models friction as a spring-damper. With the default parameters, a light joint that sticks slides at
+# tenths of rad/s. These are the stiffest parameters that RK4 integrates without oscillations; they reduce the
+# sliding by a factor of ten thousand.
 _STICTION_SOLREF = (0.002, 1.0)
 _STICTION_SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 CONTACT_SOLREF = (0.004, 1.0)
@@ -35,15 +36,18 @@ def compiled(
     also: tuple[Excluded, ...] = (),
     margin: float = 0.0,
 ) -> mujoco.MjModel:
-    """Returns the model: body i carries joint i of Pinocchio's tree, site k is its frame k.
+    """Returns MuJoCo's model. Body i carries joint i of Pinocchio's tree, and site k is frame k of this tree.
 
-    With contacts, geometry k is solid k of the robot; one body for what is fixed to the world, and one for
-    each object of the world, follow the robot's bodies, and the joints of free objects follow the robot's.
+    With contacts, geometry k is solid k of the robot. The robot's bodies are followed by one body for all
+    solids that are fixed to the world, and by one body for each object of the world. The joints of free
+    objects follow the robot's joints.
 
     Args:
-        robot, settings, world: what to model; the world counts with contacts only.
-        also: pairs of bodies, besides those of the robot's own list, that do not touch.
-        margin: m, the distance below which two solids count as touching.
+        robot, settings, world: the modelled robot, plant settings and world; the world is used with contacts
+            only.
+        also: pairs of bodies that do not touch, in addition to the robot's own list.
+        margin: m, margin of each solid; two solids count as touching if they are nearer than the sum of their
+            margins.
 
     Raises InputError for a per-joint list of the wrong length, and for free objects with a changed diagonal.
     """
@@ -55,7 +59,8 @@ def compiled(
     spec.compiler.degree = False
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
     spec.option.gravity = truth.gravity.linear
-    # Without this MuJoCo silently restarts a diverging simulation; we want to see it diverge.
+    # By default MuJoCo restarts a diverging simulation without a message; here the divergence must be
+    # visible.
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     if not settings.contacts:
         spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
@@ -110,7 +115,7 @@ def _body(joint: int) -> str:
 
 
 def _stop(joint: mujoco.MjsJoint, lower: float, upper: float) -> None:
-    """Limits a joint that has a limit; MuJoCo knows limits on both sides only."""
+    """Sets the limits of a joint that has one. In MuJoCo a joint has either two limits or no limits."""
     if np.isfinite(lower) or np.isfinite(upper):
         joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
         joint.range = (max(lower, -_FAR), min(upper, _FAR))
@@ -146,14 +151,15 @@ _TYPES = {
 
 
 def _friction(sliding: float) -> tuple[float, float, float]:
-    """Sliding, torsion (m) and rolling (m) with MuJoCo's defaults for the last two."""
+    """Returns the coefficients of sliding, torsional (m) and rolling (m) friction. The last two are MuJoCo's
+    defaults."""
     return sliding, 0.005, 0.0001
 
 
 def _add_world(spec: mujoco.MjSpec, robot: Robot, world: World, altered: bool) -> None:
     if altered and any(thing.free for thing in world):
         raise InputError(
-            "plant.diagonal_scale and plant.contacts do not go together in a scene with free objects: "
+            "plant.diagonal_scale and plant.contacts cannot be combined in a scene with free objects: "
             "set one of them to its default, 1 or false."
         )
     standing = base_joint(robot)
@@ -173,7 +179,7 @@ def _add_world(spec: mujoco.MjSpec, robot: Robot, world: World, altered: bool) -
 
 
 def _shape(thing: Thing) -> tuple[mujoco.mjtGeom, tuple[float, ...]]:
-    """MuJoCo's type, and its size."""
+    """Returns the type and the size of an object's geometry in MuJoCo."""
     match thing.shape:
         case Ball(_, _, radius):
             return mujoco.mjtGeom.mjGEOM_SPHERE, (radius, 0.0, 0.0)
@@ -186,7 +192,7 @@ def _shape(thing: Thing) -> tuple[mujoco.mjtGeom, tuple[float, ...]]:
 
 
 def _gyration(thing: Thing) -> tuple[float, float, float]:
-    """Squares of the radii of gyration of a homogeneous body, m²."""
+    """Returns the squares of the radii of gyration of a homogeneous body, m²."""
     match thing.shape:
         case Ball(_, _, radius):
             same = 0.4 * radius**2
@@ -201,6 +207,6 @@ def _gyration(thing: Thing) -> tuple[float, float, float]:
 
 
 def label(robot: Robot, world: World, geom: int) -> str:
-    """Name of the link or object to which a geometry of the model belongs."""
+    """Returns the name of the link or object to which a geometry of the model belongs."""
     solids: tuple[Solid, ...] = robot.collision.solids
     return solids[geom].link if geom < len(solids) else world[geom - len(solids)].shape.name

@@ -1,4 +1,4 @@
-"""The plant's mechanics as a file that MuJoCo's C library reads."""
+"""Saves the plant's mechanics as a file that MuJoCo's C library reads."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ def saved(robot: Robot, settings: PlantSettings, world: World, timestep: float) 
     """Returns the content of an MJB file, for this version of MuJoCo.
 
     Args:
-        robot, settings, world: as for `robots.Plant`. Delay and lag of the motors, encoders and saturation
-            are not part of it.
+        robot, settings, world: as for `robots.Plant`. The file contains neither delay, lag and saturation of
+            the motors nor the encoders.
         timestep: s.
     """
     model = compiled(robot, settings, world)

@@ -1,1 +1,1 @@
-"""The mesh files that a description names: their places and their triangles."""
+"""The mesh files that a description names: finds them and reads their triangles."""

@@ -16,16 +16,15 @@ from lxml.etree import _Element as Element
 from robots.errors import shortened
 from robots.report import Finding
 
-# rtb-data keeps packages under other folder names than their `package://` name.
+# In rtb-data, the folders of some packages have other names than the packages.
 _RENAMED = {"kuka_lbr_iiwa_support": "kuka_description/kuka_lbr_iiwa"}
 
 
 def localise(root: Element, folder: Path | None, within: Path | None = None) -> Iterator[Finding]:
-    """Removes every shape whose mesh is not found and yields a note about it; the link is then drawn as
-    capsules.
+    """Removes every shape whose mesh is not found, and yields a note. The link is then drawn as capsules.
 
-    A mesh of an installed package keeps its `package://` name, any other gets its absolute path. within:
-    folder that must contain all other meshes; None: they may be anywhere.
+    The name of a mesh in an installed package stays a `package://` name; all other names become absolute
+    paths. within: folder that must contain all meshes that are not installed; None: they may be anywhere.
     """
     missing: dict[str, int] = {}
     for link in root.findall("link"):
@@ -51,13 +50,13 @@ def localise(root: Element, folder: Path | None, within: Path | None = None) -> 
 
 
 def has_meshes(text: str) -> bool:
-    """Whether a canonical URDF names mesh files, whose reading takes time."""
+    """Whether a canonical URDF names mesh files; it takes time to read them."""
     return next(etree.fromstring(text.encode()).iterfind("link/*/geometry/mesh"), None) is not None
 
 
 def installed_mesh(uri: str) -> Path | None:
     """Returns the file of an installed package that a `package://` URI names, or None. Uploaded descriptions
-    can use no other files."""
+    can use only these files."""
     parts = _package_parts(uri)
     if parts is None:
         return None
@@ -65,10 +64,11 @@ def installed_mesh(uri: str) -> Path | None:
 
 
 def find_mesh(uri: str, folder: Path) -> Path | None:
-    """Returns the file that a mesh URI names in a URDF of the machine's owner, or None.
+    """Returns the file that a mesh URI names in a local URDF file, or None.
 
-    Plain paths and `file://` are relative to `folder`. `package://pkg/rest` is looked up in the ancestors of
-    `folder`, the ROS package path and the installed packages; nothing is downloaded.
+    Plain paths and `file://` paths are relative to `folder`. A `package://pkg/rest` URI is searched for in
+    the parent folders of `folder`, in the ROS package path and in the installed packages. Nothing is
+    downloaded.
     """
     if not uri.strip() or "\0" in uri:
         return None
@@ -84,8 +84,8 @@ def find_mesh(uri: str, folder: Path) -> Path | None:
 
 
 def _package_parts(uri: str) -> tuple[str, str] | None:
-    """Returns (package, path inside it) of a `package://` URI that stays inside its package; None for any
-    other URI."""
+    """Returns the package and the path inside the package for a `package://` URI whose path stays inside;
+    None for any other URI."""
     scheme, separator, rest = uri.partition("://")
     package, _, path = rest.partition("/")
     if scheme not in ("package", "model") or not separator or "\0" in rest or "\\" in rest:
@@ -117,7 +117,8 @@ def _installed(package: str) -> Iterator[Path]:
 
 @cache
 def installed_shares() -> tuple[Path, ...]:
-    """Folders of the installed mesh packages (example-robot-data, rtb-data) that hold robot packages."""
+    """Returns the folders with robot packages in the installed mesh packages (example-robot-data,
+    rtb-data)."""
     places = [Path(entry) for entry in (*site.getsitepackages(), *sys.path) if entry]
     found: dict[Path, None] = {}
     for place in places:

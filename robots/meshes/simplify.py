@@ -6,11 +6,12 @@ import numpy as np
 
 
 def simplify(vertices: np.ndarray, faces: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
-    """Returns (vertices, faces) with at most about `most` faces; they are unchanged if there are few enough.
+    """Returns (vertices, faces) with at most about `most` faces. A mesh that already has few enough faces is
+    returned unchanged.
 
-    Vertices in one cell of a grid move to their mean. Vertices whose normals point to different sides stay
-    separate, so creases are kept, but have the same position, so no gap opens. The cell grows until it is
-    coarse enough.
+    All vertices in one cell of a grid move to their mean position. Vertices whose normals point to different
+    sides stay separate, so edges stay sharp, but have the same position, so no gap opens. The size of the
+    cells is increased until the mesh has few enough faces.
     """
     if len(faces) <= most:
         return vertices, faces
@@ -52,7 +53,7 @@ def _cluster(
 
 
 def _labels(rows: np.ndarray) -> np.ndarray:
-    """Returns a number per row, equal for equal rows of integers."""
+    """Returns one number per row of integers. Equal rows have equal numbers."""
     shifted = rows - rows.min(axis=0)
     spans = shifted.max(axis=0) + 1
     codes = np.zeros(len(rows), dtype=np.int64)

@@ -15,13 +15,13 @@ from robots.meshes.files import installed_mesh
 from robots.meshes.simplify import simplify
 from robots.processes.isolation import DEADLINE, Fault, isolated
 
-MAX_FACES = 12_000  # faces per mesh: a browser on a laptop still rotates several robots smoothly
+MAX_FACES = 12_000  # faces per mesh; with this number, a laptop's browser rotates several robots smoothly
 MAX_BYTES = 100_000_000
 _FORMATS = (".stl", ".dae", ".obj", ".ply", ".glb", ".gltf", ".off")
-_BRIGHTEST = 238  # pure white loses all shading under the page's lights
+_BRIGHTEST = 238  # pure white would show no shading under the page's lights
 Colour = tuple[int, int, int]
 Piece = tuple[Colour | None, np.ndarray, np.ndarray]
-"""(colour or None, vertices (V, 3) m, faces (F, 3))."""
+"""A piece of a mesh: (colour or None, vertices (V, 3) m, faces (F, 3))."""
 
 
 def mesh_pieces(uris: Iterable[str]) -> dict[str, tuple[Piece, ...]]:
@@ -42,7 +42,7 @@ def mesh_pieces(uris: Iterable[str]) -> dict[str, tuple[Piece, ...]]:
 
 
 def read_meshes(paths: tuple[str, ...]) -> dict[str, tuple[Piece, ...]]:
-    """Returns the pieces of the files that can be read before the deadline of isolated work."""
+    """Returns the pieces of all files that can be read within the time limit of isolated work."""
     end = time.monotonic() + 0.7 * DEADLINE
     found: dict[str, tuple[Piece, ...]] = {}
     for path in paths:
@@ -76,7 +76,7 @@ def read_mesh(path: Path) -> tuple[Piece, ...]:
 
 
 def joined(parts: list[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
-    """Joins several surfaces to one (vertices, faces)."""
+    """Joins several surfaces into one (vertices, faces)."""
     offsets = np.cumsum([0, *(len(vertices) for vertices, _ in parts)])
     vertices = np.concatenate([vertices for vertices, _ in parts])
     return vertices, np.concatenate(
@@ -85,7 +85,8 @@ def joined(parts: list[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.n
 
 
 def split_creases(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Gives each side of a sharp edge its own vertices, by grouping a vertex' faces by direction."""
+    """Returns a mesh in which each side of a sharp edge has its own vertices. The faces of a vertex are
+    grouped by direction."""
     corners = vertices[faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True) + 1e-30
@@ -96,7 +97,7 @@ def split_creases(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, 
 
 
 def limited(colour: np.ndarray) -> Colour | None:
-    """Returns the colour (3,), 0–255, that the page shows for a given one."""
+    """Returns the colour that the page shows for a colour of a mesh, (3,), 0–255."""
     if colour.shape != (3,) or not np.all(np.isfinite(colour)):
         return None
     red, green, blue = (int(c) for c in np.clip(np.round(colour), 0, _BRIGHTEST))

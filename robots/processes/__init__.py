@@ -1,1 +1,1 @@
-"""Child processes: limits on their time and memory, and how they and their descendants are ended."""
+"""Child processes: limits their time and memory, and ends them and their descendants."""

@@ -1,4 +1,4 @@
-"""A process and its descendants: their common memory and computing time, and how they are ended together."""
+"""A process and its descendants: measures their total memory and computing time, and ends them together."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ def family(pid: int) -> list[psutil.Process]:
 
 
 def has_ended(pid: int, within: float) -> bool:
-    """Returns whether a child that has not been waited for ends within some seconds."""
+    """Waits up to `within` seconds and returns whether a child process has ended. `wait` must not have been
+    called for this child."""
     end = time.monotonic() + within
     while True:
         try:
@@ -34,8 +35,8 @@ def has_ended(pid: int, within: float) -> bool:
 
 
 def spent(pid: int) -> tuple[float, bool]:
-    """Returns the seconds of CPU time that a process has used in all its threads, and whether it is idle: it
-    neither computes nor waits for a core."""
+    """Returns the CPU time, s, of all threads of a process, and whether the process is idle: it neither
+    computes nor waits for a core."""
     try:
         process = psutil.Process(pid)
         times = process.cpu_times()
@@ -45,8 +46,7 @@ def spent(pid: int) -> tuple[float, bool]:
 
 
 def memory_of(pid: int) -> int:
-    """Returns the bytes that a process and its descendants use; pages that they share count once per
-    process."""
+    """Returns the memory, in bytes, of a process and its descendants. Shared pages count once per process."""
     found = 0
     for each in family(pid):
         with suppress(psutil.Error):
@@ -58,9 +58,9 @@ def end_family(pid: int, mark: tuple[str, str] | None = None) -> bool:
     """Ends a process, all its descendants, and its process group if it leads one.
 
     Args:
-        pid: process id. The process may have ended, but it must not have been waited for.
-        mark: an environment variable of the process with a unique value: every process that has this value is
-            ended too, whatever its group or parent is.
+        pid: process id. The process may have ended, but `wait` must not have been called for it.
+        mark: name and unique value of an environment variable. All processes with this variable and value are
+            ended too, whatever their group or parent is.
 
     Returns:
         whether there were other processes than the process itself.
@@ -92,7 +92,8 @@ def _alive(group: int) -> list[psutil.Process]:
 
 
 def _end_marked(mark: tuple[str, str] | None) -> bool:
-    """Ends the processes that have an environment variable with this value until none is left."""
+    """Ends all processes that have an environment variable with this value, until none of them is left.
+    Returns whether there were any."""
     any_found = False
     for _ in range(100 if mark else 0):
         found = []

@@ -19,7 +19,7 @@ from typing import NoReturn, TypeVar, final
 
 from robots.errors import InputError, shortened
 
-DEADLINE = 10.0  # s, the start of the process included
+DEADLINE = 10.0  # time limit, s, including the start of the process
 MEMORY = 1_000_000_000  # bytes of address space
 
 _T = TypeVar("_T")
@@ -33,12 +33,12 @@ class Allowance:
     """The time and memory that isolated work may use, and the words for its error message.
 
     Attributes:
-        seconds: time limit, the start of the process included. Waiting for a core on a busy machine does not
-            count, up to `PATIENCE` times this limit in all.
-        memory: bytes of address space.
+        seconds: time limit, including the start of the process. The time in which the process waits for a
+            core does not count, but the total time is at most `PATIENCE` times this limit.
+        memory: largest address space in bytes.
         doing: the beginning of the error message.
         ended: the part of the error message that says how the process ended; "(why)" follows it.
-        hint: what the user can do about it.
+        hint: advice for the user.
     """
 
     seconds: float
@@ -64,7 +64,8 @@ class Allowance:
 
 
 class Fault(Exception):
-    """Isolated work did not finish. The message is the end of a sentence that says why."""
+    """Raised if isolated work did not finish. The message is the end of a sentence that describes the
+    problem."""
 
 
 def isolated(
@@ -79,8 +80,8 @@ def isolated(
         function: a function of a module; the function, its arguments and its result must be picklable.
         args: arguments of the function.
         within: limits of time and memory; DEADLINE and MEMORY by default.
-        copied: whether the process may start as a copy of this one (a fork), where the system allows it:
-            modules imported here are then available at once, and count against the limit of memory.
+        copied: whether the process may start as a copy of this one (a fork), if the system allows this.
+            Modules that are imported here are then available at once, and count towards the limit of memory.
 
     Raises:
         InputError: raised by the function.
@@ -113,8 +114,8 @@ def threads() -> int:
 
 
 def _copies() -> bool:
-    """Returns whether a fork is safe here. Libraries of other systems fail after a fork, and a forked process
-    blocks if another thread holds a lock."""
+    """Returns whether a fork is safe: on Linux, and with a single thread. On other systems, libraries fail
+    after a fork. A forked process blocks if another thread holds a lock."""
     return sys.platform == "linux" and hasattr(os, "pidfd_open") and threads() == 1
 
 
@@ -123,7 +124,7 @@ def _empty(within: Allowance) -> subprocess.Popen[bytes]:
     environment = {
         **os.environ,
         "PYTHONPATH": os.pathsep.join(dict.fromkeys((folder, *filter(None, sys.path)))),
-        # Each thread of a matrix library reserves memory that counts against the limit.
+        # Each thread of a matrix library reserves memory, which counts towards the limit.
         "OPENBLAS_NUM_THREADS": "1",
         "OMP_NUM_THREADS": "1",
     }
@@ -139,7 +140,8 @@ def _empty(within: Allowance) -> subprocess.Popen[bytes]:
 
 @final
 class _Copy:
-    """A fork of this process that answers one request. It has the methods of Popen that are needed here."""
+    """A fork of this process that answers one request. It has those methods of Popen that this module
+    uses."""
 
     def __init__(self, request: bytes, within: Allowance) -> None:
         self.returncode = 1
@@ -182,11 +184,12 @@ def _be_a_copy(request: bytes, within: Allowance, parent: int, out: int) -> NoRe
 
 
 def _let_go(out: int) -> None:
-    """Closes all file descriptors of the copied process except one, and discards what is printed."""
+    """Closes all file descriptors of the copied process except one, and discards everything that is
+    printed."""
     nowhere = os.open(os.devnull, os.O_RDWR)
     for number in range(3):
         os.dup2(nowhere, number)
-    # Only open descriptors are closed: in containers the highest number may be a billion.
+    # Only open descriptors are closed: in containers the highest possible number may be a billion.
     for number in map(int, os.listdir("/proc/self/fd")):
         if number > 2 and number != out:
             with suppress(OSError):  # the descriptor of the listing itself is closed already
@@ -197,7 +200,7 @@ def _let_go(out: int) -> None:
 
 
 def _answer_of(child: subprocess.Popen[bytes] | _Copy, request: bytes | None, seconds: float) -> bytes:
-    """Returns the output of the process. Raises TimeoutExpired after the seconds that `Allowance` grants."""
+    """Returns the output of the process. Raises TimeoutExpired at the time limit, see `Allowance.seconds`."""
     began, longest, more = time.monotonic(), PATIENCE * seconds, seconds
     while True:
         try:
@@ -211,7 +214,8 @@ def _answer_of(child: subprocess.Popen[bytes] | _Copy, request: bytes | None, se
 
 
 def waited(pid: int) -> float:
-    """Returns the seconds that a process was ready to run and had no core (Linux; 0 elsewhere)."""
+    """Returns the time, s, in which a process was ready to run but had no core (Linux; 0 on other
+    systems)."""
     try:
         return int(Path(f"/proc/{pid}/schedstat").read_text().split()[1]) * 1e-9
     except (OSError, ValueError, IndexError):
@@ -219,7 +223,7 @@ def waited(pid: int) -> float:
 
 
 def is_stopped(pid: int) -> bool:
-    """Returns whether a process is stopped by SIGSTOP or a debugger (Linux; False elsewhere)."""
+    """Returns whether a process is stopped by SIGSTOP or a debugger (Linux; False on other systems)."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(") ")[2][:1] in ("T", "t")
     except OSError:
@@ -227,11 +231,11 @@ def is_stopped(pid: int) -> bool:
 
 
 def serve() -> None:
-    """Main function of the child: it reads one request from standard input and writes one answer to standard
-    output."""
+    """Main function of the child process: reads one request from standard input and writes one answer to
+    standard output."""
     within = Allowance(float(sys.argv[2]), int(sys.argv[3]))
     _restrict(within, int(sys.argv[1]))
-    # Compiled libraries may print to standard output, and this must not get into the answer.
+    # Compiled libraries may print to standard output; their text must not become part of the answer.
     with os.fdopen(os.dup(1), "wb") as out:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         answer = _answer(sys.stdin.buffer.read(), within)
@@ -239,7 +243,7 @@ def serve() -> None:
 
 
 def _answer(request: bytes, within: Allowance) -> bytes:
-    """Returns the pickled tuple (result, fault, refusal); fault and refusal are None if the work
+    """Returns the pickled tuple (result, fault, refusal). Fault and refusal are None if the work
     succeeded."""
     try:
         function, args = pickle.loads(request)
@@ -249,15 +253,15 @@ def _answer(request: bytes, within: Allowance) -> bytes:
     except MemoryError:
         fault = within.too_much
     except RecursionError:
-        fault = "it is nested too deeply; give a flatter one"
+        fault = "it is nested too deeply; give a file with fewer nested elements"
     except Exception as error:
         fault = f"the import failed on it ({type(error).__name__}: {shortened(str(error), 100)})"
     return pickle.dumps((None, fault, None))
 
 
 def _restrict(within: Allowance, parent: int) -> None:
-    """Makes this process end with its parent, at the deadline and at the limit of memory, if the system
-    supports this."""
+    """Makes this process end with its parent, at the largest wall time and at the limit of memory, if the
+    system supports this."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent notices this and ends the process
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
     signal.alarm(int(PATIENCE * within.seconds) + 1)

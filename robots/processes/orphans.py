@@ -16,7 +16,7 @@ def end_with(pipe: int, group: bool = False) -> None:
 
     Args:
         pipe: the end to read from. Nothing may be written to the other end.
-        group: whether the rest of the process group ends too.
+        group: whether all other processes of the group end too.
     """
     try:
         import fcntl
@@ -25,7 +25,8 @@ def end_with(pipe: int, group: bool = False) -> None:
         fcntl.fcntl(pipe, fcntl.F_SETSIG, signal.SIGKILL)
         fcntl.fcntl(pipe, fcntl.F_SETFL, fcntl.fcntl(pipe, fcntl.F_GETFL) | os.O_ASYNC)
     except (ImportError, AttributeError, OSError):
-        # On other systems than Linux a thread watches the pipe; a long call of a library may delay it.
+        # On other systems than Linux, a thread watches the pipe. A long call of a library may delay this
+        # thread.
         threading.Thread(target=_wait, args=(pipe,), daemon=True).start()
         return
     with contextlib.suppress(OSError):
@@ -34,8 +35,8 @@ def end_with(pipe: int, group: bool = False) -> None:
 
 
 def end_with_parent() -> None:
-    """Makes this process end when the process that spawned it through multiprocessing ends. Does nothing in a
-    process that was not spawned through multiprocessing."""
+    """Makes this process end when its parent ends. Does nothing if the process was not started by
+    `multiprocessing`."""
     parent = mp.parent_process()
     if parent is not None:
         end_with(parent.sentinel)

@@ -1,5 +1,5 @@
-"""Generates visual shapes: for bodies without meshes capsules from joint to joint, and a drum at each
-revolute joint; for a cover its capsules."""
+"""Generates visual shapes. Bodies without meshes get capsules from joint to joint, and a drum at each
+revolute joint. Covers get the shapes of their capsules."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def _limb(limb: Limb) -> Iterator[MeshPart]:
 
 
 def _capsule(length: float, radius: float, sections: int) -> tuple[np.ndarray, np.ndarray]:
-    """(vertices, faces) of a capsule along z, from 0 to a length."""
+    """Returns (vertices, faces) of a capsule along z, from 0 to a length."""
     solid = trimesh.creation.capsule(height=length, radius=radius, count=[sections, sections])
     vertices = np.asarray(solid.vertices)
     middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
@@ -103,8 +103,8 @@ def _along(vertices: np.ndarray, direction: np.ndarray) -> np.ndarray:
 
 
 def _hard_edged(solid: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the mesh with separate vertices for caps and mantle, so that shading keeps the edge between
-    them sharp."""
+    """Returns the mesh with separate vertices for the caps and the curved side, so that the edge between them
+    looks sharp."""
     faces = np.asarray(solid.faces)
     directions = np.round(1.2 * np.asarray(solid.face_normals)).astype(int)
     mantle = np.where(np.abs(directions[:, 2]) > 0, directions[:, 2], 0)

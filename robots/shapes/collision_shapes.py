@@ -1,5 +1,5 @@
-"""Makes the solids of a robot: the collision shapes of its URDF, convex hulls of the visual shapes of links
-without any, and capsules along the kinematics for bodies without any shape."""
+"""Makes the solids of a robot: the collision shapes of its URDF, convex hulls of visual shapes for links
+without collision shapes, and capsules along the kinematics for bodies without any shape."""
 
 from __future__ import annotations
 
@@ -19,24 +19,25 @@ from robots.urdf.read import Refusal, placement
 
 CORNERS = 96
 """Largest number of corners of a hull."""
-_SPREAD = 40  # directions in which the farthest points of a link are corners
-_NEAR = 1e-3  # m by which a link may stand out of its hull
+_SPREAD = 40  # number of directions; a link's farthest points in these directions are corners of its hull
+_NEAR = 1e-3  # largest distance by which a link may stand out of its hull, m
 _TAGS: tuple[tuple[str, Source], ...] = (("collision", "collision"), ("visual", "hull"))
-SHAPES_PER_LINK = 500  # shapes of a link
+SHAPES_PER_LINK = 500  # largest number of shapes of a link that are read
 _PER_LINK = 8
 _PER_ROBOT = 120
-FARTHEST = 1e3  # m, largest distance of a point from its joint
-_THIN = 1e-3  # m, half the least thickness of a hull
-_DIGITS = 4  # of a coordinate in m
+FARTHEST = 1e3  # largest coordinate of a point in the axes of its joint, m
+_THIN = 1e-3  # half the least thickness of a hull, m
+_DIGITS = 4  # decimal places of a coordinate in m
 
 
 @np.errstate(all="ignore")
 def collision_solids(robot: Robot, meshes: bool = True) -> tuple[Solid, ...]:
-    """Returns the solids of a robot in the order of their joints, the base's last, at most 120.
+    """Returns at most 120 solids of a robot, in the order of their joints; those of the base come last.
 
     meshes: whether mesh files are read.
-    A link with more than eight shapes gets their common hull. Shapes whose numbers or files cannot be used
-    are left out. No content of the description or of a mesh file raises an error.
+
+    A link with more than eight shapes gets one hull around all of them. Shapes whose numbers or files cannot
+    be used are left out. No content of the description or of a mesh file raises an error.
     """
     root = etree.fromstring(robot.urdf_text.encode())
     chosen: list[tuple[Element, Source]] = []
@@ -79,7 +80,7 @@ def _of_link(
 
 
 def _surfaces(uris: list[str]) -> dict[str, np.ndarray]:
-    """The points (V, 3), m, of mesh files."""
+    """Returns the points of mesh files, (V, 3) m."""
     if not uris:
         return {}
     from robots.meshes.surfaces import mesh_pieces  # it loads trimesh, which most descriptions do not need
@@ -92,14 +93,14 @@ def _surfaces(uris: list[str]) -> dict[str, np.ndarray]:
 
 
 def _scaled(shape: Element, meshes: Mapping[str, np.ndarray]) -> np.ndarray:
-    """The points (V, 3), m, of the mesh that an element names. Raises ValueError for a scale that is not
-    a number."""
+    """Returns the points of the mesh that an element names, (V, 3) m. Raises ValueError for a scale that is
+    not a number."""
     scale = np.broadcast_to([float(word) for word in shape.get("scale", "1 1 1").split()], 3)
     return meshes.get(shape.get("filename", ""), np.zeros((0, 3))) * scale
 
 
 def _corners(solid: Solid) -> np.ndarray:
-    """Points (V, 3), m, of a primitive in its own axes, whose hull is about the primitive."""
+    """Returns points of a primitive in its own axes, (V, 3) m. Their hull is about the primitive."""
     if solid.kind == "box":
         return np.array(list(product(*((-half, half) for half in solid.size))))
     if solid.kind == "sphere":
@@ -110,7 +111,8 @@ def _corners(solid: Solid) -> np.ndarray:
 
 
 def primitive(shape: Element, joint: int, link: str, source: Source, at: pin.SE3) -> Solid | None:
-    """A box, cylinder or sphere; None for a mesh. Raises ValueError for a size that is not a number."""
+    """Returns a box, cylinder or sphere; None for a mesh. Raises ValueError for a size that is not a
+    number."""
     sizes = {
         name: [float(word) for word in shape.get(name, "").split()] for name in ("size", "radius", "length")
     }
@@ -138,8 +140,8 @@ def _placed(joint: int, link: str, kind: SolidKind, source: Source, size: list[f
 
 
 def _hull(joint: int, link: str, source: Source, clouds: list[np.ndarray]) -> Solid | None:
-    """The convex hull of points in the joint's axes; flat ones get a thickness of 2 mm. None without
-    points."""
+    """Returns the convex hull of points in the joint's axes, or None without points. A flat hull gets a
+    thickness of 2 mm."""
     cloud = np.concatenate([np.zeros((0, 3)), *clouds])
     cloud = cloud[(np.abs(cloud) < FARTHEST).all(axis=1)]
     if not len(cloud):
@@ -154,7 +156,8 @@ def _hull(joint: int, link: str, source: Source, clouds: list[np.ndarray]) -> So
     try:
         cloud = cloud[ConvexHull(cloud).vertices]
         chosen = np.unique((cloud @ _directions().T).argmax(axis=0))
-        # The corner that lies farthest outside is added until all are near, or there are enough.
+        # The farthest point outside is added repeatedly, until all points are near the hull or it has enough
+        # corners.
         while len(chosen) < CORNERS:
             planes = ConvexHull(cloud[chosen]).equations
             outside = (cloud @ planes[:, :3].T + planes[:, 3]).max(axis=1)
@@ -170,7 +173,7 @@ def _hull(joint: int, link: str, source: Source, clouds: list[np.ndarray]) -> So
 
 
 def _directions() -> np.ndarray:
-    """Unit vectors (_SPREAD, 3): the axes, and a spiral over the sphere."""
+    """Returns unit vectors (_SPREAD, 3): along the axes, and on a spiral over the sphere."""
     k = np.arange(_SPREAD - 6) + 0.5
     z, turn = 1.0 - 2.0 * k / len(k), np.pi * (1.0 + np.sqrt(5.0)) * k
     ring = np.sqrt(1.0 - z**2)

@@ -1,4 +1,5 @@
-"""The straight parts of a robot's bodies, from joint to joint, for bodies that have no shape of their own."""
+"""The straight parts of a robot's bodies, from joint to joint, for bodies without shapes in the
+description."""
 
 from __future__ import annotations
 
@@ -12,7 +13,7 @@ Colour = tuple[int, int, int]
 BODY: Colour = (222, 226, 231)
 DRUM: Colour = (74, 82, 94)
 TIP: Colour = (236, 122, 44)
-_SHORTEST = 0.004  # m: two joints that are closer than this share one drum
+_SHORTEST = 0.004  # m; shorter parts are left out
 _SLENDER = 0.05  # capsule radius divided by the length of the whole chain
 
 
@@ -55,7 +56,8 @@ def limbs(model: pin.Model, tip: int, drawn: set[int]) -> Iterator[Limb]:
 
 
 def _ends(model: pin.Model, tip: int, joint: int) -> list[tuple[np.ndarray, Colour]]:
-    """The points, in a joint's frame, m, to which its body reaches: its child joints and the end-effector."""
+    """Returns the points to which a joint's body extends: its child joints and the end-effector, in the
+    joint's frame, m."""
     children = [k for k in range(1, model.njoints) if model.parents[k] == joint]
     ends: list[tuple[np.ndarray, Colour]] = [(model.jointPlacements[k].translation, BODY) for k in children]
     if model.frames[tip].parentJoint == joint:
@@ -66,20 +68,21 @@ def _ends(model: pin.Model, tip: int, joint: int) -> list[tuple[np.ndarray, Colo
 
 
 def _farthest(model: pin.Model, joint: int) -> np.ndarray:
-    """Position of the farthest frame that a last body carries, in its joint's frame, m."""
+    """Returns the position of the farthest frame that a body without child joints carries, in the frame of
+    the body's joint, m."""
     own = [frame.placement.translation for frame in model.frames if frame.parentJoint == joint]
     return max(own, key=lambda at: float(np.linalg.norm(at)))
 
 
 def _foot(top: np.ndarray, radius: float) -> np.ndarray:
-    """The end (3,), m, of a column from the floor to the first joint, or of a flat foot below a first joint
-    that is on the floor."""
+    """Returns the end, (3,) m, of a column from the floor to the first joint. If this joint is on the floor,
+    returns the end of a flat foot below the joint."""
     return top if float(np.linalg.norm(top)) > 0.5 * radius else np.array([0.0, 0.0, -0.5 * radius])
 
 
 def joint_radius(model: pin.Model, tip: int, joint: int) -> float:
-    """Radius of the capsules of a body, m: it decreases towards the tip, which makes the chain easier to
-    see."""
+    """Returns the radius of a body's capsules, m. It decreases towards the tip, which makes the chain easier
+    to see."""
     thickness = _thickness(model, tip)
     depth = len(model.supports[joint]) - 1
     deepest = max(len(support) for support in model.supports) - 1

@@ -17,8 +17,8 @@ from robots.robot import Robot
 from robots.shapes.capsules import body_capsules
 from robots.urdf.read import Refusal, placement
 
-MAX_TOTAL = 400_000  # faces of a robot
-_FARTHEST = 1e3  # m, largest distance of a point from its joint
+MAX_TOTAL = 400_000  # largest number of faces of a robot
+_FARTHEST = 1e3  # largest coordinate of a point in the axes of its joint, m
 _COLOURS = 8  # largest number of shapes of a link: each is a separate object on the page
 _DEFAULT = (205, 209, 216)  # colour of a mesh without a colour
 
@@ -27,9 +27,9 @@ _DEFAULT = (205, 209, 216)  # colour of a mesh without a colour
 class Shape:
     """One coloured piece of a robot's surface.
 
-    joint: the Pinocchio joint in whose frame the piece is fixed, 0 = the world; vertices (V, 3) float32, m,
-    in that frame; faces (F, 3) int32, counter-clockwise seen from outside; colour 0–255; name: unique.
-    Vertices are shared only where the surface is smooth; averaged vertex normals can be used for shading.
+    joint: the Pinocchio joint to which the piece is fixed, 0 = the world; vertices (V, 3) float32, m, in the
+    joint's frame; faces (F, 3) int32, counter-clockwise seen from outside; colour 0–255; name: unique. Faces
+    share vertices only where the surface is smooth: averaged vertex normals can be used for shading.
     """
 
     joint: int
@@ -42,7 +42,7 @@ class Shape:
 @np.errstate(all="ignore")
 def link_shapes(robot: Robot) -> list[Shape]:
     """Returns the shapes of all links. Visuals that cannot be drawn and visuals beyond MAX_TOTAL faces are
-    left out; a body that then has no shape is drawn as capsules along its kinematics. No content of the
+    left out. A body without any remaining shape is drawn as capsules along its kinematics. No content of the
     description or of a mesh file raises an error.
     """
     root = etree.fromstring(robot.urdf_text.encode())

@@ -1,5 +1,5 @@
-"""Converts a URDF to its canonical form: it is read, checked and repaired, and all changes are reported.
-Every URDF is imported this way."""
+"""Converts a URDF to its canonical form: the URDF is read, checked and repaired, and all changes are
+reported. Every import of a URDF begins with this conversion."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from robots.urdf.read import Refusal, parse, without_shapes
 from robots.urdf.structure import check_structure, movable_joints
 
 MAX_JOINTS = 20
-"""Largest number of moving joints: a tick with three levels then takes 0.4 ms, and the control period is 1
-ms."""
+"""Largest number of moving joints. With this number, a tick with three levels takes 0.4 ms of the control
+period of 1 ms."""
 MAX_FINDINGS = 200
 
 
@@ -42,9 +42,9 @@ def canonicalise(
 ) -> tuple[Canonical | None, ImportReport]:
     """Returns the canonical form of a URDF document (None if it cannot be used) and the report of the import.
 
-    source: name of the document in messages; folder: start of relative and `package://` mesh paths, None for
-    a description that may use installed packages only; within: folder that must contain all meshes except
-    installed ones, None for no such limit.
+    source: name of the document in messages. folder: folder from which relative and `package://` mesh paths
+    are searched; None for a description that may use installed packages only. within: folder that must
+    contain all meshes except installed ones; None: meshes may be anywhere.
     """
     try:
         root = parse(data, source)
@@ -75,7 +75,8 @@ def canonicalise(
 
 
 def _report(source: str, findings: list[Finding]) -> ImportReport:
-    """Builds the report; refused findings come first if not all findings fit."""
+    """Returns the report. If there are too many findings, refused findings come first and the last ones are
+    left out."""
     if len(findings) > MAX_FINDINGS:
         kept = sorted(findings, key=lambda finding: finding.kind != "refused")[:MAX_FINDINGS]
         more = f"{len(findings) - MAX_FINDINGS} more findings are not listed"
@@ -86,10 +87,10 @@ def _report(source: str, findings: list[Finding]) -> ImportReport:
 def _check_freedom(root: Element, source: str) -> Iterator[Finding]:
     count = len(movable_joints(root))
     if count == 0:
-        yield Finding("refused", source, "no joint of it moves; give a robot with at least one movable joint")
+        yield Finding("refused", source, "none of its joints moves; give a robot with a movable joint")
     elif count > MAX_JOINTS:
         text = f"it has {count} moving joints; at most {MAX_JOINTS} can be controlled every millisecond"
-        yield Finding("refused", source, f"{text}: make the others fixed")
+        yield Finding("refused", source, f"{text}: make the other joints fixed")
 
 
 def _model(root: Element) -> pin.Model:
@@ -104,9 +105,9 @@ def _model(root: Element) -> pin.Model:
         raise Refusal("robot", "a joint has more than one coordinate; only one-axis joints are supported")
     for joint in range(1, model.njoints):
         moments = np.linalg.eigvalsh(model.inertias[joint].inertia)
-        # MuJoCo requires a moment of at least 1e-15, and rejects inertias with A + B < C even by a rounding
-        # error.
+        # MuJoCo requires moments of at least 1e-15. It also rejects inertias with A + B < C, even if the
+        # difference is a rounding error.
         if not (moments[0] > max(1e-14, 1e-12 * moments[2]) and moments[0] + moments[1] > moments[2]):
-            text = "the body it moves has an inertia no simulator can use; check masses and origins there"
+            text = "no simulator can use the inertia of the body that it moves; check its masses and origins"
             raise Refusal(f"joint '{model.names[joint]}'", text)
     return model

@@ -15,15 +15,15 @@ from robots.urdf.structure import body_of, movable_joints
 
 _DENSITY = 1000.0  # kg/m³: density of the solid sphere that replaces a missing inertia
 _LEAST_MASS = 1e-6  # kg
-_FILL_MASS = 0.1  # kg: mass for a moving body without one
-_MARGIN = 1e-9  # share of the trace: distance of a repaired inertia from the boundary of the physical region
+_FILL_MASS = 0.1  # kg: mass that a moving body without mass gets
+_MARGIN = 1e-9  # distance of a repaired inertia from the limit of physical inertias, as a share of the trace
 _KEYS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
 def repair_inertials(root: Element) -> Iterator[Finding]:
     """Repairs the inertia of every link, then gives mass to moving bodies that have none.
 
-    Raises nothing; an inertial element that cannot be read is yielded as `refused`.
+    Raises no exception. For an inertial element that cannot be read, a `refused` finding is yielded.
     """
     masses: dict[str, float] = {}
     for name, link in named(root, "link").items():
@@ -45,13 +45,14 @@ def repair_inertials(root: Element) -> Iterator[Finding]:
 
 
 def nearest_physical(inertia: np.ndarray) -> tuple[np.ndarray, float]:
-    """Returns (I', violation): I' is the inertia about the centre of mass, changed to that of some mass
-    distribution, kg·m².
+    """Returns (I', violation): the nearest physically possible inertia about the centre of mass, kg·m², and
+    the violation of the condition by the given inertia.
 
     A body's inertia is I = tr(Σ)·1 − Σ with Σ = ∫ρ r rᵀ ⪰ 0, so Σ = ½ tr(I)·1 − I must be positive
-    semidefinite; that is A + B ≥ C for the principal moments, and it implies I ⪰ 0 (Wensing, Kim, Slotine,
-    IEEE RA-L 2018). Σ's eigenvalues are raised to a small positive value and I is rebuilt. The violation is
-    the most negative eigenvalue divided by the trace, without its sign; it is 0 for a physical inertia.
+    semidefinite. For the principal moments, this condition is A + B ≥ C; it implies I ⪰ 0 (Wensing, Kim,
+    Slotine, IEEE RA-L 2018). Smaller eigenvalues of Σ are raised to a small positive value, and I is computed
+    again. The violation is the magnitude of the most negative eigenvalue divided by the trace; it is 0 for a
+    physical inertia.
     """
     trace = float(np.trace(inertia))
     eigenvalues, axes = np.linalg.eigh(0.5 * trace * np.eye(3) - inertia)
@@ -66,7 +67,7 @@ def nearest_physical(inertia: np.ndarray) -> tuple[np.ndarray, float]:
 
 
 def _repair_link(link: Element) -> Iterator[Finding]:
-    """Repairs one link: a generator of findings that returns the link's mass, kg."""
+    """Repairs the inertia of one link. Yields the findings and returns the link's mass, kg."""
     inertial = link.find("inertial")
     if inertial is None:
         return 0.0
@@ -77,17 +78,17 @@ def _repair_link(link: Element) -> Iterator[Finding]:
         raise Refusal(label(link), f"its mass is {mass:.4g} kg; give a positive mass")
     inertia = _read_inertia(inertial)
     if 0.0 < mass < _LEAST_MASS:
-        yield Finding("repaired", label(link), f"a mass of {mass:.3g} kg is as good as none; dropped")
+        yield Finding("repaired", label(link), f"a mass of {mass:.3g} kg has no effect and was removed")
         link.remove(inertial)
         return 0.0
     if mass == 0.0:
         if inertia is not None and np.abs(inertia).max() > 0.0:
-            yield Finding("repaired", label(link), "an inertia without mass is impossible and was dropped")
+            yield Finding("repaired", label(link), "an inertia without mass is impossible and was removed")
         link.remove(inertial)
         return 0.0
     if inertia is None or float(np.abs(inertia).max()) < 1e-12 * mass:
         _write_inertia(inertial, np.eye(3) * _sphere(mass))
-        text = f"no rotational inertia; that of a solid sphere of {mass:.4g} kg was used"
+        text = f"no rotational inertia; the inertia of a solid sphere of {mass:.4g} kg was used"
         yield Finding("filled", label(link), text)
         return mass
     physical, violation = nearest_physical(inertia)

@@ -17,13 +17,13 @@ from robots.report import Finding
 from robots.urdf.read import Refusal, end_of, label, named, numbers, placement
 from robots.urdf.structure import movable_joints, parent_joints
 
-UNBOUNDED = 1e6  # rad or m: written for a joint without limits, so that nq = nv; read back as ±inf
+UNBOUNDED = 1e6  # rad or m: limit of a joint without limits, so that nq = nv; it is read as ±inf
 _GRIPPER_JOINT = re.compile(r"finger|knuckle|gripper|thumb|jaw", re.IGNORECASE)
 _GRIPPER_LINK = re.compile(r"finger|knuckle|thumb", re.IGNORECASE)  # "gripper" also names whole hands
 
 
 def normalise_joints(root: Element) -> Iterator[Finding]:
-    """Rewrites every joint so that Pinocchio gives it exactly one coordinate; yields the changes."""
+    """Rewrites all joints so that each has exactly one coordinate in Pinocchio; yields the changes."""
     try:
         frozen = _to_freeze(root)
     except Refusal as refusal:
@@ -47,8 +47,8 @@ def normalise_joints(root: Element) -> Iterator[Finding]:
 
 
 def freeze(joint: Element, value: float, reason: str) -> Finding:
-    """Makes a joint fixed at `value` (rad or m), clipped to its limits, and adds this motion to its
-    origin."""
+    """Makes a joint fixed at `value` (rad or m), which is clipped to the joint's limits, and adds this motion
+    to the joint's origin."""
     limit = joint.find("limit")
     if limit is not None:
         value = float(np.clip(value, float(limit.get("lower", "0")), float(limit.get("upper", "0"))))
@@ -71,7 +71,7 @@ def freeze(joint: Element, value: float, reason: str) -> Finding:
 
 
 def _to_freeze(root: Element) -> dict[str, tuple[float, str]]:
-    """Returns name → (value, reason) of the joints that an arm controller does not move."""
+    """Returns the joints that an arm controller does not move, as name → (value, reason)."""
     frozen: dict[str, tuple[float, str]] = {}
     joints, carriers = named(root, "joint"), parent_joints(root)
     for joint in movable_joints(root):
@@ -84,8 +84,8 @@ def _to_freeze(root: Element) -> dict[str, tuple[float, str]]:
             if leader in joints and not _same_chain(carriers, joint, joints[leader]):
                 frozen.setdefault(leader, (0.0, f"'{name}' mimics it, so it drives a gripper"))
         elif _GRIPPER_JOINT.search(name) or _GRIPPER_LINK.search(end_of(joint, "child")):
-            frozen.setdefault(name, (0.0, "its name says it belongs to a gripper"))
-    # A hand alone is a robot too: if no other joints move, joints with gripper names stay movable.
+            frozen.setdefault(name, (0.0, "by its name it belongs to a gripper"))
+    # The robot may be a hand without an arm: if no other joints move, joints with gripper names stay movable.
     if len(frozen) == len(movable_joints(root)):
         frozen = {name: why for name, why in frozen.items() if joints[name].find("mimic") is not None}
     return frozen
@@ -138,7 +138,7 @@ def _limits(joint: Element) -> Iterator[Finding]:
     upper = float(numbers(limit, "upper", 1, (0.0,))[0])
     if lower == upper == 0.0 and float(numbers(limit, "velocity", 1, (0.0,))[0]) <= 0.0:
         lower, upper = -UNBOUNDED, UNBOUNDED
-        text = "all its limits are 0, as CAD exporters leave them; it is treated as unbounded"
+        text = "all its limits are 0, a usual result of CAD exporters; it is treated as unbounded"
         yield Finding("filled", label(joint), text)
     if lower > upper:
         lower, upper = upper, lower
@@ -147,7 +147,7 @@ def _limits(joint: Element) -> Iterator[Finding]:
         )
     if max(abs(lower), abs(upper)) > UNBOUNDED:
         lower, upper = max(lower, -UNBOUNDED), min(upper, UNBOUNDED)
-        yield Finding("repaired", label(joint), f"limits beyond ±{UNBOUNDED:.0g} were cut there")
+        yield Finding("repaired", label(joint), f"limits beyond ±{UNBOUNDED:.0g} were reduced to this value")
     limit.set("lower", repr(lower))
     limit.set("upper", repr(upper))
 
@@ -156,7 +156,7 @@ def _freeze_if_stuck(joint: Element) -> Iterator[Finding]:
     limit = _require(joint, "limit")
     lower, upper = float(limit.get("lower", "0")), float(limit.get("upper", "0"))
     if upper - lower < 1e-6:
-        yield freeze(joint, 0.5 * (lower + upper), "its limits leave it no room to move")
+        yield freeze(joint, 0.5 * (lower + upper), "its limits allow no motion")
 
 
 def _require(joint: Element, tag: str) -> Element:

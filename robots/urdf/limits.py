@@ -15,14 +15,15 @@ from robots.urdf.joints import finite_bounds
 from robots.urdf.read import Refusal, label, numbers
 from robots.urdf.structure import movable_joints
 
-_SPEED = {"revolute": np.pi, "prismatic": 0.5}  # rad/s, m/s: fast but safe for an unknown arm
+_SPEED = {"revolute": np.pi, "prismatic": 0.5}  # rad/s, m/s: fast, but safe for an unknown arm
 _LEAST = 1e-6  # rad/s, N·m: a smaller limit counts as missing, because it would allow no motion
 _LEVER = 3.0  # effort limit divided by the largest gravity load
-_ACCELERATION = 10.0  # rad/s², m/s²: acceleration that the effort limit allows in addition
+_ACCELERATION = 10.0  # rad/s², m/s²: acceleration that the effort limit allows in addition to gravity
 
 
 def fill_speeds(root: Element) -> Iterator[Finding]:
-    """Fills missing, zero and negative velocity limits, and marks effort limits of these kinds with 0."""
+    """Fills missing, zero and negative velocity limits. Effort limits that are missing, zero or negative are
+    set to 0."""
     for joint in movable_joints(root):
         limit = joint.find("limit")
         if limit is None:
@@ -40,8 +41,8 @@ def fill_speeds(root: Element) -> Iterator[Finding]:
 
 
 def fill_efforts(root: Element, model: pin.Model) -> Iterator[Finding]:
-    """Fills the effort limits that are 0, in the tree and in its model: three times the largest gravity load,
-    and enough to accelerate.
+    """Fills the effort limits that are 0, in the tree and in its model: three times the largest gravity load
+    plus an effort for acceleration.
 
     τ_i = 3 max|g_i(q)| + 10 rad/s² · max M_ii(q) over sampled configurations, to two digits.
     """

@@ -16,9 +16,9 @@ from robots.errors import InputError, shortened
 from robots.report import Finding
 
 MAX_BYTES = 10_000_000
-_LARGEST = {"xyz": 1e3, "value": 1e5}  # m and kg: sums of inertias lose all digits for larger numbers
+_LARGEST = {"xyz": 1e3, "value": 1e5}  # m and kg: with larger numbers, sums of inertias lose all digits
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
-"""The format of numbers that C++ readers of URDF accept; Python accepts more."""
+"""The format of numbers that C++ readers of URDF accept; Python also accepts other formats."""
 _XACRO_HINT = "; is this a xacro file? Run `xacro FILE > robot.urdf` first"
 
 
@@ -31,7 +31,7 @@ class Refusal(Exception):
 
 
 def parse(data: bytes, source: str) -> Element:
-    """Returns the root element `robot` of a URDF document without comments and foreign sections.
+    """Returns the root element `robot` of a URDF document. Comments and foreign sections are removed.
 
     No entity is resolved, no DTD is loaded and nothing is downloaded. Raises Refusal for a document that is
     too large, is not XML, declares a DTD, is a xacro template, or has another root element.
@@ -64,8 +64,8 @@ def parse(data: bytes, source: str) -> Element:
 def load_bytes(path: Path) -> bytes:
     """Returns the content of a URDF file, at most one byte more than the parser accepts.
 
-    Raises InputError if the path cannot be read, or is not a regular file: reading a pipe could block
-    for ever.
+    Raises InputError if the path cannot be read or is not a regular file: a read from a pipe could block for
+    ever.
     """
     try:
         if path.is_dir():
@@ -82,7 +82,7 @@ def load_bytes(path: Path) -> bytes:
 
 
 def label(element: Element) -> str:
-    """Returns the name of an element in findings: ``joint 'elbow'``."""
+    """Returns the name of an element for findings, such as ``joint 'elbow'``."""
     return f"{element.tag} '{shortened(element.get('name', ''))}'"
 
 
@@ -110,7 +110,7 @@ def numbers(
     if not known or not all(math.isfinite(value) for value in values):
         raise Refusal(where, f"{name} is '{shortened(text)}', not {_count(count)}")
     if max(abs(value) for value in values) > _LARGEST.get(attribute, 1e9):
-        raise Refusal(where, f"{name} is '{shortened(text)}', beyond anything physical; check its unit")
+        raise Refusal(where, f"{name} is '{shortened(text)}', too large for a real robot; check its unit")
     return np.array(values)
 
 

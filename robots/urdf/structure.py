@@ -15,17 +15,17 @@ from robots.urdf.read import end_of, label, named
 MAX_LINKS = 1_000
 MAX_SHAPES = 5_000
 MAX_DEPTH = 200
-"""Largest number of joints in a chain: readers of URDF descend by recursion."""
+"""Largest number of joints in a chain: readers of URDF call themselves once per joint of a chain."""
 MAX_NAME = 100
 MOVABLE = ("revolute", "continuous", "prismatic")
 _KNOWN = (*MOVABLE, "fixed", "floating", "planar")
 _GUESSES = 5
-"""Number of findings with a suggested name: the first ones show how to correct the others."""
+"""Largest number of findings with a suggested name. They show how to correct the other findings."""
 
 
 def check_structure(root: Element, source: str) -> Iterator[Finding]:
-    """Yields a `refused` finding for every fault that prevents the description from being one tree of
-    links."""
+    """Yields a `refused` finding for every fault of the description that makes it something else than one
+    tree of links."""
     for checks in ((_sizes,), (_names,), (_joint_ends, _types), (_single_tree,)):
         faults = [fault for check in checks for fault in check(root, source)]
         yield from faults
@@ -39,12 +39,12 @@ def movable_joints(root: Element) -> list[Element]:
 
 
 def parent_joints(root: Element) -> dict[str, Element]:
-    """Returns for every link except the root the joint that carries it."""
+    """Returns, for every link except the root, the joint that carries the link."""
     return {end_of(joint, "child"): joint for joint in root.findall("joint")}
 
 
 def body_of(root: Element) -> dict[str, str]:
-    """Returns for every link the first link of its rigid body: the link that a moving joint carries."""
+    """Returns, for every link, the first link of its rigid body: the link that a moving joint carries."""
     carriers = parent_joints(root)
     found: dict[str, str] = {}
     for link in named(root, "link"):
@@ -128,7 +128,7 @@ def _single_tree(root: Element, source: str) -> Iterator[Finding]:
     carried = parent_joints(root)
     roots = [name for name in links if name not in carried]
     if not roots:
-        yield Finding("refused", source, "no link is the root: the joints form a loop; open it")
+        yield Finding("refused", source, "no link is the root: the joints form a loop; open the loop")
         return
     if len(roots) > 1:
         names = ", ".join(f"'{shortened(name, 30)}'" for name in roots[:6])
@@ -138,7 +138,7 @@ def _single_tree(root: Element, source: str) -> Iterator[Finding]:
         return
     depths = _depths(root, roots[0])
     if len(depths) != len(links):
-        yield Finding("refused", source, "some joints form a loop apart from the root link; open it")
+        yield Finding("refused", source, "some joints form a loop without the root link; open the loop")
     elif max(depths.values()) > MAX_DEPTH:
         text = f"its longest chain has {max(depths.values())} joints; at most {MAX_DEPTH} can be used"
         yield Finding("refused", source, text)

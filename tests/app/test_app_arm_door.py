@@ -180,5 +180,5 @@ def test_the_arm_must_be_the_scene_s_robot(library: FakeLibrary, bench: Bench) -
 def test_nobody_answers_at_this_machine() -> None:
     """No arm listens at this address, and the error contains the message of the real library."""
     pytest.importorskip("pylibfranka")
-    with pytest.raises(InputError, match="is this the address of the arm"):
+    with pytest.raises(InputError, match="check the address of the arm"):
         door.Franka("127.0.0.1")

@@ -213,7 +213,7 @@ def test_nobody_but_compiled_code_calls_a_piece() -> None:
         return dot(a, b, n)
 
     for _ in range(2):
-        with pytest.raises(TypeError, match="dot is a piece of compiled functions"):
+        with pytest.raises(TypeError, match="dot can be called by compiled functions only"):
             dot(np.ones(2), np.ones(2), 2)
         intermediate(caller, (VECTOR, VECTOR, WHOLE))
 

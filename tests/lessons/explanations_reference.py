@@ -23,10 +23,10 @@ REFERENCE = (
     )),
     Exempt("purpose", "", (
         ("robots/shapes/capsules.py", "Returns vertices that are modelled along z"),
-        ("robots/shapes/capsules.py", "Returns the mesh with separate vertices for caps and mantle"),
+        ("robots/shapes/capsules.py", "Returns the mesh with separate vertices for the caps"),
         ("himpc/formulation/forms.py", "All active levels, their rows stacked"),
         ("himpc/limits/rows.py", "All rows are in N·m"),
-        ("himpc/references/square_wave.py", "s: a switch counts as reached this much earlier"),
+        ("himpc/references/square_wave.py", "A switch takes place earlier by this time"),
         ("himpc/stack.py", "The generic rank is the largest rank over a few random"),
         ("lessons/own/deadline.py", "The waiting time is read only after the first alarm"),
         ("lessons/papers/himpc_paper/ablations.py", "All tasks are in one cost, one step ahead"),
@@ -38,7 +38,7 @@ REFERENCE = (
     Exempt("mathematics", (
         LESSONS + "derivations.py::test_an_error_of_acceleration_is_mapped_by_I_minus_M_inverse_M_bar"
     ), (
-        ("robots/inertia.py", "The estimation error is multiplied by I − M⁻¹M̄"),
+        ("robots/inertia.py", "From one period to the next, the estimation error is multiplied"),
         ("examples/horizon_and_M_bar.py", "Time-delay estimation multiplies its error"),
     )),
     Exempt("mathematics", FURTHER + "an_equation_holds", (
@@ -68,18 +68,18 @@ REFERENCE = (
         ("himpc/htmpc/prediction.py", "The input is constant between knots"),
     )),
     Exempt("mathematics", HTMPC + "equations.py::test_ramp_and_stop_rows_leave_a_way_on", (
-        ("himpc/htmpc/rows.py", "Two groups of rows are about the time beyond the horizon"),
+        ("himpc/htmpc/rows.py", "Two groups of rows concern the time beyond the horizon"),
     )),
     Exempt("mathematics", HTMPC + "loop.py::test_htidkc_first_step_by_hand", (
-        ("himpc/htmpc/htidkc.py", "They form a box, one interval per joint"),
+        ("himpc/htmpc/htidkc.py", "The bounds form a box, one interval per joint"),
     )),
     Exempt("mathematics", HIMPC + (
         "errors.py::test_what_controllers_take_for_its_derivative_is_the_errors_own"
     ), (
-        ("himpc/tasks/orientation.py", "The first is enough: d/dt ½‖x̃‖²"),
+        ("himpc/tasks/orientation.py", "Stability needs the component along x̃ only: d/dt ½‖x̃‖²"),
     )),
     Exempt("mathematics", HIMPC + "references.py::test_a_dragged_position_keeps_its_caps_and_its_promises", (
-        ("himpc/references/target.py", "A dragged target: filtered so that"),
+        ("himpc/references/target.py", "It is filtered so that"),
         ("himpc/references/target.py", "The acceleration a is constant in each step"),
     )),
     Exempt("mathematics", LESSONS + "geometry.py::test_the_box_is_where_the_rows_hold", (
@@ -90,7 +90,7 @@ REFERENCE = (
     )),
     # ---------------------------------------- sentences about the program
     Exempt("software", ROBOTS + "mobile.py::test_ideal_kinematics_are_the_double_integrator", (
-        ("robots/servo.py", "mode: \"ideal\": the velocity moves linearly"),
+        ("robots/servo.py", "mode: \"ideal\": within each step, the velocity changes linearly"),
     )),
     Exempt("software", ROBOTS + "signals.py::test_configure_keeps_the_state_and_the_memory", (
         ("robots/signals.py", "Commands are stored with their times"),
@@ -99,7 +99,7 @@ REFERENCE = (
         ("robots/meshes/simplify.py", "Vertices whose normals point to different sides"),
     )),
     Exempt("software", ROBOTS + "urdf.py::test_continuous_becomes_unbounded_with_one_coordinate", (
-        ("robots/urdf/joints.py", "Rewrites every joint so that"),
+        ("robots/urdf/joints.py", "Rewrites all joints so that"),
     )),
     Exempt("software", ROBOTS + (
         "urdf.py::test_the_driver_of_a_mimic_gripper_is_fixed_but_a_parallel_arm_is_not"
@@ -122,17 +122,17 @@ REFERENCE = (
         ("himpc/kinematics/configuration.py", "Only geometry is used, no inertia or gravity"),
     )),
     Exempt("software", HTMPC + "active_set.py::test_rows_that_contradict_each_other_are_found_out", (
-        ("himpc/htmpc/active_set.py", "A row that depends on those taken does not enlarge their basis, so"),
+        ("himpc/htmpc/active_set.py", "A row that depends linearly on the active rows does not enlarge"),
     )),
     Exempt("software", HTMPC + "loop.py::test_every_setting_changes_live_without_a_jump", (
-        ("himpc/htmpc/htmpc.py", "`configure` changes settings and keeps that plan"),
+        ("himpc/htmpc/htmpc.py", "`configure` changes settings and keeps these plans"),
     )),
     Exempt("software", HTMPC + "equations.py::test_too_many_coordinates_are_explained", (
-        ("himpc/htmpc/tracking.py", "InputError: the sum is not less, so that no freedom is left"),
+        ("himpc/htmpc/tracking.py", "InputError: the sum is too large, so that no freedom is left"),
         ("himpc/htmpc/tracking.py", "joints: their sum must be smaller"),
     )),
     Exempt("software", HIMPC + "limits.py::test_tightened_limits_close_in_and_arrive", (
-        ("himpc/limits/ramp.py", "A tightened one first falls to the present value"),
+        ("himpc/limits/ramp.py", "Then it moves to its goal with time constant RAMP_SECONDS"),
     )),
     Exempt("software", LESSONS + "sweep.py::test_all_cores_give_the_same_result_as_one", (
         ("lessons/parallel.py", "Outcomes come in the order in which they are ready"),

@@ -145,7 +145,7 @@ def test_a_printed_bound_on_speed_is_overrun() -> None:
     house = (Path(__file__).parents[2] / "docs/house.md").read_text(encoding="utf-8")
     assert "with 0, as printed, the limit is overrun by 17 %" in " ".join(house.split())
     told = " ".join((Limits.__doc__ or "").split())
-    assert "by 17 % on the iiwa's circle with rate 0, which is (32e) as printed, by 0.2 % with 15" in told
+    assert "on the iiwa's circle by 17 % with rate 0, which is (32e) as printed, and by 0.2 % with 15" in told
     rows = stored(False)["himpc-limits"].rows
     printed_one, ours = (
         rows[f"nominal, {how}: largest velocity over its limit"][0]

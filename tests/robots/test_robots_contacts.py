@@ -191,7 +191,7 @@ def test_worlds_that_cannot_be_are_refused() -> None:
         Plant(robot, TOUCHING, world=(ball, ball))
     with pytest.raises(InputError, match="give at most 50"):
         Plant(robot, TOUCHING, world=(ball,) * 51)
-    with pytest.raises(InputError, match=r"diagonal_scale and plant\.contacts do not go together"):
+    with pytest.raises(InputError, match=r"diagonal_scale and plant\.contacts cannot be combined"):
         Plant(robot, replace(TOUCHING, diagonal_scale=0.9), world=(ball,))
     with pytest.raises(InputError, match="object 'ball': mass_kg is -1"):
         Thing(ball.shape, mass_kg=-1.0)

@@ -151,10 +151,10 @@ REFUSED = {
     ),
     "xacro number": (two_joint_arm(l2=link("l2", inertial("${m}", "1 1 1"))), "xacro"),
     "no link": ("<robot name='a'/>", "no link"),
-    "no joint": (robot(link("base")), "no joint"),
+    "no joint": (robot(link("base")), "none of its joints"),
     "only fixed": (
         robot(link("base"), link("a"), joint("j", "base", "a", "fixed", "")),
-        "no joint of it moves",
+        "none of its joints moves",
     ),
     "two roots": (two_joint_arm(link("loose")), "2 root links"),
     "loop": (robot(link("a"), link("b"), joint("x", "a", "b"), joint("y", "b", "a")), "loop"),

@@ -1,5 +1,5 @@
-"""One QP of HTMPC: its rows, and the choice of the most violated row, for the dual method of
-`goldfarb_idnani`."""
+"""Solves one QP of HTMPC by the dual method of `goldfarb_idnani`. This module handles the rows and chooses
+the most violated row."""
 
 from __future__ import annotations
 
@@ -24,13 +24,14 @@ from himpc.tick.kernel.linear import copy, copy_rows, dot, factorise, forward, s
 
 SOLVED, CONTRADICTION, LIMIT = range(3)
 VECTORS = 8
-"""Number of rows of the vectors of `solve`."""
+"""Number of rows of the array `vectors` of `solve`."""
 _STEPS = 600
-"""Budget of one QP: the multiplications for this many added or removed rows. It bounds the computing time."""
+"""Budget of one QP, as a number of added or removed rows. It bounds the computing time."""
 _ROUGH = 1e-8
-"""A smaller violation at a point without refinement may be a rounding error."""
+"""At a point that was not refined, a smaller violation may be a rounding error."""
 _CLOSE = 0.05
-"""Rows whose bound is nearer to x = 0 than this share of their range, or of one unit, are checked first."""
+"""A row is checked first if its bound is near x = 0: nearer than this share of the row's range or of one
+unit."""
 
 
 @inline_kernel
@@ -45,7 +46,7 @@ def residual_of(
     value: Array,
     gradient: Array,
 ) -> float:
-    """Returns `himpc.qp.kkt_residual`; value is Ax, and gradient is scratch, (n,)."""
+    """Returns the same number as `himpc.qp.kkt_residual`; value is Ax, and gradient is scratch, (n,)."""
     n = len(g)
     squares, worst, total = 0.0, 0.0, 0.0
     for i in range(n):
@@ -61,7 +62,7 @@ def residual_of(
     for i in range(n):
         worst = max(worst, abs(gradient[i]) / scale)
         total += x[i]
-    # `max` may ignore NaN, a sum cannot.
+    # `max` may ignore NaN; a sum does not.
     return worst if math.isfinite(total) else math.inf
 
 
@@ -75,7 +76,7 @@ def factor(H: Array, L: Array) -> bool:
 
 @inline_kernel
 def hold(active: ActiveSet, index: int, upper_side: bool, lower: Array, upper: Array) -> None:
-    """Sets side and target of a row that is taken; an equality has side 0 and stays."""
+    """Sets side and target of a row that becomes active. An equality has side 0 and is never removed."""
     i = active.row[index]
     active.target[index] = upper[i] if upper_side else lower[i]
     active.side[index] = 0 if lower[i] == upper[i] else (1 if upper_side else -1)
@@ -118,12 +119,12 @@ def solve(
 
     Args:
         L, H, g, A, lower, upper: the QP, H = LLᵀ (n, n).
-        held, normals, cholesky_factor, vectors: the `ActiveSet` and scratch: (3, n + 1), (3, n + 1, n),
-            (n + 1, n + 1), (VECTORS, n + 1).
-        count: the number of active rows; those of the QP before on entry.
-        watched, value: scratch, as long as A.
+        held, normals, cholesky_factor, vectors: the `ActiveSet` and scratch, of the shapes (3, n + 1),
+            (3, n + 1, n), (n + 1, n + 1) and (VECTORS, n + 1).
+        count: the number of active rows of the previous QP.
+        watched, value: scratch, one entry per row of A.
         x: (n,), the result.
-        multipliers: as long as A, zero; the result.
+        multipliers: the result, one entry per row of A; zero at the call.
     """
     n, rows = len(g), len(A)
     A, H, L, vectors = borrowed(A), borrowed(H), borrowed(L), borrowed(vectors)
@@ -143,7 +144,7 @@ def solve(
         watched[i] = lower[i] > -near or upper[i] < near
     for p in range(count):
         watched[active.row[p]] = 1
-    # Active rows of the QP before are kept if their multipliers have the right sign here.
+    # Active rows of the previous QP are kept if their multipliers have the right sign in this QP.
     for p in range(count - 1, -1, -1):
         hold(active, p, active.multiplier[p] > 0.0, lower, upper)
         if not math.isfinite(active.target[p]):
@@ -197,7 +198,7 @@ def solve(
             count = release(active, cost, count, budget)
             point_from_multipliers(active, cost, count, z)
         unscale(cost, z, x)
-        # At a point without refinement the violation of a linearly dependent row may be a rounding error.
+        # At a point that was not refined, the violation of a linearly dependent row may be a rounding error.
         exact = not met
         if exact:
             refine(active, cost, count, H, g, slope, z, x)

@@ -30,9 +30,9 @@ def model(
     """See `gauss_newton`; H (k, k) and g (k,) are the result.
 
     Args:
-        J, Q, e, T_q, effort, share, ridge: see there.
-        weighted, pull: J_kᵀ Q_k J_k and J_kᵀ Q_k e_k, (N, n, n) and (N, n); zero.
-        H, g: the result; g is zero.
+        J, Q, e, T_q, effort, share, ridge: see `gauss_newton`.
+        weighted, pull: scratch for J_kᵀ Q_k J_k and J_kᵀ Q_k e_k, (N, n, n) and (N, n); zero at the call.
+        H, g: the result; g is zero at the call.
     """
     N, m, n = J.shape
     for k in range(N):

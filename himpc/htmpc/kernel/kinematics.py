@@ -24,7 +24,8 @@ def place_all(
     placed: Array,
     z: Array,
 ) -> None:
-    """`forward_kinematics` at configurations q (K, n); placed (K, n+1, 12) and z (K, n+1, 3) are results."""
+    """Applies `forward_kinematics` to configurations q (K, n). Results: placed (K, n+1, 12) and z
+    (K, n+1, 3)."""
     rotation, translation, axis, q = borrowed(rotation), borrowed(translation), borrowed(axis), borrowed(q)
     placed, z = borrowed(placed), borrowed(z)
     for k in range(len(q)):
@@ -52,7 +53,7 @@ def frame_along(
 
     Args:
         task, part: the tasks whose rows are computed, see `jacobian`.
-        parent, is_revolute: of the joints. placed, z: from `place_all`.
+        parent, is_revolute: properties of all joints. placed, z: the results of `place_all`.
         joint: (1,), the joint that carries the frame. rotation, translation: the frame's axes (3, 3) and
             origin (1, 3) in that joint's frame.
         R, p, J: the result, (K, 3, 3), (K, 3) and (K, m, n).

@@ -12,7 +12,7 @@ from himpc.compilation.compiled import GIVEN_VECTOR, MATRIX, NUMBER, kernel
 Array = NDArray[np.float64]
 
 _NO_JERK_BOUND = 1e9
-"""Replaces an infinite jerk bound, whose product with a speed of zero would be NaN."""
+"""Replaces an infinite jerk bound: infinity times a speed of zero would be NaN."""
 
 
 @kernel(
@@ -39,8 +39,8 @@ def brake(
         for k in range(len(U)):
             excess = max(q - q_upper[i], 0.0) - max(q_lower[i] - q, 0.0)
             step = j_max[i] * (min(period, dt) if k == 0 else dt)
-            # A jerk bound needs time to end the braking: with u = √(2j|v|) speed and input reach zero at the
-            # same time.
+            # With a jerk bound, the end of the braking takes time. With u = √(2j|v|), speed and input reach
+            # zero at the same time.
             gap = min(max(-excess / (5.0 * dt), -speed), speed) - v
             most = min(a_max[i], 0.7 * math.sqrt(2.0 * min(j_max[i], _NO_JERK_BOUND) * abs(gap)))
             u = min(max(min(max(gap / dt, -most), most), u - step), u + step)

@@ -36,7 +36,8 @@ STOP_STEPS = 40
 
 @kernel(MATRIX, WHOLE, INDICES, MATRIX, FIXED)
 def spread(A: Array, index: int, knot: NDArray[np.intp], slopes: Array, T_q: Array) -> None:
-    """Writes the rows of A (…, N·n) from `index` on whose values at knots (r,) have slopes (r, n) in q."""
+    """Writes rows of functions of q to A (…, N·n), from `index` on. `slopes` (r, n) are the derivatives of
+    the functions with respect to q at the knots (r,)."""
     n = slopes.shape[1]
     for r in range(len(knot)):
         for s in range(len(T_q)):
@@ -46,7 +47,8 @@ def spread(A: Array, index: int, knot: NDArray[np.intp], slopes: Array, T_q: Arr
 
 @kernel(MATRIX, MATRIX, VECTOR, WHOLE, MATRIX)
 def about(A: Array, bounds: Array, u: Array, count: int, room: Array) -> None:
-    """Writes the bounds of the first rows for the change d of u: A d in [lower − Au, upper − Au] = `room`."""
+    """Writes the bounds on the change d of u to `room`, for the first `count` rows: lower − Au ≤ A d ≤ upper
+    − Au."""
     A, u = borrowed(A), borrowed(u)
     for r in range(count):
         value = dot(A[r], u, len(u))
@@ -69,9 +71,9 @@ def guard(
 
     Args:
         J, e: (N, m, n) and (N, m), the error of a level above at the iterate. best: e*, (N, m).
-        strict: whether an error that already exceeds e* must return to e*; it may stay otherwise. If strict,
+        strict: whether an error that exceeds e* must return to e*. Otherwise it may keep its size. If strict,
             the rows of A must have been written before.
-        T_q: (N, N), ∂q_k/∂u_s. A, room, labels: of the table.
+        T_q: (N, N), ∂q_k/∂u_s. A, room, labels: arrays of the table.
     """
     N, m, n = J.shape
     for k in range(N):
@@ -156,8 +158,8 @@ def limits(
             bounds[0, count], bounds[1, count] = -room - v[i], room - v[i]
             labels[0, count], labels[1, count], labels[2, count] = RAMP, N, i
             count += 1
-    # "stop": q_N + mΔt v_N ∓ ½a(mΔt)², the position after m steps of full braking, inside the range. A row is
-    # left out if the fastest motion within the input bounds does not reach its bound.
+    # "stop": q_N + mΔt v_N ∓ ½a(mΔt)², the position after m steps of full braking, is inside the range. A row
+    # is left out if the fastest motion within the input bounds does not reach the row's bound.
     for m in range(1, STOP_STEPS + 1):
         ahead = m * dt
         for i in range(n):
