@@ -15,8 +15,8 @@ EXERCISE = "distance-row"
 
 
 def distance_rows(now):
-    """Rows D (r, n) and their lower bounds (r,): D Δτ ≥ lower, one row for each pair."""
-    # `now.near` has d and d_safe (r,), gradient (r, n), reaction (t, s) and deceleration (a, m/s²).
+    """Returns the rows D (r, n) and their lower bounds (r,): D Δτ ≥ lower, one row for each pair."""
+    # `now.near` has d and d_safe (r,), gradient (r, n), reaction (t in s) and deceleration (a in m/s²).
     # TODO: the next velocity is q̇ + T_s (q̈₀ + M̄⁻¹ Δτ). Which D and which lower bound follow from this?
     return np.zeros((0, now.n)), np.zeros(0)
 
@@ -26,11 +26,11 @@ def torque(now):
     return cascade(now, D, lower)
 
 
-# ------------------------------------------------------------ the levels: exercise two-levels, nothing to add
+# ------------------------------------------------------------ the levels, as in exercise two-levels: complete
 
 
 def cascade(now, D, least):
-    """The torques of the levels under all bounds, D Δτ ≥ least among them."""
+    """Returns the torques of the levels under all bounds, including D Δτ ≥ least."""
     torques, found = [], np.zeros(now.n)
     for level in now.levels:
         H, f = quadratic(now, level)
@@ -43,7 +43,7 @@ def cascade(now, D, least):
             B = above.J / now.M_bar
             rows, lower, upper = np.vstack([rows, B]), np.r_[lower, B @ found], np.r_[upper, B @ found]
         solution = solve_qp(H, f, rows, lower, upper)
-        if not solution.solved:  # no torque meets all rows: come to rest
+        if not solution.solved:  # no torque meets all rows: brake the joints
             return now.tau_0 - now.M_bar * (now.q_ddot + 5.0 * now.q_dot)
         found = solution.x
         torques.append(now.tau_0 + found)

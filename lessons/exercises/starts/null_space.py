@@ -1,4 +1,4 @@
-"""Exercise null-space: a second task that leaves the first alone (OSF).
+"""Exercise null-space: a second task that does not disturb the first (OSF).
 
 himpc-lab grade FILE.py
 himpc-lab --scene planar3-circle --controller FILE.py
