@@ -1,4 +1,4 @@
-"""The names of the scenes with one line each, for lists and menus, which load no scene."""
+"""The names of the scenes with one line each, for lists and menus. No scene is loaded."""
 
 from __future__ import annotations
 
