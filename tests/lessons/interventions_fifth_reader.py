@@ -54,8 +54,8 @@ FIFTH_ROWS = (
         there=(0.55, 0.65), without=("rate_hz=10",), gone=(2.7, 2.85), of=(*EVERY_TWENTIETH, "rate_hz=20"),
     ),
     STEPS(
-        says="If level 1 also pays for its effort, with the same $Q = 10$ (`formulation=paper` and `Q=10`), "
-        "its best leaves an error and the cost has a slope, but the steps are as short as before. So the "
+        says="If the cost of level 1 contains effort, with the same $Q = 10$ (`formulation=paper` and `Q=10`), "
+        "its best plan leaves an error and the cost has a slope, but the steps are as short as before. So the "
         "missing slope is not the reason.",
         without=("formulation=paper", "Q=10"), gone=(0.02, 0.025), stays=True,
     ),

@@ -84,11 +84,12 @@ FOURTH_ROWS = (
     ),
     # ---------------------------------------- deadlines
     Intervention(
-        "deadlines/1", "the hand of the late loop is off by 47 mm, that of half the rate by 3.2 mm",
+        "deadlines/1",
+        "the error of the hand is 47 mm in the late loop, and 3.2 mm in the loop of half the rate",
         HAND, (45, 49), ("T_s=0.002", "deadline_ms=2"), (3.1, 3.3), of=LATE,
     ),
     Intervention(
-        "deadlines/1", "without it, in the bounds and in the motors, the late hand is off by 3.4 mm",
+        "deadlines/1", "without this limit, in the bounds and in the motors, the late hand is off by 3.4 mm",
         HAND, (45, 49), ("limits.torque=false", "plant.saturate=false"), (3.3, 3.5), of=LATE,
     ),
     Intervention(
@@ -97,7 +98,7 @@ FOURTH_ROWS = (
     ),
     # ---------------------------------------- how-strict-is-strict
     Intervention(
-        "how-strict-is-strict/0", "with $\\delta = 10^{-12}$ m it does not move either",
+        "how-strict-is-strict/0", "with $\\delta = 10^{-12}$ m the base does not move either",
         WAY, (0, 1e-6), ("delta_m=1e-12",), (0, 1e-6), stays=True,
     ),
     Intervention(

@@ -85,7 +85,8 @@ LIMIT_ROWS = (
     ),
     Intervention(
         "a-blind-arm/1",
-        "Stiffness does not limit it: with half of $K_p$ both bounds are reached, too, up to 0.9 s later",
+        "Stiffness does not limit the force: with half of $K_p$ both bounds are reached, too, up to 0.9 s "
+        "later",
         FORCE, (205, 225), ("levels.position.K_p=28.1",), (205, 225), seconds=2.7, stays=True,
     ),
     # ---------------------------------------- keeping-clear
@@ -152,7 +153,7 @@ LIMIT_ROWS = (
         (7, 15),
     ),
     Intervention(
-        "deadlines/2", "the effect of noise doubles",
+        "deadlines/2", "The effect of noise doubles",
         of("delta_tau", "N·m", "rms"), (1.1, 1.6), ("M_bar_scale=1",), (0.5, 0.8),
         of=("plant.encoder_resolution_deg=0.001",), seconds=0.3,
     ),

@@ -26,7 +26,7 @@ MOBILE_ROWS = (
     ),
     Intervention(
         "first-hold-then-reach/1",
-        "It is where every plan that makes $\\mathcal J_2$ smaller also changes $\\mathcal J_1$.",
+        "Here every plan that makes $\\mathcal J_2$ smaller also changes $\\mathcal J_1$.",
         of("error/base", "m", "mean", 7.0), (1.55, 1.7), ("order=base,ee",), (0, 0.05),
     ),
     # ---------------------------------------- how-strict-is-strict
@@ -36,11 +36,11 @@ MOBILE_ROWS = (
     ),
 
     Intervention(
-        "how-strict-is-strict/3", "in its own best plan the hand slips a little",
+        "how-strict-is-strict/3", "in the best plan of level 1 the hand slips a little",
         EE, (12, 20), ("velocity_effort=0.001",), (2, 9),
     ),
     Intervention(
-        "how-strict-is-strict/3", "$\\delta$ is added to it", EE, (12, 20), ("delta_m=0.001",), (2, 9),
+        "how-strict-is-strict/3", "$\\delta$ is added to the slip", EE, (12, 20), ("delta_m=0.001",), (2, 9),
     ),
     # ---------------------------------------- seeing-ahead
     Intervention(

@@ -129,7 +129,7 @@ READER_ROWS = (
         X, (0.528, 0.538), ("horizon=1",), (0.47, 0.476), of=LONG, on="iiwa14-circle-paper", seconds=4.0,
     ),
     Intervention(
-        "how-far-ahead/0", "with $N = 1$ 1600 QPs have no solution",
+        "how-far-ahead/0", "1600 QPs have no solution with $N = 1$",
         of("unsolved", "", "sum"), (0, 50), ("horizon=1",), (1550, 1700), of=LONG, on="iiwa14-circle-paper",
         seconds=4.0,
     ),

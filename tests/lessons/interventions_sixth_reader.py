@@ -116,7 +116,8 @@ SIXTH_ROWS = (
     ),
     Intervention(
         "how-strict-is-strict/3",
-        "with $Q = 1000$ it is off by 40 mm. With this $Q$ and without the bounds on speed, 5.4 mm remain",
+        "with $Q = 1000$ the hand is off by 40 mm. With this $Q$ and without the bounds on speed, 5.4 mm "
+        "remain",
         EE, (39.5, 40.4), ("limits.velocity=false",), (5.35, 5.5), of=("Q=1000",), seconds=1.2,
     ),
     Intervention(
@@ -144,7 +145,7 @@ SIXTH_ROWS = (
     ),
     # ---------------------------------------- deliveries
     THERE(
-        says="it loses more because it now has to go all the way to it",
+        says="It loses more because it now has to go all the way to the place",
         there=(18.8, 19.6), without=("base_tolerance=0.05",), gone=(30.5, 31.3), of=PASSES,
     ),
     THERE(

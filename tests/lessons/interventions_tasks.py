@@ -33,7 +33,7 @@ TASK_ROWS = (
     ),
     Intervention(
         "a-redundant-arm/1",
-        "Joint 3 stops at 29°, because the same level asks the other six joints to stay",
+        "Joint 3 stops at 29°, because the same level has to hold the other six joints",
         of("q", "deg", "range", column=2), (28.5, 29.5), ("tasks.posture.K_p=[0,0,56.2,0,0,0,0]",), (53, 61),
     ),
     Intervention(

@@ -255,7 +255,7 @@ QUOTED = (
         0.55,
         0.667,
     ),
-    Quoted("deliveries/0", "and of its distance", _ratio(WAY), 0.55, 0.667),
+    Quoted("deliveries/0", "of the ghost's time and distance", _ratio(WAY), 0.55, 0.667),
     Quoted(
         "deliveries/2", "The hand is with the first person by 3 s", _of(EE, after=3.0, until=4.0), 0.0, 10.0
     ),
@@ -266,10 +266,10 @@ QUOTED = (
         10,
         20,
     ),
-    Quoted("deadlines/2", "the limit of stability is where it was, between 2 and 2.5", _of(RADIUS), 0.5, 1.0),
+    Quoted("deadlines/2", "the limit of stability is still between 2 and 2.5", _of(RADIUS), 0.5, 1.0),
     Quoted(
         "deadlines/2",
-        "the limit of stability is where it was, between 2 and 2.5",
+        "the limit of stability is still between 2 and 2.5",
         _of(RADIUS),
         1.0,
         9.0,
@@ -301,7 +301,12 @@ QUOTED = (
         None,
     ),
     Quoted(
-        "how-strict-is-strict/2", "allow a third and more", _of(Signal("step/base"), "mean"), 0.34, 0.9, None
+        "how-strict-is-strict/2",
+        "a third of a step and more",
+        _of(Signal("step/base"), "mean"),
+        0.34,
+        0.9,
+        None,
     ),
     Quoted("deliveries/2", "three seconds to the second person", _of(Signal("place"), until=17.1), 4, 4),
     Quoted("deliveries/2", "needs nearly seven", _of(Signal("place"), until=21.1), 4, 4, None),
