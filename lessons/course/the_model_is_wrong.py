@@ -119,9 +119,10 @@ HEAVIER = Step(
     friction. But three quarters of the error are due to friction, which does not grow with the mass. A
     larger $\bar M$ makes the whole error as small as before. Lighter links make corrections faster and the
     error smaller. They do not lead to instability, since the inertia of the motors is left: with links of a
-    twentieth of the mass the gauge reads 0.47. It passes 1 only if the motors are lighter, too, 0.01 kg·m²
-    each. As long as $\lVert I - M^{-1}\bar M \rVert$ is below 1 errors stay bounded (Remark 4). That is
-    sufficient, not necessary: in the long run the spectral radius decides, the gauge.
+    twentieth of the mass the gauge reads 0.47. The gauge passes 1 only if the motors are lighter, too, with
+    0.01 kg·m² each. As long as $\lVert I - M^{-1}\bar M \rVert$ is below 1 errors stay bounded (Remark 4).
+    This condition is sufficient, not necessary: in the long run the spectral radius decides, which the
+    gauge shows.
     """,
     prediction=Choice(
         "The links are 50 % heavier, and HIMPC does not know it. HIMPC's largest error grows …",
@@ -156,7 +157,7 @@ HEAVIER = Step(
             "at most",
             0.3,
             fails_with=("controller=hqp",),
-            because="its model has no friction",
+            because="HQP's model has no friction",
         ),
     ),
     set=("plant.mass_scale=1.5", "plant.inertia_scale=1.5"),

@@ -43,7 +43,7 @@ BOTH = Step(
             "at most",
             1.0,
             fails_with=("controller=osf",),
-            because="its model has no friction",
+            because="OSF's model has no friction",
         ),
         Claim(
             "Joint 1 stays within 1° of its reference.",
@@ -80,8 +80,8 @@ WEIGHTED = Step(
     """,
     do="Make Q of level 2 smaller until the hand is on its circle. How large is the error of joint 1 then?",
     why=r"""
-    A sum is a compromise. It weighs $e$, and at rest $e = K_P \tilde x$. A metre of the hand counts 200
-    m/s², and a radian of joint 1 counts 50 rad/s². So the gains act as weights, too. Both tasks have
+    A sum is a compromise. The sum weighs $e$, and at rest $e = K_P \tilde x$. A metre of the hand counts
+    200 m/s², and a radian of joint 1 counts 50 rad/s². So the gains act as weights, too. Both tasks have
     errors, and the hand leaves its circle by a quarter of a metre. The units do not determine the right
     weights.
     """,
@@ -162,7 +162,7 @@ STRICT = Step(
             "at least",
             30.0,
             fails_with=("controller=weighted",),
-            because="there most of the error is that of the hand",
+            because="in a weighted sum most of the error is that of the hand",
         ),
     ),
     duration=SECONDS,
@@ -182,11 +182,11 @@ LIMIT = Step(
     tasks can be fulfilled, and go down to the least Q.
     """,
     why=r"""
-    The error is smaller, and still several times that of a strict priority. In the limit the weighted
-    solution becomes the strict one. But such a small $Q$ no longer outweighs $R$. With the smaller swing
-    joint 1 is off by 0.02° with $Q_2 = 1$, by 0.05° with 0.01, and at the slider's end, with $10^{-5}$, by
-    13° of its 20°: there joint 1 no longer follows its reference, although this would be possible. With a
-    smaller $R$ it would follow.
+    The error is smaller, and still several times that of a strict priority. In the limit of a very small
+    $Q_2$ the weighted solution becomes the strict one. But such a small $Q$ no longer outweighs $R$. With
+    the smaller swing joint 1 is off by 0.02° with $Q_2 = 1$, and by 0.05° with 0.01. At the end of the
+    slider, with $10^{-5}$, it is off by 13° of its 20°: there joint 1 no longer follows its reference,
+    although this would be possible. With a smaller $R$ it would follow.
     """,
     prediction=Choice(
         "The hand counts 200 times as much as joint 1. Its largest error is …",

@@ -43,7 +43,7 @@ SIXTH_ROWS = (
         measure=LATE_SPEED, there=(17.5, 18.5), without=NO_DELAY, gone=(57, 58),
     ),
     VIABLE(
-        says="with twice the $\\bar M$ the joint does 18 as well",
+        says="with twice the $\\bar M$ the joint also turns with 18°/s",
         measure=LATE_SPEED, there=(17.5, 18.5), without=("M_bar_scale=2",), gone=(17.5, 18.5), stays=True,
     ),
     VIABLE(
@@ -96,7 +96,7 @@ SIXTH_ROWS = (
     ),
     # ---------------------------------------- keeping-clear
     Intervention(
-        "keeping-clear/3", "without the orientation alone 19 cm",
+        "keeping-clear/3", "if only the orientation is off, 19 cm are left",
         HAND_LAST, (265, 275), ("levels.orientation.enabled=false",), (190, 199),
     ),
     # ---------------------------------------- deadlines
