@@ -130,8 +130,8 @@ BOUND = Step(
 SEEN = Step(
     title="Seen, not felt",
     text=r"""
-    Now the controller knows the position of the table. It bounds the speed with which any link may approach
-    the table or any other object. The next lesson shows how.
+    Now the controller knows the position of the table, and bounds the speed with which any link may
+    approach the table or any other object. The next lesson shows how.
     """,
     do="Lower d_safe to 0 mm. Can the arm be made to touch the table lightly?",
     why=r"""

@@ -108,7 +108,7 @@ SLOWER = Step(
     ),
     claims=(
         Claim(
-            "Half the rate in time is no worse than the full rate one tick late (within 10 %).",
+            "The largest error is at most 10 % above that with the full rate and a late torque.",
             Measure(HAND, over_ghost=True),
             "at most",
             1.1,

@@ -157,8 +157,8 @@ WAIT = Step(
     text=r"""
     The time that a person needs to take a ball is unknown. The hand is with the first person by 3 s. Here
     the ball is taken at 14 s, and the controller receives this information only then. Until 14 s $\mathcal
-    T_{l_0}$ is *hand at her hand*, of unknown duration, and the next place of the base, 2 m farther, is out
-    of reach. What will the base do during this time?
+    T_{l_0}$ is *hand at the person's hand*, of unknown duration, and the next place of the base, 2 m
+    farther, is out of reach. What will the base do during this time?
     """,
     do="Release the ball yourself, early or late. Can you predict how long the rest of the round will take?",
     why=r"""
@@ -192,7 +192,7 @@ WAIT = Step(
             "at most",
             1.0,
             fails_with=("formulation=paper",),
-            because="a first level that saves effort lets the hand slip",
+            because="if the first level also minimises effort, the hand slips",
         ),
         Claim(
             "Both balls are delivered within 18 s.",
@@ -259,7 +259,7 @@ MOVES = Step(
             "at most",
             1.0,
             fails_with=("formulation=paper",),
-            because="a first level that saves effort lets the hand slip",
+            because="if the first level also minimises effort, the hand slips",
         ),
     ),
     events=(

@@ -188,7 +188,7 @@ SUM = Step(
             "at most",
             0.1,
             fails_with=("lexicographic=per_coordinate",),
-            because="with the linear rows of (12) a third of a step and more is accepted",
+            because="with the linear rows of (12) at least a third of a step is accepted",
         ),
     ),
     set=("lexicographic=cost",),

@@ -30,7 +30,7 @@ LINE = Step(
     text=r"""
     The picture *Inside* shows one tick. With $N = 1$ the unknowns are three torque changes; joint 3 only
     holds its own angle, so the picture shows the plane of $\Delta\tau_1$ and $\Delta\tau_2$. The red frame
-    shows the bounds: no torque change outside it is allowed.
+    shows the bounds: no torque change outside the frame is allowed.
 
     **Level 1** (orange) has a target for *one* number, the wrist's $x$. This gives one equation for two
     unknowns: the cost (31) is a long valley, and disc 1 is its optimum (of all points in the valley, $R$
@@ -221,7 +221,7 @@ SUM = Step(
     ),
     claims=(
         Claim(
-            "With strict priorities the error of the joints is more than 1.5 times as large.",
+            "With strict priorities the error of the joints is more than 1.5 times the ghost's.",
             Measure(JOINTS, "last", over_ghost=True),
             "at least",
             1.5,

@@ -1,6 +1,6 @@
 """Keeping clear
 
-An arm must not touch a table and a post: is that a task, a bound, or a filter?
+An arm must not touch a table and a post: is this requirement a task, a bound, or a filter?
 
 Minutes: 10
 You need: lesson "stopping-takes-distance"; lesson "a-blind-arm"
@@ -52,7 +52,7 @@ BELOW = Step(
     prediction=Choice(
         "The task of the distance ranks right below the hand's position. At the end the arm presses with …",
         (
-            Option("nothing: the hand stops above it", high=1.0),
+            Option("nothing: the hand stops above the table", high=1.0),
             Option("less than without that task", 1.0, 200.0),
             Option("more than 200 N, as without that task", low=200.0),
         ),

@@ -39,9 +39,9 @@ LOAD = Step(
     why=r"""
     The hand dips by a few millimetres and comes back, to a hundredth of a millimetre. The effect of the
     load on the acceleration is measured, and in the next millisecond the load is part of $H_q$. Then the
-    hand stops sagging. The spring of (4) then brings the hand back. Without a spring, $K_P = 0$, the hand
-    stays 3.3 mm too low. The ghost's model is exact except for the kilogram; only its springs carry the
-    kilogram, so it sags by centimetres and stays there.
+    hand stops sagging, and the spring of (4) brings it back. Without a spring, $K_P = 0$, the hand stays
+    3.3 mm too low. The ghost's model is exact except for the kilogram; only its springs carry the kilogram,
+    so it sags by centimetres and stays there.
     """,
     prediction=Choice(
         "One kilogram that the controller does not know of: where is the hand 1.5 s later?",
@@ -94,7 +94,7 @@ SMALL = Step(
     q$ is removed. The gauge shows the spectral radius of $I - M^{-1}\bar M$: after each step, this share of
     the slowest component of the error is left. Here a gauge close to 1 means *slow*, with an eigenvalue
     near +1. An eigenvalue near −1 would give the same radius and mean *almost unstable*. The radius alone
-    does not distinguish the two.
+    does not distinguish the two cases.
     """,
     prediction=Value(
         "With 0.3 M̄ instead of M̄: how many times larger is the largest error?",
@@ -150,7 +150,7 @@ FURTHER = Step(
             "at least",
             1.2,
             fails_with=("M_bar_scale=1",),
-            because="with the old M̄ it is 0.999",
+            because="with the old M̄ the norm is 0.999",
         ),
         Claim(
             "The spectral radius is below 0.95.",

@@ -158,16 +158,16 @@ FREE = Step(
     bound changes it. The middle link gets a short push, 10 N for 0.2 s, and the last level, `damping`, is
     switched off.
     """,
-    do="Switch the speed limits off and push again: which way does the elbow go? Then switch damping on.",
+    do="Switch the speed limits off and push again: which way does the elbow move? Then switch damping on.",
     why=r"""
     No task stops the motion in that direction, so the elbow still moves when the hand has long been on its
     target. A bound determines the direction in which the elbow moves. The push drives joint 2 to its speed
     limit, and the torques change to hold this speed. When the push ends, the part of the torques along the
     free motion stays as it is, and this part reverses joint 2. 0.2 s later joint 2 turns with 80°/s in the
     opposite direction. Without speed limits joint 2 continues in the direction of the push, with more than
-    300°/s. It reverses only 0.75 s after the push, where the held hand allows no further motion: the last
-    link then lies on the line from joint 1 to the hand. A last level with the task $\ddot q + K_V \dot q =
-    0$ brings the elbow to rest, with hardly any effect on the hand.
+    300°/s. It reverses only 0.75 s after the push. There the held hand allows no further motion: the last
+    link lies on the line from joint 1 to the hand. A last level with the task $\ddot q + K_V \dot q = 0$
+    brings the elbow to rest, with hardly any effect on the hand.
     """,
     prediction=Choice(
         "The hand is held. What does the elbow do after the push?",

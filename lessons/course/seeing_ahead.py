@@ -1,6 +1,6 @@
 """Seeing ahead
 
-Eight seconds away, eight seconds back: what is the advantage of knowing this in advance?
+A robot must go away and come back after eight seconds: what is the advantage of knowing this in advance?
 
 Minutes: 12
 You need: lesson "first-hold-then-reach"
@@ -60,7 +60,7 @@ EARLY = Step(
             because="without preview the controller receives the next place only at 8 s",
         ),
         Claim(
-            "In Part 2 its mean error is at most half of the ghost's.",
+            "In Part 2 the base's mean error is at most half the ghost's.",
             BACK,
             "at most",
             0.5,
@@ -92,7 +92,7 @@ SHORT = Step(
     select a plan for events beyond the horizon.
     """,
     prediction=Choice(
-        "N = 2 instead of 10. The hand still ranks first. It is off by at most …",
+        "With N = 2 instead of 10, the hand still ranks first. The hand is off by at most …",
         (
             Option("less than 1 mm, as before: it ranks first", high=1.5),
             Option("some millimetres", 1.5, 10.0),
@@ -151,7 +151,7 @@ NO_PLAN = Step(
     ),
     claims=(
         Claim(
-            "In Part 2 its mean error is at least twice the ghost's.",
+            "In Part 2 the base's mean error is at least twice the ghost's.",
             BACK,
             "at least",
             2.0,

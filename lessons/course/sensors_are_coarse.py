@@ -87,7 +87,7 @@ SQUARE = Step(
     by little more than half.
     """,
     prediction=Value(
-        "T_s twice as long: the torque changes become how many times as large?",
+        "With T_s twice as long, the torque changes become how many times as large?",
         Measure(ROUGH, "rms", over_ghost=True),
         low=0.05,
         high=5.0,

@@ -117,7 +117,7 @@ LONGER = Step(
             "at least",
             90.0,
             fails_with=("limits.position=viability",),
-            because="there the joint brakes over the whole distance",
+            because="with the bound on speed the joint brakes over the whole distance",
         ),
     ),
     set=("limits.position=paper", "horizon=20"),
@@ -158,7 +158,7 @@ VIABLE = Step(
     (32d).
     """,
     prediction=Choice(
-        "A horizon of 5 ms again, but with the bound on speed. The largest torque is …",
+        "With a horizon of 5 ms and the bound on speed, the largest torque is …",
         (
             Option("all the available torque, as before", low=95.0),
             Option("about half", 30.0, 95.0),
@@ -185,12 +185,12 @@ VIABLE = Step(
             because="the late stop takes all the torque",
         ),
         Claim(
-            "At no time would a stop before the limit take more than 2 rad/s².",
+            "A stop before the limit would never take more than 2 rad/s².",
             Measure(STOP),
             "at most",
             2.0,
             fails_with=("limits.velocity_approach=0",),
-            because="with t = Tₛ it takes 16 of the 20 rad/s²",
+            because="with t = Tₛ a stop takes 16 of the 20 rad/s²",
         ),
         Claim(
             "Within 5° of the limit no joint moves at more than 20°/s.",
@@ -222,7 +222,7 @@ CHALLENGE = Challenge(
     """,
     goals=(
         Claim("Joint 2 gets to 149°.", Measure(JOINT_2, "last"), "at least", 149.0),
-        Claim("It stays within its range.", Measure(RANGE), "at most", 100.0),
+        Claim("The joint stays within its range.", Measure(RANGE), "at most", 100.0),
         Claim("The joint needs less than 90 % of its torque.", Measure(TORQUE), "at most", 90.0),
     ),
     knobs=(N, Control("limits.velocity_scale", "Speed limit, factor", 0.1, 1.0)),

@@ -33,7 +33,7 @@ INVERSE = Step(
     acceleration many million times. With a gentle start the circle demands no acceleration along the arm at
     first, and for a tenth of a second the demanded torque is small. Then, at 0.13 s, the demand still
     exceeds a thousand times the limit, for one or two ticks. A damped inverse, `osf_damped`, demands a
-    fifth of the limit. Motors cannot supply torques above their limit: they clip them.
+    fifth of the limit. Real motors clip torques above their limit.
     """,
     prediction=Choice(
         "The hand should only move sideways. What is the largest torque that OSF demands?",
@@ -120,9 +120,10 @@ BLAME = Step(
     do="Look at 8 s: the arm is straight again, and the circles change.",
     why=r"""
     Nearly all of the error was due to the jump. The size of this error is mostly due to the desired motion:
-    (4) returns slowly. With four times the $K_P$ and twice the $K_V$ the error after the jump is 1.7 mm. In
-    a singular pose HIMPC follows the directions that the arm can move in. Where an experiment has two
-    possible causes at once, it does not show which of them acts; so remove one of them.
+    (4) brings the hand back slowly. With four times the $K_P$ and twice the $K_V$ the error after the jump
+    is 1.7 mm. In a singular pose HIMPC follows the reference in the directions in which the arm can move.
+    Where an experiment has two possible causes at once, it does not show which of them acts; so remove one
+    of them.
     """,
     prediction=Choice(
         "With the same singular pose and a gentle start, the largest error becomes …",

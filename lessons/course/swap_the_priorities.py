@@ -116,8 +116,8 @@ FIRST = Step(
 BACK = Step(
     title="And back",
     text=r"""
-    At 2.6 s the old order is restored. At this moment the order of the problems jumps, but the measurements
-    do not: $\tau_0$, $\ddot x_0$ and the last plan stay the same.
+    At 2.6 s the old order is restored. At this moment the order of the problems changes abruptly, but the
+    measurements do not: $\tau_0$, $\ddot x_0$ and the last plan stay the same.
     """,
     do="Swap levels as fast as you can. Try to make the arm jump.",
     why=r"""

@@ -80,7 +80,7 @@ REALITY = Step(
     friction. HIMPC needs no model of friction: it measures the effect of the torque of a millisecond ago.
     """,
     prediction=Value(
-        "Model 20 % light, friction unknown: how many times larger is OSF's error than HIMPC's?",
+        "The model is 20 % light and has no friction: how many times larger is OSF's error than HIMPC's?",
         Measure(HAND, over_ghost=True),
         low=0.1,
         high=1000.0,
@@ -93,7 +93,7 @@ REALITY = Step(
             "at least",
             10.0,
             fails_with=("plant.friction=0", *EXACT),
-            because="with the exact model OSF is the better one",
+            because="with the exact model OSF is better than HIMPC",
         ),
     ),
     set=("controller=osf",),
@@ -107,8 +107,8 @@ HEAVIER = Step(
     title="Links that are 50 % heavier",
     text=r"""
     The controller is HIMPC, and every link is 50 % heavier than before. The controller has no information
-    about this change, and $\bar M$ stays. Table V of the paper disturbs the inertias by ±20 % and finds
-    that level 1 changes by about 2 % at most. The ghost has the old links.
+    about this change, and $\bar M$ stays the same. Table V of the paper disturbs the inertias by ±20 % and
+    finds that level 1 changes by about 2 % at most. The ghost has the old links.
     """,
     do=(
         "Set half the mass: how do error and gauge change? Then reset the mass, raise M̄, and remove friction."

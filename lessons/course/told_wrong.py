@@ -33,9 +33,9 @@ NOT_THERE = Step(
 
     $$\mathrm{sd}(B(q_k), O) \ge d_{\mathrm{safe}} \quad (7c),$$
 
-    with $d_{\mathrm{safe}}$ = 5 cm. But a camera and a map report the place of $O$. From 1 s to 7 s they
-    report the crate 1.1 m away from its true place, next to the line of the base: the outline shows the
-    reported place. The hand can pass above the low crate, and the base has to make way. Then the report is
+    with $d_{\mathrm{safe}}$ = 5 cm. A camera and a map report the place of $O$. From 1 s to 7 s they report
+    the crate 1.1 m away from its true place, next to the line of the base: the outline shows the reported
+    place. The hand can pass above the low crate, and the base has to make way. Then the report is
     corrected.
     """,
     do="Correct the report at 5 s. Then put the base first, in the tab Mission.",
@@ -121,7 +121,7 @@ THERE = Step(
     measured here).
     """,
     prediction=Choice(
-        "The crate is reported beside the line until 7 s. The least distance to it is …",
+        "The crate is reported beside the line until 7 s. The least distance to the crate is …",
         (
             Option("5 cm, as always", low=40.0),
             Option("less, but the robot stops before the crate", 0.0, 40.0),

@@ -110,7 +110,7 @@ WEIGHTED = Step(
             "at least",
             200.0,
             fails_with=("tasks.q1.K_p=5", "tasks.q1.K_v=1.6"),
-            because="with a tenth of its K_P, joint 1 is ten times cheaper with the same Q",
+            because="with a tenth of its K_P, an error of joint 1 counts a tenth with the same Q",
         ),
     ),
     set=("controller=weighted",),
@@ -174,19 +174,19 @@ STRICT = Step(
 LIMIT = Step(
     title="Is a large weight a priority?",
     text=r"""
-    Weighted again, but now the hand counts 200 times as much: $Q_1 = 200$, $Q_2 = 1$. The ghost is
-    strict.
+    The tasks are weighted again, but now the hand counts 200 times as much: $Q_1 = 200$, $Q_2 = 1$. The
+    ghost has strict priorities.
     """,
     do=r"""
     Make Q of level 2 ten and a hundred times smaller still. Then let joint 1 swing by 20° only, where both
-    tasks can be fulfilled, and go down to the least Q.
+    tasks can be fulfilled, and reduce Q to its smallest value.
     """,
     why=r"""
-    The error is smaller, and still several times that of a strict priority. In the limit of a very small
-    $Q_2$ the weighted solution becomes the strict one. But such a small $Q$ no longer outweighs $R$. With
-    the smaller swing joint 1 is off by 0.02° with $Q_2 = 1$, and by 0.05° with 0.01. At the end of the
-    slider, with $10^{-5}$, it is off by 13° of its 20°: there joint 1 no longer follows its reference,
-    although this would be possible. With a smaller $R$ it would follow.
+    The error of the hand is smaller, but still several times that of a strict priority. In the limit of a
+    very small $Q_2$ the weighted solution becomes the strict one. But such a small $Q$ no longer outweighs
+    $R$. With the smaller swing joint 1 is off by 0.02° with $Q_2 = 1$, and by 0.05° with 0.01. At the end
+    of the slider, with $10^{-5}$, it is off by 13° of its 20°: there joint 1 no longer follows its
+    reference, although this would be possible. With a smaller $R$ it would follow.
     """,
     prediction=Choice(
         "The hand counts 200 times as much as joint 1. Its largest error is …",
@@ -217,9 +217,8 @@ LIMIT = Step(
 
 CHALLENGE = Challenge(
     text=r"""
-    At the start the tasks are weighted with equal weights. Keep the hand within 5 mm of its circle while
-    joint 1 still gets as close to its reference as it can (within 80°), with torque changes below 0.1 N·m
-    RMS.
+    At the start the tasks have equal weights. Keep the hand within 5 mm of its circle while joint 1 still
+    gets as close to its reference as it can (within 80°), with torque changes below 0.1 N·m RMS.
     """,
     goals=(
         Claim("The hand stays within 5 mm.", Measure(HAND), "at most", 5.0),

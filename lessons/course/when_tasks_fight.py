@@ -139,16 +139,16 @@ EQUALITY = Step(
     Level 2 has a target that it cannot reach. It moves joint 1 to the limit that level 1 allows, where
     links 2 and 3 are in line, and the arm does not come to rest there: from 2 s on joint 3 swings about
     this limit, to and fro with 94°/s, a little more than once a second, until the reference of joint 1
-    comes back. A strict order does not prevent such oscillations. The strict order does not keep the joint
-    swinging: in a weighted sum with $Q_2 = 0.01$ joint 3 swings as well, with up to 73°/s. The estimation
-    does not keep it swinging either: with twice the $\bar M$ it swings as before. With our weights the
-    horizon of level 2 does: with $N = 1$ at level 2 alone the swing decays to an oscillation of 12°/s, with
-    $N = 1$ at level 1 alone it swings as before. Another weight changes this result. With $R_2 = 10^5$ the
-    swing slows down to 58°/s and does not need the horizon: with $N = 1$ and $R_2 = 10^5$ joint 3 continues
-    to swing with 62°/s. In spite of the swing, torque and speed stay within their bounds, and the hand
-    stays on its circle. The equality (34g) alone is not enough for this. The bounds are needed, too:
-    without those on speed and position every motor comes to its limit and the hand is off by 11 mm, and
-    without any bound the arm goes out of control as with a projection.
+    comes back. A strict order does not prevent such oscillations, but it does not sustain them: in a
+    weighted sum with $Q_2 = 0.01$ joint 3 swings as well, with up to 73°/s. The estimation does not sustain
+    the swing either: with twice the $\bar M$ it swings as before. With our weights the horizon of level 2
+    sustains the swing: with $N = 1$ at level 2 alone the swing decays to an oscillation of 12°/s, with $N =
+    1$ at level 1 alone it swings as before. Another weight changes this result. With $R_2 = 10^5$ the swing
+    slows down to 58°/s and does not need the horizon: with $N = 1$ and $R_2 = 10^5$ joint 3 continues to
+    swing with 62°/s. In spite of the swing, torque and speed stay within their bounds, and the hand stays
+    on its circle. The equality (34g) alone is not enough for this. The bounds are needed, too: without
+    those on speed and position every motor comes to its limit and the hand is off by 11 mm, and without any
+    bound the arm goes out of control as with a projection.
     """,
     claims=(
         Claim(

@@ -46,7 +46,7 @@ LOAD = Step(
     position has an error instead.
     """,
     prediction=Choice(
-        "The head is moved by 11 cm. It has five joints. In the end …",
+        "The lamp has five joints, and its head is moved by 11 cm. In the end …",
         (
             Option("the head is on its target, as upright as before", high=1.0),
             Option("the head is on its target, but tilted", low=5.0),
@@ -102,7 +102,7 @@ WRONG = Step(
     ),
     claims=(
         Claim(
-            "In the end the head is within 1 mm.",
+            "In the end the head is within 1 mm of its target.",
             Measure(HAND, "last"),
             "at most",
             1.0,
@@ -126,9 +126,9 @@ TUNE = Step(
     text=r"""
     The suggested $\bar M$ must be safe in all poses of the lamp. Your own $\bar M$ need only be safe in the
     poses that you use. Here it is twice the suggestion; the ghost keeps the suggestion. Then use the
-    controller in your own program: *export* writes a Python script of twenty lines that runs this stack,
-    `load_robot("lamp.urdf")`, `Level((FramePosition(…),))`, `HIMPC(robot, Settings(stack, M_bar))`, `step`
-    once a millisecond.
+    controller in your own program: *export* writes a Python script of twenty lines that runs this stack:
+    `load_robot("lamp.urdf")`, `Level((FramePosition(…),))`, `HIMPC(robot, Settings(stack, M_bar))`, and
+    `step` once a millisecond.
     """,
     do="Set 3 times the suggestion and read the gauge. Then export, and run the script.",
     why=r"""

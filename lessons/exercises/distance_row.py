@@ -144,13 +144,13 @@ EXERCISE = Exercise(
     r"-v_\mathrm{stop}(d - d_\mathrm{safe})",
     plain="∇dᵀ(q̇ + T_s (q̈₀ + M̄⁻¹Δτ)) ≥ −v_stop(d − d_safe), v_stop(s) = a (√(t² + 2s/a) − t)",
     hints=(
-        "`now.near.gradient @ now.q_dot` is how fast each distance grows. The next velocity is "
+        "`now.near.gradient @ now.q_dot` is the rate at which each distance grows. The next velocity is "
         "q̇ + T_s (q̈₀ + M̄⁻¹Δτ).",
         "The factor of Δτ is D = T_s ∇dᵀM̄⁻¹, a row for each pair. All other terms go to the right.",
         "The largest speed from which the arm can still stop within the distance s is "
         "v_stop(s) = a (√(t² + 2s/a) − t); here s = max(d − d_safe, 0).",
-        "As a bound of a joint, in one period it may use at most min(1, approach · T_s) of what is left: "
-        "share · (−v_stop − ∇dᵀq̇) is the least change of ∇dᵀq̇.",
+        "As for a bound of a joint, one period uses at most the share min(1, approach · T_s) of the distance "
+        "to the bound: share · (−v_stop − ∇dᵀq̇) is the least change of ∇dᵀq̇.",
     ),
     lesson="keeping-clear",
     checks=checks,

@@ -12,7 +12,7 @@ SCENES: dict[str, str] = {
     "baxter-hold": "Baxter, two arms: drag both hands; their positions come before their orientations",
     "baxter-tray": "Baxter's hands move along a square as if they carried a tray; the grip is level 1",
     "baxter-conflict": "Baxter's hands keep their relative pose, but have targets at two different places",
-    "hold": "any robot: the same three levels; levels without freedom stay empty (needs --urdf)",
+    "hold": "any robot: the same three levels; levels without freedom have no effect (needs --urdf)",
     "planar3-plane": "the same arm, N = 1: the whole QP is drawn; the wrist's x comes before two joints",
     "planar3-circle": "planar 3-joint arm on RT1 of the HIMPC paper: a circle while joint 1 swings a little",
     "planar3-conflict": "the same arm on RT2: joint 1 swings so far that the hand cannot keep to the circle",
@@ -25,11 +25,11 @@ SCENES: dict[str, str] = {
 VELOCITY_SCENES: dict[str, str] = {
     "ridgeback-ur10-drag": "Ridgeback and UR10: drag the targets of hand and base; the hand comes first",
     "ridgeback-ur10-square": "the HTMPC paper's test: the hand stays, the base is sent out of reach and back",
-    "ridgeback-ur10-waypoints": "two places for the hand; the base has no waypoint at the first one (Fig. 8)",
+    "ridgeback-ur10-waypoints": "two places for the hand, the first one without a waypoint for the base (Fig. 8)",
     "ridgeback-ur10-delivery": "a delivery round to three people, four times (Fig. 9)",
     "ridgeback-ur10-handover": "the hand waits until the ball is taken; people move meanwhile",
     "ridgeback-ur10-cluttered": "the base drives past obstacles that it must avoid",
-    "ridgeback-ur10-perception": "a crate beside the way is reported on the way for a while",
+    "ridgeback-ur10-perception": "a crate beside the robot's path is reported on the path for a while",
     "iiwa14-htmpc": "KUKA iiwa 14 under HTMPC: position, then orientation",
     "panda-htmpc": "Franka Panda under HTMPC: position, then orientation",
 }

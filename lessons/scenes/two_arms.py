@@ -87,7 +87,7 @@ def baxter_tray() -> TorqueScene:
     way = Waypoints(corners, np.array([START_S + EDGE_S * k for k in range(5)]))
     times = [START_S + _SCRIPT_S * k for k in range(1, round(4 * EDGE_S / _SCRIPT_S) + 1)]
     events = tuple((t, MoveTarget("tray", tuple(way.preview(t, 1e-3, 1).value.tolist()))) for t in times)
-    title = "Baxter moves as if it carried a tray: nothing but level 1 keeps the hands together"
+    title = "Baxter moves as if it carried a tray: only level 1 keeps the hands together"
     return _scene(robot, "baxter-tray", title, levels, events, START_S + 4 * EDGE_S + 0.5)
 
 

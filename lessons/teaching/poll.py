@@ -62,7 +62,7 @@ class Poll:
             raise InputError("the vote is closed: your answer was not counted")
         vote = valid(self.asked, answer)
         if voter not in self.latest and len(self.latest) >= VOTERS:
-            raise InputError(f"{VOTERS} people have voted, and this vote takes no more")
+            raise InputError(f"{VOTERS} people have voted: this vote accepts no more voters")
         if self.latest.get(voter) == vote:
             return self
         return replace(self, rounds=(*self.rounds[:-1], {**self.latest, voter: vote}))
@@ -77,7 +77,7 @@ class Poll:
         if self.is_open:
             raise InputError("the vote is open: close it before the second vote")
         if len(self.rounds) >= ROUNDS:
-            raise InputError("this step has had its second vote: run it, or choose another step")
+            raise InputError("the second vote of this step is over: run the step, or choose another one")
         return replace(self, rounds=(*self.rounds, {}), is_open=True)
 
     def favourite(self) -> float:

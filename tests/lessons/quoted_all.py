@@ -55,7 +55,7 @@ QUOTED = (
     Quoted("no-model-needed/2", "leaves 0.41 of the error", _ratio(HAND), 0.405, 0.415, ("M_bar_scale=2",)),
     Quoted("no-model-needed/2", "The error is less than a fifth", _ratio(HAND), 0.16, 0.2),
     Quoted("no-model-needed/2", "the largest of them is 0.94", _of(RADIUS, "mean"), 0.935, 0.945),
-    Quoted("no-model-needed/2", "with the old M̄ it is 0.999", _of(NORM, "mean"), 0.9985, 0.9995, None),
+    Quoted("no-model-needed/2", "with the old M̄ the norm is 0.999", _of(NORM, "mean"), 0.9985, 0.9995, None),
     Quoted("no-model-needed/3", "At × 6 the gauge read 0.91", _of(RADIUS, "mean"), 0.905, 0.915, None),
     Quoted("no-model-needed/3", "to −1.21 at × 7", _of(RADIUS, "mean"), 1.205, 1.215, ("M_bar_scale=7",)),
     Quoted("no-model-needed/3", "the error grows by half", _of(RADIUS, "mean"), 1.4, 1.6),
@@ -138,7 +138,7 @@ QUOTED = (
     ),
     Quoted(
         "stopping-takes-distance/2",
-        "it takes 16 of the 20 rad/s²",
+        "a stop takes 16 of the 20 rad/s²",
         _of(Signal("deceleration to stop", "rad/s²")),
         15.5,
         16.5,
@@ -302,7 +302,7 @@ QUOTED = (
     ),
     Quoted(
         "how-strict-is-strict/2",
-        "a third of a step and more",
+        "at least a third of a step",
         _of(Signal("step/base"), "mean"),
         0.34,
         0.9,

@@ -47,11 +47,11 @@ def cascade(now, D, least):
             return now.tau_0 - now.M_bar * (now.q_ddot + 5.0 * now.q_dot)
         found = solution.x
         torques.append(now.tau_0 + found)
-    return torques  # one row per level: the last one acts
+    return torques  # one row per level: the last row acts
 
 
 def quadratic(now, level):
-    """H and f of ½ΔτᵀHΔτ + fᵀΔτ for ‖e⁰ + G Δτ‖²_Q + ‖Δτ‖²_R: exercise one-level-qp."""
+    """Returns H and f of ½ΔτᵀHΔτ + fᵀΔτ for ‖e⁰ + G Δτ‖²_Q + ‖Δτ‖²_R, as in exercise one-level-qp."""
     T = now.T_s
     G = (1.0 + level.K_v * T)[:, None] * level.J / now.M_bar
     e = (
@@ -64,7 +64,8 @@ def quadratic(now, level):
 
 
 def bounds(now):
-    """lower ≤ rows Δτ ≤ upper: the torque, and the next velocity in N·m."""
+    """Returns rows, lower and upper of lower ≤ rows Δτ ≤ upper: the bounds of the torque, and of the next
+    velocity in N·m."""
     T, limit, share = now.T_s, now.bounds, min(1.0, now.bounds.approach * now.T_s or 1.0)
     scale = now.M_bar / T
     lower = [limit.tau_lower - now.tau_0, (share * (limit.v_lower - now.q_dot) - T * now.q_ddot) * scale]
