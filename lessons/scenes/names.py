@@ -25,7 +25,7 @@ SCENES: dict[str, str] = {
 VELOCITY_SCENES: dict[str, str] = {
     "ridgeback-ur10-drag": "Ridgeback and UR10: drag the targets of hand and base; the hand comes first",
     "ridgeback-ur10-square": "the HTMPC paper's test: the hand stays, the base is sent out of reach and back",
-    "ridgeback-ur10-waypoints": "two places for the hand, the first one without a waypoint for the base (Fig. 8)",
+    "ridgeback-ur10-waypoints": "two places for the hand; the base has no waypoint at the first one (Fig. 8)",
     "ridgeback-ur10-delivery": "a delivery round to three people, four times (Fig. 9)",
     "ridgeback-ur10-handover": "the hand waits until the ball is taken; people move meanwhile",
     "ridgeback-ur10-cluttered": "the base drives past obstacles that it must avoid",
