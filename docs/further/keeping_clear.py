@@ -13,7 +13,7 @@ from himpc.qp import solve_qp
 
 A, T = Avoidance().deceleration, Avoidance().reaction
 KEPT = Avoidance().d_safe + Avoidance().margin
-LEAK = measured("keeping-clear", "The filter's change of the torque")
+LEAK = measured("keeping-clear", "The filter changes the accelerations")
 
 
 def speed(room: float) -> float:

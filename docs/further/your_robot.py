@@ -18,7 +18,7 @@ from robots.inertia import (
     suggest_M_bar,
 )
 
-TILT = measured("your-robot", "It is tilted by more than 5°.")
+TILT = measured("your-robot", "The head is tilted by more than 5°.")
 
 
 @cache

@@ -1,6 +1,6 @@
 """The lessons of the course, one per file; the docstring of each file is the card of its lesson.
 
-A file defines `LESSON`. A file is imported when its lesson is first needed.
+Each file defines `LESSON`, and is imported when its lesson is first needed.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ COURSE: tuple[str, ...] = (
     "told-wrong",
     "your-robot",
 )
-"""The lessons by name, in the order in which to take them."""
+"""The lessons by name, in the recommended order."""
 
 
 def load_lesson(name: str) -> Lesson:
-    """Returns the lesson of this name; an InputError for an unknown name contains the nearest one."""
+    """Returns the lesson with this name. Raises InputError with the nearest name if there is none."""
     if name not in COURSE:
         raise unknown_name("lesson", name, COURSE)
     lesson: Lesson = import_module(f"lessons.course.{name.replace('-', '_')}").LESSON

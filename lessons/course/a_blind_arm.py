@@ -28,8 +28,8 @@ STIFFNESS = Control("levels.position.K_p", "K_P of the hand, 1/s²", 10.0, 100.0
 UNSEEN = Step(
     title="A table one centimetre too high",
     text=r"""
-    The hand is sent straight down, to a place 1 cm below the surface of a table. The controller has no
-    information about the table. It estimates everything that acts on the arm from the last torque,
+    The target of the hand moves straight down, to 1 cm below the surface of a table. The controller has no
+    information about the table. It estimates all forces on the arm from the last torque and acceleration,
 
     $$\tau_0 - \bar M \ddot q_0,$$
 
@@ -39,10 +39,10 @@ UNSEEN = Step(
     why=r"""
     The force grows by more than 200 N per second. The force of the table is part of the estimate, so the
     controller compensates for this force, as it compensated for the unknown weight in lesson *No model
-    needed*. In addition, every millisecond the torque grows by the change that the remaining centimetre of
-    error demands. OSF without a horizon, but with time-delay estimation, presses as hard, so MPC is not to
-    blame. With half of $\bar M$ the arm presses half as hard. The ghost acts like a spring: for one
-    centimetre of error it presses with 4 N, and no more.
+    needed*. In addition, the remaining error of one centimetre increases the torque every millisecond. OSF
+    with time-delay estimation has no horizon and presses as hard, so MPC is not to blame. With half of
+    $\bar M$ the arm presses half as hard. The ghost acts like a spring: for one centimetre of error it
+    presses with 4 N, and no more.
     """,
     prediction=Choice(
         "The target lies 1 cm inside the table. Two seconds after the target has moved, the arm presses "
@@ -83,17 +83,17 @@ UNSEEN = Step(
 BOUND = Step(
     title="Who limits the force?",
     text=r"""
-    The same motion, but the bound of the torque (32f) is a quarter of the torque of the motors:
+    The motion is the same, but the bound of the torque (32f) is a quarter of the torque of the motors:
 
     $$\tau_{\min} \le \tau_0 + \sum_{s=0}^{j} \Delta\tau_{k+s} \le \tau_{\max}$$
     """,
-    do="Halve K_P, and let the simulation run on. Does the arm press less, or only later?",
+    do="Halve K_P, and let the simulation continue. Does the arm press less, or only later?",
     why=r"""
-    The torque grows until joints 2 and 4 are at their bounds, and so does the force. Stiffness does not
-    limit it: with half of $K_p$ both bounds are reached, too, up to 0.9 s later and at the same force. With
+    The torque and the force grow until joints 2 and 4 are at their bounds. Stiffness does not limit the
+    force: with half of $K_p$ both bounds are reached, too, up to 0.9 s later and at the same force. With
     all its torque the arm presses with 650 N after 4 s, and joint 2 is at its bound again. A bound of the
-    torque does not replace a bound of the force: it also limits the load that the arm can carry, and its
-    deceleration.
+    torque does not replace a bound of the force: the bound of the torque also limits the deceleration of
+    the arm, and the load that it can carry.
     """,
     prediction=Value(
         "With a quarter of the torque: how hard does the arm press at the end, in N?",
@@ -117,7 +117,7 @@ BOUND = Step(
             "at least",
             99.9,
             fails_with=("limits.torque_scale=1",),
-            because="two seconds are too short for that",
+            because="two seconds are too short for the torque to reach its bound",
         ),
     ),
     set=("limits.torque_scale=0.25",),
@@ -130,8 +130,8 @@ BOUND = Step(
 SEEN = Step(
     title="Seen, not felt",
     text=r"""
-    Now the controller knows the position of the table. It bounds the speed with which any link may approach
-    the table or any other object. The next lesson shows how.
+    Now the controller knows the position of the table, and bounds the speed with which any link may
+    approach the table or any other object. The next lesson shows how.
     """,
     do="Lower d_safe to 0 mm. Can the arm be made to touch the table lightly?",
     why=r"""
@@ -157,12 +157,12 @@ SEEN = Step(
             because="the hand reaches the table",
         ),
         Claim(
-            "It needs less than 30 % of its torque.",
+            "The arm needs less than 30 % of its torque.",
             Measure(TORQUE),
             "at most",
             30.0,
             fails_with=("avoidance.on=false",),
-            because="the force on the table takes the rest",
+            because="pressing on the table needs more torque",
         ),
     ),
     set=("avoidance.on=true",),
@@ -181,8 +181,8 @@ CHALLENGE = Challenge(
     least 100 N, and at no time with more than 300 N.
     """,
     goals=(
-        Claim("At the end it presses with 100 N.", Measure(FORCE, "last"), "at least", 100.0),
-        Claim("It never presses with more than 300 N.", Measure(FORCE), "at most", 300.0),
+        Claim("At the end the arm presses with 100 N.", Measure(FORCE, "last"), "at least", 100.0),
+        Claim("The arm never presses with more than 300 N.", Measure(FORCE), "at most", 300.0),
     ),
     knobs=(SCALE, STIFFNESS),
     score=Score(Measure(FORCE), worst=300.0, best=180.0),

@@ -82,14 +82,14 @@ ELBOW = Step(
     text=r"""
     A hand has six coordinates, three for its position and three for its orientation. Seven joints for six
     coordinates leave one free motion. This motion is the null space of $J$, the joint velocities with $J
-    \dot q = 0$. Joint 3 is asked to turn by 60°, as the last of three levels.
+    \dot q = 0$. The last of three levels has the task to turn joint 3 by 60°.
     """,
-    do="Drag the target of the posture and turn the elbow. Then drag that of the hand: which task is met?",
+    do="Drag the target of the posture and turn the elbow. Then drag the hand's target: which task is met?",
     why=r"""
     The elbow swings around the line from shoulder to wrist, and the hand stays in place. This motion is
-    called *self-motion*. Joint 3 stops at 29°, because the same level asks the other six joints to stay,
-    and the elbow cannot swing without them. If the level has a target for joint 3 alone, the arm turns
-    joint 3 by nearly the whole 60°.
+    called *self-motion*. Joint 3 stops at 29°, because the same level has to hold the other six joints, and
+    the elbow cannot swing without them. If the level has a target for joint 3 alone, the arm turns joint 3
+    by nearly the whole 60°.
     """,
     prediction=Choice(
         "The elbow turns by almost 30°. How far does the hand move during this motion?",
@@ -129,15 +129,15 @@ COUNT = Step(
     title="Count the freedom",
     text=r"""
     The hand may now turn freely: the orientation level is off. Three coordinates are left for seven joints,
-    which makes $7 - 3 = 4$ free motions instead of one. The target of joint 3 is the same. The ghost keeps
-    its orientation.
+    which makes $7 - 3 = 4$ free motions instead of one. The target of joint 3 is the same. The hand of the
+    ghost keeps its orientation.
     """,
     do="Switch levels on and off, push the elbow and see how stiff it is.",
     why=r"""
     Joint 3 turns further, and the hand tilts, because no level holds its orientation. The position of the
-    hand is unchanged. Every level takes away at most as many free motions as it has coordinates. It takes
-    away fewer if levels above have taken some already, or in a singular pose. The next level can use only
-    the free motions that remain.
+    hand is unchanged. Every level takes away at most as many free motions as it has coordinates. The number
+    is smaller in a singular pose, or if levels above have already taken some of these motions. The next
+    level can use only the free motions that remain.
     """,
     prediction=Value(
         "Without the orientation level: by how many degrees does the hand tilt?",
@@ -148,7 +148,7 @@ COUNT = Step(
     ),
     claims=(
         Claim(
-            "Joint 3 turns at least 15 % further than the ghost's.",
+            "Joint 3 turns at least 15 % further than the ghost's joint 3.",
             Measure(JOINT_3, "range", over_ghost=True),
             "at least",
             1.15,

@@ -28,23 +28,23 @@ PLOTS = (HAND, LATE, Signal("torque share", "%"))
 ONE_MORE = Step(
     title="One knot more",
     text=r"""
-    So far the simulated time stood still while the controller computed. Now time goes on: measuring,
+    So far the simulated time stopped while the controller computed. Now the time continues: measuring,
     solving and applying the torque must all fit in $T_s = 1$ ms. If the torque is not ready when it is due,
-    the motors hold the previous torque, and the late torque acts at the next tick. The computer of this
-    lesson needs 0.1 ms for each of the $N$ knots, on every machine the same. (That is an assumption, and a
-    slow computer: this lab's own step takes about 0.01 ms a knot.) With $N = 10$ the torque is just in
-    time; now $N = 11$. The target moves by 13 cm in half a second.
+    the motors hold the previous torque, and the late torque acts at the next tick. On every machine, the
+    computer of this lesson is assumed to need 0.1 ms for each of the $N$ knots. (This is slow: this lab's
+    own step takes about 0.01 ms per knot.) With $N = 10$ the torque is just in time. Now $N = 11$. The
+    target moves by 13 cm in half a second.
     """,
-    do="What is the largest N in time if the deadline is 2 ms? What happens beyond it, at N = 20 and N = 30?",
+    do="If the deadline is 2 ms, what is the largest N in time? What happens at N = 20 and N = 30?",
     why=r"""
-    The error more than doubles with one knot more. The longer horizon brings no gain, and every torque is
-    one tick late. Each $\Delta\tau$ is computed as a change of the torque that acts now. When $\Delta\tau$
-    is applied, another torque acts already. The even and the odd ticks form two sequences of torques. Each
-    sequence is corrected only once in 2 ms, and neither contains the corrections of the other. No
-    correction is lost, but each sequence is a control loop of half the rate.
+    The error more than doubles with one additional knot. The longer horizon brings no gain, and every
+    torque is one tick late. Each $\Delta\tau$ is computed as a change of the torque that acts at that
+    moment. When $\Delta\tau$ is applied, another torque acts already. The even and the odd ticks form two
+    sequences of torques. Each sequence is corrected only once in 2 ms, and neither contains the corrections
+    of the other. No correction is lost, but each sequence is a control loop of half the rate.
     """,
     prediction=Choice(
-        "Eleven knots instead of ten, 0.1 ms too slow: the largest error of this motion …",
+        "With eleven knots instead of ten, each torque is 0.1 ms late: the largest error of this motion …",
         (
             Option("shrinks a little: a longer horizon covers more time", high=0.95),
             Option("stays the same within 30 %", 0.95, 1.3),
@@ -63,12 +63,12 @@ ONE_MORE = Step(
             because="ten knots take exactly the available millisecond",
         ),
         Claim(
-            "The largest error is at least 1.8 times that of an arm in time.",
+            "The largest error is at least 1.8 times that with a torque in time.",
             Measure(HAND, over_ghost=True),
             "at least",
             1.8,
             fails_with=("deadline_ms=0",),
-            because="in lockstep eleven knots do as well as ten",
+            because="in lockstep, eleven knots give the same error as ten",
         ),
     ),
     set=("deadline_ms=1", "horizon=11"),
@@ -82,21 +82,21 @@ ONE_MORE = Step(
 SLOWER = Step(
     title="Half the rate, in time",
     text=r"""
-    Eleven knots again, but the controller computes a torque only every 2 ms, and the torque is due after 2
-    ms: now it is in time. The prediction of the controller uses $T_s = 2$ ms as well. The ghost still
-    computes a torque every millisecond and is always one tick late.
+    There are again eleven knots, but the controller computes a torque only every 2 ms. The torque is due
+    after 2 ms, and is now in time. The prediction of the controller uses $T_s = 2$ ms as well. The ghost
+    still computes a torque every millisecond and is always one tick late.
     """,
     do="Try 5 ms and 10 ms. From which period on is the arm no longer usable?",
     why=r"""
-    The error is the same, with half the computing. A loop that misses every deadline by one tick follows no
-    better than a loop of half the rate. With coarse sensors the late loop follows worse. With encoders of
-    0.005° the hand of the late loop is off by 47 mm, that of half the rate by 3.2 mm. In time and at the
-    full rate, the hand is off by 1.5 mm with the same encoders, although the torque reaches its limit in
-    that case, too. Besides the lateness, two conditions are necessary for so large an error. One is the
-    division by 1 ms: if the late controller divides by 2 ms instead, 6.6 mm are left of the 47. The other
-    is the torque limit: without it, in the bounds and in the motors, the late hand is off by 3.4 mm. The
-    error grows with the period (Remark 6): that is why the paper requires 1 ms, and why it calls its own 8
-    ms per step on seven joints, at $N = 5$, too long.
+    The error is the same with half the computation. A loop in which every torque is one tick late follows
+    no better than a loop of half the rate. With coarse sensors the late loop follows worse. With encoders
+    of 0.005° the error of the hand is 47 mm in the late loop, and 3.2 mm in the loop of half the rate. In
+    time and at the full rate, the hand is off by 1.5 mm with the same encoders, although the torque reaches
+    its limit in that case, too. Besides the lateness, two conditions are necessary for so large an error.
+    The first is the division by 1 ms: if the late controller divides by 2 ms instead, 6.6 mm are left of
+    the 47. The second is the torque limit: without this limit, in the bounds and in the motors, the late
+    hand is off by 3.4 mm. The error grows with the period (Remark 6): that is why the paper requires 1 ms,
+    and why it calls its own 8 ms per step on seven joints, at $N = 5$, too long.
     """,
     prediction=Value(
         "A torque every 2 ms in time, against a torque every 1 ms that is one tick late: the ratio of the "
@@ -108,12 +108,12 @@ SLOWER = Step(
     ),
     claims=(
         Claim(
-            "Half the rate in time is no worse than the full rate one tick late (within 10 %).",
+            "The largest error is at most 10 % above that with the full rate and a late torque.",
             Measure(HAND, over_ghost=True),
             "at most",
             1.1,
             fails_with=("T_s=0.005", "deadline_ms=5"),
-            because="a torque every 5 ms is slower than one every 2 ms",
+            because="a loop with a torque every 5 ms is slower",
         ),
         Claim(
             "No torque is late.",
@@ -136,16 +136,17 @@ REPAIR = Step(
     title="A larger M̄ for a late torque",
     text=r"""
     The torque is one tick late again. A small $\bar M$ and a late torque have the same effect: corrections
-    are too slow. So let $\bar M$ be twice as large. The ghost is in time, with the old $\bar M$.
+    are too slow. So let $\bar M$ be twice as large. The torque of the ghost is in time, with the old $\bar
+    M$.
     """,
     do="Try factors of 2.5 and 3. What happens if the torque is in time again, with N = 10?",
     why=r"""
     The error of the late controller is now as small as that of the controller in time, to the third digit.
-    But its stability margin is smaller: the limit of stability is where it was, between 2 and 2.5 times the
-    old $\bar M$, and the effect of noise doubles.
+    But its stability margin is smaller: the limit of stability is still between 2 and 2.5 times the old
+    $\bar M$. The effect of noise doubles.
     """,
     prediction=Choice(
-        "The torque is always one tick late, but M̄ is doubled. Compared with an arm in time the error is …",
+        "The torque is always one tick late, but M̄ is doubled. Compared to a torque in time the error is …",
         (
             Option("still clearly larger", low=1.2),
             Option("the same within 10 %", 0.9, 1.1),
@@ -156,12 +157,12 @@ REPAIR = Step(
     ),
     claims=(
         Claim(
-            "The largest error is at most 10 % above that of an arm in time.",
+            "The largest error is at most 10 % above that with a torque in time.",
             Measure(HAND, over_ghost=True),
             "at most",
             1.1,
             fails_with=("M_bar_scale=1",),
-            because="with the old M̄ nothing compensates the slow corrections",
+            because="with the old M̄ the corrections are too slow",
         ),
     ),
     set=("deadline_ms=1", "horizon=11", "M_bar_scale=2"),

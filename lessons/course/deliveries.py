@@ -33,24 +33,24 @@ OVERLAP = Step(
     title="Two tasks at the same time",
     text=r"""
     A round to three people is a list of tasks that alternate: base to a place near the person, hand to the
-    person's hand for one second, base to the next place, … The controller gets a window of $L$ tasks of
+    person's hand for one second, base to the next place, … The controller receives a window of $L$ tasks of
     this list, $[\mathcal T_{l_0}, \ldots, \mathcal T_{l_0+L-1}]$. When $\mathcal T_{l_0}$ is done the
-    window moves on by one. The ghost has $L = 1$: it drives, reaches, waits, drives. Here $L = 2$: the
-    current task ranks first, the next one second. For both robots a task of the hand is done when the hand
-    was within 2 cm of its goal for a second, and a task of the base as soon as the base comes within 80 cm
-    of its place.
+    window moves to the next task. The ghost has $L = 1$: it drives, reaches, waits, drives. Here $L = 2$:
+    the current task ranks first, the next task second. For both robots a task of the hand is done when the
+    hand has been within 2 cm of its goal for a second. A task of the base is done as soon as the base is
+    within 80 cm of its place.
     """,
     do="Is the ghost as fast if its paths have a higher speed? What does its base do at each stop?",
     why=r"""
-    The robot needs less than two thirds of the ghost's time, and of its distance. While the hand holds the
-    ball out, the base already leaves for the next person, as far as the arm allows. While the base drives,
-    the hand already reaches. Leaving early by itself saves 9 of the ghost's 31 seconds, reaching early 7
+    The robot needs less than two thirds of the ghost's time and distance. While the hand holds the ball
+    out, the base already leaves for the next person, as far as the arm allows. While the base drives, the
+    hand reaches. By itself, leaving early saves 9 of the ghost's 31 seconds, and reaching early saves 7
     (measured with a second task active only at times). Both together save 11, less than the sum: once the
     base is there, no driving is left during which the hand could reach. The distance is shorter because the
     base stays behind its hand: the ghost's only task is the hand, so its base moves with the hand.
     """,
     prediction=Choice(
-        "The same places, the same speed of the paths. Two tasks at a time take …",
+        "With the same places and the same speed of the paths, two tasks at a time take …",
         (
             Option("nearly as long: the distance is the same", low=0.85),
             Option("about two thirds of the time", 0.55, 0.85),
@@ -96,29 +96,29 @@ THERE = Step(
     title="When is the base there?",
     text=r"""
     A rule must define when *base to a place near the person* is done. So far the task was done within 80 cm
-    of the place, at any speed. Now the base must come within 5 cm and to rest, and again the rule is the
+    of the place, at any speed. Now the base must come within 5 cm and stop there, and again the rule is the
     same for both robots. Which of the two robots loses more time by this rule?
     """,
     do="Set the distance to 5, 25 and 50 cm, without the condition of rest. How does the factor change?",
     why=r"""
-    The strict rule costs the ghost 11 seconds and the other robot 14. The robot with two tasks could pass
-    the place at a distance of 80 cm, and it loses more because it now has to go all the way to it: its base
-    drives half as far again. The ghost's base drives only a tenth farther, because it went up to the people
-    under the first rule as well. Each of the rule's two conditions makes the base go all the way. The
-    condition of 5 cm alone, at any speed, costs the ghost 8 s and the other robot 12. The condition of rest
-    alone, within 80 cm, costs as much as the whole rule: the base comes to rest only at its place. So the
-    factor between the two ways of working depends on the rule: it was 1.6 before and is 1.2 now. Two tasks
-    at a time under the first rule save 22 s of the 41 s that one task at a time takes under the strict
-    rule. About half of that is due to the rule: 11 s if the rule is changed first, 14 s if it is changed
-    last. The paper measured a factor of 2.3 over four rounds, against a robot whose base and arm move in
-    turn. The paper does not say when a task of the base is done.
+    The strict rule costs the ghost 11 seconds and the other robot 14. Under the first rule the robot with
+    two tasks could pass the place at a distance of 80 cm. It loses more because it now has to go all the
+    way to the place: its base drives farther by half. The ghost's base drives only a tenth farther, because
+    it went up to the people under the first rule as well. Each of the rule's two conditions makes the base
+    go all the way. The condition of 5 cm alone, at any speed, costs the ghost 8 s and the other robot 12.
+    The condition of rest alone, within 80 cm, costs as much as the whole rule: the base comes to rest only
+    at its place. So the factor between the two ways of working depends on the rule: it was 1.6 before and
+    is 1.2 now. Two tasks at a time under the first rule save 22 s of the 41 s that one task at a time takes
+    under the strict rule. About half of that is due to the rule: 11 s if the rule is changed first, and 14
+    s if the rule is changed last. The paper measured a factor of 2.3 over four rounds, against a robot
+    whose base and arm move in turn. The paper does not say when a task of the base is done.
     """,
     prediction=Choice(
-        "Both have to stop at every place. Two tasks at a time now take …",
+        "Both robots have to stop at every place. Two tasks at a time now take …",
         (
-            Option("less than half of it: the ghost stops as before, the other robot reaches", high=0.5),
-            Option("two thirds of it, as in the step before", 0.55, 0.7),
-            Option("more than three quarters of it", low=0.75),
+            Option("less than half the ghost's time: the ghost stopped before as well", high=0.5),
+            Option("two thirds of the ghost's time, as in the step before", 0.55, 0.7),
+            Option("more than three quarters of the ghost's time", low=0.75),
         ),
         Measure(WORK, over_ghost=True),
         tempting=1,
@@ -155,17 +155,17 @@ THERE = Step(
 WAIT = Step(
     title="A person who takes the ball late",
     text=r"""
-    The time that a person needs to take a ball is unknown. The hand is with the first person by 3 s; here
-    the ball is taken at 14 s, and the controller has this information only from then on. Until then
-    $\mathcal T_{l_0}$ is *hand at her hand*, of unknown length, and the base's next place, 2 m further on,
-    is out of reach. What will the base do during this time?
+    The time that a person needs to take a ball is unknown. The hand is with the first person by 3 s. Here
+    the ball is taken at 14 s, and the controller receives this information only then. Until 14 s $\mathcal
+    T_{l_0}$ is *hand at the person's hand*, of unknown duration, and the next place of the base, 2 m
+    farther, is out of reach. What will the base do during this time?
     """,
-    do="Release the ball yourself, early or late. Can you predict how long the rest will take?",
+    do="Release the ball yourself, early or late. Can you predict how long the rest of the round will take?",
     why=r"""
     The base goes as far as the arm allows and waits there, with the arm stretched. When the ball is taken
-    the window moves on, and the rest of the way is short: the robot needs three seconds to the second
-    person, where the ghost, whose only task was the hand, needs nearly seven. The plan needs no duration of
-    the wait: the problem contains none.
+    the window moves to the next task, and the rest of the way is short: the robot needs three seconds to
+    the second person. The ghost, whose only task was the hand, needs nearly seven. The plan does not need
+    the duration of the wait, which is not part of the problem.
     """,
     prediction=Choice(
         "From 5 s until the ball is taken, how far does the base drive?",
@@ -179,7 +179,7 @@ WAIT = Step(
     ),
     claims=(
         Claim(
-            "While the hand waits, from 5 s to 14 s, the base drives on by at least 45 cm.",
+            "While the hand waits, from 5 s to 14 s, the base drives at least 45 cm.",
             Measure(WAY, "range", after=5.0, until=14.0),
             "at least",
             0.45,
@@ -192,7 +192,7 @@ WAIT = Step(
             "at most",
             1.0,
             fails_with=("formulation=paper",),
-            because="a first level that saves effort lets the hand slip",
+            because="if the first level also minimises effort, the hand slips",
         ),
         Claim(
             "Both balls are delivered within 18 s.",
@@ -213,21 +213,21 @@ WAIT = Step(
 MOVES = Step(
     title="People move",
     text=r"""
-    The same wait, and at 8 s the second person walks over to another seat: the goals of tasks three and
-    four change, while the hand is still with the first one. At 16.5 s, when the hand is almost there, the
-    second person lifts the ball's place by 20 cm and shifts it by 30 cm. No plan starts again from the
-    beginning: the references $r$ in (8) change, and the next plan, a tenth of a second later, uses them.
-    The ghost is HTIDKC, which has no plan.
+    The wait is the same, and at 8 s the second person walks to another seat: the goals of tasks three and
+    four change while the hand is still with the first person. At 16.5 s, when the hand has almost arrived,
+    the second person lifts the place for the ball by 20 cm and shifts it by 30 cm. No plan starts again
+    from the beginning: the references $r$ in (8) change, and the next plan, a tenth of a second later, uses
+    the new ones. The ghost is HTIDKC, which has no plan.
     """,
     do="Move the people yourself, while the ball waits and while the robot is on its way.",
     why=r"""
-    At 8 s the base, which waits at the limit of the arm's reach for the old place, moves along this limit
-    to the point nearest to the new one. At 16.5 s the hand turns to the new spot, and a second later it is
-    there within two centimetres. The goals changed twice, and the controller received only new references.
-    The goals are given in the space in which the people move.
+    Until 8 s the base waits at the limit of the arm's reach for the old place. Then it moves along this
+    limit to the point nearest to the new place. At 16.5 s the hand turns to the new goal, and a second
+    later it is there within two centimetres. The goals changed twice, and the controller received only new
+    references. The goals are positions in the space in which the people move.
     """,
     prediction=Choice(
-        "At 16.5 s the goal jumps by 36 cm, when the hand is almost there. One second later the hand is …",
+        "At 16.5 s the goal jumps by 36 cm, when the hand has almost arrived. One second later the hand is …",
         (
             Option("still more than 10 cm off", low=100.0),
             Option("some centimetres off", 20.0, 100.0),
@@ -238,7 +238,7 @@ MOVES = Step(
     ),
     claims=(
         Claim(
-            "From 18.5 s on the hand is within 5 mm of the new spot.",
+            "From 18.5 s on the hand is within 5 mm of the new goal.",
             Measure(HAND, after=18.5, until=19.5),
             "at most",
             5.0,
@@ -246,12 +246,12 @@ MOVES = Step(
             because="with the authors' gain the hand needs seconds for the last part of the way",
         ),
         Claim(
-            "Between 8 s and 14 s the base turns to the new place by at least 10 cm.",
+            "Between 8 s and 14 s the base moves towards the new place by at least 10 cm.",
             Measure(WAY, "range", after=8.0, until=14.0),
             "at least",
             0.1,
             fails_with=SINGLE,
-            because="with one task at a time the base does not know its next place yet",
+            because="with one task at a time the controller does not yet know the next place",
         ),
         Claim(
             "Meanwhile the first ball stays within 1 mm.",
@@ -259,7 +259,7 @@ MOVES = Step(
             "at most",
             1.0,
             fails_with=("formulation=paper",),
-            because="a first level that saves effort lets the hand slip",
+            because="if the first level also minimises effort, the hand slips",
         ),
     ),
     events=(

@@ -29,12 +29,12 @@ BASE_FIRST = ("order=base,ee",)
 BOTH = Step(
     title="Nine joints, two tasks",
     text=r"""
-    A base that rolls in every direction and turns, and on it an arm of six joints. Task $\mathcal T_1$: the
-    hand stays where it is, three coordinates. Task $\mathcal T_2$: the base drives to a place 64 cm away,
-    two coordinates. The tasks use five of nine coordinates, which should leave enough freedom for both. Ten
-    times a second the controller plans the accelerations of the next second, $N = 10$ knots $\Delta t =
-    0.1$ s apart, and each task has a cost of its own, the errors $e = f(q) - r$ summed over
-    them:
+    The base rolls in every direction and turns, and carries an arm of six joints. In task $\mathcal T_1$
+    the hand stays where it is (three coordinates). In task $\mathcal T_2$ the base drives to a place 64 cm
+    away (two coordinates). The tasks use five of nine coordinates, which should leave enough freedom for
+    both. Ten times a second the controller plans the accelerations of the next second, at $N = 10$ knots
+    with a distance of $\Delta t = 0.1$ s. The cost of each task is a sum over the knots, with the errors $e
+    = f(q) - r$ of the task:
 
     $$\mathcal J_l = \tfrac12 \Big( \sum_{k=0}^{N-1} \lVert e_k \rVert_{Q_k}^2 + \lVert e_N
     \rVert_P^2 \Big) \quad (8) \qquad \mathrm{lex\,min} \; [\mathcal J_1, \mathcal J_2] \quad (7a)$$
@@ -43,10 +43,10 @@ BOTH = Step(
     $\mathcal J_1$, and then the smallest $\mathcal J_2$ among the plans that have the smallest $\mathcal
     J_1$.
     """,
-    do="Drag the base's target around the hand. On which side is the base furthest from it?",
+    do="Drag the base's target around the hand. On which side is the base furthest from the hand?",
     why=r"""
     The hand is off by hundredths of a millimetre. The base drives off, and the arm compensates at every
-    instant for the motion of the base. With the base first (the ghost) both tasks end at their goals too,
+    instant for the motion of the base. With the base first (the ghost) both tasks also reach their goals,
     but on the way the hand swings out by 12 cm. Even where all tasks reach their goals, priorities decide
     which task may have an error on the way.
     """,
@@ -88,9 +88,9 @@ BOTH = Step(
 REACH = Step(
     title="Out of reach",
     text=r"""
-    The hand stays where it is, and now the base is sent to a place 3.5 m away from the hand. The
-    arm reaches 1.86 m. The second task cannot be done, so what is the best plan? Level 2 minimises
-    $\mathcal J_2$ and must not make any error of level 1 larger than its best,
+    The hand stays where it is, and now the base is sent to a place 3.5 m away from the hand. The arm
+    reaches 1.86 m. The second task cannot be done, so what is the best plan? Level 2 minimises $\mathcal
+    J_2$ and must not make any error of level 1 larger than its best value,
 
     $$|e_{kp}| \le |e_{kp}|^*, \quad k = 0, \ldots, N \quad (12)$$
 
@@ -98,10 +98,10 @@ REACH = Step(
     """,
     do="Drag the base's target around in a circle. Which path does the base follow on the floor?",
     why=r"""
-    The base stops exactly where the arm is stretched, 1.63 m before its target, and the hand stays
-    in its place. The program contains no rule for this place. It is where every plan that makes
-    $\mathcal J_2$ smaller also changes $\mathcal J_1$. There the arm is singular: its
-    manipulability $w = \sqrt{\det J J^\top}$ is almost zero.
+    The base stops exactly where the arm is stretched, 1.63 m before its target, and the hand stays in its
+    place. The program contains no rule for this place of the base. Here every plan that makes $\mathcal
+    J_2$ smaller also changes $\mathcal J_1$. The arm is singular: its manipulability $w = \sqrt{\det J
+    J^\top}$ is almost zero.
     """,
     prediction=Choice(
         "The base's target cannot be reached while the hand stays. What happens to the hand?",
@@ -149,17 +149,17 @@ REACH = Step(
 SWAP = Step(
     title="Reverse the order",
     text=r"""
-    The start is the same, and at 4 s, when the arm is stretched, the two tasks change places. Now $\mathcal
-    T_1$ is the base and $\mathcal T_2$ the hand: (12) protects the base.
+    The start is the same, and at 4 s, when the arm is stretched, the order of the two tasks is reversed.
+    Now $\mathcal T_1$ is the task of the base and $\mathcal T_2$ that of the hand: (12) protects the base.
     """,
     do="Swap the tasks once more while the base is on its way. Does the hand return?",
     why=r"""
-    The base goes the missing 1.63 m, and the hand is left behind by exactly these 1.63 m. The conflict is
-    as large as before, but now the other task has the error: in a hierarchy it is the last task in the
-    list.
+    The base drives the missing 1.63 m, and the hand is left behind by exactly these 1.63 m. The conflict is
+    as large as before, but now the other task has the error: in a hierarchy the last task in the list has
+    it.
     """,
     prediction=Value(
-        "The base now gets to its target. How large is the error of the hand in the end, in m?",
+        "The base now reaches its target. How large is the error of the hand in the end, in m?",
         Measure(HAND_M, "mean", after=8.5),
         low=0.05,
         high=5.0,

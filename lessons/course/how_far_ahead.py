@@ -24,9 +24,9 @@ FURTHER = Step(
     title="Twenty steps instead of one",
     text=r"""
     The arm follows the paper's circle. $N = 20$ means that the cost (32a) is summed over 20 steps of a
-    millisecond, and that the first of 20 torque changes is applied. The ghost looks one step ahead (HIQP).
-    Remark 9 says: choose $N$ as large as the computer allows. Our computer allows it: of the available
-    millisecond, a step takes about 0.04 ms with $N = 5$, 0.12 with 20 and 0.21 with 30.
+    millisecond, and that the first of 20 torque changes is applied. The ghost plans one step ahead (HIQP).
+    Remark 9 says: choose $N$ as large as the computer allows. Our computer allows a large $N$: of the
+    available millisecond, a step takes about 0.04 ms with $N = 5$, 0.12 with 20 and 0.21 with 30.
     """,
     do="Try N = 1, 2, 5, 10, 20 and read the time per step. Then keep N and double M̄.",
     why=r"""
@@ -35,8 +35,8 @@ FURTHER = Step(
     error left to remove. The paper's Table VI prints a gain of 17 % in x from $N = 5$ to $N = 30$. Over the
     whole 4 s we find a third of that gain, because a longer horizon includes the ends of the joints' ranges
     sooner. Without position limits there is no gain. In the 1.2 s of this step no joint comes near an end.
-    Over the 4 s the error in x is smaller with $N = 1$ than with $N = 30$, but with $N = 1$ 1600 QPs have
-    no solution. Twice the $\bar M$ halves the error; no horizon has this effect.
+    Over the 4 s the error in x is smaller with $N = 1$ than with $N = 30$, but 1600 QPs have no solution
+    with $N = 1$. Twice the $\bar M$ halves the error; no horizon has this effect.
     """,
     prediction=Choice(
         "N = 20 instead of N = 1: the RMS error of the hand becomes …",
@@ -50,20 +50,20 @@ FURTHER = Step(
     ),
     claims=(
         Claim(
-            "The RMS error is not 5 % smaller than with a horizon of one step.",
+            "The RMS error is at most 5 % smaller than with a horizon of one step.",
             Measure(HAND, "rms", over_ghost=True),
             "at least",
             0.95,
             fails_with=("M_bar_scale=2",),
-            because="twice the M̄ halves it, whatever the horizon",
+            because="twice the M̄ halves the error, with any horizon",
         ),
         Claim(
-            "The RMS error is not 5 % larger either.",
+            "The RMS error is at most 5 % larger than with a horizon of one step.",
             Measure(HAND, "rms", over_ghost=True),
             "at most",
             1.05,
             fails_with=("limits.position=viability",),
-            because="with this lab's own bound on the speed towards an end, N = 20 does worse than N = 1",
+            because="with this lab's own bound on the speed towards an end, the error with N = 20 is larger",
         ),
     ),
     set=("horizon=20",),
@@ -76,9 +76,9 @@ FURTHER = Step(
 REASON = Step(
     title="Another meaning of R",
     text=r"""
-    Let $R$ weigh the change of acceleration that a torque change makes, $\lVert \bar M^{-1}
-    \Delta\tau \rVert_R^2$. In these units $R = 10$ is no longer small beside $Q = 200$, so no step
-    removes all of $e$. Again $N = 20$, and the ghost has $N = 1$.
+    Let $R$ weigh the change of acceleration that a torque change makes, $\lVert \bar M^{-1} \Delta\tau
+    \rVert_R^2$. In these units $R = 10$ is no longer small compared with $Q = 200$, so no step removes all
+    of $e$. As before, $N = 20$, and the ghost has $N = 1$.
     """,
     do="Compare N = 1 with N = 20 for both meanings of R. Then set N = 1 and make R smaller, down to 0.1.",
     why=r"""
@@ -87,9 +87,9 @@ REASON = Step(
     all later knots. With $N = 20$ its cost counts once and its effect counts at twenty knots, so $R$ weighs
     less: $R = 10$ acts like 1.7 with $N = 1$. It does not act like $10/20$: the plan's later changes remove
     a part of $e$ as well, so the first change counts for fewer than twenty knots. A smaller $R$ has the
-    same effect: with a hundredth of it, $R = 0.1$, the error of one step ahead is smaller than that of
-    twenty steps with $R = 10$, and its torque is as smooth. At $R = 0.1$ the errors of the two horizons are
-    equal. Even here another weight gives the same improvement as the longer horizon.
+    same effect: with a hundredth, $R = 0.1$, the error of one step ahead is smaller than that of twenty
+    steps with $R = 10$, and its torque is as smooth. At $R = 0.1$ the errors of the two horizons are equal.
+    Even here another weight gives the same improvement as the longer horizon.
     """,
     prediction=Value(
         "R on accelerations: the RMS error with N = 20 is how many times that with N = 1?",

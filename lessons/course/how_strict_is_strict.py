@@ -27,21 +27,21 @@ PLOTS = (HAND, BASE, STEP)
 NOTHING = Step(
     title="No tolerance at all",
     text=r"""
-    The hand holds its place, and the base is sent out of reach, 2.2 m from the hand. Level 2 must keep
-    (12), $|e_{kp}| \le |e_{kp}|^*$. The errors are nonlinear functions of the joints; the quadratic program
-    of level 2 uses only their linearisation. Its solution is a direction. A line search tries the steps
-    $\alpha = 1, \frac12, \frac14, \ldots$ in this direction until the true errors keep
+    The hand holds its place, and the base is sent out of reach, 2.2 m from the hand. Level 2 must satisfy
+    (12), $|e_{kp}| \le |e_{kp}|^*$. The errors are nonlinear functions of the joints, but the quadratic
+    program of level 2 uses only their linearisation. Its solution is a direction. A line search tries the
+    steps $\alpha = 1, \frac12, \frac14, \ldots$ in this direction until the true errors satisfy
 
     $$h_i \le \delta_i \quad (13)$$
 
-    Here $\delta = 0$: the error of the hand must not exceed its best at all.
+    Here $\delta = 0$: the error of the hand must not exceed its best value at all.
     """,
     do="What is the smallest δ with which the base moves at all?",
     why=r"""
     The base does not move: with $\delta = 0$ the second task has no effect, and the line search accepts no
-    step. Rounding errors are not what matters: with $\delta = 10^{-12}$ m it does not move either, and with
-    $10^{-6}$ m it drives 14 cm. A step along a tangent departs from the curve immediately (given), so that
-    only very small steps are accepted.
+    step. Rounding errors do not explain this: with $\delta = 10^{-12}$ m the base does not move either, and
+    with $10^{-6}$ m it drives 14 cm. A step along a tangent departs from the curve immediately (given), so
+    that only very small steps are accepted.
     """,
     prediction=Choice(
         "The hierarchy is as strict as possible, δ = 0. How far does the base drive in 8 s?",
@@ -81,9 +81,9 @@ NOTHING = Step(
 LITTLE = Step(
     title="A tolerance of one centimetre",
     text=r"""
-    Now $\delta = 1$ cm: a plan of the base is accepted if the error of the hand exceeds its best by at most
-    a centimetre, at every knot of the coming second. (13) expresses as a number how much the first task may
-    be compromised to improve the second.
+    Now $\delta = 1$ cm: a plan of the base is accepted if the error of the hand exceeds its best value by
+    at most a centimetre, at every knot of the coming second. In (13), $\delta$ is the additional error of
+    the first task that is allowed to improve the second task.
     """,
     do="Watch the hand while you raise δ from 1 mm to 5 cm. Does the base get faster?",
     why=r"""
@@ -138,32 +138,33 @@ LITTLE = Step(
 SUM = Step(
     title="A bound on the sum or on every knot",
     text=r"""
-    *No worse than the best* can have two meanings. One bounds the whole cost,
+    *No worse than the best* can have two meanings. The first meaning bounds the whole cost,
 
     $$\mathcal J_i(\bar x, \bar u) \le \mathcal J_i(\bar x^{i*}, \bar u^{i*}) \quad (11)$$
 
-    the other bounds each error, (12). Every plan that keeps (12) keeps (11) as well: (12) is the stricter
-    one. This step uses (11), with a $\delta$ that allows the cost of 1 cm at every knot. The ghost uses
-    (12).
+    the second meaning bounds each error, (12). Every plan that satisfies (12) also satisfies (11): (12) is
+    stricter. This step uses (11), with a $\delta$ that allows the cost of an error of 1 cm at every knot.
+    The ghost uses (12).
     """,
     do="Raise the δ of (11) until the base is as fast as the ghost. How large is the error of the hand?",
     why=r"""
     The robot is slower with the looser rule: the line search cuts the step to a fortieth. A possible
-    explanation is the flat cost: at its best the hand's error is nearly zero, and there the slope of
-    $\mathcal J_1$, a sum of squares, is nearly zero. We tested this explanation. If level 1 also pays for
-    its effort, with the same $Q = 10$ (`formulation=paper` and `Q=10`), its best leaves an error and the
-    cost has a slope, but the steps are as short as before. So the missing slope is not the reason. A
-    smaller $Q$ makes the steps longer: with $Q = 1$ they are 2.3 times as long, still far shorter than with
-    (12). We do not know why they are so short. The paper finds the same, (12) "permitting larger step
-    sizes", and for the hand 3.07 and 3.42 mm at low and high $\delta$ against 3.24 and 6.25 mm.
+    explanation is the flat cost: in the best plan of level 1 the hand's error is nearly zero. There the
+    slope of $\mathcal J_1$, a sum of squares, is nearly zero, too. We tested this explanation. If the cost
+    of level 1 contains effort, with the same $Q = 10$ (`formulation=paper` and `Q=10`), its best plan
+    leaves an error and the cost has a slope, but the steps are as short as before. So the missing slope is
+    not the reason. A smaller $Q$ makes the steps longer: with $Q = 1$ they are 2.3 times as long, still far
+    shorter than with (12). We do not know why the steps are so short. The paper also reports that (12) is
+    "permitting larger step sizes". For low and high $\delta$ it prints mean errors of the hand of 3.07 and
+    3.42 mm with (12), and of 3.24 and 6.25 mm with (11).
 
-    In the formulation as printed (`formulation=paper`, which brings our $Q = 1$) it depends on $Q$ which of
-    the two is better for the hand, and the paper does not print $Q$. With our $Q = 1$ the error of the hand
-    is larger under (12). With $Q = 100$ its mean error is smaller under (12), and its largest error is
+    In the formulation as printed (`formulation=paper`, which brings our $Q = 1$), the better constraint for
+    the hand depends on $Q$. The paper does not print $Q$. With our $Q = 1$ the error of the hand is larger
+    under (12). With $Q = 100$ the mean error of the hand is smaller under (12), but its largest error is
     still larger.
     """,
     prediction=Choice(
-        "(11) forbids less than (12). With it, the base's mean error over the 8 s is …",
+        "(11) forbids less than (12). With (11), the base's mean error over the 8 s is …",
         (
             Option("smaller: there is more freedom", high=0.9),
             Option("the same within 10 %", 0.9, 1.1),
@@ -187,7 +188,7 @@ SUM = Step(
             "at most",
             0.1,
             fails_with=("lexicographic=per_coordinate",),
-            because="linear rows near the curve allow a third and more",
+            because="with the linear rows of (12) at least a third of a step is accepted",
         ),
     ),
     set=("lexicographic=cost",),
@@ -200,25 +201,25 @@ SUM = Step(
 EFFORT = Step(
     title="What a level protects",
     text=r"""
-    Each level also pays for effort,
+    The cost of each level also contains effort,
 
     $$\mathcal J_{eff} = \tfrac12 \left\{ \lVert \bar x \rVert_{\bar S}^2 + \lVert \bar u
     \rVert_{\bar R}^2 + \lVert \Delta \bar u \rVert_{\bar W}^2 \right\} \quad (10)$$
 
-    with which $|e|^*$ is the best *compromise between error and effort*. So far the cost of the first level
-    only contained the changes of its plan; now it contains all effort, as the paper prints it, and its
-    bounds are softened, as in the paper's experiments on the real robot. $Q = 10$, (12) and $\delta = 1$ cm
-    are as before.
+    Then $|e|^*$ is the best *compromise between error and effort*. So far the cost of the first level only
+    contained the changes of its plan. Now it contains all effort, as the paper prints it, and the bounds of
+    this level are softened, as in the paper's experiments on the real robot. $Q = 10$, (12) and $\delta =
+    1$ cm are as before.
     """,
     do="Try our default, Q = 1, and Q = 100. Is the error of the hand small with one of them?",
     why=r"""
     The hand is off by more than $\delta$. The arm must move to hold the hand while the base drives, and the
-    cost of level 1 now contains this motion: in its own best plan the hand slips a little. (12) allows
-    level 2 the same slip, $\delta$ is added to it, and the next plan starts from there. Most of the error
-    is due to the cost of speed: with a thousandth of this cost 6 mm remain. A very large $Q$ does not
-    protect the hand either: with $Q = 1000$ it is off by 40 mm. With this $Q$ and without the bounds on
-    speed, 5.4 mm remain. A hierarchy protects the *cost* of a level. If this cost is a compromise, the
-    hierarchy protects the compromise.
+    cost of level 1 now contains this motion: in the best plan of level 1 the hand slips a little. (12)
+    allows level 2 the same slip, $\delta$ is added to the slip, and the next plan starts from there. Most
+    of the error is due to the cost of speed: with a thousandth of this cost 6 mm remain. A very large $Q$
+    does not protect the hand either: with $Q = 1000$ the hand is off by 40 mm. With this $Q$ and without
+    the bounds on speed, 5.4 mm remain. A hierarchy protects the *cost* of a level. If this cost is a
+    compromise, the hierarchy protects the compromise.
     """,
     prediction=Choice(
         "With the same δ and constraint (12), and effort in the cost of both levels, the hand is off by at "

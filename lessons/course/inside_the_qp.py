@@ -1,6 +1,6 @@
 """Inside the QP
 
-The picture of one millisecond: what does each level ask for, what is left, and which bounds are active?
+In one millisecond, what does each level require, what is left, and which bounds are active?
 
 Minutes: 15
 You need: lesson "torque-has-a-limit"; ellipses as the contours of a quadratic function
@@ -29,36 +29,37 @@ LINE = Step(
     title="Two levels in one plane",
     text=r"""
     The picture *Inside* shows one tick. With $N = 1$ the unknowns are three torque changes; joint 3 only
-    holds its own angle, so all the rest happens in the plane of $\Delta\tau_1$ and $\Delta\tau_2$. The red
-    frame shows the bounds: no torque change outside it is allowed.
+    holds its own angle, so the picture shows the plane of $\Delta\tau_1$ and $\Delta\tau_2$. The red frame
+    shows the bounds: no torque change outside the frame is allowed.
 
     **Level 1** (orange) has a target for *one* number, the wrist's $x$. This gives one equation for two
-    unknowns: its cost (31) is a long valley, and its optimum is the disc 1 ($R$ selects the optimum nearest
-    to no change at all). **(33)** requires that the levels below keep this result. The points that (33)
-    allows are the orange line. **Level 2** (blue) has the task to keep both joints where they are. At 0.1 s
-    the wrist's target moves aside by 10 cm.
+    unknowns: the cost (31) is a long valley, and disc 1 is its optimum (of all points in the valley, $R$
+    selects the point with the smallest change). **(33)** requires that the levels below keep this result.
+    The points that (33) allows form the orange line. **Level 2** (blue) has the task to keep both joints
+    where they are. At 0.1 s the wrist's target moves aside by 10 cm.
     """,
     do=("Drag the target to and fro, and watch line, valley and discs. Pause, and step tick by tick (T)."),
     why=r"""
     The optimum of level 2 by itself is the ring "2 alone", the centre of its ellipses. Level 2 may choose
     only points on the line, and takes the point where one of its ellipses touches the line. The wrist
-    arrives, and level 2 keeps an error of 14 degrees: the line contains no better point by the weights of
-    level 2, which count joint 1 four times as much as joint 2. With equal weights the error is 12 degrees.
-    At rest both discs lie at zero, which means no change of torque, and the ring stays outside.
+    reaches its target, and level 2 keeps an error of 14 degrees. By the weights of level 2, which count
+    joint 1 four times as much as joint 2, the line contains no better point. With equal weights the error
+    is 12 degrees. At rest both discs lie at zero, which means no change of torque, and the ring lies off
+    the line.
     """,
     prediction=Choice(
         "The wrist goes 10 cm aside, and both joints should stay. In the end the joints are off by …",
         (
             Option("nothing: three joints are enough for all", high=1.0),
             Option("10° to 20°, and the wrist is on its target", 10.0, 20.0),
-            Option("half of that: the wrist and the joints share the loss", 5.0, 10.0),
+            Option("half as much: the wrist and the joints share the error", 5.0, 10.0),
         ),
         Measure(JOINTS, "last"),
         tempting=2,
     ),
     claims=(
         Claim(
-            "Level 1 gets what it asks for: in the end less than 0.01 mm is missing.",
+            "Level 1 reaches its target: the final error is less than 0.01 mm.",
             Measure(WRIST, after=1.9),
             "at most",
             0.01,
@@ -82,20 +83,20 @@ LINE = Step(
 SWAP = Step(
     title="Swap the levels",
     text=r"""
-    The start is the same, but at 1.2 s the two levels change places: the blue level becomes level 1. It has
-    targets for *two* numbers, so look at the part of the plane that (33) then allows.
+    The start is the same, but at 1.2 s the order of the two levels is reversed: the blue level becomes
+    level 1. It has targets for *two* numbers, so look at the part of the plane that (33) then allows.
     """,
     do="Swap the levels back and forth, and watch the line appear and disappear.",
     why=r"""
     Two equations for two unknowns leave one point. The line is gone, disc 1 lies in the middle of the blue
     ellipses, and the orange level must use this point: the wrist goes all the way back, 10 cm off its
-    target, though its task has the same weight as before. The costs and the numbers are the same, and only
-    the order has changed.
+    target, although its task has the same weight as before. The costs and the numbers are the same, and
+    only the order has changed.
     """,
     prediction=Choice(
         "The wrist is on its target when its level becomes level 2. After 1 s the wrist is …",
         (
-            Option("still there: nobody has moved the target", high=10.0),
+            Option("still on its target: the target has not moved", high=10.0),
             Option("half way back", 10.0, 80.0),
             Option("back where it began, 10 cm off", low=80.0),
         ),
@@ -104,7 +105,7 @@ SWAP = Step(
     ),
     claims=(
         Claim(
-            "The joints return to their angles: less than 0.2° is missing in the end.",
+            "The joints return to their angles: the final error is less than 0.2°.",
             Measure(JOINTS, "last"),
             "at most",
             0.2,
@@ -117,7 +118,7 @@ SWAP = Step(
             "at least",
             90.0,
             fails_with=("controller=weighted",),
-            because="there the wrist keeps half of its way",
+            because="in a weighted sum the wrist keeps half of its way",
         ),
     ),
     events=(ASIDE, (1.2, MoveLevel("pose", 0))),
@@ -130,26 +131,26 @@ BOUND = Step(
     title="A torque bound",
     text=r"""
     Now the motors give a quarter of their torque. At every tick $\Delta\tau$ is limited by the distance
-    from the torque to its limit, so a side of the red frame says *torque* and comes close to zero while the
-    arm speeds up. The frame cuts the line: the thick part is inside the frame.
+    from the torque to its limit, so one side of the red frame has the label *torque* and comes close to
+    zero while the arm speeds up. The frame cuts the line: the thick part is inside the frame.
 
-    The red triangle is the torque change that OSF demands in the same tick, with projection instead of
-    (33), the same order of tasks, and no bounds at all. The ghost is OSF, and *its* motors give any torque.
+    The red triangle is the torque change that OSF demands in the same tick. OSF uses the same order of
+    tasks, a projection instead of (33), and no bounds. The ghost is OSF with motors that give any torque.
     """,
     do="Reduce the torque further, to 0.1. At what time does disc 1 reach the frame, too?",
     why=r"""
     Level 1 moves along its valley, where other points are as good, and its error does not grow: it is no
     larger than with all the torque. Level 2 moves along the line only to the frame, before the point where
-    its ellipse touches the line. Such a bound is *active*. With a little more room this level's cost (31)
-    would fall by twice the bound's multiplier, per N·m. With a tenth of the torque the whole valley is
-    outside for a while: then the error of level 1 grows as well.
+    its ellipse touches the line. Such a bound is *active*. If the bound were a little wider, the cost (31)
+    of level 2 would fall by twice the bound's multiplier, per N·m. With a tenth of the torque the whole
+    valley is outside the frame for a while: then the error of level 1 grows as well.
 
     A projection separates torques by priority, but it contains no bounds: the triangle leaves the frame,
-    here by a third of the limit. Real motors would clip their torques joint by joint, and the clipped
-    torques no longer lie on the orange line: they change the result of level 1.
+    here by a third of the limit. Real motors would clip their torques joint by joint. The clipped torques
+    would no longer lie on the orange line, and would change the result of level 1.
     """,
     prediction=Choice(
-        "With all of the torque the wrist is never more than 1.1 mm off. With a quarter of it …",
+        "With all of the torque the wrist is never more than 1.1 mm off. With a quarter of the torque …",
         (
             Option("more than 3 mm: it needs the torque most", low=3.0),
             Option("a little more, 1.5 to 3 mm", 1.5, 3.0),
@@ -197,13 +198,13 @@ SUM = Step(
     text=r"""
     The violet diamond is the optimum of *one* cost, the sum of the costs of all levels, without a line and
     without an order. The ghost uses this sum. The strictness of the order can be measured: the leak is the
-    effect of lower levels on a higher one, $\lVert J_p \bar M^{-1} (\Delta\tau_i - \Delta\tau_p) \rVert$,
-    in m/s². By (33) it should be zero.
+    effect of lower levels on a higher level, $\lVert J_p \bar M^{-1} (\Delta\tau_i - \Delta\tau_p) \rVert$,
+    in m/s². By (33) the leak should be zero.
     """,
     do="Give level 1 a larger Q, and watch the diamond come nearer to the line; it never reaches the line.",
     why=r"""
     The diamond lies between the valley and the ring, where the slopes of the two costs cancel. In the end
-    the wrist is left 5 cm short of its 10 cm, and the joints are off by 7 degrees instead of the 14 of a
+    the wrist is left 5 cm short of its 10 cm, and the joints are off by 7 degrees instead of 14 with a
     strict order: half of each. The disc 2 never leaves the line: the leak is zero, up to rounding. But this
     line is computed with $\bar M$. With the true $M$ a leak remains, which the second meter shows: $\bar M$
     is not the arm's true inertia. Time-delay estimation measures the leak at the next tick and corrects it
@@ -220,7 +221,7 @@ SUM = Step(
     ),
     claims=(
         Claim(
-            "Strict priorities cost the joints more than 1.5 times as much.",
+            "With strict priorities the error of the joints is more than 1.5 times the ghost's.",
             Measure(JOINTS, "last", over_ghost=True),
             "at least",
             1.5,

@@ -1,6 +1,6 @@
 """Keeping clear
 
-An arm must not touch a table and a post: is that a task, a bound, or a filter?
+An arm must not touch a table and a post: is this requirement a task, a bound, or a filter?
 
 Minutes: 10
 You need: lesson "stopping-takes-distance"; lesson "a-blind-arm"
@@ -43,16 +43,16 @@ BELOW = Step(
     The hand is sent 1 cm into the table again. Level 2 is a task that keeps the hand's distance from
     the table's surface, $x = n^\top p - d$. Level 1 is the hand's position.
     """,
-    do="Before you read on: put the distance first. Which task is not met now?",
+    do="Before you continue, put the distance first. Which task is not met now?",
     why=r"""
-    Level 2 has no effect. The position fixes the hand's height, so nothing is left for the distance, and
+    Level 2 has no effect. The position fixes the hand's height, so no freedom is left for the distance, and
     the arm presses on the table as if there were no task of a distance. A task does not protect against a
     task of higher priority.
     """,
     prediction=Choice(
         "The task of the distance ranks right below the hand's position. At the end the arm presses with …",
         (
-            Option("nothing: the hand stops above it", high=1.0),
+            Option("nothing: the hand stops above the table", high=1.0),
             Option("less than without that task", 1.0, 200.0),
             Option("more than 200 N, as without that task", low=200.0),
         ),
@@ -66,7 +66,7 @@ BELOW = Step(
             "at least",
             200.0,
             fails_with=(FIRST,),
-            because="then the hand is not sent down at all",
+            because="then the hand does not go down at all",
         ),
     ),
     set=WITH_A_TASK,
@@ -80,13 +80,14 @@ FIRST_TASK = Step(
     title="The task ranks first",
     text=r"""
     Now the distance is level 1, and the hand's target is moved to 5 cm above the table: a place where the
-    arm touches nothing. A task requires an equality, $x = x_d$, and this task holds the 20 cm of the start.
+    arm touches nothing. A task requires an equality, $x = x_d$, and this task holds the initial distance of
+    20 cm.
     """,
     do="Drag the target sideways, then up. In which directions can the hand still move?",
     why=r"""
-    The hand stays where it is, 15 cm above a target that is safe. The requirement is an inequality, a
-    minimum distance. A task fixes the whole direction, even where there is enough distance. A task also
-    holds only the distance of one frame from one plane: it does not include the elbow and the post.
+    The hand stays where it is, 15 cm above a target that is safe. Safety requires an inequality, a minimum
+    distance. A task fixes the whole direction, even where there is enough distance. This task also holds
+    only the distance of one frame from one plane: it does not include the elbow and the post.
     """,
     claims=(
         Claim(
@@ -116,20 +117,21 @@ FIRST_TASK = Step(
 INSIDE = Step(
     title="Above all levels",
     text=r"""
-    For a distance $d$ between any two links, or a link and an object, the controller adds a row to those of
-    torque and speed. The row bounds how fast $d$ may shrink,
+    For a distance $d$ between any two links, or a link and an object, the controller adds a row to the rows
+    of torque and speed. The row bounds the speed at which $d$ shrinks,
 
     $$\nabla d^\top \dot q_{k+j} \ge -a\left(-t + \sqrt{t^2 + 2\,(d - d_s)/a}\right),$$
 
-    to the speed from which the arm can still stop. The seven pairs that could reach $d_s$ first have rows,
+    by the speed from which the arm can still stop. The seven pairs that could reach $d_s$ first have rows,
     and each level is solved under these rows. The hand is sent to the other side of the post, and the elbow
-    has to pass it.
+    has to pass the post.
     """,
     do="Open the list of active bounds: which pairs are at their bound? Then put the orientation first.",
     why=r"""
-    The bound applies to all levels, and the order decides which task has an error. The hand comes first:
-    its target is reached, and the hand's orientation is off by 28°. With the orientation first the position
-    has the error: then the hand stays 6 cm away. Where the bound is not active, no task has an error.
+    The bound applies to all levels, and the order decides which task has an error. The hand's position
+    comes first: the hand reaches its target, and its orientation is off by 28°. With the orientation first
+    the position has the error: then the hand stays 6 cm away. Where the bound is not active, no task has an
+    error.
     """,
     prediction=Choice(
         "The post blocks the straight way. At the end the hand …",
@@ -180,27 +182,28 @@ INSIDE = Step(
 BEHIND = Step(
     title="Behind all levels",
     text=r"""
-    Many robots have a safety filter instead: the controller itself uses no distances. Behind the controller
-    a QP changes its torque as little as possible,
+    Many robots have a safety filter instead: the controller itself uses no distances. After the controller,
+    a QP changes the torque as little as possible,
 
     $$\min_\tau \lVert \bar M^{-1} (\tau - \tau_{\mathrm{nom}}) \rVert^2,$$
 
-    within the bounds of the torque and under the same rows, at the next step alone.
-    The ghost has its rows inside the hierarchy.
+    within the bounds of the torque and under the same rows, but only for the next step. The ghost has its
+    rows inside the hierarchy.
     """,
     do="Switch off the orientation and the posture. How near does the hand come now?",
     why=r"""
-    The filter is as safe: the arm touches nothing. But the filter does not use the order of the tasks. The
-    tasks of orientation and posture move the elbow towards the post, the filter changes the sum of all
-    torques as little as possible, and the hand has the error: it stops 27 cm before its target. The lower
-    levels are to blame: with both of them switched off the hand is 5 cm away by then, and comes closer. One
-    of them is enough to hold it back: without the posture alone 23 cm are left, without the orientation
-    alone 19 cm. An order of tasks does not hold if the bounds are applied after it.
+    The filter is as safe as the rows: the arm touches nothing. But the filter does not use the order of the
+    tasks. The tasks of orientation and posture move the elbow towards the post, the filter changes the sum
+    of all torques as little as possible, and the hand has the error: it stops 27 cm before its target. The
+    lower levels are to blame: with both of them switched off the hand is 5 cm away by then, and comes
+    closer. One of them is enough to hold the hand back: if only the posture is off, 23 cm are left, and if
+    only the orientation is off, 19 cm are left. An order of tasks does not hold if the bounds are applied
+    after it.
     """,
     prediction=Choice(
         "The rows are the same, but a filter after all levels imposes them. At the end the hand …",
         (
-            Option("is at its target, as the ghost's", high=5.0),
+            Option("is at its target, as the ghost's hand is", high=5.0),
             Option("is a few centimetres away", 5.0, 100.0),
             Option("is a quarter of a metre away", low=200.0),
         ),
@@ -225,7 +228,7 @@ BEHIND = Step(
             because="inside the hierarchy the hand comes first",
         ),
         Claim(
-            "The filter's change of the torque changes higher levels by more than 1 m/s².",
+            "The filter changes the accelerations of higher levels by more than 1 m/s².",
             Measure(LEAK),
             "at least",
             1.0,

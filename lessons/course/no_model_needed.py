@@ -25,24 +25,23 @@ M_BAR = Control("M_bar_scale", "M̄, factor", 0.1, 40.0, log=True)
 LOAD = Step(
     title="Pick up a kilogram",
     text=r"""
-    At 0.2 s one kilogram is attached to the hand. The controller has no information about it. The
-    controller has no identified model, only one number in kg·m² per joint, $\bar M$. All unknown terms are
-    collected in one term (6),
+    At 0.2 s one kilogram is attached to the hand. The controller has no information about this load. It has
+    no identified model, only one number in kg·m² per joint, $\bar M$. All unknown terms are collected in
+    one term (6),
 
     $$\bar M \ddot q + H_q = \tau,$$
 
     and $H_q$ is estimated by its value of a millisecond ago (8): $H_q \approx \tau_0 - \bar M \ddot q_0$,
-    from the torque that acted and the acceleration that resulted. So (13) only contains the *change*:
-    $\ddot x = \ddot x_0 + J \bar M^{-1} \Delta\tau$. The ghost knows the exact model of the arm, but not
-    the load.
+    from the last torque and the acceleration under this torque. So (13) only contains the *change*: $\ddot
+    x = \ddot x_0 + J \bar M^{-1} \Delta\tau$. The ghost knows the exact model of the arm, but not the load.
     """,
     do="Attach more weight, and remove it again.",
     why=r"""
     The hand dips by a few millimetres and comes back, to a hundredth of a millimetre. The effect of the
-    load on the acceleration is measured, and in the next millisecond it is part of $H_q$. That ends the
-    sag. The spring of (4) then brings the hand back. Without a spring, $K_P = 0$, the hand stays 3.3 mm too
-    low. The ghost's model is exact except for the kilogram; only its springs carry the kilogram, so it sags
-    by centimetres and stays there.
+    load on the acceleration is measured, and in the next millisecond the load is part of $H_q$. Then the
+    hand stops sagging, and the spring of (4) brings it back. Without a spring, $K_P = 0$, the hand stays
+    3.3 mm too low. The ghost's model is exact except for the kilogram; only its springs carry the kilogram,
+    so it sags by centimetres and stays there.
     """,
     prediction=Choice(
         "One kilogram that the controller does not know of: where is the hand 1.5 s later?",
@@ -64,12 +63,12 @@ LOAD = Step(
             because="if the model does not contain the load, only the springs of (4) carry it",
         ),
         Claim(
-            "In the end it is within 0.1 mm of its target.",
+            "In the end the hand is within 0.1 mm of its target.",
             Measure(HAND, "last"),
             "at most",
             0.1,
             fails_with=("controller=hqp",),
-            because="its model does not contain the load, and it does not estimate the load",
+            because="HQP has a model without the load, and does not estimate the load",
         ),
     ),
     events=((0.2, Set("plant.payload_kg", 1.0)),),
@@ -85,17 +84,17 @@ LOAD = Step(
 SMALL = Step(
     title="M̄ too small",
     text=r"""
-    One quantity must be chosen, the diagonal $\bar M$. It gives the torque for a wanted acceleration. Now
-    it is 0.3 times its old value: the model of the controller is that light, and its torque changes are
-    three tenths of the old ones. The target moves aside by 13 cm.
+    One quantity must be chosen, the diagonal $\bar M$. It determines the torque for a desired acceleration.
+    Now $\bar M$ is 0.3 times its old value: the controller assumes a lighter arm, and its torque changes
+    are three tenths of the old changes. The target moves aside by 13 cm.
     """,
-    do="Go down to 0.1, then up to 2, and watch the gauge.",
+    do="Reduce the factor to 0.1, then raise it to 2, and watch the gauge.",
     why=r"""
-    The torque is right in the end, but it comes late: every millisecond only a part of the error in
-    $\ddot q$ is removed. The gauge is the spectral radius of $I - M^{-1}\bar M$. It is the share of the
-    slowest component of that error that is left after each step. Here a gauge close to 1 means *slow*:
-    the eigenvalue behind it is near +1. An eigenvalue near −1 would give the same radius and mean
-    *almost unstable*; the radius alone does not tell which.
+    The torque is right in the end, but it comes late: every millisecond only a part of the error in $\ddot
+    q$ is removed. The gauge shows the spectral radius of $I - M^{-1}\bar M$: after each step, this share of
+    the slowest component of the error is left. Here a gauge close to 1 means *slow*, with an eigenvalue
+    near +1. An eigenvalue near −1 would give the same radius and mean *almost unstable*. The radius alone
+    does not distinguish the two cases.
     """,
     prediction=Value(
         "With 0.3 M̄ instead of M̄: how many times larger is the largest error?",
@@ -136,22 +135,22 @@ FURTHER = Step(
     text=r"""
     Now $\bar M$ is larger. Twice the $\bar M$ leaves 0.41 of the error; here $\bar M$ is four times as
     large. Remark 4 guarantees that the errors stay bounded if $\lVert I - M^{-1} \bar M \rVert < 1$. For
-    four times $\bar M$ this norm is 1.21 where the arm begins.
+    four times $\bar M$ this norm is 1.21 at the start.
     """,
-    do="Raise M̄ from 1. Which of the two numbers turns upwards first, norm or radius?",
+    do="Raise M̄ from 1. Which of the two numbers begins to rise first, norm or radius?",
     why=r"""
-    The error is less than a fifth, and the arm does not vibrate. A norm below 1 is sufficient, but it is
-    not necessary: it requires that *no* error grows, not even for a single step. In the long run the
-    eigenvalues decide, and the largest of them is 0.94.
+    The error is less than a fifth of the ghost's, and the arm does not vibrate. A norm below 1 is
+    sufficient, but not necessary: it means that *no* error grows, not even for a single step. In the long
+    run the eigenvalues decide, and the largest of them is 0.94.
     """,
     claims=(
         Claim(
-            "The norm of Remark 4 is above 1.2: it guarantees nothing here.",
+            "The norm of Remark 4 is above 1.2: here the remark guarantees nothing.",
             Measure(Signal("gauge_norm"), "mean"),
             "at least",
             1.2,
             fails_with=("M_bar_scale=1",),
-            because="there it is 0.999",
+            because="with the old M̄ the norm is 0.999",
         ),
         Claim(
             "The spectral radius is below 0.95.",
@@ -159,7 +158,7 @@ FURTHER = Step(
             "at most",
             0.95,
             fails_with=("M_bar_scale=7",),
-            because="its fastest eigenvalue has passed −1",
+            because="with this M̄ the fastest eigenvalue has passed −1",
         ),
         Claim(
             "The largest error is at most a quarter of the ghost's.",
@@ -167,7 +166,7 @@ FURTHER = Step(
             "at most",
             0.25,
             fails_with=("M_bar_scale=2",),
-            because="twice the M̄ still leaves 0.41 of it",
+            because="twice the M̄ still leaves 0.41 of the ghost's error",
         ),
     ),
     set=("M_bar_scale=4",),
@@ -182,17 +181,17 @@ LARGE = Step(
     title="M̄ too large",
     text=r"""
     Four times the $\bar M$ left less than a fifth of the error, and six times leaves even less. Now $\bar
-    M$ is eight times as large. For each eigenvalue $\lambda$ of $M^{-1}\bar M$ the error is multiplied by
-    $1 - \lambda$ in every step. (Remark 4 prints $1 - \bar M_i/\lambda_i(M)$; the two agree for a diagonal
-    $M$ only.)
+    M$ is eight times as large. For each eigenvalue $\lambda$ of $M^{-1}\bar M$ a component of the error is
+    multiplied by $1 - \lambda$ in every step. (Remark 4 prints the factor $1 - \bar M_i/\lambda_i(M)$,
+    which is the same for a diagonal $M$ only.)
     """,
     do="Reset, raise M̄ from 4 in small steps, and read the gauge each time before you run the simulation.",
     why=r"""
-    The smallest $1 - \lambda$ has passed −1: each correction is more than twice too large, and every
-    millisecond the error comes back half as large again, with the opposite sign. The arm chatters, reaches
-    full torque and becomes unstable. At × 6 the gauge read 0.91, its smallest value: the slowest component
-    had 0.91, the fastest −0.89. From there on the fastest component is the largest in size, up to −1.21 at
-    × 7. So start small, go up in small steps, and stop when the gauge turns upwards: there the limit of
+    The smallest $1 - \lambda$ has passed −1: each correction is more than twice as large as it should be,
+    and every millisecond the error grows by half and changes its sign. The arm chatters, reaches full
+    torque and becomes unstable. At × 6 the gauge read 0.91, its smallest value: the slowest component had
+    0.91, the fastest −0.89. From there on the fastest component is the largest in size, up to −1.21 at × 7.
+    So start small, go up in small steps, and stop when the gauge begins to rise: there the limit of
     stability is near.
     """,
     prediction=Choice(
@@ -212,7 +211,7 @@ LARGE = Step(
             "at least",
             1.0,
             fails_with=("M_bar_scale=4",),
-            because="there every eigenvalue of the error's map lies between −1 and 1",
+            because="with half of this M̄ every factor 1 − λ of the error lies between −1 and 1",
         ),
         Claim(
             "From × 6 to × 8 the gauge goes up by more than half.",
@@ -220,7 +219,7 @@ LARGE = Step(
             "at least",
             1.5,
             fails_with=("M_bar_scale=6.5",),
-            because="there the gauge has only just turned upwards",
+            because="with this M̄ the gauge has only just begun to rise",
         ),
         Claim(
             "A joint exceeds its speed limit at least threefold.",
@@ -228,7 +227,7 @@ LARGE = Step(
             "at least",
             300.0,
             fails_with=("M_bar_scale=4",),
-            because="with half of it the motion is smooth, and more accurate than before",
+            because="with half of this M̄ the motion is smooth, and more accurate than before",
         ),
     ),
     set=("M_bar_scale=8",),

@@ -67,9 +67,9 @@ SPRING = Step(
 DAMPER = Step(
     title="Take the damper away",
     text=r"""
-    Now $K_V = 2$, a tenth of the value before. Equation (4) has become a weakly damped oscillator with
-    $\omega = \sqrt{K_P} = 10$ rad/s, thus a period of 0.63 s. The arm, its motors and its links are the
-    same as before.
+    Now $K_V = 2$, a tenth of the old value. Equation (4) has become a weakly damped oscillator with $\omega
+    = \sqrt{K_P} = 10$ rad/s, thus a period of 0.63 s. The arm, its motors and its links are the same as
+    before.
     """,
     do="Look for the smallest K_V without a swing to the other side. Then double K_P and look again.",
     why=r"""
@@ -86,7 +86,7 @@ DAMPER = Step(
             because="with critical damping the hand is at rest by then",
         ),
         Claim(
-            "It swings to both sides of its target, 10 mm in x from end to end after 0.5 s.",
+            "The hand swings to both sides of its target: after 0.5 s by 10 mm in x from end to end.",
             Measure(Signal("error/position", "mm", column=0), "range", after=0.5),
             "at least",
             10.0,
@@ -104,7 +104,7 @@ DAMPER = Step(
 PRICE = Step(
     title="The weight on changes of torque",
     text=r"""
-    Every millisecond the controller looks $N = 5$ steps ahead and minimises (31), summed over them:
+    Every millisecond the controller plans $N = 5$ steps ahead and minimises (31), summed over these steps:
 
     $$\lVert e \rVert_Q^2 + \lVert \Delta\tau \rVert_R^2, \qquad e = \ddot{\tilde x} + K_V
     \dot{\tilde x} + K_P \tilde x \quad (28)$$
@@ -154,27 +154,27 @@ FREE = Step(
     title="A motion without a task",
     text=r"""
     The hand has two coordinates and the arm three joints: no task controls the remaining direction of
-    motion. $R$ weighs changes of torque, so in that direction the torque stays what it is, as long as no
+    motion. $R$ weighs changes of torque, so in that direction the torque does not change, as long as no
     bound changes it. The middle link gets a short push, 10 N for 0.2 s, and the last level, `damping`, is
     switched off.
     """,
-    do="Switch the speed limits off and push again: which way does the elbow go? Then switch damping on.",
+    do="Switch the speed limits off and push again: which way does the elbow move? Then switch damping on.",
     why=r"""
     No task stops the motion in that direction, so the elbow still moves when the hand has long been on its
-    target. A bound determines which way the elbow moves. The push drives joint 2 to its speed limit, and
-    the torques change to hold it there. When the push ends, the part of the torques along the free motion
-    stays as it is, and this part reverses joint 2. 0.2 s later joint 2 does 80°/s the other way. Without
-    speed limits joint 2 goes on in the direction of the push, with more than 300°/s. It turns round only
-    0.75 s after the push, where the held hand allows no further motion: the last link then lies on the line
-    from joint 1 to the hand. A last level with the task $\ddot q + K_V \dot q = 0$ brings the elbow to
-    rest, with hardly any effect on the hand.
+    target. A bound determines the direction in which the elbow moves. The push drives joint 2 to its speed
+    limit, and the torques change to hold this speed. When the push ends, the part of the torques along the
+    free motion stays as it is, and this part reverses joint 2. 0.2 s later joint 2 turns with 80°/s in the
+    opposite direction. Without speed limits joint 2 continues in the direction of the push, with more than
+    300°/s. It reverses only 0.75 s after the push. There the held hand allows no further motion: the last
+    link lies on the line from joint 1 to the hand. A last level with the task $\ddot q + K_V \dot q = 0$
+    brings the elbow to rest, with hardly any effect on the hand.
     """,
     prediction=Choice(
         "The hand is held. What does the elbow do after the push?",
         (
             Option("it moves a little and stops", high=30.0),
             Option("it coasts slowly on", 30.0, 75.0),
-            Option("it gets faster until it meets its speed limit", low=75.0),
+            Option("it gets faster until it reaches its speed limit", low=75.0),
         ),
         Measure(Signal("speed share", "%")),
         tempting=0,
@@ -186,7 +186,7 @@ FREE = Step(
             "at least",
             75.0,
             fails_with=("damping=true",),
-            because="the last level brings it to rest",
+            because="the last level brings the elbow to rest",
         ),
     ),
     set=("damping=false",),
@@ -206,7 +206,7 @@ CHALLENGE = Challenge(
     """,
     goals=(
         Claim("The hand stays within 3 mm.", Measure(HAND), "at most", 3.0),
-        Claim("From 0.6 s on it is within 0.5 mm.", Measure(HAND, after=0.6), "at most", 0.5),
+        Claim("From 0.6 s on the hand is within 0.5 mm.", Measure(HAND, after=0.6), "at most", 0.5),
     ),
     knobs=(K_P, K_V, Control("levels.position.R", "R", 0.1, 1e6, log=True)),
     score=Score(Measure(HAND, "rms"), worst=1.5, best=0.7),

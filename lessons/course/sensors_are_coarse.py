@@ -27,18 +27,19 @@ COARSE = "plant.encoder_resolution_deg=0.005"
 ROUNDING = Step(
     title="Two differences",
     text=r"""
-    The encoders round to $\delta = 0.005°$: at the hand that is 0.08 mm. Velocity is the difference of two
-    positions over $T_s$, acceleration the difference of two velocities over $T_s$. A change by one digit is
-    an acceleration of $\delta / T_s^2$, and the torque change in (13) is $\bar M\,\delta / T_s^2$.
+    The encoders round to $\delta = 0.005°$: at the hand this is 0.08 mm. Velocity is the difference of two
+    positions divided by $T_s$, and acceleration is the difference of two velocities divided by $T_s$. A
+    change by one digit is an acceleration of $\delta / T_s^2$, and the torque change in (13) is $\bar
+    M\,\delta / T_s^2$.
     """,
     do="Make the encoders finer until you cannot see the noise in the torque any more.",
     why=r"""
-    $\bar M \delta / T_s^2 = 0.033 \cdot 8.7 \cdot 10^{-5} / 10^{-6} = 2.9$ N·m for a single digit, of the
-    available 4 N·m. With finer encoders the noise decreases in proportion. The hand hardly moves in spite
-    of the noise. The paper finds the same limit (Table VIII) and calls it chattering.
+    A single digit changes the torque by $\bar M \delta / T_s^2 = 0.033 \cdot 8.7 \cdot 10^{-5} / 10^{-6} =
+    2.9$ N·m, and 4 N·m are available. With finer encoders the noise decreases in proportion. The hand
+    hardly moves in spite of the noise. The paper finds the same limit (Table VIII) and calls it chattering.
     """,
     prediction=Choice(
-        "Without rounding the motion needs 3 % of the torque limit. With it, the largest demand is …",
+        "Without rounding the motion needs 3 % of the torque limit. With rounding, the largest demand is …",
         (
             Option("still about 3 %", high=8.0),
             Option("10 to 30 %", 10.0, 30.0),
@@ -82,11 +83,11 @@ SQUARE = Step(
     why=r"""
     $\bar M \delta / T_s^2$ contains the square of the period: twice the period gives a quarter of the
     noise, while the error grows by little more than half. With coarse sensors a faster loop is not better.
-    $\bar M$ enters to the first power: half of it leaves half of the noise, and again the error grows by
-    little more than half.
+    $\bar M$ enters to the first power: half of $\bar M$ leaves half of the noise, and again the error grows
+    by little more than half.
     """,
     prediction=Value(
-        "T_s twice as long: the torque changes become how many times as large?",
+        "With T_s twice as long, the torque changes become how many times as large?",
         Measure(ROUGH, "rms", over_ghost=True),
         low=0.05,
         high=5.0,
@@ -115,7 +116,7 @@ SQUARE = Step(
             "at most",
             0.5,
             fails_with=("controller=osf",),
-            because="its torque is smoother, but its model has no friction",
+            because="OSF's torque is smoother, but its model has no friction",
         ),
     ),
     set=(COARSE, "T_s=0.002"),
@@ -127,8 +128,8 @@ SQUARE = Step(
 
 CHALLENGE = Challenge(
     text=r"""
-    Encoders of 0.005°. Bring the torque changes below 0.5 N·m RMS while the hand stays within half
-    a millimetre of its circle.
+    The encoders round to 0.005°. Bring the torque changes below 0.5 N·m RMS while the hand stays within
+    half a millimetre of its circle.
     """,
     goals=(
         Claim("Torque changes stay below 0.5 N·m RMS.", Measure(ROUGH, "rms"), "at most", 0.5),

@@ -26,11 +26,11 @@ PLOTS = (JOINT_2, SPEED, TORQUE)
 # Joint 2 ends at 150°; its target lies 22° beyond that.
 BEYOND = ((0.1, MoveTarget("posture", (0.0, 3.0, -1.57))),)
 ONLY_JOINTS = ("levels.position.enabled=false", "levels.orientation.enabled=false")
-# The joints have no end stops here, so that the plot shows how far one overruns its range.
+# The joints have no end stops here, so that the plot shows how far a joint overruns its range.
 NO_STOPS = "plant.joint_stops=false"
 MODE = Control("limits.position", "Position limits", choices=("paper", "viability", "off"))
 N = Control("horizon", "N", 1, 40)
-APPROACH = Control("limits.velocity_approach", "Speed bounds closed in on at, 1/s", 5.0, 200.0, log=True)
+APPROACH = Control("limits.velocity_approach", "Approach rate to speed bounds, 1/s", 5.0, 200.0, log=True)
 
 PRINTED = Step(
     title="Five milliseconds",
@@ -50,14 +50,14 @@ PRINTED = Step(
     reaches 35 to 38 rad/s², and the joint overruns its range by 0.6°. Many of the QPs have no solution, and
     a fallback takes over. The lack of torque explains most of the overrun: at 15°/s, where 26 rad/s² are
     enough, the joint overruns by 0.03° only. But QPs have no solution in that case either, because the rows
-    on the position contradict those on the change of speed: without the latter
+    on the position contradict the rows on the change of speed: without the rows on the change of speed
     (`limits.velocity_approach=0`) only seven such QPs are left. The rows on speed add 0.07° to the overrun:
-    without them it is still 0.57°. With three times the torque, in the bounds and in the motors, 0.2° is
-    left, and the rows on speed cause half of it: without them 0.1° is left. The row on the position is
-    correct, but it takes effect too late.
+    without them the overrun is still 0.57°. With three times the torque, in the bounds and in the motors,
+    0.2° is left, and the rows on speed cause half of it: without them 0.1° is left. The row on the position
+    is correct, but it takes effect too late.
     """,
     prediction=Choice(
-        "The joint comes at 57°/s and the controller looks 5 ms ahead. How hard does it brake?",
+        "The joint arrives at 57°/s, and the controller plans 5 ms ahead. How hard does the joint brake?",
         (
             Option("gently, because the limit is in its horizon", high=50.0),
             Option("firmly", 50.0, 95.0),
@@ -73,7 +73,7 @@ PRINTED = Step(
             "at least",
             100.1,
             fails_with=("limits.position=viability",),
-            because="with this bound it starts to brake in time",
+            because="with this bound the joint starts to brake in time",
         ),
         Claim(
             "More than twenty QPs have no solution.",
@@ -94,8 +94,8 @@ PRINTED = Step(
 LONGER = Step(
     title="Look further?",
     text=r"""
-    The same rows with $N = 20$. Braking from $v$ with deceleration $a$ takes the time $v/a$ and the
-    distance $v^2/2a$: at 1 rad/s and the 20 rad/s² this arm is rated for, 50 ms and 1.4°.
+    The rows are the same, with $N = 20$. Braking from $v$ with deceleration $a$ takes the time $v/a$ and
+    the distance $v^2/2a$: from 1 rad/s with the 20 rad/s² for which this arm is rated, 50 ms and 1.4°.
     """,
     do="Raise N to 40. Which horizon is needed to brake gently, and how long does a step then take?",
     why=r"""
@@ -117,7 +117,7 @@ LONGER = Step(
             "at least",
             90.0,
             fails_with=("limits.position=viability",),
-            because="there the braking is spread over the whole distance",
+            because="with the bound on speed the joint brakes over the whole distance",
         ),
     ),
     set=("limits.position=paper", "horizon=20"),
@@ -135,29 +135,30 @@ VIABLE = Step(
 
     $$\dot q \le a\left(-t + \sqrt{t^2 + 2\,(q_s - q)/a}\right)$$
 
-    A joint at that speed that goes on for a time $t$ and then brakes with $a = 20$ rad/s² stops at $q_s$.
-    Such a state is called viable: a motion exists that keeps the limit. For an exact model $t = T_s$ and
-    $q_s = q_{\max}$ would be enough. Two things are not exact. The rows on speed delay the braking: in a
+    A joint that continues at this speed for a time $t$ and then brakes with $a = 20$ rad/s² stops at $q_s$.
+    Such a state is called viable: a motion exists that keeps the limit. With immediate braking and an exact
+    model, $t = T_s$ and $q_s = q_{\max}$ would be enough. But the rows on speed delay the braking: in a
     second the speed may change by at most 15 times its distance from its bound. So $t = T_s + 5/15$ s $=
     0.33$ s. Our model is estimated, so the joint brakes late, and then harder than with $a$. To allow for
     this late braking, $q_s$ lies 0.4° before the limit. Beyond $q_s$ the joint must come back: its speed in
     °/s is five times its distance from $q_s$ in degrees. Again $N = 5$.
     """,
-    do="Let the speed bound close in faster, at 60 and 200 1/s. What improves, and how large is the torque?",
+    do="Raise the approach rate to 60 and 200 1/s. What improves, and how large is the torque?",
     why=r"""
     Now the bound on the next step already contains the whole braking distance. At 5° before the limit $t =
-    T_s$ would allow 106°/s, $t = 0.33$ s only 13.5°/s. The joint does 18: it follows the falling bound a
-    little late. The rows on speed are the reason, not the estimate: with twice the $\bar M$ the joint does
-    18 as well. Without the rows on speed ($t = T_s$) the delay of the estimate has a visible effect: the
-    joint brakes with 28 instead of 20 rad/s² and passes $q_s$ by 0.002°. With twice the $\bar M$ it brakes
-    with 24 rad/s². With 0.3 of the $\bar M$ it needs all the torque and passes $q_s$ by 0.03°. So 0.4° are
-    more than enough for the estimate. A stop before the limit with constant deceleration would never take
-    more than 1.5 of the 20 rad/s², and every QP has a solution. The disadvantage is time: the joint moves
-    slowly over the last degrees. Limits beyond a short horizon must be part of its bounds. This bound is
-    the default of this lab and a deliberate departure from (32d).
+    T_s$ would allow 106°/s, $t = 0.33$ s only 13.5°/s. The joint turns with 18°/s: it follows the falling
+    bound a little late. The rows on speed are the reason, not the estimate: with twice the $\bar M$ the
+    joint also turns with 18°/s. Without the rows on speed ($t = T_s$) the delay of the estimate has a
+    visible effect: the joint brakes with 28 instead of 20 rad/s² and passes $q_s$ by 0.002°. With twice the
+    $\bar M$ it brakes with 24 rad/s². With 0.3 of the $\bar M$ it needs all the torque and passes $q_s$ by
+    0.03°. So 0.4° are more than enough for the estimate. A stop before the limit with constant deceleration
+    would never take more than 1.5 of the 20 rad/s², and every QP has a solution. The disadvantage is time:
+    the joint moves slowly over the last degrees. A limit beyond a short horizon must be part of the bounds
+    within the horizon. The bound on speed is the default of this lab, and a deliberate departure from
+    (32d).
     """,
     prediction=Choice(
-        "A horizon of 5 ms again, but with the bound on speed. The largest torque is …",
+        "With a horizon of 5 ms and the bound on speed, the largest torque is …",
         (
             Option("all the available torque, as before", low=95.0),
             Option("about half", 30.0, 95.0),
@@ -176,20 +177,20 @@ VIABLE = Step(
             because="5 ms are too short to stop in",
         ),
         Claim(
-            "It needs less than 30 % of its torque.",
+            "The joint needs less than 30 % of its torque.",
             Measure(TORQUE),
             "at most",
             30.0,
             fails_with=("limits.position=paper",),
-            because="the late stop takes all of it",
+            because="the late stop takes all the torque",
         ),
         Claim(
-            "At no time would a stop before the limit take more than 2 rad/s².",
+            "A stop before the limit would never take more than 2 rad/s².",
             Measure(STOP),
             "at most",
             2.0,
             fails_with=("limits.velocity_approach=0",),
-            because="with t = Tₛ it takes 16 of the 20 rad/s²",
+            because="with t = Tₛ a stop takes 16 of the 20 rad/s²",
         ),
         Claim(
             "Within 5° of the limit no joint moves at more than 20°/s.",
@@ -221,8 +222,8 @@ CHALLENGE = Challenge(
     """,
     goals=(
         Claim("Joint 2 gets to 149°.", Measure(JOINT_2, "last"), "at least", 149.0),
-        Claim("It stays within its range.", Measure(RANGE), "at most", 100.0),
-        Claim("It needs less than 90 % of its torque.", Measure(TORQUE), "at most", 90.0),
+        Claim("The joint stays within its range.", Measure(RANGE), "at most", 100.0),
+        Claim("The joint needs less than 90 % of its torque.", Measure(TORQUE), "at most", 90.0),
     ),
     knobs=(N, Control("limits.velocity_scale", "Speed limit, factor", 0.1, 1.0)),
     score=Score(Measure(TORQUE), worst=90.0, best=30.0),

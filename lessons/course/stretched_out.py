@@ -28,12 +28,12 @@ INVERSE = Step(
     """,
     do="Start the circle gently. Then try OSF with a damped inverse, TDEOSF, HQP and HIMPC.",
     why=r"""
-    Sideways almost no torque would be enough. But the path is curved: right after the start the circle
-    demands 0.06 m/s² along the arm, where no joint can move the hand, and the inverse magnifies that many
-    million times. With a gentle start the circle demands no acceleration along the arm at first, and for a
-    tenth of a second the demanded torque is small. Then, at 0.13 s, the demand still passes a thousand
-    times the limit, for a tick or two. A damped inverse, `osf_damped`, demands a fifth of the limit. Motors
-    cannot supply torques above their limit: they clip them.
+    A sideways motion alone needs almost no torque. But the path is curved: right after the start the circle
+    demands 0.06 m/s² along the arm, where no joint can move the hand, and the inverse magnifies this
+    acceleration many million times. With a gentle start the circle demands no acceleration along the arm at
+    first, and for a tenth of a second the demanded torque is small. Then, at 0.13 s, the demand still
+    exceeds a thousand times the limit, for one or two ticks. A damped inverse, `osf_damped`, demands a
+    fifth of the limit. Real motors clip torques above their limit.
     """,
     prediction=Choice(
         "The hand should only move sideways. What is the largest torque that OSF demands?",
@@ -52,7 +52,7 @@ INVERSE = Step(
             "at least",
             1e5,
             fails_with=("controller=himpc",),
-            because="HIMPC with R = 10 demands no more than half of the limit, even without bounds",
+            because="HIMPC with R = 10 demands at most half of the limit, even without bounds",
         ),
     ),
     set=("controller=osf",),
@@ -66,17 +66,17 @@ REGULAR = Step(
     text=r"""
     HIMPC minimises $Q \lVert e \rVert^2 + R \lVert \Delta\tau \rVert^2$ over $\Delta\tau$. Where $J$ loses
     a direction, the first term does not depend on the torque in this direction, and the second term makes
-    its change zero. The Hessian $\bar B^\top \bar Q \bar B + \bar R$ is positive definite whatever $J$ is
-    (Lemma 1).
+    the change of this torque zero. The Hessian $\bar B^\top \bar Q \bar B + \bar R$ is positive definite
+    for every $J$ (Lemma 1).
     """,
     do="Make R smaller by a factor of a million. Is the torque still small?",
     why=r"""
     The torque never leaves its bounds, and after a few tenths of a second the hand is on its circle,
     without a special case for singular poses. With its bounds HIMPC demands 67 % of the limit even with $R
-    = 10^{-12}$. Without bounds $R$ keeps the torque small: with $R = 10^{-5}$ it then demands more than a
-    hundred times the limit. $R$ is a damping factor, too. But $R$ damps the *change* of torque: at rest its
-    cost is zero, so $R$ need not be small for accuracy. The ghost, with a hundred times the $R$, is as
-    accurate; with a million times the hand swings by centimetres and more.
+    = 10^{-12}$. Without bounds $R$ keeps the torque small: with $R = 10^{-5}$ and no bounds HIMPC demands
+    more than a hundred times the limit. $R$ is a damping factor, too. But $R$ damps the *change* of torque:
+    at rest the cost of the change is zero, so $R$ need not be small for accuracy. The ghost, with a hundred
+    times the $R$, is as accurate; with a million times the hand swings by centimetres and more.
     """,
     claims=(
         Claim(
@@ -93,10 +93,10 @@ REGULAR = Step(
             "at most",
             0.5,
             fails_with=("controller=hqp",),
-            because="HQP keeps control as well, but its model has no friction",
+            because="HQP also keeps control, but its model has no friction",
         ),
         Claim(
-            "From 1 s on it is as near with R = 10 as with R = 1000, within 10 %.",
+            "From 1 s on the error with R = 10 is that with R = 1000, within 10 %.",
             Measure(HAND, after=1.0, over_ghost=True),
             "at most",
             1.1,
@@ -120,9 +120,10 @@ BLAME = Step(
     do="Look at 8 s: the arm is straight again, and the circles change.",
     why=r"""
     Nearly all of the error was due to the jump. The size of this error is mostly due to the desired motion:
-    (4) returns slowly. With four times the $K_P$ and twice the $K_V$ the error after the jump is 1.7 mm. In
-    a singular pose HIMPC follows the directions that the arm can move in. Where an experiment has two
-    possible causes at once, it does not show which of them acts; so remove one of them.
+    (4) brings the hand back slowly. With four times the $K_P$ and twice the $K_V$ the error after the jump
+    is 1.7 mm. In a singular pose HIMPC follows the reference in the directions in which the arm can move.
+    Where an experiment has two possible causes at once, it does not show which of them acts; so remove one
+    of them.
     """,
     prediction=Choice(
         "With the same singular pose and a gentle start, the largest error becomes …",
@@ -149,7 +150,7 @@ BLAME = Step(
             "at most",
             0.5,
             fails_with=("controller=hqp",),
-            because="its model has no friction, whether the start is gentle or not",
+            because="HQP's model has no friction, whether the start is gentle or not",
         ),
     ),
     set=("smooth=true",),

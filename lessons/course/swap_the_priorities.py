@@ -18,7 +18,7 @@ from lessons.teaching.prediction import Choice, Option, Value
 HAND = Signal("error/position", "mm")
 POSTURE = Signal("error/posture", "deg")
 PLOTS = (HAND, Signal("error/orientation", "deg"), POSTURE)
-# Shoulder and elbow 25° and 20° on: in the arm's own plane, where the hand leaves no freedom.
+# Shoulder and elbow turn by 25° and 20° in the plane of the arm, where the hand leaves no freedom.
 BENT = (0.0, 0.9599, 0.0, -1.2217, 0.0, 1.0472, 0.0)
 ASK = (0.1, MoveTarget("posture", BENT))
 PROMOTE = (1.2, MoveLevel("posture", 0))
@@ -116,8 +116,8 @@ FIRST = Step(
 BACK = Step(
     title="And back",
     text=r"""
-    At 2.6 s the old order is restored. At this moment the order of the problems jumps, but the
-    measurements do not: $\tau_0$, $\ddot x_0$ and the last plan stay.
+    At 2.6 s the old order is restored. At this moment the order of the problems changes abruptly, but the
+    measurements do not: $\tau_0$, $\ddot x_0$ and the last plan stay the same.
     """,
     do="Swap levels as fast as you can. Try to make the arm jump.",
     why=r"""

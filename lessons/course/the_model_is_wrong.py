@@ -80,7 +80,7 @@ REALITY = Step(
     friction. HIMPC needs no model of friction: it measures the effect of the torque of a millisecond ago.
     """,
     prediction=Value(
-        "Model 20 % light, friction unknown: how many times larger is OSF's error than HIMPC's?",
+        "The model is 20 % light and has no friction: how many times larger is OSF's error than HIMPC's?",
         Measure(HAND, over_ghost=True),
         low=0.1,
         high=1000.0,
@@ -93,7 +93,7 @@ REALITY = Step(
             "at least",
             10.0,
             fails_with=("plant.friction=0", *EXACT),
-            because="with the exact model OSF is the better one",
+            because="with the exact model OSF is better than HIMPC",
         ),
     ),
     set=("controller=osf",),
@@ -107,8 +107,8 @@ HEAVIER = Step(
     title="Links that are 50 % heavier",
     text=r"""
     The controller is HIMPC, and every link is 50 % heavier than before. The controller has no information
-    about this change, and $\bar M$ stays. Table V of the paper disturbs the inertias by ±20 % and finds
-    that level 1 changes by about 2 % at most. The ghost has the old links.
+    about this change, and $\bar M$ stays the same. Table V of the paper disturbs the inertias by ±20 % and
+    finds that level 1 changes by about 2 % at most. The ghost has the old links.
     """,
     do=(
         "Set half the mass: how do error and gauge change? Then reset the mass, raise M̄, and remove friction."
@@ -119,9 +119,10 @@ HEAVIER = Step(
     friction. But three quarters of the error are due to friction, which does not grow with the mass. A
     larger $\bar M$ makes the whole error as small as before. Lighter links make corrections faster and the
     error smaller. They do not lead to instability, since the inertia of the motors is left: with links of a
-    twentieth of the mass the gauge reads 0.47. It passes 1 only if the motors are lighter, too, 0.01 kg·m²
-    each. As long as $\lVert I - M^{-1}\bar M \rVert$ is below 1 errors stay bounded (Remark 4). That is
-    sufficient, not necessary: in the long run the spectral radius decides, the gauge.
+    twentieth of the mass the gauge reads 0.47. The gauge passes 1 only if the motors are lighter, too, with
+    0.01 kg·m² each. As long as $\lVert I - M^{-1}\bar M \rVert$ is below 1 errors stay bounded (Remark 4).
+    This condition is sufficient, not necessary: in the long run the spectral radius decides, which the
+    gauge shows.
     """,
     prediction=Choice(
         "The links are 50 % heavier, and HIMPC does not know it. HIMPC's largest error grows …",
@@ -156,7 +157,7 @@ HEAVIER = Step(
             "at most",
             0.3,
             fails_with=("controller=hqp",),
-            because="its model has no friction",
+            because="HQP's model has no friction",
         ),
     ),
     set=("plant.mass_scale=1.5", "plant.inertia_scale=1.5"),

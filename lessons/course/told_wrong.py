@@ -27,15 +27,16 @@ UNTIL = Control("report_end", "Right again from, s", 2.0, 12.0)
 NOT_THERE = Step(
     title="A reported crate at a wrong position",
     text=r"""
-    The hand has to move along a line for 4 m: level 1. The base has a line of its own, level 2. A crate
-    stands 1.4 m beside it. Every plan keeps the signed distance of each body $B$ of the robot to each
-    obstacle $O$ at every knot,
+    Level 1 moves the hand along a line for 4 m. Level 2 moves the base along a line of its own. A crate
+    stands 1.4 m beside the line of the base. Every plan bounds the signed distance of each body $B$ of the
+    robot to each obstacle $O$ at every knot,
 
     $$\mathrm{sd}(B(q_k), O) \ge d_{\mathrm{safe}} \quad (7c),$$
 
-    here 5 cm. But a camera and a map report $O$. From 1 s to 7 s they report the crate 1.1 m away from its
-    true place, next to the line of the base: the outline shows the reported place. The crate is low enough
-    for the hand to pass above it, and the base has to make way. Then the report is corrected.
+    with $d_{\mathrm{safe}}$ = 5 cm. A camera and a map report the place of $O$. From 1 s to 7 s they report
+    the crate 1.1 m away from its true place, next to the line of the base: the outline shows the reported
+    place. The hand can pass above the low crate, and the base has to make way. Then the report is
+    corrected.
     """,
     do="Correct the report at 5 s. Then put the base first, in the tab Mission.",
     why=r"""
@@ -49,7 +50,7 @@ NOT_THERE = Step(
     prediction=Choice(
         "The base cannot pass the reported place of the crate. The hand leaves its line by …",
         (
-            Option("more than 10 cm: the hand is carried by the base", low=100.0),
+            Option("more than 10 cm: the base carries the hand", low=100.0),
             Option("some millimetres or centimetres", 1.0, 100.0),
             Option("less than 1 mm", high=1.0),
         ),
@@ -82,7 +83,7 @@ NOT_THERE = Step(
             because="then the base has no task",
         ),
         Claim(
-            "The crate is never nearer than 40 cm.",
+            "The distance of the crate is never less than 40 cm.",
             Measure(DISTANCE, "smallest"),
             "at least",
             400.0,
@@ -108,7 +109,7 @@ THERE = Step(
     simulation has no contacts: the crate does not stop the robot, and the distance becomes negative where
     the two overlap.
     """,
-    do="How late may the correction of the report come? Find the last time with which 5 cm are kept.",
+    do="How late may the report be corrected? Find the latest time with which 5 cm are kept.",
     why=r"""
     The robot drives 40 cm into the crate; until 7 s its base is never more than 3 mm from its line. The
     bound keeps a distance from the reported crate, not from the true one. The time of the
@@ -120,7 +121,7 @@ THERE = Step(
     measured here).
     """,
     prediction=Choice(
-        "The crate is reported beside the line until 7 s. The least distance to it is …",
+        "The crate is reported beside the line until 7 s. The least distance to the crate is …",
         (
             Option("5 cm, as always", low=40.0),
             Option("less, but the robot stops before the crate", 0.0, 40.0),
@@ -136,7 +137,7 @@ THERE = Step(
             "at most",
             -300.0,
             fails_with=IN_TIME,
-            because="then the controller learns of the crate in time",
+            because="then the controller receives the right report in time",
         ),
         Claim(
             "Until 7 s the base stays within 5 mm of its reference.",

@@ -33,9 +33,9 @@ ENOUGH = Step(
     """,
     do="Lower the limit until something changes. Which error changes first?",
     why=r"""
-    The run needs nine tenths of the 0.24 N·m, and most of that is friction: without any friction the same
-    motion needs a third of the 0.24 N·m, and without dry friction alone it needs half of it. A bound that
-    is not active has no effect: with all the torque the errors are the same.
+    The run needs nine tenths of the 0.24 N·m, and most of this torque is friction: without any friction the
+    same motion needs a third of the 0.24 N·m, and without dry friction alone it needs half of this torque.
+    A bound that is not active has no effect: with all the torque the errors are the same.
     """,
     prediction=Value(
         "What is the largest torque during the motion, as a share of the reduced limit?",
@@ -51,7 +51,7 @@ ENOUGH = Step(
             "at most",
             0.5,
             fails_with=("limits.torque_scale=0.03",),
-            because="that is too little for level 1 alone, with the dry friction of the joints",
+            because="this torque is too little for level 1 alone, with the dry friction of the joints",
         ),
         Claim(
             "Joint 1 stays within 0.1°.",
@@ -73,7 +73,7 @@ SHORT = Step(
     text=r"""
     The limit is now four per cent of the torque, 0.16 N·m. This is not enough for both tasks and the dry
     friction of the joints, 0.05 to 0.1 N·m each. Every level is solved under the same bounds, level 1
-    first; level 2 chooses among what leaves level 1 as it is (34).
+    first; level 2 chooses among the torques that do not change the result of level 1 (34).
     """,
     do="Open the list of active bounds: at which level is the torque limit active? Then remove the friction.",
     why=r"""
@@ -117,7 +117,7 @@ SHORT = Step(
             "at most",
             100.01,
             fails_with=("controller=tdeosf",),
-            because="that controller does not use the bounds",
+            because="TDEOSF does not use the bounds",
         ),
     ),
     set=(SWING, "limits.torque_scale=0.04"),
@@ -142,11 +142,11 @@ LESS = Step(
     do="Find the least torque with which the hand stays on its circle. How much is enough without friction?",
     why=r"""
     The hand leaves its circle: bounds rank above level 1. Without dry friction the circle by itself would
-    need 0.07 N·m, and the hand would stay on it. Level 2 does not make it worse, in either order: with
-    joint 1 first the hand is off as far. In both orders joint 1's motor is at the same limit nearly all the
-    time. The order holds at each tick. Over a run a second task may still lead the arm to poses in which
-    the error of the hand is larger: with a swing of −30° the hand gets further off than the ghost's, 16 mm
-    instead of 10. With joint 1 first it is off by 9 mm there.
+    need 0.07 N·m, and the hand would stay on it. Level 2 does not increase the error of the hand, in either
+    order: with joint 1 first the hand is off as far. In both orders joint 1's motor is at the same limit
+    nearly all the time. The order holds at each tick. Over a run a second task may still lead the arm to
+    poses in which the error of the hand is larger: with a swing of −30° the error of the hand is larger
+    than the ghost's, 16 mm instead of 10. With joint 1 first the hand is off by 9 mm there.
     """,
     prediction=Choice(
         "The ghost has no second task. How much larger is the error of the hand than the ghost's?",
@@ -165,10 +165,10 @@ LESS = Step(
             "at least",
             3.0,
             fails_with=("limits.torque_scale=0.04",),
-            because="that is still enough for level 1",
+            because="this torque is still enough for level 1",
         ),
         Claim(
-            "Its largest error is at most 10 % above that of a hand alone.",
+            "The hand's largest error is at most 10 % above the ghost's.",
             Measure(HAND, over_ghost=True),
             "at most",
             1.1,

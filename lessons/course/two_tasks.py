@@ -43,7 +43,7 @@ BOTH = Step(
             "at most",
             1.0,
             fails_with=("controller=osf",),
-            because="its model has no friction",
+            because="OSF's model has no friction",
         ),
         Claim(
             "Joint 1 stays within 1° of its reference.",
@@ -80,8 +80,8 @@ WEIGHTED = Step(
     """,
     do="Make Q of level 2 smaller until the hand is on its circle. How large is the error of joint 1 then?",
     why=r"""
-    A sum is a compromise. It weighs $e$, and at rest $e = K_P \tilde x$. A metre of the hand counts 200
-    m/s², and a radian of joint 1 counts 50 rad/s². So the gains act as weights, too. Both tasks have
+    A sum is a compromise. The sum weighs $e$, and at rest $e = K_P \tilde x$. A metre of the hand counts
+    200 m/s², and a radian of joint 1 counts 50 rad/s². So the gains act as weights, too. Both tasks have
     errors, and the hand leaves its circle by a quarter of a metre. The units do not determine the right
     weights.
     """,
@@ -110,7 +110,7 @@ WEIGHTED = Step(
             "at least",
             200.0,
             fails_with=("tasks.q1.K_p=5", "tasks.q1.K_v=1.6"),
-            because="with a tenth of its K_P, joint 1 is ten times cheaper with the same Q",
+            because="with a tenth of its K_P, an error of joint 1 counts a tenth with the same Q",
         ),
     ),
     set=("controller=weighted",),
@@ -162,7 +162,7 @@ STRICT = Step(
             "at least",
             30.0,
             fails_with=("controller=weighted",),
-            because="there most of the error is that of the hand",
+            because="in a weighted sum most of the error is that of the hand",
         ),
     ),
     duration=SECONDS,
@@ -174,19 +174,19 @@ STRICT = Step(
 LIMIT = Step(
     title="Is a large weight a priority?",
     text=r"""
-    Weighted again, but now the hand counts 200 times as much: $Q_1 = 200$, $Q_2 = 1$. The ghost is
-    strict.
+    The tasks are weighted again, but now the hand counts 200 times as much: $Q_1 = 200$, $Q_2 = 1$. The
+    ghost has strict priorities.
     """,
     do=r"""
     Make Q of level 2 ten and a hundred times smaller still. Then let joint 1 swing by 20° only, where both
-    tasks can be fulfilled, and go down to the least Q.
+    tasks can be fulfilled, and reduce Q to its smallest value.
     """,
     why=r"""
-    The error is smaller, and still several times that of a strict priority. In the limit the weighted
-    solution becomes the strict one. But such a small $Q$ no longer outweighs $R$. With the smaller swing
-    joint 1 is off by 0.02° with $Q_2 = 1$, by 0.05° with 0.01, and at the slider's end, with $10^{-5}$, by
-    13° of its 20°: there joint 1 no longer follows its reference, although this would be possible. With a
-    smaller $R$ it would follow.
+    The error of the hand is smaller, but still several times that of a strict priority. In the limit of a
+    very small $Q_2$ the weighted solution becomes the strict one. But such a small $Q$ no longer outweighs
+    $R$. With the smaller swing joint 1 is off by 0.02° with $Q_2 = 1$, and by 0.05° with 0.01. At the end
+    of the slider, with $10^{-5}$, it is off by 13° of its 20°: there joint 1 no longer follows its
+    reference, although this would be possible. With a smaller $R$ it would follow.
     """,
     prediction=Choice(
         "The hand counts 200 times as much as joint 1. Its largest error is …",
@@ -217,9 +217,8 @@ LIMIT = Step(
 
 CHALLENGE = Challenge(
     text=r"""
-    At the start the tasks are weighted with equal weights. Keep the hand within 5 mm of its circle while
-    joint 1 still gets as close to its reference as it can (within 80°), with torque changes below 0.1 N·m
-    RMS.
+    At the start the tasks have equal weights. Keep the hand within 5 mm of its circle while joint 1 still
+    gets as close to its reference as it can (within 80°), with torque changes below 0.1 N·m RMS.
     """,
     goals=(
         Claim("The hand stays within 5 mm.", Measure(HAND), "at most", 5.0),

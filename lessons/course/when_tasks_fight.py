@@ -25,13 +25,13 @@ PROJECTION = Step(
     title="Project and invert",
     text=r"""
     The classical method for priorities projects task 2 into the null space of task 1, $J_{2|1} = J_2 P_1$,
-    and computes the force that task 2 needs there. That needs the inverse of $J_{2|1} M^{-1} J_{2|1}^\top$.
-    Here the hand follows its circle and joint 1 swings to −120°, beyond what the circle allows. From 1.3 s
-    on links 2 and 3 come into line. When they are in line, they can no longer compensate for joint 1, so
-    any motion of joint 1 moves the hand: $J_{2|1}$ vanishes. The controller is OSF, with a model that is 20
-    % too light. The torque limit of the motors is only measured here, not enforced.
+    and computes the force that task 2 needs there. This requires the inverse of $J_{2|1} M^{-1}
+    J_{2|1}^\top$. Here the hand follows its circle and joint 1 swings to −120°, beyond what the circle
+    allows. From 1.3 s on links 2 and 3 come into line. When they are in line, they can no longer compensate
+    for joint 1, so any motion of joint 1 moves the hand: $J_{2|1}$ vanishes. The controller is OSF, with a
+    model that is 20 % too light. The torque limit of the motors is only measured here, not enforced.
     """,
-    do="Switch to HIMPC in good time, and back, while the arm moves.",
+    do="While the arm moves, switch to HIMPC before the conflict, and back.",
     why=r"""
     A division by almost zero gives a very large number: the demanded torque passes a thousand times the
     limit and the arm goes out of control. Neither Jacobian alone is singular there. The algorithm creates
@@ -54,7 +54,7 @@ PROJECTION = Step(
             "at least",
             10000.0,
             fails_with=("controller=himpc",),
-            because="bounds are part of the problem; without them it also demands a hundred times more",
+            because="HIMPC has bounds in its QPs; without bounds it demands a hundred times the limit, too",
         ),
         Claim(
             "A joint turns at more than twenty times its speed limit: control is lost.",
@@ -109,7 +109,7 @@ BETTER_MODEL = Step(
             "at most",
             0.3,
             fails_with=("controller=osf",),
-            because="its model has no friction",
+            because="OSF's model has no friction",
         ),
         Claim(
             "Then a joint passes twenty times its speed limit.",
@@ -117,7 +117,7 @@ BETTER_MODEL = Step(
             "at least",
             2000.0,
             fails_with=("controller=himpc",),
-            because="bounds are part of the problem",
+            because="HIMPC has bounds in its QPs",
         ),
     ),
     set=("controller=tdeosf",),
@@ -136,19 +136,19 @@ EQUALITY = Step(
     """,
     do="Watch joint 1 at 1.4 s and again when it comes back.",
     why=r"""
-    Level 2 has a target that it cannot reach. It goes to the limit of the motions that level 1 leaves,
-    where links 2 and 3 are in line, and does not come to rest there: from 2 s on joint 3 swings about this
-    limit, to and fro with 94°/s, a little more than once a second, until the reference of joint 1 comes
-    back. A strict order does not prevent such oscillations. What keeps the joint swinging? It is not the
-    strict order: in a weighted sum with $Q_2 = 0.01$ joint 3 swings as well, with up to 73°/s. It is not
-    the estimation: with twice the $\bar M$ it swings as before. With our weights it is the horizon of level
-    2: with $N = 1$ at level 2 alone the swing decays to an oscillation of 12°/s, with $N = 1$ at level 1
-    alone it swings as before. Another weight changes this result. With $R_2 = 10^5$ the swing slows down to
-    58°/s and does not need the horizon: with $N = 1$ and $R_2 = 10^5$ joint 3 goes on swinging with 62°/s.
-    But torque and speed stay within their bounds, and the hand stays on its circle. The equality (34g)
-    alone is not enough for this. The bounds are needed, too: without those on speed and position every
-    motor comes to its limit and the hand is off by 11 mm, and without any bound the arm goes out of control
-    as with a projection.
+    Level 2 has a target that it cannot reach. It moves joint 1 to the limit that level 1 allows, where
+    links 2 and 3 are in line, and the arm does not come to rest there: from 2 s on joint 3 swings about
+    this limit, to and fro with 94°/s, a little more than once a second, until the reference of joint 1
+    comes back. A strict order does not prevent such oscillations, but it does not sustain them: in a
+    weighted sum with $Q_2 = 0.01$ joint 3 swings as well, with up to 73°/s. The estimation does not sustain
+    the swing either: with twice the $\bar M$ it swings as before. With our weights the horizon of level 2
+    sustains the swing: with $N = 1$ at level 2 alone the swing decays to an oscillation of 12°/s, with $N =
+    1$ at level 1 alone it swings as before. Another weight changes this result. With $R_2 = 10^5$ the swing
+    slows down to 58°/s and does not need the horizon: with $N = 1$ and $R_2 = 10^5$ joint 3 continues to
+    swing with 62°/s. In spite of the swing, torque and speed stay within their bounds, and the hand stays
+    on its circle. The equality (34g) alone is not enough for this. The bounds are needed, too: without
+    those on speed and position every motor comes to its limit and the hand is off by 11 mm, and without any
+    bound the arm goes out of control as with a projection.
     """,
     claims=(
         Claim(

@@ -35,21 +35,21 @@ LOAD = Step(
     --check lamp.urdf` lists what is missing: a joint without end stops, a head without inertia, a joint
     without a speed limit. The program reports the values that it fills in, and refuses a file whose values
     it cannot fill in. The stack is made for any robot: position, then orientation, then posture. The
-    program suggests $\bar M$ from the masses in the file, on the safe side, and the gains from the speed of
+    program suggests $\bar M$ from the masses in the file, with a margin, and the gains from the speed of
     the loop with this $\bar M$.
     """,
     do="Load a URDF of your own: Robot, Load URDF, or himpc-lab --urdf FILE.",
     why=r"""
-    The lamp has five joints for six coordinates of the head: no free motion is left, and even one joint is
-    missing. The hierarchy resolves this conflict by itself: the position is reached, the orientation as far
-    as five joints allow, and no motion is left for the posture. In a weighted sum the position has an error
-    instead.
+    The lamp has five joints for six coordinates of the head: no free motion is left, and one more joint
+    would be needed. The hierarchy resolves this conflict by itself: the position is reached, the
+    orientation as far as five joints allow, and no motion is left for the posture. In a weighted sum the
+    position has an error instead.
     """,
     prediction=Choice(
-        "The head is moved by 11 cm. It has five joints. In the end …",
+        "The lamp has five joints, and its head is moved by 11 cm. In the end …",
         (
-            Option("the head is there, as upright as before", high=1.0),
-            Option("the head is there, but tilted", low=5.0),
+            Option("the head is on its target, as upright as before", high=1.0),
+            Option("the head is on its target, but tilted", low=5.0),
         ),
         Measure(TILT, "last"),
         tempting=0,
@@ -64,7 +64,7 @@ LOAD = Step(
             because="in a sum the orientation and the posture hold the head back, each of them alone as well",
         ),
         Claim(
-            "It is tilted by more than 5°.",
+            "The head is tilted by more than 5°.",
             Measure(TILT, "last"),
             "at least",
             5.0,
@@ -102,12 +102,12 @@ WRONG = Step(
     ),
     claims=(
         Claim(
-            "In the end the head is within 1 mm.",
+            "In the end the head is within 1 mm of its target.",
             Measure(HAND, "last"),
             "at most",
             1.0,
             fails_with=("controller=hqp",),
-            because="it compensates the weight in the file instead of the lamp's true weight",
+            because="HQP compensates the weight in the file instead of the lamp's true weight",
         ),
     ),
     set=HEAVY,
@@ -126,9 +126,9 @@ TUNE = Step(
     text=r"""
     The suggested $\bar M$ must be safe in all poses of the lamp. Your own $\bar M$ need only be safe in the
     poses that you use. Here it is twice the suggestion; the ghost keeps the suggestion. Then use the
-    controller in your own program: *export* writes a Python script of twenty lines that runs this stack,
-    `load_robot("lamp.urdf")`, `Level((FramePosition(…),))`, `HIMPC(robot, Settings(stack, M_bar))`, `step`
-    once a millisecond.
+    controller in your own program: *export* writes a Python script of twenty lines that runs this stack:
+    `load_robot("lamp.urdf")`, `Level((FramePosition(…),))`, `HIMPC(robot, Settings(stack, M_bar))`, and
+    `step` once a millisecond.
     """,
     do="Set 3 times the suggestion and read the gauge. Then export, and run the script.",
     why=r"""

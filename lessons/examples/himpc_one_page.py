@@ -2,7 +2,8 @@
 
     himpc-lab run iiwa14-circle --controller himpc_one_page.py
 
-The same torque as himpc-lab's own, without its fallbacks and its speed. N knots, n joints, m rows of a level.
+The torque is that of the lab's own HIMPC. This file has no fallbacks, and it is slower. N knots, n joints, m
+rows of a level.
 """
 
 import numpy as np
@@ -11,7 +12,7 @@ from himpc.qp import solve_qp
 
 
 class Controller:
-    """Its only memory is the last prediction, for the Jacobians along it (30)."""
+    """HIMPC. Its only memory is the last prediction, along which the Jacobians are computed (30)."""
 
     def __init__(self):
         self.predicted = None  # q at knots 0 … N of the last plan
@@ -27,24 +28,24 @@ class Controller:
             B = np.array([level.jacobian(q) for q in knots]) / now.M_bar  # Ĵ M̄⁻¹, (N, m, n)
             U = U + self.optimum(now, level, B, U, Z, rows, lower, upper)
             torques.append(now.tau_0 + U[:n])
-            # U meets the bounds up to rounding, and must stay feasible for the levels below (Theorem 2).
+            # U meets the bounds only up to rounding, but must be feasible for the levels below (Theorem 2).
             lower, upper = np.minimum(lower, rows @ U), np.maximum(upper, rows @ U)
             Z = [shrunk(Z[j], B[j]) for j in range(N)]
         self.predicted = predict(now, U.reshape(N, n))
         return torques or now.tau_0
 
     def knots(self, now):
-        """q̂ at knots 0 … N−1: the last prediction, moved so that it begins at the measured q (30)."""
+        """Returns q̂ at knots 0 … N−1: the last prediction, moved so that it begins at the measured q
+        (30)."""
         if self.predicted is None or len(self.predicted) != now.N + 1:
             return [now.q + j * now.T_s * now.q_dot for j in range(now.N)]
         path = self.predicted[1:]
         return path + (now.q - path[0])
 
     def optimum(self, now, level, B, U, Z, rows, lower, upper):
-        """The optimal change of U for a level: Problem i, (34), with U_i = U_{i−1} + Z y.
+        """Returns the optimal change of U for a level: Problem i, (34), with U_i = U_{i−1} + Z y.
 
-            For every y, J_p M̄⁻¹ Δτ keeps the value that the levels p above have chosen, so that the equality
-            (33)
+        For every y, J_p M̄⁻¹ Δτ keeps the value that the levels p above have chosen, so that the equality (33)
         needs no rows.
         """
         basis = block_diagonal(Z)
@@ -59,15 +60,16 @@ class Controller:
 
 
 def residual(now, level, B):
-    """G and e⁰ of the stacked residuals e = e⁰ + G U, knots 1 … N, each of (28): ẍ̃ + K_v ẋ̃ + K_p x̃.
+    """Returns G and e⁰ of the stacked residuals e = e⁰ + G U at knots 1 … N, (28): ẍ̃ + K_v ẋ̃ + K_p x̃.
 
-    From the incremental system (15): ẍ_{j+1} = ẍ_j + Ĵ M̄⁻¹ Δτ_j, ẋ and x its sums over T_s.
+    The residuals follow from the incremental system (15): ẍ_{j+1} = ẍ_j + Ĵ M̄⁻¹ Δτ_j; ẋ and x are the sums
+    of ẍ and ẋ over T_s.
     """
     N, (m, n) = now.N, level.J.shape
     T, K_p, K_v = now.T_s, level.K_p, level.K_v
 
     def weight(j):
-        """The contribution to the residual of an acceleration that has lasted for j periods."""
+        """Returns the contribution to the residual of an acceleration that has lasted for j periods."""
         return 1.0 + K_v * T * (j + 1) + K_p * T**2 * j * (j + 1) / 2
 
     G, free = np.zeros((N, m, N, n)), np.empty((N, m))
@@ -81,7 +83,8 @@ def residual(now, level, B):
 
 
 def bounds(now):
-    """lower ≤ rows U ≤ upper: the torque (32f) and the velocity (32e) at every knot, all in N·m."""
+    """Returns rows, lower and upper of lower ≤ rows U ≤ upper: the bounds of the torque (32f) and of the
+    velocity (32e) at every knot, all in N·m."""
     N, T, limit, eye = now.N, now.T_s, now.bounds, np.eye(now.n)
     lag = np.subtract.outer(np.arange(N), np.arange(N))
     rows = np.vstack([np.kron(lag >= 0, eye), np.kron(np.maximum(lag + 1, 0), eye)])
@@ -96,7 +99,7 @@ def bounds(now):
 
 
 def predict(now, U):
-    """q at knots 0 … N by the incremental joint-space system (18)."""
+    """Returns q at knots 0 … N by the incremental joint-space system (18)."""
     q, v, a = now.q, now.q_dot, now.q_ddot
     path = [q]
     for effort in U / now.M_bar:
@@ -108,13 +111,14 @@ def predict(now, U):
 
 
 def shrunk(Z, B):
-    """An orthonormal basis of the directions of Z that B maps to zero: the freedom of the levels below."""
+    """Returns an orthonormal basis of the directions of Z that B maps to zero: the freedom of lower
+    levels."""
     _, sigma, right = np.linalg.svd(B @ Z)
     return Z @ right[int((sigma > 1e-10 * np.linalg.norm(B)).sum()) :].T
 
 
 def block_diagonal(blocks):
-    """One matrix with the blocks along its diagonal."""
+    """Returns one matrix with the blocks along its diagonal."""
     sizes = np.cumsum([0, *(each.shape[1] for each in blocks)])
     found = np.zeros((sum(len(each) for each in blocks), sizes[-1]))
     for j, each in enumerate(blocks):

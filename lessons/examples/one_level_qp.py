@@ -2,8 +2,9 @@
 
     himpc-lab run planar3-circle --controller FILE.py
 
-min Σ ‖e‖²_Q + ‖Δτ‖²_R with e the residual (28) at the next knot. It is affine in Δτ: the last torque and the
-acceleration that it caused replace a model of the robot (time-delay estimation, (9) of the HIMPC paper).
+min Σ ‖e‖²_Q + ‖Δτ‖²_R with e the residual (28) at the next knot. The residual is affine in Δτ: the last
+torque and the acceleration that it caused replace a model of the robot (time-delay estimation, (9) of the
+HIMPC paper).
 """
 
 import numpy as np

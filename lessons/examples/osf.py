@@ -19,7 +19,7 @@ def torque(now):
         # The target motion (4): ẍ_d − K_v (ẋ − ẋ_d) − K_p x̃.
         wanted = level.x_ddot_d[0] - level.K_v * (level.x_dot - level.x_dot_d[0]) - level.K_p * level.error
         J = level.J @ N
-        # In directions without freedom there is no inverse: the pseudo-inverse gives zero there.
+        # In directions without freedom there is no inverse; in these the pseudo-inverse is zero.
         Lambda = np.linalg.pinv(J @ M_inv @ J.T, rcond=1e-9, hermitian=True)
         tau = tau + J.T @ Lambda @ (wanted - level.J_dot_q_dot - level.J @ M_inv @ tau)
         N = N - M_inv @ J.T @ Lambda @ J

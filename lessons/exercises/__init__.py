@@ -1,6 +1,6 @@
 """Exercises: students write the missing lines of a controller, and the motion of the robot is graded.
 
-Each exercise is one file, whose docstring is its card; `starts/` has the file with missing lines.
+Each exercise is one file, and its docstring is the card. `starts/` contains the files with missing lines.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ if TYPE_CHECKING:
 
 EXERCISES: dict[str, str] = {
     "joint-pd": "PD control with gravity compensation, joint by joint",
-    "null-space": "OSF: a second task that leaves the first alone",
+    "null-space": "OSF: a second task that does not disturb the first",
     "time-delay": "time-delay estimation: hold an unknown load without a model",
     "one-level-qp": "one level of the QP (35), one knot, with its bounds",
     "two-levels": "two levels with the equality (33)",
     "distance-row": "rows that keep distances, above all levels",
 }
-"""Each exercise with one line, in the recommended order."""
+"""The names of the exercises with a short description, in the recommended order."""
 
 
 def load_exercise(name: str) -> Exercise:
-    """The exercise of a name. Raises InputError, which names the nearest valid name, if there is none."""
+    """Returns the exercise with this name. Raises InputError with the nearest valid name if there is none."""
     if name not in EXERCISES:
         raise unknown_name("exercise", name, EXERCISES)
     found: Exercise = import_module(f"lessons.exercises.{name.replace('-', '_')}").EXERCISE
@@ -35,12 +35,12 @@ def load_exercise(name: str) -> Exercise:
 
 
 def exercises_of(lesson: str) -> tuple[Exercise, ...]:
-    """The exercises that belong to a lesson, in order."""
+    """Returns the exercises that belong to a lesson, in order."""
     return tuple(each for each in map(load_exercise, EXERCISES) if each.lesson == lesson)
 
 
 def start_of(name: str) -> str:
-    """The file with missing lines. Raises InputError if there is no exercise of this name."""
+    """Returns the file with missing lines. Raises InputError if no exercise has this name."""
     load_exercise(name)
     place = Path(str(files("lessons.exercises") / "starts" / f"{name.replace('-', '_')}.py"))
     return place.read_text(encoding="utf-8")

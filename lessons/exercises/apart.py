@@ -1,4 +1,4 @@
-"""The lab's side of a submission's process: it sends numbers and receives a torque, within deadlines."""
+"""Runs a submission in a separate process: sends it numbers and receives a torque, within deadlines."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from robots.errors import shortened
 from robots.processes.family import end_family, has_ended, memory_of, spent
 
 LOADING = 10.0
-"""Time, s, that loading the file may take, without the start of the process."""
+"""Largest time for loading the file, s, without the start of the process."""
 STARTING = 60.0
-"""Time, s, that the start of the process may take."""
+"""Largest time for the start of the process, s."""
 _MARK = "HIMPC_LAB_SUBMISSION"
 _BOOT = (
     "import sys; sys.path.insert(0, sys.argv[1]); from lessons.exercises.inside.serve import serve; "
@@ -44,22 +44,22 @@ class Exhausted(Exception):
 
 @final
 class Apart:
-    """A process that runs a submission and contains no data of the lab. To be used in a `with` statement.
+    """A process that runs a submission and contains no data of the lab. Use it in a `with` statement.
 
     Attributes:
-        protection: mechanisms of the operating system that refuse it files, the network and other processes;
-            () if only Python refuses them.
+        protection: mechanisms of the operating system that block access to files, the network and other
+            processes; () if only Python blocks it.
         exercise: the name that the file assigns to EXERCISE.
-        line: number of the line at which the function of the torque begins.
+        line: number of the line at which the function that returns the torque begins.
     """
 
     def __init__(self, source: Source, seconds: float, memory: int, kernel: bool = True) -> None:
-        """Starts it and loads the file.
+        """Starts the process and loads the file.
 
         Args:
             source: the file. Its text is sent to the process, which reads no files.
-            seconds: total time, s, in which the process may compute or sleep to answer.
-            memory: bytes for the process and all processes that it starts, if it can start any.
+            seconds: largest total time, s, in which the process may compute or sleep before it answers.
+            memory: largest memory, bytes, of the process and all processes that it starts.
             kernel: whether to use the mechanisms of the operating system, see `protection`.
 
         Raises:
@@ -84,7 +84,7 @@ class Apart:
 
     @property
     def where(self) -> str:
-        """File and line, for the beginning of a sentence."""
+        """The file and the line, as the beginning of an error message."""
         return f"{self._source.path}, line {self.line}"
 
     @property
@@ -110,7 +110,7 @@ class Apart:
         child.wait()
 
     def fresh(self) -> Callable[[View], Any]:
-        """The law of the file, loaded anew. Raises OwnFault."""
+        """Loads the file again and returns its control law. Raises OwnFault."""
         if self._child is None:
             self._start()
         kind, data = self._exchanged(wire.LOAD, b"", LOADING, "loading it")
@@ -151,13 +151,13 @@ class Apart:
         kind, data = self._exchanged(wire.LOAD, text, STARTING, "starting its process")
         if kind != wire.READY:
             raise self._nonsense()
-        self.protection = tuple(json.loads(data))  # written before any line of the file was run
+        self.protection = tuple(json.loads(data))  # sent before the process runs the file
 
     # ---------------------------------------------------------------- one message and its answer
 
     def torque(self, now: View) -> Any:
-        """The torque of the control law for a tick. Raises OwnFault, whose message is one sentence, if the
-        call fails, takes too long, or its process has ended."""
+        """Returns the torque of the control law for a tick. Raises OwnFault with a message of one sentence if
+        the call fails, takes too long, or the process has ended."""
         if self._child is None:
             raise OwnFault(f"{self._source.path}: its process has ended")
         message, arrays = b"", numbers_of(now)
@@ -186,7 +186,7 @@ class Apart:
         raise self._fault(kind, data, now.n)
 
     def _reply(self, now: View, data: bytes) -> bytes:
-        """The message with the result of a function of the model that the submission has called."""
+        """Calls a function of the model for the submission, and returns the message with the result."""
         try:
             name, level, arguments = json.loads(data)
             given = [np.array(each, float).reshape(now.n) for each in arguments]
@@ -207,8 +207,8 @@ class Apart:
         return self._answered(wire.packed(kind, data), ProcessDeadline(child.pid, seconds, what))
 
     def _answered(self, message: bytes, watch: ProcessDeadline) -> tuple[bytes, bytes]:
-        """Sends one message and receives the answer. Raises OwnFault, and ends the process, if that takes too
-        long.
+        """Sends one message and returns the answer. If this takes too long, ends the process and raises
+        OwnFault.
         """
         left = memoryview(message)
         while left:
@@ -238,7 +238,7 @@ class Apart:
             self._look(watch)
 
     def _look(self, watch: ProcessDeadline) -> None:
-        """Raises OwnFault, and ends the process, if the process is too slow or needs too much memory."""
+        """Ends the process and raises OwnFault if the process is too slow or needs too much memory."""
         slept = watch.slept
         if watch.over():
             self.close()
@@ -247,8 +247,8 @@ class Apart:
         self._account()
 
     def _account(self) -> None:
-        """Ends the process and raises OwnFault if all answers together took too long, or if the process and
-        the processes that it started use too much memory."""
+        """Ends the process in two cases. Raises Exhausted if all answers together took too long, and OwnFault
+        if the process and the processes that it started use too much memory."""
         child = self._child
         assert child is not None
         if self._before + self._slept + spent(child.pid)[0] > self._seconds:
@@ -285,7 +285,7 @@ class Apart:
 
 
 def _pipes(child: subprocess.Popen[bytes]) -> tuple[int, int]:
-    """The pipes to and from the process; neither of them blocks this side."""
+    """Returns the pipes to and from the process. Neither pipe blocks this side."""
     assert child.stdin is not None and child.stdout is not None
     for pipe in (child.stdin, child.stdout):
         os.set_blocking(pipe.fileno(), False)

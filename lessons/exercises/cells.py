@@ -1,4 +1,4 @@
-"""The cells of a table for a spreadsheet."""
+"""Converts texts to cells of a spreadsheet, and back."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
 
 
 def cell(text: str) -> str:
-    """The cell in a form that a spreadsheet shows as text."""
+    """Returns the text as a cell that a spreadsheet shows as text."""
     return f"'{text}" if text.startswith(_FORMULA) else text
 
 
 def of_cell(text: str) -> str:
-    """The text of a cell that `cell` may have written."""
+    """Returns the text from which `cell` has made this cell."""
     return text[1:] if text.startswith("'") and text[1:].startswith(_FORMULA) else text

@@ -41,8 +41,8 @@ PAST = _run(events=((0.0, PAST_THE_POST), (0.45, BACK)), duration=0.7)
 def checks(seed: int) -> tuple[GradeCheck, ...]:
     return (
         GradeCheck(
-            "If the hand is sent into the table, the arm keeps clear of everything.",
-            "the row does not bound how fast d may shrink, or does so too late",
+            "If the target of the hand lies in the table, the arm still touches nothing.",
+            "the row does not bound how fast d shrinks, or bounds it too late",
             INTO,
             5.0,
             "at least",
@@ -50,15 +50,15 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
             points=3,
         ),
         GradeCheck(
-            "The hand comes as near to the table as it may.",
-            "the bound must be looser where there is room, and reach 0 at d_safe",
+            "The hand comes as near to the table as the row allows.",
+            "far from d_safe the bound must be looser, and at d_safe it must be 0",
             INTO,
             25.0,
             measure=Measure(NEAREST, "last", until=0.9),
             points=2,
         ),
         GradeCheck(
-            "Then it reaches a target that is free, 6 cm above the table.",
+            "Then the hand reaches a target in free space, 6 cm above the table.",
             "the bound is tighter than the stopping distance, or the arm goes out of control",
             INTO,
             15.0,
@@ -66,7 +66,7 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
             points=2,
         ),
         GradeCheck(
-            "On a way past the post, with a push, the torque is the optimum of both levels.",
+            "On a path past the post, with a push, the torque is the optimum of both levels.",
             "D = T_s ∇dᵀM̄⁻¹ or its lower bound is wrong: v_stop, ∇dᵀq̇, ∇dᵀq̈₀ or `approach`",
             pushed(PAST, seed, "link_5", 20.0),
             1e-6,
@@ -90,7 +90,7 @@ def _rows(
     at_once: bool = False,
     pairs: str = "all",
 ) -> tuple[Array, Array]:
-    """D and the lower bounds; the arguments are factors on terms, or switch parts of them off."""
+    """Returns D and the lower bounds. The arguments are factors on terms, or switch terms off."""
     near, T = now.near, now.T_s
     slopes = gradient * near.gradient
     room = np.maximum(near.d - d_safe * near.d_safe, 0.0)
@@ -120,20 +120,20 @@ def _law(now: View, **how: Any) -> Any:
 
 MISTAKES: tuple[Mistake, ...] = (
     wrong("no pair has a row", _law, pairs="none"),
-    wrong("∇d has the wrong sign: d may grow as fast as it likes, but not shrink", _law, gradient=-1.0),
+    wrong("∇d has the wrong sign: the row must bound how d shrinks, not how it grows", _law, gradient=-1.0),
     wrong("∇d has the wrong sign in D", _law, D=-1.0),
     wrong("M̄ is missing in D = T_s ∇dᵀM̄⁻¹", _law, M_bar=False),
     wrong("T_s is missing in D = T_s ∇dᵀM̄⁻¹", _law, T_s=False),
-    wrong("d_safe is missing: the room to stop is d − d_safe", _law, d_safe=0.0),
-    wrong("the arm stops altogether: −v_stop lets d shrink where there is room", _law, v_stop="upwards"),
-    wrong("the bound is constant: d may never shrink, however much room there is", _law, v_stop="none"),
-    wrong("the bound is linear in the room: the speed of a stop is a square root", _law, v_stop="linear"),
-    wrong("the reaction t is missing in v_stop", _law, v_stop="no reaction"),
+    wrong("d_safe is missing: the distance for stopping is d − d_safe", _law, d_safe=0.0),
+    wrong("the arm stops completely: a bound of −v_stop lets d shrink to d_safe", _law, v_stop="upwards"),
+    wrong("the bound is constant: d can never shrink, not even far from d_safe", _law, v_stop="none"),
+    wrong("the bound is linear in d − d_safe: v_stop contains a square root", _law, v_stop="linear"),
+    wrong("the reaction time t is missing in v_stop", _law, v_stop="no reaction"),
     wrong("∇dᵀq̇ is missing: Δτ changes the present velocity", _law, speed=0.0),
-    wrong("q̈₀ is missing: without Δτ the robot goes on accelerating", _law, q_ddot=0.0),
-    wrong("the bound is approached at once: `approach` is not used", _law, at_once=True),
+    wrong("q̈₀ is missing: with Δτ = 0 the robot continues to accelerate", _law, q_ddot=0.0),
+    wrong("one period uses the whole distance to the bound: `approach` is not used", _law, at_once=True),
     wrong("only the nearest pair has a row", _law, pairs="nearest"),
-    wrong("a pair has a row only at d_safe or below: then it is too late to stop", _law, pairs="touching"),
+    wrong("a pair has a row only at d_safe or below: there it is too late to stop", _law, pairs="touching"),
 )
 
 
@@ -144,13 +144,13 @@ EXERCISE = Exercise(
     r"-v_\mathrm{stop}(d - d_\mathrm{safe})",
     plain="∇dᵀ(q̇ + T_s (q̈₀ + M̄⁻¹Δτ)) ≥ −v_stop(d − d_safe), v_stop(s) = a (√(t² + 2s/a) − t)",
     hints=(
-        "`now.near.gradient @ now.q_dot` is how fast each distance grows. The next velocity is "
+        "`now.near.gradient @ now.q_dot` is the rate at which each distance grows. The next velocity is "
         "q̇ + T_s (q̈₀ + M̄⁻¹Δτ).",
-        "What stands before Δτ is D = T_s ∇dᵀM̄⁻¹, a row for each pair; the rest goes to the right.",
+        "The factor of Δτ is D = T_s ∇dᵀM̄⁻¹, a row for each pair. All other terms go to the right.",
         "The largest speed from which the arm can still stop within the distance s is "
         "v_stop(s) = a (√(t² + 2s/a) − t); here s = max(d − d_safe, 0).",
-        "As a bound of a joint, in one period it may use at most min(1, approach · T_s) of what is left: "
-        "share · (−v_stop − ∇dᵀq̇) is the least change of ∇dᵀq̇.",
+        "As for a bound of a joint, one period uses at most the share min(1, approach · T_s) of the distance "
+        "to the bound: share · (−v_stop − ∇dᵀq̇) is the least change of ∇dᵀq̇.",
     ),
     lesson="keeping-clear",
     checks=checks,

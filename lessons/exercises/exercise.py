@@ -22,18 +22,18 @@ TORQUE_UNIT = "N·m"
 
 @dataclass(frozen=True)
 class GradeCheck:
-    """One statement about a submission that is measured.
+    """One statement about a submission, and the measured value that decides it.
 
     Attributes:
         text: the statement, as a sentence.
-        why: a possible cause if the statement does not hold and no known mistake fits.
-        run: the run in which it is measured; the controller is the submission.
+        why: a possible cause, shown if the statement does not hold and no known mistake fits.
+        run: the run in which the value is measured; its controller is the submission.
         relation, bound: the condition: the value is "at most" or "at least" the bound.
-        measure: the measured quantity of the submission's own run; None: the difference in torque from the
-            controller `beside`.
-        beside: the lab's controller that drives the run while the submission is shown the same states; the
-            largest difference in torque is measured, N·m.
-        points: number of points if it holds.
+        measure: the quantity that is measured in the submission's own run. None: the difference in torque
+            from the controller `beside` is measured.
+        beside: the lab's controller that moves the robot while the submission receives the same states. The
+            value is the largest difference in torque, N·m.
+        points: number of points if the statement holds.
     """
 
     text: str
@@ -46,7 +46,7 @@ class GradeCheck:
     points: int = 1
 
     def holds(self, value: float) -> bool:
-        """Whether a value meets the condition; NaN does not."""
+        """Returns whether a value meets the condition; False for NaN."""
         return holds(value, self.relation, self.bound)
 
     @property
@@ -55,7 +55,7 @@ class GradeCheck:
 
     @property
     def condition(self) -> str:
-        """E.g. "≤ 1 mm"."""
+        """The condition as an inequality, e.g. "≤ 1 mm"."""
         return condition(self.relation, self.bound, self.unit)
 
 
@@ -64,17 +64,17 @@ class Exercise:
     """The task of an exercise and the checks that grade a solution.
 
     Attributes:
-        name: its name in `lessons.exercises.EXERCISES`, or that of a teacher's own exercise.
+        name: its key in `lessons.exercises.EXERCISES`, or the name of a teacher's own exercise.
         card: the docstring of its file.
-        equation: LaTeX.
+        equation: the equation in LaTeX.
         plain: the equation as plain text, for a terminal.
-        hints: shown one by one.
-        lesson: the lesson it belongs to; "" if there is none.
-        checks: function of a seed, which decides the disturbances.
-        mistakes: frequent mistakes, which the grade names.
-        start, solution: the file with the missing lines and the right one, of a teacher's own exercise; ""
-            for the lab's.
-        live: assignments "PATH=VALUE" with which to watch a solution.
+        hints: hints for students, shown one by one.
+        lesson: the lesson to which the exercise belongs; "" if there is none.
+        checks: function that returns the checks for a seed; the seed decides the disturbances.
+        mistakes: frequent mistakes that the grade can name.
+        start, solution: the file with missing lines and the complete file, for a teacher's own exercise; ""
+            for the lab's exercises.
+        live: assignments "PATH=VALUE" that are needed to watch a solution on the page.
     """
 
     name: str
@@ -91,24 +91,24 @@ class Exercise:
 
     @property
     def scene(self) -> str:
-        """The scene in which to watch the solution live."""
+        """The scene in which a solution is shown live."""
         return self.checks(0)[-1].run.scene
 
     @property
     def before(self) -> str:
-        """What to set on the page before a solution is watched there; "" if nothing."""
+        """The sentence that says what to set on the page before a solution is watched; "" if nothing."""
         pairs = [each.split("=", 1) for each in self.live]
         said = [f"“{entry_at(TORQUE_ENTRIES, path).label}” to {value}" for path, value in pairs]
         return f"On the page, first set {', '.join(said)}." if said else ""
 
     @property
     def file(self) -> str:
-        """A name for the file with a solution."""
+        """The suggested name for the file with a solution."""
         return f"my_{self.name.replace('-', '_')}.py"
 
     def commands(self, file: str | None = None) -> tuple[str, str, str]:
-        """The commands that start a solution in a file (by default `file`), show it on the page, and grade
-        it.
+        """Returns the commands that create a file for a solution (by default `self.file`), show it on the
+        page, and grade it.
         """
         file = file or self.file
         return (
@@ -121,7 +121,8 @@ class Exercise:
 def pushed(
     run: RunSpec, seed: int, body: str, newtons: float, at: float = 0.2, plane: bool = False
 ) -> RunSpec:
-    """The run with a push of 0.1 s in a direction that the seed decides; in the plane of a planar arm."""
+    """Returns the run with an additional push of 0.1 s, whose direction depends on the seed. plane: whether
+    the push lies in the plane of a planar arm."""
     direction = np.random.default_rng(seed).normal(size=3)
     if plane:
         direction[2] = 0.0

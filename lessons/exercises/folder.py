@@ -1,4 +1,4 @@
-"""Grades a folder of submissions into one table; an interrupted grading continues from this table."""
+"""Grades a folder of submissions and writes a table. An interrupted grading continues from the table."""
 
 from __future__ import annotations
 
@@ -36,16 +36,16 @@ def grade_folder(
 
     Args:
         folder: the folder of the submissions.
-        exercise: name of the exercise, or path of a teacher's own; None: the name that each file assigns to
-            EXERCISE.
+        exercise: name of the exercise, or path of a teacher's own exercise; None: the name that each file
+            assigns to EXERCISE.
         seed: seed of the disturbances, which are the same for all files.
-        out: CSV file; its rows of files whose content has not changed are kept.
-        spread: function that spreads the work.
+        out: CSV file; the existing row of a file is used again if the file has not changed.
+        spread: function that distributes the work over the cores.
         progress: called with the completed share.
         within: time and memory for grading one file.
 
     Raises:
-        InputError: no such exercise, no Python file in the folder, or the table cannot be written.
+        InputError: there is no such exercise, the folder has no Python file, or the table cannot be written.
     """
     asked = exercise if exercise is None or not is_file(exercise) else fingerprint(exercise)
     files = sorted(path for path in folder.iterdir() if path.suffix == SUFFIX and path.is_file())
@@ -81,7 +81,7 @@ def grade_folder(
 
 
 def row_of(found: Grade, seed: int, asked: str | None) -> Row:
-    """A grade as a row of the table."""
+    """Returns a grade as a row of the table."""
     missed = "; ".join(f"{line.check} {line.why}" for line in found.lines if line.why)
     name = Path(found.file).name
     values = (
@@ -104,12 +104,13 @@ def _one_line(text: str) -> str:
 
 
 def _text(name: str) -> str:
-    """The text as valid UTF-8: names of files may be any bytes."""
+    """Returns the text as valid UTF-8. Names of files may contain any bytes."""
     return name.encode(errors="replace").decode()
 
 
 def _rows(out: Path) -> Iterator[Row]:
-    """The rows that a table already contains; a file that is not such a table counts as empty."""
+    """Yields the rows that a table already contains; none if there is no such file. Raises InputError if the
+    file is not a table of grades."""
     if not out.exists():
         return
     try:
@@ -124,7 +125,7 @@ def _rows(out: Path) -> Iterator[Row]:
 
 
 def _write(out: Path, rows: list[Row]) -> None:
-    """Writes the whole table or nothing: if the writing is stopped, the old file stays."""
+    """Writes the whole table. If writing is interrupted, the old file is unchanged."""
     beside = out.with_name(out.name + ".part")
     try:
         with beside.open("w", newline="", encoding="utf-8") as file:

@@ -13,12 +13,12 @@ Visibility = Literal["visible", "hidden", "after_due_date", "after_published"]
 
 
 def formatted(found: Grade, form: Format, visibility: Visibility = "visible") -> dict[str, Any]:
-    """A grade in a format; visibility: when Gradescope shows the checks to students."""
+    """Returns a grade in a format. visibility: when Gradescope shows the checks to students."""
     return gradescope(found, visibility) if form == "gradescope" else github(found)
 
 
 def gradescope(found: Grade, visibility: Visibility = "visible") -> dict[str, Any]:
-    """The content of Gradescope's results.json, JSON-ready."""
+    """Returns the content of Gradescope's results.json as data for JSON."""
     return {
         "score": found.points,
         "output": _output(found),
@@ -42,8 +42,8 @@ def gradescope(found: Grade, visibility: Visibility = "visible") -> dict[str, An
 
 
 def github(found: Grade) -> dict[str, Any]:
-    """The result that a grader hands to the autograding reporter of GitHub Classroom, JSON-ready; the
-    reporter reads it as base64."""
+    """Returns the result for the autograding reporter of GitHub Classroom as data for JSON. The reporter
+    reads it in base64."""
     status = "error" if found.error else "pass" if found.passed else "fail"
     tests = [
         {
@@ -57,7 +57,7 @@ def github(found: Grade) -> dict[str, Any]:
         }
         for line in found.lines
     ]
-    # The reporter divides by the number of tests: an empty list becomes one failed test.
+    # The reporter divides by the number of tests. An empty list is replaced by one failed test.
     failed = {"name": found.exercise or "grade", "status": "error", "score": 0, "message": found.error}
     return {"version": 1, "status": status, "max_score": found.of, "tests": tests or [failed]}
 

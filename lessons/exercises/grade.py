@@ -43,8 +43,8 @@ class Submission:
         exercise: name of the exercise; None: the name that the file assigns to EXERCISE.
         seed: seed of the disturbances.
         within: time and memory for grading it.
-        kernel: whether the operating system refuses it files, the network and other processes; otherwise
-            only Python refuses them.
+        kernel: whether the operating system blocks access to files, the network and other processes;
+            otherwise only Python blocks it.
         own: the file of the exercise, if it is a teacher's own.
         possible: points that the exercise gives.
     """
@@ -61,7 +61,7 @@ class Submission:
     def to(
         cls, exercise: str | None, source: Source, seed: int = 0, within: Allowance = WITHIN
     ) -> Submission:
-        """A submission to an exercise, given by its name or by the path of a teacher's file.
+        """Returns a submission to an exercise. exercise: its name, or the path of a teacher's file.
 
         Raises:
             InputError: there is no such exercise, or the teacher's file cannot be used.
@@ -78,20 +78,20 @@ class Submission:
 
 
 class Shown(Protocol):
-    """A submission as the checks see it: only its inputs and its outputs."""
+    """A submission as the checks use it: only its inputs and its outputs."""
 
     @property
     def where(self) -> str:
-        """File and line, for the beginning of a sentence."""
+        """The file and the line, as the beginning of an error message."""
         ...
 
     def fresh(self) -> Callable[[View], Any]:
-        """Its control law, loaded anew, so that it has no memory of earlier runs."""
+        """Loads the control law again, so that it has no memory of earlier runs, and returns it."""
         ...
 
 
 def grade(path: str, exercise: str | None = None, seed: int = 0) -> Grade:
-    """Grades a file, in a process of its own; arguments as of `Submission`.
+    """Grades a file in a separate process. The arguments are those of `Submission`.
 
     Raises:
         InputError: there is no such exercise or no such file, or the file of the exercise cannot be used.
@@ -100,8 +100,8 @@ def grade(path: str, exercise: str | None = None, seed: int = 0) -> Grade:
 
 
 def grade_only(path: Path, exercise: str | None = None, seed: int = 0) -> Grade:
-    """Grades a file, or the only Python file of a folder. Whatever was handed in, there is a grade: one with
-    an error if there is no such file, or more than one.
+    """Grades a file, or the only Python file of a folder. If there is no such file or more than one, or the
+    file cannot be read, the grade contains an error.
 
     Raises:
         InputError: there is no such exercise, or its file cannot be used.
@@ -118,7 +118,7 @@ def grade_only(path: Path, exercise: str | None = None, seed: int = 0) -> Grade:
 
 
 def grade_apart(submission: Submission) -> Grade:
-    """Grades a submission in a process of its own. If that process fails, the grade contains the error."""
+    """Grades a submission in a separate process. If this process fails, the grade contains the error."""
     source, asked = submission.source, submission.exercise
     # Only the time in the submission's own process counts, not the time of the checks.
     within = replace(submission.within, seconds=PATIENCE * submission.within.seconds)
@@ -132,7 +132,8 @@ def grade_apart(submission: Submission) -> Grade:
 
 
 def graded(submission: Submission) -> Grade:
-    """Grades a submission with the plant and the checks in this process; the submission runs in another one.
+    """Grades a submission with the plant and the checks in this process; the submission runs in another
+    process.
 
     Raises:
         InputError: the file cannot be loaded, or the name of its exercise is missing or unknown.
@@ -156,11 +157,11 @@ def graded(submission: Submission) -> Grade:
 
 
 def judged_by(exercise: Exercise, shown: Shown, seed: int) -> tuple[CheckResult, ...]:
-    """The results of all checks of an exercise; if a run fails, only the checks of this run fail."""
+    """Returns the results of all checks of an exercise. If a run fails, only the checks of this run fail."""
     recordings: dict[RunSpec, Recording | str] = {}
     diagnosis = Diagnosis(exercise.mistakes)
     lines: list[CheckResult] = []
-    general: list[tuple[int, str]] = []  # lines that name a possible mistake, and how they begin
+    general: list[tuple[int, str]] = []  # places of lines that name a possible cause, and beginnings
     for check in exercise.checks(seed):
         begins = ""
         try:
@@ -218,8 +219,8 @@ def _scene(run: RunSpec, controller: str | None = None) -> TorqueScene:
 
 
 def _own(shown: Shown, diagnosis: Diagnosis, settings: TorqueSettings, robot: Robot) -> OwnController:
-    """The controller of a submission: this process computes the data that it gets, and the submission's
-    process computes the torque."""
+    """Returns the controller of a submission. This process computes the data for the controller, and the
+    submission's process computes the torque."""
     diagnosis.begin()
 
     def call(law: Callable[[View], Any], now: View) -> Any:
@@ -231,8 +232,9 @@ def _own(shown: Shown, diagnosis: Diagnosis, settings: TorqueSettings, robot: Ro
 
 
 def beside(scene: TorqueScene, shown: Shown, diagnosis: Diagnosis, duration: float) -> float:
-    """The largest difference, N·m, between the torque of the scene's controller, which moves the robot, and
-    the torque that a submission computes for the same states. Raises InputError if the submission fails."""
+    """Returns the largest difference, N·m, between the torque of the scene's controller and the torque of a
+    submission for the same states. The scene's controller moves the robot. Raises InputError if the
+    submission fails."""
     session = TorqueSession(scene)
     other = _own(shown, diagnosis, scene.settings, session.robot)
     other.reset(session.plant.tau)

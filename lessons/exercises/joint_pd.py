@@ -30,7 +30,7 @@ PLANAR = RunSpec("planar3-hold", set=(*ALONE, *QUICK), duration=1.2)
 
 
 def checks(seed: int) -> tuple[GradeCheck, ...]:
-    # A configuration with other gravity torques than at the start.
+    # A configuration whose gravity torques differ from those at the start.
     moved = tuple(radians(each) for each in (0.0, 55.0, 0.0, -60.0, 0.0, 60.0, 0.0))
     sent = replace(IIWA, set=(*ALONE, *STIFF), events=((0.02, MoveTarget("posture", moved)),), duration=1.0)
     return (
@@ -44,7 +44,7 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
         ),
         GradeCheck(
             "The planar arm comes back after a push.",
-            "the spring K_p does not pull it back",
+            "the spring K_p does not pull the arm back",
             pushed(PLANAR, seed, "link_3", 10.0, plane=True),
             0.5,
             measure=Measure(ERROR, "last"),
@@ -52,7 +52,7 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
         ),
         GradeCheck(
             "The arm is at rest afterwards.",
-            "the damper K_v does not brake it",
+            "the damper K_v does not brake the arm",
             pushed(PLANAR, seed, "link_3", 10.0, plane=True),
             5.0,
             measure=Measure(Signal("v", "deg/s"), "last"),

@@ -1,5 +1,5 @@
-"""The control laws of the exercises, with a switch for each known mistake; they are used to recognise
-mistakes.
+"""The control laws of the exercises, with an argument for each known mistake. The grader recognises mistakes
+by these laws.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ Array = NDArray[Any]
 
 
 def wanted(level: LevelView, *, K_p: float = 1.0, K_v: float = 1.0, target: bool = True) -> Array:
-    """ẍ of the target motion (4), (m,); K_p, K_v: factors on the gains; target: whether the error is x − x_d
-    instead of x."""
+    """Returns ẍ of the target motion (4), (m,). K_p, K_v: factors on the gains. target: whether the error is
+    x − x_d instead of x."""
     error = level.error if target else next(iter(level.x.values()))
     velocity = level.x_dot - level.x_dot_d[0]
     return level.x_ddot_d[0] - K_v * level.K_v * velocity - K_p * level.K_p * error
@@ -41,7 +41,8 @@ def osf(
     levels: int = 2,
     bias: bool = True,
 ) -> Array:
-    """Operational-space control; the arguments are factors on its terms, or switch parts of it off."""
+    """Returns the torque of operational-space control. The arguments are factors on terms, or switch terms
+    off."""
     M_inv = np.linalg.inv(now.M)
     N, tau = np.eye(now.n), np.zeros(now.n)
     for level in now.levels[::order][:levels]:
@@ -73,8 +74,8 @@ def hierarchy(
     equality: str = "(33)",
     alone: bool = False,
 ) -> Array:
-    """One or two levels of the QP (35), one knot; the arguments are factors on its terms, or switch parts of
-    it off."""
+    """Returns the torque of one or two levels of the QP (35), one knot. The arguments are factors on terms,
+    or switch terms off."""
     chosen = now.levels[::order][:levels]
     first: Array | None = None
     found = now.tau_0

@@ -1,4 +1,4 @@
-"""Finds the known mistake of a submission: the one that returns the same torques at every state shown."""
+"""Finds the known mistake whose torques are equal to those of a submission at all compared states."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from himpc.controllers.view import View
 
 Law = Callable[[View], Any]
 CLOSE = 1e-6
-"""Share of the largest torque by which the torques of two laws that count as equal may differ."""
+"""Largest difference of two torques that count as equal, as a share of the largest torque."""
 _FIRST, _EVERY = 30, 10
 
 
@@ -22,9 +22,9 @@ class Mistake:
     """A frequent mistake.
 
     Attributes:
-        says: one sentence about it.
+        says: the sentence that names the mistake.
         make: returns a new control law with this mistake, without memory of earlier runs.
-        text: the file of a student who makes it; "" for the lab's own, which are laws.
+        text: a student's file with this mistake; "" for the mistakes of the lab's own exercises.
     """
 
     says: str
@@ -42,11 +42,12 @@ class Diagnosis:
         self._seen = 0
 
     def begin(self) -> None:
-        """Called when a run begins."""
+        """Prepares the comparison for a new run."""
         self._laws, self._seen = [each.make() for each in self._left], 0
 
     def see(self, now: View, answer: Any) -> None:
-        """Compares the torque of a submission at a tick: at the first ticks of a run, then at every tenth."""
+        """Compares the torque of a submission at a tick, for the first ticks of a run and then every tenth
+        tick."""
         self._seen += 1
         if self._seen > _FIRST and self._seen % _EVERY:
             return
@@ -69,5 +70,5 @@ def _alike(ours: Any, theirs: Any) -> bool:
 
 
 def wrong(says: str, law: Callable[..., Any], **how: Any) -> Mistake:
-    """A mistake as the control law `law` with the arguments `how`."""
+    """Returns a mistake: the control law `law` with the arguments `how`."""
     return Mistake(says, lambda: partial(law, **how))

@@ -17,7 +17,7 @@ from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.lesson import card_of
 from lessons.teaching.measure import Measure, Signal
 
-# The controller gets the true parameters of the plant; then the law is exact.
+# The true parameters of the plant, with which the law is exact.
 EXACT = (
     "nominal.mass_scale=1",
     "nominal.inertia_scale=1",
@@ -40,7 +40,7 @@ ROUGH = replace(HOLD, set=HOLD.set[:1], duration=0.5)
 def checks(seed: int) -> tuple[GradeCheck, ...]:
     return (
         GradeCheck(
-            "The hand follows its circle although the second task wants it to stay: the first has priority.",
+            "The hand follows its circle although the second task holds the posture: the first has priority.",
             "the first level does not satisfy (4), or does not have priority",
             HOLD,
             2.5,
@@ -56,7 +56,7 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
             points=2,
         ),
         GradeCheck(
-            "The torque of the second level does not accelerate the hand, by the model of the arm.",
+            "In the model of the arm the torque of the second level does not accelerate the hand.",
             "the projector is not the dynamically consistent one; return a row of torques per level",
             CIRCLE,
             1e-6,
@@ -64,7 +64,7 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
             points=3,
         ),
         GradeCheck(
-            "The torque is OSF's, with a model that is a little wrong and a push.",
+            "With a model that is a little wrong and a push, the torque is that of OSF.",
             "one of these terms is wrong: J̇q̇, Λ, N, or the effect of the levels above on this level",
             pushed(ROUGH, seed, "link_3", 3.0, plane=True),
             1e-6,
@@ -78,7 +78,7 @@ MISTAKES: tuple[Mistake, ...] = (
     wrong("the levels are in reverse order: level 1 has the highest priority", osf, order=-1),
     wrong("the second level is left out", osf, levels=1),
     wrong("J̇q̇ is missing: ẍ = J q̈ + J̇q̇", osf, curvature=0.0),
-    wrong("J̇q̇ has the wrong sign: it is taken off ẍ", osf, curvature=-1.0),
+    wrong("J̇q̇ has the wrong sign: it must be subtracted from ẍ", osf, curvature=-1.0),
     wrong("the projector is missing: use J N instead of J for the level below", osf, projector="none"),
     wrong("the projector is transposed: the order of its products is M⁻¹JᵀΛJ", osf, projector="transposed"),
     wrong(

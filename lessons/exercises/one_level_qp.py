@@ -47,7 +47,7 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
             points=2,
         ),
         GradeCheck(
-            "At the torque bound the torque is the optimum of the QP, not a clipped one.",
+            "At the torque bound the torque is the optimum of the QP, not a clipped torque.",
             "the torque is not the optimum: the bounds must be constraints of the QP",
             WEAK,
             1e-6,
@@ -88,7 +88,7 @@ MISTAKES: tuple[Mistake, ...] = (
     wrong("R is missing: it weighs the increments, and is a part of H", _law, R=False),
     wrong("Q is missing in f = GᵀQe⁰", _law, Q=False),
     wrong(
-        "the desired values are those of this tick: (28) needs those of the next knot, index 1",
+        "the desired values are those of this tick: (28) needs the values of the next knot, index 1",
         hierarchy,
         levels=1,
         ahead=0,
@@ -103,7 +103,7 @@ MISTAKES: tuple[Mistake, ...] = (
         limits="on the increment",
     ),
     wrong(
-        "the velocity bound is approached at once: `approach` is not used",
+        "one period uses the whole distance to the velocity bound: `approach` is not used",
         hierarchy,
         levels=1,
         limits="at once",
@@ -119,7 +119,7 @@ EXERCISE = Exercise(
     r"\text{ within bounds}",
     plain="min ‖e⁰ + G Δτ‖²_Q + ‖Δτ‖²_R, with τ₀ + Δτ and q̇ + T_s (q̈₀ + M̄⁻¹Δτ) within bounds",
     hints=(
-        "One knot on: ẍ = ẍ₀ + J M̄⁻¹Δτ, ẋ = ẋ₀ + T_s ẍ, x̃ = x̃₀ + T_s ẋ₀ (explicit Euler).",
+        "One knot later: ẍ = ẍ₀ + J M̄⁻¹Δτ, ẋ = ẋ₀ + T_s ẍ, x̃ = x̃₀ + T_s ẋ₀ (explicit Euler).",
         "e = (ẍ − ẍ_d) + K_v (ẋ − ẋ_d) + K_p x̃, all desired values one knot ahead: index 1.",
         "G = (1 + K_v T_s) J M̄⁻¹, H = GᵀQG + R, f = GᵀQe⁰.",
         "In one period a velocity may use at most min(1, approach · T_s) of the distance to its bound.",

@@ -1,4 +1,4 @@
-"""An exercise of a teacher's own: one Python file with the text, the hole, the checks and the solution."""
+"""Teachers' own exercises: one Python file with the text, the missing lines, the checks and the solution."""
 
 from __future__ import annotations
 
@@ -23,8 +23,7 @@ HOLE = "TODO"
 
 
 def filled(start: str, lines: str) -> str:
-    """The file of a student who writes these lines instead of the line with `TODO`; they are indented as that
-    line.
+    """Returns the start with these lines instead of the line with `TODO`, at the indentation of that line.
 
     Raises:
         InputError: no line, or more than one, contains TODO.
@@ -51,18 +50,18 @@ def own_exercise(
     hints: tuple[str, ...] = (),
     lesson: str = "",
 ) -> Exercise:
-    """An exercise whose solution and mistakes are lines of code.
+    """Returns an exercise whose solution and mistakes are lines of code.
 
     Args:
-        name: for the table of grades and the names of files.
-        card: title, question, minutes and what one must know.
+        name: name in the table of grades and in the names of files.
+        card: title, question, minutes and required knowledge.
         start: the file that students complete; one line contains the word TODO.
-        solution: the lines that belong there.
-        mistakes: wrong lines, by the sentence that names what is wrong with them.
-        checks: function of a seed, which decides the disturbances.
+        solution: the right lines instead of the line with TODO.
+        mistakes: wrong lines; the key is the sentence that names the mistake.
+        checks: function that returns the checks for a seed; the seed decides the disturbances.
         plain, equation: what students implement, as plain text and in LaTeX.
-        hints: shown one by one.
-        lesson: a lesson that it belongs to.
+        hints: hints for students, shown one by one.
+        lesson: the lesson to which the exercise belongs.
 
     Raises:
         InputError: start has no line with TODO, or more than one.
@@ -87,31 +86,31 @@ def _mistake(says: str, text: str) -> Mistake:
 
 
 def _law(text: str) -> Law:
-    """The control law of a teacher's text, without memory of earlier runs."""
+    """Returns the control law of a teacher's text, without memory of earlier runs."""
     return law_of(execute(Source("a known mistake", text)))()
 
 
 def any_exercise(name: str) -> Exercise:
-    """The lab's exercise of a name, or the one of a teacher's file.
+    """Returns the lab's exercise with this name, or the exercise of a teacher's file.
 
     Raises:
-        InputError: there is none of this name, or the file cannot be used.
+        InputError: no exercise has this name, or the file cannot be used.
     """
     return exercise_in(name) if is_file(name) else load_exercise(name)
 
 
 def exercise_in(path: str) -> Exercise:
-    """The exercise of a teacher's file. Raises InputError if the file cannot be used."""
+    """Returns the exercise of a teacher's file. Raises InputError if the file cannot be used."""
     return exercise_of(read(path))
 
 
 @lru_cache(maxsize=8)
 def exercise_of(source: Source) -> Exercise:
-    """The exercise of a teacher's file, which is executed in this process.
+    """Executes a teacher's file in this process and returns its exercise.
 
     Raises:
-        InputError: the file does not assign a call, such as `own_exercise(…)`, to EXERCISE (then nothing of
-            it is executed: it may be a student's), or it cannot be loaded or used.
+        InputError: the file cannot be loaded or used, or does not assign a call, such as `own_exercise(…)`,
+            to EXERCISE. A file without this assignment is not executed: it may be a student's.
     """
     if not _makes_one(source):
         raise InputError(

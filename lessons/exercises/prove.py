@@ -1,5 +1,5 @@
-"""Proves that an exercise of a teacher's own can be graded: the solution gets all points, every known mistake
-loses some, and every check is failed by a mistake."""
+"""Tests whether a teacher's own exercise can be graded: the solution gets all points, every known mistake
+loses some points, and every check detects a mistake."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from lessons.parallel import FailedJob, Spread
 
 @dataclass(frozen=True)
 class Proof:
-    """The grades that belong to an exercise of a teacher's own.
+    """The grades of the solution, the start and the known mistakes of a teacher's own exercise.
 
     Attributes:
         exercise: the exercise.
@@ -33,7 +33,7 @@ class Proof:
 
     @property
     def faults(self) -> tuple[str, ...]:
-        """Sentences about what must be mended; () if the exercise can be used."""
+        """Sentences that say what must be corrected; () if the exercise can be used."""
         found: list[str] = []
         for name, grade in (("the solution", self.solution), ("the start", self.start)):
             if grade.error:
@@ -64,13 +64,13 @@ class Proof:
 
 
 def prove(path: str, seed: int, spread: Spread, progress: Callable[[float], None]) -> Proof:
-    """Grades the solution, the start and the mistakes of a teacher's file, each in a process of its own, as
-    submissions are.
+    """Grades the solution, the start and the mistakes of a teacher's file, each in a separate process, like
+    submissions.
 
     Args:
         path: the teacher's file.
         seed: seed of the disturbances.
-        spread: function that spreads the work.
+        spread: function that distributes the work over the cores.
         progress: called with the completed share.
 
     Raises:

@@ -15,7 +15,7 @@ class CheckResult:
         check: the sentence of the check.
         measured: value in `unit`; NaN if there was nothing to measure.
         unit, wanted: e.g. "mm", "≤ 0.5 mm".
-        points, of: the points that were given, and the largest possible number.
+        points, of: the points for this check, and the largest possible number of points.
         why: one sentence with the cause if the check fails, "" if it holds.
     """
 
@@ -33,14 +33,14 @@ class Grade:
     """The grade of a submission.
 
     Attributes:
-        file: its path.
-        digest: hash of its content.
+        file: path of the submission.
+        digest: hash of the content of the file.
         exercise: name of the exercise, "" if it is unknown.
         lines: one per check; empty if the file could not be run.
-        error: one sentence if it could not be run, or was ended.
-        protection: mechanisms of the operating system that refused it files, the network and other processes;
-            () if only Python refused them.
-        possible: points that the exercise gives, for a file that could not be run.
+        error: one sentence if the file could not be run, or its process was ended.
+        protection: mechanisms of the operating system that blocked access to files, the network and other
+            processes; () if only Python blocked it.
+        possible: largest number of points, for a file that could not be run.
     """
 
     file: str

@@ -1,6 +1,6 @@
 """Time-delay estimation
 
-The last torque and acceleration show how heavy a robot is: how, and how accurately?
+How, and how accurately, do the last torque and acceleration show how heavy a robot is?
 
 Minutes: 20
 You need: exercise "joint-pd"; lesson "no-model-needed"
@@ -56,7 +56,7 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
             points=2,
         ),
         GradeCheck(
-            "The torque is that of the equation.",
+            "The torque is equal to that of the equation.",
             "one of these terms is wrong: τ₀, M̄, q̈₀, K_p x̃ or K_v ẋ̃",
             pushed(STILL, seed + 1, "link_5", 20.0, at=0.02),
             1e-6,
@@ -79,11 +79,11 @@ def _late(now: View) -> Any:
 MISTAKES: tuple[Mistake, ...] = (
     wrong("the torque is constant: the law does not depend on q and q̇", held),
     wrong("q̈₀ has the wrong sign in Ĥ = τ₀ − M̄ q̈₀", _law, a=-1.0),
-    wrong("q̈₀ is missing: the wanted acceleration is added to the present one", _law, a=0.0),
+    wrong("q̈₀ is missing: the desired acceleration is added to the present acceleration", _law, a=0.0),
     wrong("q̈₀ is a difference of velocities that is not divided by T_s", _late),
     wrong("the model is used instead of τ₀", _law, tau="g"),
     wrong("the model is used instead of Ĥ: compute Ĥ from the last tick", _law, tau="g", a=0.0),
-    wrong("g(q) is in τ₀ already, and is added again", _law, tau="both"),
+    wrong("g(q) is added again: τ₀ contains it already", _law, tau="both"),
     wrong("τ₀ is missing in Ĥ = τ₀ − M̄ q̈₀", _law, tau="none"),
     wrong("M̄ is missing: it turns an acceleration into a torque", _law, M_bar=False),
     wrong("the stiffness K_p has the wrong sign", _law, K_p=-1.0),

@@ -34,7 +34,7 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
         ),
         GradeCheck(
             "Nothing leaks from level 2 to level 1.",
-            "the equality (33) is not kept: J₁M̄⁻¹Δτ₂ = J₁M̄⁻¹Δτ₁. Return a row per level",
+            "the equality (33) is not satisfied: J₁M̄⁻¹Δτ₂ = J₁M̄⁻¹Δτ₁. Return one row per level",
             WEAK,
             1e-7,
             measure=Measure(Signal("priority_leak", "m/s²")),
@@ -77,7 +77,7 @@ MISTAKES: tuple[Mistake, ...] = (
     wrong("R is missing: it weighs the increments, and is a part of H", hierarchy, R=False),
     wrong("Q is missing in f = GᵀQe⁰", hierarchy, Q=False),
     wrong(
-        "the desired values are those of this tick: (28) needs those of the next knot, index 1",
+        "the desired values are those of this tick: (28) needs the values of the next knot, index 1",
         hierarchy,
         ahead=0,
     ),
@@ -86,7 +86,7 @@ MISTAKES: tuple[Mistake, ...] = (
     wrong("the velocity bound (32e) is missing", hierarchy, limits="torque"),
     wrong("the bound (32f) is on Δτ instead of τ₀ + Δτ", hierarchy, limits="on the increment"),
     wrong(
-        "the velocity bound is approached at once: `approach` is not used",
+        "one period uses the whole distance to the velocity bound: `approach` is not used",
         hierarchy,
         limits="at once",
     ),
@@ -102,8 +102,8 @@ EXERCISE = Exercise(
     hints=(
         "Solve level 1 as before. Level 2 is the same QP with rows that keep J₁M̄⁻¹Δτ as in level 1.",
         "In `solve_qp` a row with lower = upper is an equality.",
-        "Safer near singularities: Δτ₂ = Δτ₁ + Z y with Z a basis of the null space of J₁M̄⁻¹ (SVD).",
-        "Return np.array([now.tau_0 + dtau_1, now.tau_0 + dtau_2]): a row per level, the last one acts.",
+        "Near singularities this is safer: Δτ₂ = Δτ₁ + Z y, with Z a basis of the null space of J₁M̄⁻¹ (SVD).",
+        "Return np.array([now.tau_0 + dtau_1, now.tau_0 + dtau_2]): one row per level; the last row acts.",
     ),
     lesson="inside-the-qp",
     checks=checks,

@@ -1,4 +1,4 @@
-"""Measures how long a process itself takes to answer: the time in which it computes or sleeps."""
+"""Measures the time in which a process computes or sleeps until it answers."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from robots.processes.family import spent
 from robots.processes.isolation import PATIENCE
 
 LOOK = 0.1
-"""s between two checks of a process that has not answered."""
+"""Time between two checks of a process that has not answered, s."""
 
 
 @final
 class ProcessDeadline:
-    """The deadline of one answer of a process. Time that the process waits for a core of a busy machine does
-    not count; with this time, the answer may take at most `PATIENCE` times as long.
+    """The deadline of one answer of a process. The time in which the process waits for a core of a busy
+    machine does not count. Including this time, the answer may take `PATIENCE` times as long.
 
     Attributes:
         seconds: time that the answer may take, s.
-        what: the activity, for the beginning of a sentence.
+        what: the activity, as the beginning of an error message.
         began: time at which the request was sent.
-        slept: time up to the last check in which it neither computed nor waited for a core, s.
+        slept: time up to the last check in which the process neither computed nor waited for a core, s.
     """
 
     def __init__(self, pid: int, seconds: float, what: str) -> None:
@@ -36,7 +36,7 @@ class ProcessDeadline:
         return time.monotonic() - self.began
 
     def over(self) -> bool:
-        """Whether it took too long. Call this every tenth of a second."""
+        """Returns whether the answer has taken too long. Call this every tenth of a second."""
         now = time.monotonic()
         computed, asleep = spent(self._pid)
         if self._last is None:

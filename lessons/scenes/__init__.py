@@ -1,1 +1,1 @@
-"""Robot, stack, reference and disturbances as data, both kinds in one catalog."""
+"""Scenes: robot, stack, references and disturbances as data. One catalog contains both kinds of scenes."""

@@ -52,7 +52,7 @@ _MAKERS: dict[str, Callable[[], TorqueScene]] = {
 def load_scene(
     name: str, urdf: str | None = None, tip: str | None = None, urdf_text: str | None = None
 ) -> Scene:
-    """A scene by its name.
+    """Returns the scene with this name.
 
     Args:
         name: a key of ALL_SCENES.
@@ -61,8 +61,8 @@ def load_scene(
         urdf_text: a URDF's text instead of its path (uploads).
 
     Raises:
-        InputError: unknown scene, a URDF for a scene with its own robot, no URDF for "hold", or an invalid
-            one.
+        InputError: the scene is unknown, a scene with its own robot gets a URDF, "hold" gets no URDF, or the
+            URDF is invalid.
     """
     if name not in ALL_SCENES:
         raise unknown_name("scene", name, ALL_SCENES)
@@ -76,13 +76,13 @@ def load_scene(
 
 
 def torque_scene(name: str, urdf: str | None = None, tip: str | None = None) -> TorqueScene:
-    """A torque-level scene by its name. Raises InputError also for a velocity-level scene."""
+    """Returns the torque-level scene with this name. Raises InputError also for a velocity-level scene."""
     return as_torque_scene(load_scene(name, urdf, tip), "this")
 
 
 def as_torque_scene(scene: Scene, what: str) -> TorqueScene:
-    """The scene itself. Raises InputError if it is a velocity-level scene; the message says that `what` needs
-    torques."""
+    """Returns the scene itself. Raises InputError if it is a velocity-level scene; the message says that
+    `what` takes torques."""
     if not isinstance(scene, TorqueScene):
         raise InputError(
             f"scene '{scene.name}' is driven by velocities; {what} takes torques: choose e.g. iiwa14-hold"
@@ -91,8 +91,8 @@ def as_torque_scene(scene: Scene, what: str) -> TorqueScene:
 
 
 def attached(scene: Scene, controllers: Iterable[str], tasks: Mapping[str, Task]) -> Scene:
-    """The scene with users' files attached, if it takes torques: its controller may be one of `controllers`,
-    and its stack may name `tasks` by the path of their file."""
+    """Returns a torque-level scene with users' files attached: its controller may be one of `controllers`,
+    and its stack may name `tasks` by the paths of their files. Returns other scenes unchanged."""
     if not isinstance(scene, TorqueScene):
         return scene
     settings = admitted(scene.settings, controllers)
@@ -101,12 +101,13 @@ def attached(scene: Scene, controllers: Iterable[str], tasks: Mapping[str, Task]
 
 
 def prepared(scene: AnyScene, controller: str | None, assignments: Iterable[str]) -> AnyScene:
-    """The scene with another controller (None: its own) and every "PATH=VALUE", in order.
+    """Returns the scene with another controller (None: its own) and all assignments "PATH=VALUE", in order.
 
     The controller may be the path of a Python file; an assignment may name only files that are admitted.
 
     Raises:
-        InputError: unknown controller or one of the other kind, unknown path, or a value that does not fit.
+        InputError: the controller is unknown or of the other kind, a path is unknown, or a value does not
+            fit.
     """
     settings = scene.settings
     if controller is not None:
@@ -120,7 +121,8 @@ def prepared(scene: AnyScene, controller: str | None, assignments: Iterable[str]
 
 
 def admitted(settings: AnySettings, files: Iterable[str]) -> AnySettings:
-    """The settings with Python files, given by whoever started the program, that may be their controller.
+    """Returns the settings with additional Python files that may be the controller. The files are named by
+    the person who started the program.
 
     Raises:
         InputError: the scene takes velocities, but a user's controller gives torques.

@@ -1,4 +1,5 @@
-"""RT4: the iiwa's circle of section VI, under the data sheet's limits and as the paper most likely ran it."""
+"""RT4, the iiwa's circle of section VI: with the limits of the data sheet, and as the paper most likely ran
+it."""
 
 from __future__ import annotations
 
@@ -20,14 +21,14 @@ from robots import Plant, PlantSettings, Robot, load_robot
 Array = NDArray[np.float64]
 
 OMEGA = 0.5 * np.pi
-"""rad/s; RT4 repeats after 4 s."""
+"""Angular frequency, rad/s; RT4 repeats after 4 s."""
 
 
 def iiwa14_circle() -> TorqueScene:
     """`iiwa14-circle`: Table IV's gains, Q = 200, R = 10, N = 5, the paper's M̄, data-sheet limits, from rest.
 
-    The paper prints z_d = 1.096 − 0.1(0.5πt); read as 1.096 − 0.1 sin(0.5πt), the only reading that gives
-    its q₁ error. The reference starts with a velocity jump: look at errors after the first second.
+    The paper prints z_d = 1.096 − 0.1(0.5πt). We use 1.096 − 0.1 sin(0.5πt), the only reading that gives the
+    paper's error of q₁. The reference starts with a velocity jump: evaluate errors after the first second.
     """
     robot = load_robot("iiwa14")
     levels = (
@@ -53,13 +54,12 @@ def iiwa14_circle_paper() -> TorqueScene:
     The paper does not describe its plant. We take a weightless robot without friction or armature. It starts
     with the reference's velocity, has no velocity limits, and keeps the position rows (32d) as printed. The
     error of q₁ is then 8.768° (paper: 8.773°), and joints 5 and 7 are at their limits from 3.5 s on (section
-    VI-B: in [3.8, 4] s). Three QPs have no solution: their position rows give way, and `solver.unsolved`
-    counts them. With `limits.position=viability`, this lab's default
-    elsewhere, no QP fails and q₁ is 9.15°. Everything stays settable: `plant.gravity=true`,
-    `limits.velocity=true`.
+    VI-B: in [3.8, 4] s). Three QPs have no solution: their position rows are violated, and `solver.unsolved`
+    counts these QPs. With `limits.position=viability`, the default of this lab elsewhere, no QP fails and the
+    error of q₁ is 9.15°. All settings can be changed, e.g. `plant.gravity=true`, `limits.velocity=true`.
 
-    The start: q̇₀ = J₁₂⁺ ẋ_d(0), J₁₂ the Jacobian of levels 1 and 2, and the torque of q̈ = 0 there. At q₀ the
-    seven rows of J₁, J₂ and J₃ have rank 6: the run starts singular.
+    The start: q̇₀ = J₁₂⁺ ẋ_d(0), where J₁₂ is the Jacobian of levels 1 and 2, and the torque for q̈ = 0. At
+    q₀ the seven rows of J₁, J₂ and J₃ have rank 6: the run starts in a singular pose.
     """
     scene = iiwa14_circle()
     plant = PlantSettings(gravity=False)
@@ -78,7 +78,7 @@ def iiwa14_circle_paper() -> TorqueScene:
 
 
 def _reference_velocity(scene: TorqueScene) -> Array:
-    """The smallest joint velocity with which levels 1 and 2 start on their references, (n,) rad/s."""
+    """Returns the smallest joint velocity with which levels 1 and 2 start on their references, (n,) rad/s."""
     robot, upper = scene.robot, scene.settings.levels[:2]
     references = scene.references(robot, scene.settings.levels)
     start = Configuration(robot, robot.model.createData(), scene.q_0, np.zeros(robot.n))
@@ -89,7 +89,8 @@ def _reference_velocity(scene: TorqueScene) -> Array:
 
 
 def rt4(robot: Robot, stack: Stack) -> Mapping[str, Reference]:
-    """Circle of radius 0.1 m (a tilted ellipse in 3-D), fixed orientation, q₁ = 90° − 90° cos ωt."""
+    """Returns the references: circle of radius 0.1 m (in 3-D a tilted ellipse), fixed orientation, q₁ = 90° −
+    90° cos ωt."""
     return {
         "position": Circle(
             centre=np.array([0.2637, 0.0, 1.096]),

@@ -9,7 +9,7 @@ from lessons.scenes.torque_scene import TorqueScene
 from robots.world import Ball, Post, Thing, World, table
 
 TABLE_HEIGHT = 0.2
-"""m, of the surface of the table."""
+"""Height of the surface of the table, m."""
 _BALL_RADIUS = 0.05
 
 

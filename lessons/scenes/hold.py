@@ -1,4 +1,4 @@
-"""The draggable scenes: EE position, EE orientation, posture, in this order of priority."""
+"""The scenes with dragged targets: EE position, EE orientation, posture, in this order of priority."""
 
 from __future__ import annotations
 
@@ -15,16 +15,17 @@ from robots import Plant, PlantSettings, Robot, load_robot, load_urdf_text, sugg
 from robots.floor import standing_floor
 
 TOUCHING = PlantSettings(contacts=True, joint_stops=True)
-"""The plant of a scene whose targets people drag: a robot that is pushed anywhere stops there."""
+"""The plant of scenes with dragged targets: objects and the ends of the joints' ranges stop the robot."""
 PLANAR3_PLANT = replace(TOUCHING, armature=(0.05, 0.05, 0.03))
-"""The paper's M̄ = 0.033 supposes geared motors: without armature the loop would be unstable."""
+"""The paper's M̄ = 0.033 requires geared motors: without armature the loop would be unstable."""
 
 
 def hold_of(name: str) -> TorqueScene:
-    """The hold scene of a catalog robot.
+    """Returns the hold scene of a catalog robot.
 
-    The iiwa does not keep the paper's M̄ here: it was tuned for one motion, and in a few per cent of the
-    work space (arm folded above the base) its loop is unstable. A dragged target can get everywhere.
+    For the iiwa this M̄ is smaller than the paper's. The paper's M̄ was tuned for one motion; in a few per
+    cent of the work space (arm folded above the base) the loop is unstable with it. A dragged target can be
+    anywhere.
     """
     robot = load_robot(name)
     if name == "iiwa14":
@@ -37,7 +38,8 @@ def hold_of(name: str) -> TorqueScene:
 def hold(
     urdf: str | None, tip: str | None, urdf_text: str | None = None, within: Path | None = None
 ) -> TorqueScene:
-    """The hold scene of any robot: a URDF path, a catalog name or a URDF's text; within: as of `load_robot`.
+    """Returns the hold scene of any robot: URDF path, catalog name or text of a URDF. within: see
+    `load_robot`.
 
     Raises:
         InputError: the URDF cannot be used, or it has no frame with the name of the tip.
@@ -68,10 +70,11 @@ def _hold(robot: Robot, plant: PlantSettings) -> TorqueScene:
 
 
 def gains(robot: Robot, plant: PlantSettings, T_s: float = 1e-3) -> tuple[float, float]:
-    """K_p and K_v = 2√K_p (critical damping) that suit the bandwidth which the robot's M̄ allows.
+    """Returns K_p and K_v = 2√K_p (critical damping) for the bandwidth that the robot's M̄ allows.
 
-    Time-delay estimation delivers a wanted acceleration with a lag of about T_s/λ_min(M⁻¹M̄); with it (4)
-    becomes a third-order loop, well damped while √K_p is at most half of that rate. Never above 10 1/s.
+    With time-delay estimation the acceleration follows its desired value with a lag of about
+    T_s/λ_min(M⁻¹M̄). With this lag (4) becomes a third-order loop, which is well damped if √K_p is at most
+    half the inverse of the lag. √K_p is at most 10 1/s.
     """
     M = Plant(robot, plant).mass_matrix()
     root = np.sqrt(robot.M_bar)
@@ -81,7 +84,8 @@ def gains(robot: Robot, plant: PlantSettings, T_s: float = 1e-3) -> tuple[float,
 
 
 def _free_axes(robot: Robot) -> tuple[str, str]:
-    """The world axes along which the tip can move, and about which it can turn: a planar arm has no z."""
+    """Returns the world axes along which the tip can move, and those about which it can turn. A planar arm
+    cannot move along z."""
 
     def movable(task: type[FramePosition] | type[FrameOrientation], axis: str) -> bool:
         return freedom_left(robot, (Level((task(name="probe", axes=axis),)),)) < robot.n

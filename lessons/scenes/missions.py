@@ -31,11 +31,11 @@ from robots import Robot, load_robot
 from robots.collision import Obstacle
 
 DELIVERY_SPEEDS = (0.5, 0.5, 1.0, 0.5, 1.0, 1.0, 2.0, 2.0, 2.0)
-"""m/s and rad/s: a robot that works among people."""
+"""Speed limits of a robot that works among people, m/s and rad/s."""
 
 
 def velocity_scene(name: str) -> VelocityScene:
-    """A scene of VELOCITY_SCENES."""
+    """Returns a scene of VELOCITY_SCENES."""
     return _MAKERS[name]()
 
 
@@ -73,8 +73,8 @@ def _among_people(scene: VelocityScene) -> VelocityScene:
 
 
 def _handover() -> VelocityScene:
-    """Every ball waits until it is taken, the first one after 14 s; meanwhile the second person moves, and
-    shifts the hand later on."""
+    """Returns the scene in which the hand holds every ball until it is taken, the first ball until 14 s.
+    Meanwhile the second person moves, and later shifts the place for the ball."""
     events = (
         (8.0, MoveTarget("base 2", (-1.2, -0.4))),
         (8.0, MoveTarget("ee 2", (-1.9, -0.7, 0.8))),

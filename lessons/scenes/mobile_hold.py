@@ -14,10 +14,10 @@ from robots.floor import standing_floor
 
 
 def ridgeback_hold() -> TorqueScene:
-    """`ridgeback-ur10-hold`: EE position, then the base's place; the rest is damped.
+    """`ridgeback-ur10-hold`: EE position, then the position of the base; all other motion is damped.
 
-    The base's M̄ is half its mass, and it has softer gains than the arm. R weighs
-    accelerations: as printed it would weigh N for the base and N·m for the arm.
+    The base's M̄ is half its mass, and the base has lower gains than the arm. R weighs accelerations. As
+    printed, R would weigh forces of the base in N and torques of the arm in N·m.
     """
     robot = load_robot("ridgeback-ur10")
     levels = (

@@ -1,4 +1,4 @@
-"""The names of the scenes with one line each, for lists and menus, which load no scene."""
+"""The names of the scenes with one line each, for lists and menus. No scene is loaded."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ SCENES: dict[str, str] = {
     "baxter-hold": "Baxter, two arms: drag both hands; their positions come before their orientations",
     "baxter-tray": "Baxter's hands move along a square as if they carried a tray; the grip is level 1",
     "baxter-conflict": "Baxter's hands keep their relative pose, but have targets at two different places",
-    "hold": "any robot: the same three levels; levels without freedom stay empty (needs --urdf)",
+    "hold": "any robot: the same three levels; levels without freedom have no effect (needs --urdf)",
     "planar3-plane": "the same arm, N = 1: the whole QP is drawn; the wrist's x comes before two joints",
     "planar3-circle": "planar 3-joint arm on RT1 of the HIMPC paper: a circle while joint 1 swings a little",
     "planar3-conflict": "the same arm on RT2: joint 1 swings so far that the hand cannot keep to the circle",
@@ -29,7 +29,7 @@ VELOCITY_SCENES: dict[str, str] = {
     "ridgeback-ur10-delivery": "a delivery round to three people, four times (Fig. 9)",
     "ridgeback-ur10-handover": "the hand waits until the ball is taken; people move meanwhile",
     "ridgeback-ur10-cluttered": "the base drives past obstacles that it must avoid",
-    "ridgeback-ur10-perception": "a crate beside the way is reported on the way for a while",
+    "ridgeback-ur10-perception": "a crate beside the robot's path is reported on the path for a while",
     "iiwa14-htmpc": "KUKA iiwa 14 under HTMPC: position, then orientation",
     "panda-htmpc": "Franka Panda under HTMPC: position, then orientation",
 }

@@ -20,7 +20,7 @@ from robots import NominalSettings, PlantSettings, Robot, load_robot
 from robots.ranges import Range, check_fields
 
 OMEGA = 2 * math.pi / 8
-"""rad/s; every circle takes 8 s."""
+"""Angular frequency, rad/s; every circle takes 8 s."""
 
 _ARMATURE = (0.05, 0.05, 0.03)
 
@@ -33,14 +33,14 @@ NOMINAL = NominalSettings(
 """The nominal model: masses and inertias are 20 % too small, friction is unknown."""
 
 CONFLICT_LIMITS = Limits(velocity_approach=8.0)
-"""Under conflict the arm swings about the algorithmic singularity from one velocity bound to the other. The
-error of level 1 is smaller if the arm approaches the bounds less fast than with the default: `himpc-lab
-reproduce himpc-table-3` measures it with 0, 8 and 15 1/s."""
+"""In a conflict the arm swings about the algorithmic singularity from one velocity bound to the other. The
+error of level 1 is smaller if the arm approaches the bounds more slowly than by default: `himpc-lab reproduce
+himpc-table-3` measures this error with 0, 8 and 15 1/s."""
 
 
 @dataclass(frozen=True)
 class CircleOptions(SceneOptions):
-    """RT1 and RT2: the EE's circle with q₁ swinging once meanwhile.
+    """RT1 and RT2: the EE follows a circle, and q₁ swings once meanwhile.
 
     Attributes:
         q1_amplitude_deg: angle by which q₁ swings before it returns, degrees.
@@ -52,7 +52,8 @@ class CircleOptions(SceneOptions):
         check_fields(self)
 
     def references(self, robot: Robot, stack: Stack) -> Mapping[str, Reference]:
-        """Circle r = 0.1 m about (0.5, 0.3), phase ωt − sin ωt; q₁ = amplitude·(1 − cos ωt)/2."""
+        """Returns a circle of r = 0.1 m about (0.5, 0.3) with phase ωt − sin ωt, and q₁ = amplitude·(1 − cos
+        ωt)/2."""
         half = np.array([0.5 * math.radians(self.q1_amplitude_deg)])
         return {
             "position": _circle(0.5, 0.3, 0.1, Phase(OMEGA, "eased")),
@@ -65,13 +66,13 @@ class SingularOptions(SceneOptions):
     """RT3: two circles through the point that only the straight arm reaches.
 
     Attributes:
-        smooth: phase ωt − sin ωt, at rest in the singular point, instead of ωt.
+        smooth: whether the phase is ωt − sin ωt, with rest at the singular point, instead of ωt.
     """
 
     smooth: bool = False
 
     def references(self, robot: Robot, stack: Stack) -> Mapping[str, Reference]:
-        """Circles r = 0.1 and 0.2 m through (0.9, 0), internally tangent there, 8 s each; q₁ = 0."""
+        """Returns circles of r = 0.1 and 0.2 m, internally tangent at (0.9, 0), 8 s each, and q₁ = 0."""
         phase = Phase(OMEGA, "eased" if self.smooth else "uniform")
         return {
             "position": Switched(_circle(0.8, 0.0, 0.1, phase), _circle(0.7, 0.0, 0.2, phase), 8.0),
@@ -81,7 +82,7 @@ class SingularOptions(SceneOptions):
 
 @dataclass(frozen=True, eq=False)
 class Switched:
-    """One reference until a time (s), another one from then on; nothing is smoothed in between."""
+    """One reference before a time (s) and another one afterwards, without a smooth transition."""
 
     before: Reference
     after: Reference
@@ -100,9 +101,9 @@ class Switched:
 def planar3_circle() -> TorqueScene:
     """`planar3-circle`, RT1: q₁ swings by 20°, which the circle allows.
 
-    From the paper: link lengths, limits, gains (Table I), Q = 200, R = 10, N = 5, M̄, q₀. Left open there and
-    chosen here: masses and inertias (see the URDF), armature and friction (`plant.…`), the nominal model of
-    OSF and HQP (`nominal.…`), centre, radius and time law of the circle, and the swing of q₁
+    From the paper: link lengths, limits, gains (Table I), Q = 200, R = 10, N = 5, M̄, q₀. Not given in the
+    paper and chosen here: masses and inertias (see the URDF), armature and friction (`plant.…`), the nominal
+    model of OSF and HQP (`nominal.…`), centre, radius and time law of the circle, and the swing of q₁
     (`q1_amplitude_deg`): Fig. 3 has no readable scale.
     """
     robot = load_robot("planar3")
@@ -128,9 +129,9 @@ def planar3_circle() -> TorqueScene:
 def planar3_conflict() -> TorqueScene:
     """`planar3-conflict`, RT2: the reference of q₁ swings by −120°, where the circle is out of reach.
 
-    Else as `planar3-circle`, with velocity bounds approached more slowly. The paper prints no amplitude; −60°
-    and 170° conflict too (`q1_amplitude_deg`). The plant applies any torque, so that the demand of a
-    controller acts unchanged (`plant.saturate`).
+    Otherwise as `planar3-circle`, but the arm approaches velocity bounds more slowly. The paper prints no
+    amplitude; −60° and 170° also conflict with the circle (`q1_amplitude_deg`). The plant applies any torque,
+    so that the demand of a controller acts unchanged (`plant.saturate`).
     """
     scene = planar3_circle()
     settings = replace(
@@ -144,11 +145,11 @@ def planar3_conflict() -> TorqueScene:
 
 
 def planar3_singular() -> TorqueScene:
-    """`planar3-singular`, RT3: starts straight, and is straight again after 8 s and 16 s.
+    """`planar3-singular`, RT3: the arm starts straight, and is straight again after 8 s and 16 s.
 
-    Else as `planar3-circle`. Fig. 9 shows two tangent circles without their sizes, time law or q₁: read as
-    radii 0.1 and 0.2 m, phase ωt (velocity jumps at 0 s and 8 s, as section V-C says of 8 s; `smooth=true`
-    removes the jumps) and q₁ = 0, which both circles allow.
+    Otherwise as `planar3-circle`. Fig. 9 shows two tangent circles, but not their sizes, time law or q₁.
+    Chosen here: radii 0.1 and 0.2 m, phase ωt, and q₁ = 0, which both circles allow. The velocity jumps at
+    0 s and 8 s (section V-C mentions the jump at 8 s); `smooth=true` removes the jumps.
     """
     scene = planar3_circle()
     return replace(

@@ -13,13 +13,13 @@ from robots import load_robot
 
 
 def planar3_plane() -> TorqueScene:
-    """`planar3-plane`: the planar arm with N = 1; its wrist is dragged along x, and two joints have the task
-    to stay.
+    """`planar3-plane`: the planar arm with N = 1. Its wrist is dragged along x, and two joints have fixed
+    targets.
 
     Level 1 is the wrist's x (one coordinate), level 2 the angles of joints 1 and 2, level 3 holds joint 3.
-    The wrist is where joint 3 sits, and M̄ is diagonal: neither of the first two levels uses joint 3, so all
-    that they decide lies in the plane of Δτ₁ and Δτ₂. The two levels cannot both be met, and a conflict is
-    always visible.
+    The wrist is where joint 3 sits, and M̄ is diagonal: neither of the first two levels uses joint 3, so the
+    results of these levels lie in the plane of Δτ₁ and Δτ₂. The two levels cannot both be met, and a conflict
+    is always visible.
     """
     robot = load_robot("planar3", tip="link_3")
     first, second, third = robot.joint_names

@@ -13,25 +13,25 @@ if TYPE_CHECKING:
     from lessons.scenes.scene import Scene
 
 _TASK_FILE = re.compile(r'"task"\s*:\s*("(?:[^"\\]|\\.)*\.py")')
-"""A task of a stack that is named by its file, as JSON."""
+"""A task of a stack that is named by the path of its file, in JSON."""
 
 
 @final
 @dataclass(frozen=True)
 class RunSpec:
-    """A run: hashable, and sent to another process as it is.
+    """A run; it is hashable and can be sent to another process.
 
     Attributes:
-        scene: name of a scene, or the path of a file that makes one.
+        scene: name of a scene, or path of a file that creates a scene.
         urdf: for the scene "hold": name of a catalog robot, or path of a URDF file.
         tip: end-effector frame, for the scene "hold".
-        controller: name or path of a file; None: the scene's own, or the one that `set` names.
+        controller: name of a controller, or path of a file; None: that of the scene, or of `set`.
         set: assignments "PATH=VALUE" as of `himpc-lab run --set`, in order.
         events: (time in s, event) in order; None: the scene's own.
         duration: simulated seconds; None: the scene's own.
         seed: seed of the run.
-        files: Python files that may be the controller; whoever started the program named them.
-        tasks: Python files whose tasks the stack may name, likewise.
+        files: Python files that may be the controller, named by the person who started the program.
+        tasks: Python files whose tasks the stack may name, named by the same person.
     """
 
     scene: str
@@ -46,8 +46,8 @@ class RunSpec:
     tasks: tuple[str, ...] = ()
 
     def loaded(self, bare: Scene | None = None) -> Scene:
-        """The scene without controller and assignments; the run's files are attached to it. Raises InputError
-        if it cannot be loaded.
+        """Returns the scene with the run's files attached, without controller and assignments. Raises
+        InputError if the scene cannot be loaded.
 
         bare: the scene without the files, if it is loaded already.
         """
@@ -57,8 +57,8 @@ class RunSpec:
         return with_files(scene, self.files, self.tasks)
 
     def prepared(self, bare: Scene | None = None) -> Scene:
-        """The scene with controller, assignments, events and duration of the run. Raises InputError with one
-        sentence for an invalid run. bare: as for `loaded`.
+        """Returns the scene with controller, assignments, events and duration of the run. Raises InputError
+        with one sentence for an invalid run. bare: as for `loaded`.
         """
         from lessons.scenes.catalog import prepared
 
@@ -68,18 +68,18 @@ class RunSpec:
         return scene if self.duration is None else replace(scene, duration=self.duration)
 
     def but(self, *assignments: str) -> RunSpec:
-        """The same run with further assignments."""
+        """Returns the same run with further assignments."""
         return replace(self, set=(*self.set, *assignments))
 
     def admitting(self, *assignments: str) -> RunSpec:
-        """The same run with further assignments by the person who started the program: the Python files that
-        their stacks name are admitted as tasks."""
+        """Returns the same run with further assignments by the person who started the program: the Python
+        files that the stacks in them name are admitted as tasks."""
         stacks = (text for text in assignments if text.startswith(("stack=", "stack.add=")))
         words = (word for text in stacks for word in _TASK_FILE.findall(text))
         return replace(self.but(*assignments), tasks=(*self.tasks, *dict.fromkeys(map(_unquoted, words))))
 
     def command_line(self) -> str:
-        """The command for a shell that repeats the run without its events."""
+        """Returns the command for a shell that repeats the run without its events."""
         controller, assignments = self.controller, list(self.set)
         if controller is None and assignments and assignments[0].startswith("controller="):
             controller = assignments.pop(0).partition("=")[2]
@@ -96,7 +96,8 @@ class RunSpec:
 
 
 def _unquoted(word: str) -> str:
-    """The text of a JSON string; other texts are returned unchanged, and `read_stack` refuses them."""
+    """Returns the text of a JSON string. Other texts are returned unchanged, and `read_stack` refuses
+    them."""
     try:
         return json.loads(word)
     except ValueError:

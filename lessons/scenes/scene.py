@@ -20,12 +20,13 @@ class Scene(ABC):
     """Everything a run starts from.
 
     Attributes:
-        name: identity.
+        name: unique name.
         title: one line for lists and the page.
         robot: the robot.
         settings: controller, limits, plant and levels at the start; their class is the scene's kind.
         q_0: initial positions, (n,) rad or m.
-        duration: default length of a headless run, s; one with a mission ends earlier when that is done.
+        duration: default length of a headless run, s; a run with a mission ends earlier if the mission is
+            completed.
         events: (time in s, event) in order, for scripted scenes.
     """
 

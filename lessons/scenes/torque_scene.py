@@ -26,11 +26,11 @@ class TorqueScene(Scene):
     """A scene whose robot takes torques.
 
     Attributes:
-        references: makes a fresh reference per task name for each run; tasks without one get a draggable
-            target that starts where the task's value is at the start. A scene whose settings have options
-            takes it from them.
+        references: function that returns new references for a run, by task name. A task without a reference
+            gets a draggable target at its initial value. If the settings have options, the options supply
+            this function.
         v_0: initial velocities, (n,) rad/s.
-        tau_0: torque acting at the start, (n,) N·m; None: the plant's holding torque.
+        tau_0: torque that acts at the start, (n,) N·m; None: the torque that holds the plant at rest.
         world: the objects around the robot, which it touches if `plant.contacts` is true.
     """
 

@@ -1,5 +1,5 @@
-"""The scenes of the robot with two arms: dragged hands, hands that move as with a tray, and conflicting
-targets.
+"""The scenes of the robot with two arms: dragged hands, hands that move as if they carried a tray, and
+conflicting targets.
 """
 
 from __future__ import annotations
@@ -66,8 +66,8 @@ def baxter_hold() -> TorqueScene:
 
 
 def baxter_tray() -> TorqueScene:
-    """`baxter-tray`: level 1 is the pose of the left hand as the right one sees it; level 2 is the
-    place of the tray, which the right hand defines, and its level attitude; level 3 is the posture. A script
+    """`baxter-tray`: level 1 is the pose of the left hand relative to the right hand. Level 2 is the position
+    of the tray, which the right hand defines, and keeps the tray horizontal. Level 3 is the posture. A script
     moves the hands along a square once.
 
     The tray is not simulated: it adds no load and no forces between the hands, and only level 1 keeps the
@@ -87,13 +87,13 @@ def baxter_tray() -> TorqueScene:
     way = Waypoints(corners, np.array([START_S + EDGE_S * k for k in range(5)]))
     times = [START_S + _SCRIPT_S * k for k in range(1, round(4 * EDGE_S / _SCRIPT_S) + 1)]
     events = tuple((t, MoveTarget("tray", tuple(way.preview(t, 1e-3, 1).value.tolist()))) for t in times)
-    title = "Baxter moves as if it carried a tray: nothing but level 1 keeps the hands together"
+    title = "Baxter moves as if it carried a tray: only level 1 keeps the hands together"
     return _scene(robot, "baxter-tray", title, levels, events, START_S + 4 * EDGE_S + 0.5)
 
 
 def baxter_conflict() -> TorqueScene:
-    """`baxter-conflict`: the hands keep their relative pose (level 1), the right one stays (level 2), and the
-    target of the left one (level 3) is elsewhere and cannot be reached."""
+    """`baxter-conflict`: the hands keep their relative pose (level 1), the right hand stays (level 2), and
+    the target of the left hand (level 3) is elsewhere and cannot be reached."""
     robot, K_p, K_v = _robot()
     levels = (
         Level(_grip(K_p, K_v)),
@@ -108,7 +108,7 @@ def baxter_conflict() -> TorqueScene:
 
 
 def _robot() -> tuple[Robot, float, float]:
-    """The robot with the M̄ that suits its geared motors, and K_p and K_v that suit both."""
+    """Returns the robot with the M̄ for its geared motors, and K_p and K_v for this M̄ and these motors."""
     robot = replace(load_robot("baxter"), M_bar=np.array(_M_BAR))
     return robot, *gains(robot, PLANT)
 

@@ -12,8 +12,8 @@ from lessons.settings.velocity import VelocitySettings
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class VelocityScene(Scene):
-    """A scene whose robot takes velocities; it starts at rest, and the options of its settings make the
-    mission."""
+    """A scene whose robot takes velocities. The robot starts at rest, and the options of the settings create
+    the mission."""
 
     settings: VelocitySettings
     duration: float = 16.0

@@ -19,7 +19,7 @@ class Score:
     best: float
 
     def points(self, value: float) -> float:
-        """0 to 100; 0 for NaN."""
+        """Returns the points, 0 to 100; 0 for NaN."""
         share = (value - self.worst) / (self.best - self.worst)
         return 100.0 * min(1.0, max(0.0, share)) if share == share else 0.0
 
@@ -46,9 +46,9 @@ class Challenge:
         goals: claims that must all hold at the end of the run.
         knobs: the settings that may be changed; any other change disqualifies the attempt.
         score: the points for the quality of a solution.
-        solutions: at least two different sets of assignments "PATH=VALUE" to knobs that pass. The
-            challenge does not pass before any of them is made.
-        set: assignments on top of the lesson's before the learner begins.
+        solutions: at least two different sets of assignments "PATH=VALUE" to knobs with which the challenge
+            passes. Without them it does not pass.
+        set: assignments in addition to the lesson's, made before the learner begins.
         duration: s.
         events: the script of the run.
     """

@@ -1,4 +1,4 @@
-"""Runs lessons headless and checks that claims hold, that claims can fail, and that challenges can be
+"""Runs lessons headless and checks three things: claims hold, claims can fail, and challenges can be
 solved."""
 
 from __future__ import annotations
@@ -20,10 +20,12 @@ from lessons.teaching.prediction import Choice, Prediction
 
 @dataclass(frozen=True)
 class Outcome:
-    """The result of a run. Attributes:
-    values: its measures, without a ghost.
-    refused: number of events of the script that were not accepted.
-    error: one sentence if the run failed; None if it did not fail.
+    """The result of a run.
+
+    Attributes:
+        values: the measured values, without comparison with a ghost.
+        refused: number of events of the script that were not accepted.
+        error: one sentence if the run failed; None if it did not fail.
     """
 
     values: Mapping[Measure, float]
@@ -33,15 +35,17 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Verdict:
-    """The result of one check. Attributes:
-    lesson: name of the lesson.
-    where: the step's title, or "challenge".
-    what: the claim, prediction, script or solution.
-    value, unit: the measured value; NaN if there is nothing to measure.
-    condition: the required condition.
-    wrong: the setting under which a claim must fail; "" for other checks.
-    wrong_value: the value measured under that setting.
-    fault: one sentence, empty if the check is passed.
+    """The result of one check.
+
+    Attributes:
+        lesson: name of the lesson.
+        where: the step's title, or "challenge".
+        what: the claim, prediction, script or solution.
+        value, unit: the measured value; NaN if there is nothing to measure.
+        condition: the required condition.
+        wrong: the setting under which a claim must fail; "" for other checks.
+        wrong_value: the value measured under that setting.
+        fault: one sentence; "" if the check is passed.
     """
 
     lesson: str
@@ -59,7 +63,7 @@ Outcomes = Mapping[RunSpec, Outcome]
 
 
 def measured(piece: tuple[RunSpec, tuple[Measure, ...]]) -> Outcome:
-    """Performs a run and computes its measures. Raises InputError for a run that is not possible."""
+    """Performs a run and returns its measured values. Raises InputError if the run is not possible."""
     what, measures = piece
     recording = run(what.prepared())
     values = {measure: measure.value(recording) for measure in measures}
@@ -76,14 +80,14 @@ def check(
 
     Args:
         lessons: the lessons.
-        spread: function that spreads the runs.
+        spread: function that distributes the runs over the cores.
         progress: called after each run with the completed share.
 
     Returns:
-        one verdict per claim, prediction, script and challenge, in the lessons' order.
+        one verdict per claim, prediction, script and challenge, in the order of the lessons.
     """
     wanted = _wanted(lessons)
-    # Long runs go first, to keep all cores busy until the end.
+    # Long runs start first, to keep all cores busy until the end.
     pieces = sorted(wanted.items(), key=lambda item: -(item[0].duration or 0.0))
     outcomes: dict[RunSpec, Outcome] = {}
     work = [(run, tuple(measures)) for run, measures in pieces]
@@ -96,7 +100,7 @@ def check(
 
 
 def _wanted(lessons: Sequence[Lesson]) -> dict[RunSpec, dict[Measure, None]]:
-    """All runs with the measures that each of them needs."""
+    """Returns all runs with the measures that are needed of each run."""
     wanted: dict[RunSpec, dict[Measure, None]] = {}
 
     def want(run: RunSpec, measures: Sequence[Measure]) -> None:
@@ -125,7 +129,7 @@ def _measures(step: Step) -> list[Measure]:
 
 
 def judge(lesson: Lesson, outcomes: Outcomes) -> list[Verdict]:
-    """The verdicts on one lesson."""
+    """Returns the verdicts on one lesson."""
     found = []
     for step in lesson.steps:
         run = lesson.run_of(step)

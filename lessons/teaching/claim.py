@@ -18,11 +18,11 @@ class Claim:
     Attributes:
         text: the sentence, for the learner.
         measure: the number.
-        relation: "at most" or "at least".
-        bound: in the measure's unit.
-        fails_with: assignments "PATH=VALUE" on top of the step's own under which the sentence is false.
-            Goals of a challenge have none: they fail at the challenge's start.
-        because: why it is false under that setting, in a few words.
+        relation: whether the number must be "at most" or "at least" the bound.
+        bound: bound on the number, in the unit of the measure.
+        fails_with: assignments "PATH=VALUE", in addition to those of the step, under which the sentence is
+            false. Goals of a challenge have none: they are not met at its start.
+        because: why the sentence is false under these assignments, in a few words.
     """
 
     text: str
@@ -33,7 +33,7 @@ class Claim:
     because: str = ""
 
     def holds(self, value: float) -> bool:
-        """Whether a measured value fulfils the claim; False for NaN."""
+        """Returns whether a measured value fulfils the claim; False for NaN."""
         return holds(value, self.relation, self.bound)
 
     @property
@@ -43,10 +43,10 @@ class Claim:
 
 
 def holds(value: float, relation: Relation, bound: float) -> bool:
-    """Whether a value is at most, or at least, a bound; False for NaN."""
+    """Returns whether a value is at most, or at least, a bound; False for NaN."""
     return value <= bound if relation == "at most" else value >= bound
 
 
 def condition(relation: Relation, bound: float, unit: str) -> str:
-    """The condition as an inequality, e.g. "≤ 1 mm"."""
+    """Returns the condition as an inequality, e.g. "≤ 1 mm"."""
     return f"{_SIGNS[relation]} {bound:g} {unit}".rstrip()

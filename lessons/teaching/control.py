@@ -1,4 +1,4 @@
-"""The controls that a step shows and its script of events, as data."""
+"""The controls and the script of events of a step, as data."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from lessons.events import Event
 from lessons.settings.settings import SceneSettings
 
 Script = tuple[tuple[float, Event], ...]
-"""(time in s, event) in order; a torque-level scene takes those of `lessons.events` only."""
+"""A script: (time in s, event) in order. A torque-level scene accepts only the events of `lessons.events`."""
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class Control:
         words: its label.
         low, high: the ends of a slider; for a number only.
         log: the slider is logarithmic; low > 0.
-        choices: the values of a menu, instead of a slider; (False, True) gives a switch.
+        choices: the values of a menu, which replaces the slider; (False, True) gives a switch.
     """
 
     path: str
@@ -38,20 +38,21 @@ class Control:
             raise ValueError(f"control '{self.path}' is logarithmic: low must be above 0")
 
     def takes(self, value: Any) -> bool:
-        """Whether the control can be set to a value."""
+        """Returns whether the control can be set to a value."""
         if self.choices:
             return value in self.choices
         return isinstance(value, (int, float)) and self.low <= value <= self.high
 
 
 def chosen(settings: SceneSettings, control: Control) -> Any:
-    """The choice of a control that the settings have at present; None if they have another value."""
+    """Returns the choice of a control that is equal to the present setting; None if no choice is equal to
+    it."""
     fitting = (each for each in control.choices if settings.changed(control.path, each) == settings)
     return next(fitting, None)
 
 
 def within(settings: SceneSettings, control: Control) -> bool:
-    """Whether the present value of the setting is one that the control can set."""
+    """Returns whether the control can set the present value of the setting."""
     if control.choices:
         return chosen(settings, control) is not None
     return control.takes(settings.value_at(control.path))

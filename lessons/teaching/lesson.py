@@ -1,4 +1,5 @@
-"""A lesson: a card, a scene and ordered steps. Pure data that a page shows and a check runs headless."""
+"""A lesson: a card, a scene and ordered steps. A lesson is data that a page shows and a check runs
+headless."""
 
 from __future__ import annotations
 
@@ -56,8 +57,8 @@ class Ghost:
     """A second robot in the same scene: the same events and clock, other settings.
 
     Attributes:
-        words: its name in the legend.
-        set: assignments on top of the step's.
+        words: name of the ghost in the legend.
+        set: assignments in addition to those of the step.
     """
 
     words: str
@@ -77,10 +78,10 @@ class Step:
         do: a task for the learner after the scripted run.
         why: explanation of the result, shown after the run.
         claims: statements about the run.
-        set: assignments on top of the lesson's.
+        set: assignments in addition to those of the lesson.
         events: the script.
         duration: s.
-        prediction: asked before the run.
+        prediction: question that is asked before the run.
         ghost: a second robot to compare with.
         controls: the few settings that the learner can change.
         plots: the signals that are plotted.
@@ -116,12 +117,12 @@ class Lesson:
     """A card, a scene and the steps in this scene.
 
     Attributes:
-        name: its file's name with dashes.
+        name: name of the file, with dashes.
         card: title, question, duration and required knowledge.
         scene: name of a scene of `lessons.scenes.catalog.load_scene`.
         steps: in order.
         set: assignments "PATH=VALUE" for all steps.
-        challenge: at the end, if there is one.
+        challenge: challenge at the end of the lesson, if there is one.
         urdf: the robot, for the scene "hold".
     """
 
@@ -134,7 +135,7 @@ class Lesson:
     urdf: str | None = None
 
     def run_of(self, step: Step | Challenge) -> RunSpec:
-        """The run of a step, or of the start of the challenge."""
+        """Returns the run of a step, or of the start of the challenge."""
         return RunSpec(
             self.scene,
             self.urdf,

@@ -46,7 +46,7 @@ _PER_JOINT = ("q", "v", "tau")
 
 
 class RunRows(Protocol):
-    """A finished or running run: a field of telemetry over time by its name, (ticks, width)."""
+    """A finished or unfinished run. A field of telemetry over time is read by its name, (ticks, width)."""
 
     def __getitem__(self, field: str, /) -> Array: ...
 
@@ -72,7 +72,7 @@ class Signal:
 
     @property
     def words(self) -> str:
-        """Its name in legends."""
+        """The name of the signal in legends."""
         base, _, of = self.name.partition("/")
         plain = f"{base} of {of}" if of else _NAMES.get(base, base.replace("_", " "))
         if self.column is None:
@@ -81,10 +81,10 @@ class Signal:
         return f"{plain} {part} {self.column + 1}"
 
     def over(self, rows: RunRows) -> Array:
-        """The signal at every tick, (ticks,); NaN where it is not defined."""
+        """Returns the signal at every tick, (ticks,); NaN where it is not defined."""
         found = DERIVED[self.name](rows) if self.name in DERIVED else rows[self.name]
         one = np.linalg.norm(found, axis=1) if self.column is None else found[:, self.column]
-        # The norm of a single component would lose its sign.
+        # The norm of a single component would not keep the sign of the component.
         one = found[:, 0] if found.shape[1] == 1 else one
         return UNITS[self.unit] * one
 
@@ -97,8 +97,8 @@ class Measure:
         signal: the signal.
         statistic: "largest" absolute value, "smallest" value, "rms", "mean", "range" (greatest minus least),
             "last" (mean over the last 50 ticks) or "sum".
-        after, until: the window, s.
-        over_ghost: whether it is divided by the same number of the ghost's run; its unit is then "×".
+        after, until: start and end of the window, s.
+        over_ghost: whether the number is divided by the same number of the ghost's run. The unit is then "×".
     """
 
     signal: Signal
@@ -109,7 +109,7 @@ class Measure:
 
     @property
     def words(self) -> str:
-        """Its name in tables and on the page."""
+        """The name of the measure in tables and on the page."""
         since = f" from {self.after:g} s" if self.after > 0 else ""
         until = f" until {self.until:g} s" if math.isfinite(self.until) else ""
         ghost = ", over the ghost's" if self.over_ghost else ""
@@ -126,7 +126,7 @@ class Measure:
         return replace(self, over_ghost=False)
 
     def value(self, rows: RunRows, ghost: RunRows | None = None) -> float:
-        """The value so far; NaN as long as there is nothing to measure. `rows` may be an unfinished run."""
+        """Returns the value so far; NaN if there is nothing to measure. `rows` may be an unfinished run."""
         own = self._of(rows)
         if not self.over_ghost:
             return own
@@ -142,14 +142,15 @@ class Measure:
 
 
 def _shares(rows: RunRows, value: str, limit: str) -> Array:
-    """The largest |value| / limit over the joints that have a limit, (ticks, 1)."""
+    """Returns the largest |value| / limit over the joints that have a limit, (ticks, 1)."""
     with np.errstate(all="ignore"):
         share = np.abs(rows[value]) / rows[limit]
     return np.where(np.isfinite(share), share, 0.0).max(axis=1, keepdims=True)
 
 
 def _position_share(rows: RunRows) -> Array:
-    """The largest distance from mid-range over half the range, (ticks, 1)."""
+    """Returns the largest distance of a joint from the middle of its range, divided by half the range,
+    (ticks, 1)."""
     lower, upper = rows["q_lower"], rows["q_upper"]
     with np.errstate(all="ignore"):
         share = np.abs(rows["q"] - 0.5 * (lower + upper)) / (0.5 * (upper - lower))
@@ -161,23 +162,23 @@ _NEAR = math.radians(5.0)
 
 
 def _ahead(rows: RunRows) -> Array:
-    """Distance of each joint from the end of its range towards which it moves, (ticks, n) rad; 0 beyond
-    it."""
+    """Returns the distance of each joint from the end of its range towards which it moves, (ticks, n) rad; 0
+    beyond this end."""
     forward = rows["v"] > 0.0
     return np.maximum(np.where(forward, rows["q_upper"] - rows["q"], rows["q"] - rows["q_lower"]), 0.0)
 
 
 def _deceleration_to_stop(rows: RunRows) -> Array:
-    """The largest q̇²/2d with d the distance of `_ahead`, (ticks, 1) rad/s²; it is not defined for distances
-    below 0.05°."""
+    """Returns the largest q̇²/2d, where d is the distance of `_ahead`, (ticks, 1) rad/s². Distances below
+    0.05° are left out."""
     ahead = _ahead(rows)
     found = np.where(ahead > _CLOSE, rows["v"] ** 2 / (2.0 * np.maximum(ahead, _CLOSE)), math.nan)
     return np.fmax.reduce(found, axis=1, keepdims=True)
 
 
 def _speed_near_an_end(rows: RunRows) -> Array:
-    """The largest speed of the joints that are less than 5° before an end of their range, (ticks, 1) rad/s;
-    NaN if there is no such joint."""
+    """Returns the largest speed of the joints that are less than 5° before an end of their range, (ticks, 1)
+    rad/s; NaN if there is no such joint."""
     found = np.where(_ahead(rows) < _NEAR, np.abs(rows["v"]), math.nan)
     return np.fmax.reduce(found, axis=1, keepdims=True)
 
@@ -192,25 +193,25 @@ def _at(bit: int) -> Callable[[RunRows], Array]:
 
 
 def _joints_moved(rows: RunRows) -> Array:
-    """Number of joints that are more than 1° away from their start, (ticks, 1)."""
+    """Returns the number of joints that are more than 1° away from their start, (ticks, 1)."""
     q = rows["q"]
     return (np.abs(q - q[:1]) > math.radians(1.0)).sum(axis=1, keepdims=True).astype(float)
 
 
 def _tip_travel(rows: RunRows) -> Array:
-    """Distance of the value of the task `position` from its start, (ticks, 1) m."""
+    """Returns the distance of the value of the task `position` from its initial value, (ticks, 1) m."""
     x = rows["x/position"]
     return np.linalg.norm(x - x[:1], axis=1, keepdims=True)
 
 
 def _way_of_the_base(rows: RunRows) -> Array:
-    """Length of the base's path from the first row on, (ticks, 1) m."""
+    """Returns the length of the base's path since the first row, (ticks, 1) m."""
     steps = np.linalg.norm(np.diff(rows["x/base"], axis=0), axis=1)
     return np.concatenate([[0.0], np.cumsum(steps)])[: len(rows["t"]), None]
 
 
 def _time_at_work(rows: RunRows) -> Array:
-    """t as long as the mission has tasks that are not completed, (ticks, 1) s; afterwards NaN."""
+    """Returns t while the mission has tasks that are not completed, (ticks, 1) s; afterwards NaN."""
     return np.where(rows["left"] > 0, rows["t"], math.nan)
 
 

@@ -1,4 +1,4 @@
-"""A poll: many people answer the prediction of a step, once or twice, before its run decides."""
+"""A poll: many people answer the prediction of a step, once or twice, before the run decides it."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from lessons.teaching.prediction import Choice, Value
 from robots import InputError
 
 ROUNDS = 2
-"""A first vote, and a second one after people have talked."""
+"""Number of rounds: a first vote, and a second vote after a discussion."""
 VOTERS = 2000
-"""Largest number of people whose votes one poll holds."""
-_BARS = 8  # of a histogram of numbers
+"""Largest number of people who can vote in one poll."""
+_BARS = 8  # bars of a histogram of numbers
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Bar:
     Attributes:
         label: the option, or the interval of numbers.
         count: number of votes.
-        right: whether the measured number is here; None before it is known.
+        right: whether the measured number belongs to this bar; None before the number is known.
     """
 
     label: str
@@ -39,8 +39,8 @@ class Poll:
 
     Attributes:
         asked: the question.
-        rounds: the votes of each round by voter, the present round last.
-        is_open: whether the present round takes votes.
+        rounds: for each round, the votes by voter; the present round is the last.
+        is_open: whether the present round accepts votes.
     """
 
     asked: Choice | Value
@@ -53,35 +53,36 @@ class Poll:
         return self.rounds[-1]
 
     def with_vote(self, voter: str, answer: object) -> Poll:
-        """The poll after a vote; a voter's later vote replaces the earlier one.
+        """Returns the poll after a vote. A voter's later vote replaces the earlier one.
 
         Raises:
-            InputError: the vote is closed, the answer is none of this question, or there are too many voters.
+            InputError: the vote is closed, this question has no such answer, or there are too many voters.
         """
         if not self.is_open:
             raise InputError("the vote is closed: your answer was not counted")
         vote = valid(self.asked, answer)
         if voter not in self.latest and len(self.latest) >= VOTERS:
-            raise InputError(f"{VOTERS} people have voted, and this vote takes no more")
+            raise InputError(f"{VOTERS} people have voted: this vote accepts no more voters")
         if self.latest.get(voter) == vote:
             return self
         return replace(self, rounds=(*self.rounds[:-1], {**self.latest, voter: vote}))
 
     def closed(self) -> Poll:
-        """The poll after its present round; closing a closed poll changes nothing."""
+        """Returns the poll with its present round closed. Closing a closed poll changes nothing."""
         return replace(self, is_open=False)
 
     def again(self) -> Poll:
-        """The poll with one more round. Raises InputError while a round is open, and after the last one."""
+        """Returns the poll with one more round. Raises InputError while a round is open, and after the last
+        round."""
         if self.is_open:
             raise InputError("the vote is open: close it before the second vote")
         if len(self.rounds) >= ROUNDS:
-            raise InputError("this step has had its second vote: run it, or choose another step")
+            raise InputError("the second vote of this step is over: run the step, or choose another one")
         return replace(self, rounds=(*self.rounds, {}), is_open=True)
 
     def favourite(self) -> float:
-        """The answer of most voters, or of the middle voter for a number; without votes the first option, or
-        the middle of the scale."""
+        """Returns the most frequent option, or the median of numbers. Without votes, returns the first
+        option, or the middle of the scale."""
         votes = sorted(self.latest.values())
         match self.asked:
             case Choice():
@@ -90,14 +91,15 @@ class Poll:
                 return votes[len(votes) // 2] if votes else math.sqrt(value.low * value.high)
 
     def right(self, truth: float, number: int = -1) -> int | None:
-        """How many votes of a round are right for the measured number; None if nothing was measured."""
+        """Returns how many votes of a round are right for the measured number; None if nothing was
+        measured."""
         hits = [self.asked.hits(vote, truth) for vote in self.rounds[number].values()]
         known = self.asked.hits(self.favourite(), truth) is not None
         return sum(map(bool, hits)) if known else None
 
 
 def valid(asked: Choice | Value, answer: object) -> float:
-    """The answer as a vote. Raises InputError if it is not one of this question."""
+    """Returns the answer as a vote. Raises InputError if this question has no such answer."""
     match asked:
         case Choice() if type(answer) is int and 0 <= answer < len(asked.options):
             return answer
@@ -105,7 +107,7 @@ def valid(asked: Choice | Value, answer: object) -> float:
             raise InputError(f"this is not an option: choose one of the {len(asked.options)} options")
         case Value() as value:
             if isinstance(answer, (int, float)) and not isinstance(answer, bool):
-                slack = 1 + 1e-9  # a slider computes its ends with rounding
+                slack = 1 + 1e-9  # the ends of a slider have rounding errors
                 if value.low / slack <= answer <= value.high * slack:
                     return float(min(max(answer, value.low), value.high))
             raise InputError(
@@ -114,8 +116,8 @@ def valid(asked: Choice | Value, answer: object) -> float:
 
 
 def histogram(poll: Poll, number: int = -1, truth: float = math.nan) -> tuple[Bar, ...]:
-    """The bars of a round, by default the present one: one per option, or intervals of equal width on the
-    logarithmic scale. truth: the measured number, once it is known."""
+    """Returns the bars of a round, by default the present one: one per option, or intervals of equal width on
+    the logarithmic scale. truth: the measured number; NaN if it is not known."""
     asked, votes = poll.asked, poll.rounds[number].values()
     match asked:
         case Choice():

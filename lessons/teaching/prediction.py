@@ -26,7 +26,7 @@ class PredictionResult:
 
 @dataclass(frozen=True)
 class Option:
-    """One answer of a choice. It is right if the measured number is in [low, high)."""
+    """One answer of a choice. The answer is right if the measured number is in [low, high)."""
 
     text: str
     low: float = -math.inf
@@ -50,16 +50,16 @@ class Choice:
     tempting: int
 
     def right(self, value: float) -> int | None:
-        """Index of the right option for a measured number; None if no option is right."""
+        """Returns the index of the right option for a measured number; None if no option is right."""
         return next((k for k, each in enumerate(self.options) if each.low <= value < each.high), None)
 
     def hits(self, picked: float, value: float) -> bool | None:
-        """Whether an option is right for a measured number; None if no option is right."""
+        """Returns whether an option is right for a measured number; None if no option is right."""
         right = self.right(value)
         return None if right is None else picked == right
 
     def grade(self, picked: int, rows: RunRows, ghost: RunRows | None = None) -> PredictionResult:
-        """Compares the option picked with the run."""
+        """Compares the chosen option with the run."""
         value = self.measure.value(rows, ghost)
         right = self.right(value)
         if right is None:
@@ -74,11 +74,11 @@ class Choice:
 
 @dataclass(frozen=True)
 class Value:
-    """A number set on a scale before the run.
+    """A number that the learner sets on a scale before the run.
 
     Attributes:
         question: one sentence.
-        measure: the number to predict; it is above 0.
+        measure: the number to predict, which must be above 0.
         low, high: ends of the scale, 0 < low < high; the scale is logarithmic.
         factor: a guess within this factor of the measured number is right; a guess that is wrong by the
             square of this factor has the score 0.
@@ -91,7 +91,7 @@ class Value:
     factor: float = 1.5
 
     def hits(self, guess: float, value: float) -> bool | None:
-        """Whether a guess, above 0, is right for a measured number; None if nothing was measured."""
+        """Returns whether a guess above 0 is right for a measured number; None if nothing was measured."""
         if not (math.isfinite(value) and value > 0):
             return None
         return abs(math.log(guess / value)) <= math.log(self.factor)
@@ -109,13 +109,13 @@ class Value:
 
 @dataclass(frozen=True)
 class Sketch:
-    """A curve drawn before the run.
+    """A curve that the learner draws before the run.
 
     Attributes:
         question: one sentence.
         signal: the signal that is drawn over time.
-        low, high: the drawing's vertical range, in the signal's unit.
-        until: its horizontal range is 0 to this, s.
+        low, high: the vertical range of the drawing, in the unit of the signal.
+        until: the horizontal range of the drawing is 0 to `until`, s.
         band: a point counts as right within this share of the vertical range.
     """
 
@@ -128,11 +128,11 @@ class Sketch:
 
     @property
     def measure(self) -> Measure:
-        """The largest size of the signal, which must fit into the drawing."""
+        """The largest absolute value of the signal, which must fit into the drawing."""
         return Measure(self.signal, until=self.until)
 
     def grade(self, points: Sequence[tuple[float, float]], rows: RunRows) -> PredictionResult:
-        """Compares the drawn points (t in s, value), joined by straight lines, with the run so far."""
+        """Compares the drawn points (t in s, value), connected by straight lines, with the run so far."""
         t, truth = rows["t"][:, 0], self.signal.over(rows)
         seen = np.isfinite(truth) & (t <= self.until)
         if not points or not seen.any():

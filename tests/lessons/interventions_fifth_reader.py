@@ -30,7 +30,7 @@ FIFTH_ROWS = (
         for says in ("mostly due to the desired motion", "twice the $K_V$ the error after the jump is 1.7 mm")
     ),
     Intervention(
-        "when-tasks-fight/0", "without them it also demands a hundred times more",
+        "when-tasks-fight/0", "without bounds it demands a hundred times the limit, too",
         of("tau_demand", "N·m"), (0, 4.01),
         ("limits.torque=false", "limits.velocity=false", "limits.position=off"), (400, INF),
         of=("controller=himpc",),
@@ -41,7 +41,7 @@ FIFTH_ROWS = (
     ),
     Intervention(
         "stopping-takes-distance/0",
-        "because the rows on the position contradict those on the change of speed",
+        "because the rows on the position contradict the rows on the change of speed",
         of("unsolved", "", "sum"), (100, 150), ("limits.velocity_approach=0",), (6.5, 7.5),
         of=("limits.velocity_scale=0.15",), seconds=5.0,
     ),
@@ -54,9 +54,9 @@ FIFTH_ROWS = (
         there=(0.55, 0.65), without=("rate_hz=10",), gone=(2.7, 2.85), of=(*EVERY_TWENTIETH, "rate_hz=20"),
     ),
     STEPS(
-        says="If level 1 also pays for its effort, with the same $Q = 10$ (`formulation=paper` and `Q=10`), "
-        "its best leaves an error and the cost has a slope, but the steps are as short as before. So the "
-        "missing slope is not the reason.",
+        says="If the cost of level 1 contains effort, with the same $Q = 10$ (`formulation=paper` and `Q=10`)"
+        ", its best plan leaves an error and the cost has a slope, but the steps are as short as before. So "
+        "the missing slope is not the reason.",
         without=("formulation=paper", "Q=10"), gone=(0.02, 0.025), stays=True,
     ),
     STEPS(says="with $Q = 1$ they are 2.3 times as long", without=("Q=1",), gone=(0.049, 0.054)),

@@ -30,7 +30,7 @@ FOURTH_ROWS = (
         HAND_LAST, (0, 0.015), ("tasks.position.K_p=0",), (3.2, 3.4),
     ),
     Intervention(
-        "no-model-needed/0", "That ends the sag",
+        "no-model-needed/0", "Then the hand stops sagging",
         HAND_LAST, (3.2, 3.4), ("controller=hqp",), (50, INF), of=("tasks.position.K_p=0",),
     ),
     # ---------------------------------------- when-tasks-fight
@@ -45,7 +45,7 @@ FOURTH_ROWS = (
     # ---------------------------------------- stretched-out
     Intervention(
         "stretched-out/1",
-        "Without bounds $R$ keeps the torque small: with $R = 10^{-5}$ it then demands more than",
+        "Without bounds $R$ keeps the torque small: with $R = 10^{-5}$ and no bounds HIMPC demands more than",
         of("tau_demand", "N·m"), (1.6, 2.6), ("R=1e-5",), (400, INF), of=OFF,
     ),
     Intervention(
@@ -62,7 +62,7 @@ FOURTH_ROWS = (
         HAND, (15.5, 17), ("levels.q1.enabled=false",), (9.5, 11), of=("q1_amplitude_deg=-30",),
     ),
     Intervention(
-        "torque-has-a-limit/2", "With joint 1 first it is off by 9 mm there",
+        "torque-has-a-limit/2", "With joint 1 first the hand is off by 9 mm there",
         HAND, (15.5, 17), FIRST, (8.4, 9), of=("q1_amplitude_deg=-30",),
     ),
     # ---------------------------------------- stopping-takes-distance
@@ -84,11 +84,12 @@ FOURTH_ROWS = (
     ),
     # ---------------------------------------- deadlines
     Intervention(
-        "deadlines/1", "the hand of the late loop is off by 47 mm, that of half the rate by 3.2 mm",
+        "deadlines/1",
+        "the error of the hand is 47 mm in the late loop, and 3.2 mm in the loop of half the rate",
         HAND, (45, 49), ("T_s=0.002", "deadline_ms=2"), (3.1, 3.3), of=LATE,
     ),
     Intervention(
-        "deadlines/1", "without it, in the bounds and in the motors, the late hand is off by 3.4 mm",
+        "deadlines/1", "without this limit, in the bounds and in the motors, the late hand is off by 3.4 mm",
         HAND, (45, 49), ("limits.torque=false", "plant.saturate=false"), (3.3, 3.5), of=LATE,
     ),
     Intervention(
@@ -97,7 +98,7 @@ FOURTH_ROWS = (
     ),
     # ---------------------------------------- how-strict-is-strict
     Intervention(
-        "how-strict-is-strict/0", "with $\\delta = 10^{-12}$ m it does not move either",
+        "how-strict-is-strict/0", "with $\\delta = 10^{-12}$ m the base does not move either",
         WAY, (0, 1e-6), ("delta_m=1e-12",), (0, 1e-6), stays=True,
     ),
     Intervention(
@@ -117,13 +118,13 @@ FOURTH_ROWS = (
     ),
     # ---------------------------------------- seeing-ahead
     Intervention(
-        "seeing-ahead/3", "without those on acceleration and its change the hand is off by 18.5 mm",
+        "seeing-ahead/3", "without the limits on acceleration and its change the hand is off by 18.5 mm",
         EE, (19.8, 20.4), NO_ACCELERATION, (18.3, 18.7),
     ),
     Intervention(
-        "seeing-ahead/3", "without those on speed by 28 mm",
+        "seeing-ahead/3", "without the limits on speed by 28 mm",
         EE, (19.8, 20.4), ("limits.velocity=false",), (27.5, 28.4),
     ),
-    Intervention("seeing-ahead/3", "without any by 37 mm", EE, (19.8, 20.4), NO_LIMITS, (37, 38)),
+    Intervention("seeing-ahead/3", "without any limits by 37 mm", EE, (19.8, 20.4), NO_LIMITS, (37, 38)),
 )
 # fmt: on

@@ -41,7 +41,7 @@ LIMIT_ROWS = (
     ),
 
     Intervention(
-        "torque-has-a-limit/0", "that is too little for level 1 alone",
+        "torque-has-a-limit/0", "this torque is too little for level 1 alone",
         HAND, (0.5, 30), ("levels.q1.enabled=false",), (0.5, 30), of=("limits.torque_scale=0.03",),
         stays=True,
     ),
@@ -85,12 +85,13 @@ LIMIT_ROWS = (
     ),
     Intervention(
         "a-blind-arm/1",
-        "Stiffness does not limit it: with half of $K_p$ both bounds are reached, too, up to 0.9 s later",
+        "Stiffness does not limit the force: with half of $K_p$ both bounds are reached, too, up to 0.9 s "
+        "later",
         FORCE, (205, 225), ("levels.position.K_p=28.1",), (205, 225), seconds=2.7, stays=True,
     ),
     # ---------------------------------------- keeping-clear
     Intervention(
-        "keeping-clear/0", "The position fixes the hand's height, so nothing is left for the distance",
+        "keeping-clear/0", "The position fixes the hand's height, so no freedom is left for the distance",
         FORCE, (280, 300), ("order=distance,position,orientation,posture",), (0, 1),
     ),
     Intervention(
@@ -116,7 +117,7 @@ LIMIT_ROWS = (
         (45, 58),
     ),
     Intervention(
-        "keeping-clear/3", "without the posture alone 23 cm are left",
+        "keeping-clear/3", "if only the posture is off, 23 cm are left",
         AT_THE_END, (265, 275), ("levels.posture.enabled=false",), (225, 235),
     ),
     # ---------------------------------------- how-far-ahead
@@ -152,7 +153,7 @@ LIMIT_ROWS = (
         (7, 15),
     ),
     Intervention(
-        "deadlines/2", "the effect of noise doubles",
+        "deadlines/2", "The effect of noise doubles",
         of("delta_tau", "N·m", "rms"), (1.1, 1.6), ("M_bar_scale=1",), (0.5, 0.8),
         of=("plant.encoder_resolution_deg=0.001",), seconds=0.3,
     ),
@@ -162,7 +163,7 @@ LIMIT_ROWS = (
         of("delta_tau", "N·m", "rms"), (3.2, 4.4), ("plant.encoder_resolution_deg=0.0025",), (1.6, 2.2),
     ),
     Intervention(
-        "sensors-are-coarse/1", "half of it leaves half of the noise",
+        "sensors-are-coarse/1", "half of $\\bar M$ leaves half of the noise",
         of("delta_tau", "N·m", "rms"), (3.2, 4.4), ("M_bar_scale=0.5",), (1.6, 2.2), of=("T_s=0.001",),
     ),
     Intervention(
@@ -179,7 +180,7 @@ LIMIT_ROWS = (
         HAND, (0.5, 0.7), ("plant.encoder_resolution_deg=0",), (0.5, 0.7), of=("T_s=0.01",), stays=True,
     ),
     Intervention(
-        "sensors-are-coarse/1", "its torque is smoother, but its model has no friction",
+        "sensors-are-coarse/1", "OSF's torque is smoother, but its model has no friction",
         HAND, (1, 1.4), NO_FRICTION, (0, 0.3), of=("controller=osf",),
     ),
     # ---------------------------------------- the-model-is-wrong
@@ -222,7 +223,7 @@ LIMIT_ROWS = (
         of=("M_bar_scale=4",), seconds=0.05,
     ),
     Intervention(
-        "the-model-is-wrong/2", "its model has no friction",
+        "the-model-is-wrong/2", "HQP's model has no friction",
         HAND, (0.9, 1.6), NO_FRICTION, (0, 0.3), of=("controller=hqp",), seconds=0.6,
     ),
     Intervention(

@@ -26,7 +26,7 @@ MOBILE_ROWS = (
     ),
     Intervention(
         "first-hold-then-reach/1",
-        "It is where every plan that makes $\\mathcal J_2$ smaller also changes $\\mathcal J_1$.",
+        "Here every plan that makes $\\mathcal J_2$ smaller also changes $\\mathcal J_1$.",
         of("error/base", "m", "mean", 7.0), (1.55, 1.7), ("order=base,ee",), (0, 0.05),
     ),
     # ---------------------------------------- how-strict-is-strict
@@ -36,11 +36,11 @@ MOBILE_ROWS = (
     ),
 
     Intervention(
-        "how-strict-is-strict/3", "in its own best plan the hand slips a little",
+        "how-strict-is-strict/3", "in the best plan of level 1 the hand slips a little",
         EE, (12, 20), ("velocity_effort=0.001",), (2, 9),
     ),
     Intervention(
-        "how-strict-is-strict/3", "$\\delta$ is added to it", EE, (12, 20), ("delta_m=0.001",), (2, 9),
+        "how-strict-is-strict/3", "$\\delta$ is added to the slip", EE, (12, 20), ("delta_m=0.001",), (2, 9),
     ),
     # ---------------------------------------- seeing-ahead
     Intervention(
@@ -49,15 +49,15 @@ MOBILE_ROWS = (
         of=("controller=htmpc_wpt",), seconds=8.0,
     ),
     Intervention(
-        "seeing-ahead/1", "Without the bound on that change the same 0.2 s are enough for 6 mm",
+        "seeing-ahead/1", "Without the bound on this change, the hand is off by 6 mm with the same 0.2 s",
         EE, (25, 40), ("limits.jerk=false",), (5.5, 6.9),
     ),
     Intervention(
-        "seeing-ahead/1", "with half the top speed for 4 mm", EE, (25, 40), ("limits.velocity_scale=0.5",),
-        (3.5, 4.5),
+        "seeing-ahead/1", "half the top speed, it is off by 4 mm",
+        EE, (25, 40), ("limits.velocity_scale=0.5",), (3.5, 4.5),
     ),
     Intervention(
-        "seeing-ahead/1", "three times the acceleration hardly helps",
+        "seeing-ahead/1", "three times as high hardly helps",
         EE, (20, 40), ("limits.acceleration_scale=3",), (20, 40), stays=True,
     ),
     Intervention(
@@ -93,15 +93,15 @@ MOBILE_ROWS = (
         EE, (15, 25), ("gains=[2,0.3]",), (0, 6), seconds=4.0,
     ),
     Intervention(
-        "seeing-ahead/3", "Asked for a hundred times a second it drifts half as far.",
+        "seeing-ahead/3", "If velocities are computed a hundred times a second, the hand drifts half as far.",
         EE, (15, 25), ("rate_hz=100",), (6, 14), seconds=4.0,
     ),
     Intervention(
-        "seeing-ahead/3", "with 5 1/s for the hand it is off by half", EE, (15, 25), ("gains=[5,2]",),
-        (7, 13), seconds=4.0,
+        "seeing-ahead/3", "with 5 1/s for the hand its error is half as large",
+        EE, (15, 25), ("gains=[5,2]",), (7, 13), seconds=4.0,
     ),
     Intervention(
-        "seeing-ahead/3", "with 20 1/s by 3 mm", EE, (15, 25), ("gains=[20,2]",), (2, 4),
+        "seeing-ahead/3", "with 20 1/s it is 3 mm", EE, (15, 25), ("gains=[20,2]",), (2, 4),
     ),
     Intervention(
         "seeing-ahead/3", "the base is as quick as before",

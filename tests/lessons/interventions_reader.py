@@ -57,7 +57,7 @@ READER_ROWS = (
     ),
     # ---------------------------------------- when-tasks-fight
     Intervention(
-        "when-tasks-fight/2", "with $N = 1$ and $R_2 = 10^5$ joint 3 goes on swinging with 62°/s",
+        "when-tasks-fight/2", "with $N = 1$ and $R_2 = 10^5$ joint 3 continues to swing with 62°/s",
         LATE_SWING, (61.5, 62.5), ("levels.q1.R=10",), (11, 12.5), of=("horizon=1", "levels.q1.R=1e5"),
     ),
     Intervention(
@@ -83,7 +83,7 @@ READER_ROWS = (
     ),
     # ---------------------------------------- stretched-out
     Intervention(
-        "stretched-out/0", "Then, at 0.13 s, the demand still passes a thousand times the",
+        "stretched-out/0", "Then, at 0.13 s, the demand still exceeds a thousand times the",
         of("torque share", "%", "largest", 0.12, 0.14), (1e5, INF), ("controller=osf_damped",), (0, 5),
         of=("smooth=true",),
     ),
@@ -93,11 +93,12 @@ READER_ROWS = (
         TORQUE, (85, 92), NO_FRICTION, (32, 36),
     ),
     Intervention(
-        "torque-has-a-limit/0", "without dry friction alone it needs half of it",
+        "torque-has-a-limit/0", "without dry friction alone it needs half of this torque",
         TORQUE, (85, 92), ("plant.friction=0",), (48, 54),
     ),
     Intervention(
-        "torque-has-a-limit/0", "that is too little for level 1 alone, with the dry friction of the joints",
+        "torque-has-a-limit/0",
+        "this torque is too little for level 1 alone, with the dry friction of the joints",
         HAND, (0.5, 30), ("plant.friction=0",), (0, 0.1), of=("limits.torque_scale=0.03",),
     ),
     Intervention(
@@ -120,7 +121,7 @@ READER_ROWS = (
     # ---------------------------------------- stopping-takes-distance
     Intervention(
         "stopping-takes-distance/0",
-        "The rows on speed add 0.07° to the overrun: without them it is still 0.57°",
+        "The rows on speed add 0.07° to the overrun: without them the overrun is still 0.57°",
         JOINT_2, (150.635, 150.65), ("limits.velocity=false",), (150.565, 150.58),
     ),
     # ---------------------------------------- how-far-ahead
@@ -129,7 +130,7 @@ READER_ROWS = (
         X, (0.528, 0.538), ("horizon=1",), (0.47, 0.476), of=LONG, on="iiwa14-circle-paper", seconds=4.0,
     ),
     Intervention(
-        "how-far-ahead/0", "with $N = 1$ 1600 QPs have no solution",
+        "how-far-ahead/0", "1600 QPs have no solution with $N = 1$",
         of("unsolved", "", "sum"), (0, 50), ("horizon=1",), (1550, 1700), of=LONG, on="iiwa14-circle-paper",
         seconds=4.0,
     ),
@@ -183,7 +184,7 @@ READER_ROWS = (
         EE, (19.9, 20.2), ("peak=[0.3,-0.5]",), (3.7, 4.3),
     ),
     Intervention(
-        "seeing-ahead/3", "with a near one by 4 mm", EE, (19, 21), ("peak=[0.3,-0.5]",), (3.7, 4.3),
+        "seeing-ahead/3", "with a near peak by 4 mm", EE, (19, 21), ("peak=[0.3,-0.5]",), (3.7, 4.3),
     ),
     Intervention(
         "seeing-ahead/3", "With a peak that the arm can just reach the hand is off by 14 mm",

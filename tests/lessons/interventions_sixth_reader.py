@@ -43,7 +43,7 @@ SIXTH_ROWS = (
         measure=LATE_SPEED, there=(17.5, 18.5), without=NO_DELAY, gone=(57, 58),
     ),
     VIABLE(
-        says="with twice the $\\bar M$ the joint does 18 as well",
+        says="with twice the $\\bar M$ the joint also turns with 18°/s",
         measure=LATE_SPEED, there=(17.5, 18.5), without=("M_bar_scale=2",), gone=(17.5, 18.5), stays=True,
     ),
     VIABLE(
@@ -96,7 +96,7 @@ SIXTH_ROWS = (
     ),
     # ---------------------------------------- keeping-clear
     Intervention(
-        "keeping-clear/3", "without the orientation alone 19 cm",
+        "keeping-clear/3", "if only the orientation is off, 19 cm are left",
         HAND_LAST, (265, 275), ("levels.orientation.enabled=false",), (190, 199),
     ),
     # ---------------------------------------- deadlines
@@ -116,7 +116,8 @@ SIXTH_ROWS = (
     ),
     Intervention(
         "how-strict-is-strict/3",
-        "with $Q = 1000$ it is off by 40 mm. With this $Q$ and without the bounds on speed, 5.4 mm remain",
+        "with $Q = 1000$ the hand is off by 40 mm. With this $Q$ and without the bounds on speed, 5.4 mm "
+        "remain",
         EE, (39.5, 40.4), ("limits.velocity=false",), (5.35, 5.5), of=("Q=1000",), seconds=1.2,
     ),
     Intervention(
@@ -144,7 +145,7 @@ SIXTH_ROWS = (
     ),
     # ---------------------------------------- deliveries
     THERE(
-        says="it loses more because it now has to go all the way to it",
+        says="It loses more because it now has to go all the way to the place",
         there=(18.8, 19.6), without=("base_tolerance=0.05",), gone=(30.5, 31.3), of=PASSES,
     ),
     THERE(

@@ -33,7 +33,7 @@ TASK_ROWS = (
     ),
     Intervention(
         "a-redundant-arm/1",
-        "Joint 3 stops at 29°, because the same level asks the other six joints to stay",
+        "Joint 3 stops at 29°, because the same level has to hold the other six joints",
         of("q", "deg", "range", column=2), (28.5, 29.5), ("tasks.posture.K_p=[0,0,56.2,0,0,0,0]",), (53, 61),
     ),
     Intervention(
@@ -50,13 +50,13 @@ TASK_ROWS = (
         "one-task/2", "with $\\bar M^{-1} = 30$ here", HAND, (3.6, 4.2), ("R_on=acceleration",), (10, 40),
     ),
     Intervention(
-        "one-task/3", "0.2 s later joint 2 does 80°/s the other way",
+        "one-task/3", "0.2 s later joint 2 turns with 80°/s in the opposite direction",
         of("v", "deg/s", "mean", 0.495, 0.505, column=1), (78, 82), ("limits.velocity=false",), (-500, -200),
         seconds=0.6,
     ),
     Intervention(
         "one-task/3",
-        "Without speed limits joint 2 goes on in the direction of the push, with more than 300°/s",
+        "Without speed limits joint 2 continues in the direction of the push, with more than 300°/s",
         of("v", "deg/s", "mean", 0.3, 0.5, column=1), (-500, -300), ("limits.velocity=true",), (-50, 50),
         of=("limits.velocity=false",), seconds=0.6,
     ),
@@ -84,12 +84,12 @@ TASK_ROWS = (
         HAND, (40, 80), ("M_bar_scale=1",), (12, 19),
     ),
     Intervention(
-        "no-model-needed/3", "each correction is more than twice too large",
+        "no-model-needed/3", "each correction is more than twice as large as it should be",
         RADIUS, (1.05, 9), ("M_bar_scale=4",), (0, 0.99), seconds=0.2,
     ),
     # ---------------------------------------- two-tasks
     Intervention(
-        "two-tasks/0", "its model has no friction",
+        "two-tasks/0", "OSF's model has no friction",
         HAND, (0.7, 1.4), NO_FRICTION, (0, 0.3), of=("controller=osf",), seconds=0.6,
     ),
     Intervention(
@@ -145,7 +145,7 @@ TASK_ROWS = (
         stays=True,
     ),
     Intervention(
-        "when-tasks-fight/1", "its model has no friction",
+        "when-tasks-fight/1", "OSF's model has no friction",
         HAND, (2, 2.7), NO_FRICTION, (0, 0.3), of=("controller=osf",), seconds=0.5,
     ),
     Intervention(
@@ -161,11 +161,11 @@ TASK_ROWS = (
         of("speed share", "%"), (300, 700), ("controller=hiqp",), (95, 105), of=("controller=hqp",),
     ),
     Intervention(
-        "when-tasks-fight/0", "bounds are part of the problem",
+        "when-tasks-fight/0", "HIMPC has bounds in its QPs",
         of("tau_demand", "N·m"), (0, 3), NO_BOUNDS, (1000, INF), of=("controller=himpc",),
     ),
     Intervention(
-        "when-tasks-fight/1", "bounds are part of the problem",
+        "when-tasks-fight/1", "HIMPC has bounds in its QPs",
         of("v", "deg/s"), (50, 150), NO_BOUNDS, (2000, INF), of=("controller=himpc",),
     ),
     Intervention(
@@ -182,7 +182,7 @@ TASK_ROWS = (
     ),
     # ---------------------------------------- stretched-out
     Intervention(
-        "stretched-out/0", "demands no more than half of the limit, even without bounds",
+        "stretched-out/0", "demands at most half of the limit, even without bounds",
         of("tau_demand", "N·m", column=1), (1, 2), NO_BOUNDS, (1, 2), of=("controller=himpc",), stays=True,
     ),
     Intervention(
@@ -190,7 +190,7 @@ TASK_ROWS = (
         of("error/position", "mm", "largest", 1.0), (2, 3.5), NO_FRICTION, (0, 0.3), of=("controller=hqp",),
     ),
     Intervention(
-        "stretched-out/2", "its model has no friction, whether the start is gentle or not",
+        "stretched-out/2", "HQP's model has no friction, whether the start is gentle or not",
         HAND, (0.7, 1.3), NO_FRICTION, (0, 0.3), of=("controller=hqp",), seconds=0.5,
     ),
     Intervention(
@@ -210,7 +210,7 @@ TASK_ROWS = (
         of("error/position", "mm", "largest", 1.0), (50, INF), ("R=1000",), (0, 0.5), of=("R=1e7",),
     ),
     Intervention(
-        "stretched-out/1", "at rest its cost is zero, so $R$ need not be small for accuracy",
+        "stretched-out/1", "at rest the cost of the change is zero, so $R$ need not be small for accuracy",
         of("error/position", "mm", "largest", 1.0), (0.15, 0.3), ("R=1000",), (0.15, 0.3), stays=True,
     ),
     Intervention(

@@ -42,7 +42,7 @@ QUOTED = (
     ),
     Quoted(
         "one-task/3",
-        "It turns round only 0.75 s after the push",
+        "It reverses only 0.75 s after the push",
         _of(Signal("v", "deg/s", column=1), "mean", 1.04, 1.06),
         -5,
         5,
@@ -55,10 +55,10 @@ QUOTED = (
     Quoted("no-model-needed/2", "leaves 0.41 of the error", _ratio(HAND), 0.405, 0.415, ("M_bar_scale=2",)),
     Quoted("no-model-needed/2", "The error is less than a fifth", _ratio(HAND), 0.16, 0.2),
     Quoted("no-model-needed/2", "the largest of them is 0.94", _of(RADIUS, "mean"), 0.935, 0.945),
-    Quoted("no-model-needed/2", "there it is 0.999", _of(NORM, "mean"), 0.9985, 0.9995, None),
+    Quoted("no-model-needed/2", "with the old M̄ the norm is 0.999", _of(NORM, "mean"), 0.9985, 0.9995, None),
     Quoted("no-model-needed/3", "At × 6 the gauge read 0.91", _of(RADIUS, "mean"), 0.905, 0.915, None),
     Quoted("no-model-needed/3", "to −1.21 at × 7", _of(RADIUS, "mean"), 1.205, 1.215, ("M_bar_scale=7",)),
-    Quoted("no-model-needed/3", "comes back half as large again", _of(RADIUS, "mean"), 1.4, 1.6),
+    Quoted("no-model-needed/3", "the error grows by half", _of(RADIUS, "mean"), 1.4, 1.6),
     Quoted("two-tasks/1", "by a quarter of a metre", _of(HAND), 225, 275),
     Quoted("two-tasks/2", "keeps its circle to a millimetre", _of(HAND), 0.2, 1.25),
     Quoted("two-tasks/3", "by 0.02° with $Q_2 = 1$", _of(Q1), 0.015, 0.025, ("q1_amplitude_deg=20",)),
@@ -124,7 +124,7 @@ QUOTED = (
     ),
     Quoted(
         "stopping-takes-distance/2",
-        "The joint does 18",
+        "The joint turns with 18°/s",
         _of(Signal("speed within 5° of an end", "deg/s")),
         17.5,
         18.5,
@@ -138,7 +138,7 @@ QUOTED = (
     ),
     Quoted(
         "stopping-takes-distance/2",
-        "it takes 16 of the 20 rad/s²",
+        "a stop takes 16 of the 20 rad/s²",
         _of(Signal("deceleration to stop", "rad/s²")),
         15.5,
         16.5,
@@ -255,7 +255,7 @@ QUOTED = (
         0.55,
         0.667,
     ),
-    Quoted("deliveries/0", "and of its distance", _ratio(WAY), 0.55, 0.667),
+    Quoted("deliveries/0", "of the ghost's time and distance", _ratio(WAY), 0.55, 0.667),
     Quoted(
         "deliveries/2", "The hand is with the first person by 3 s", _of(EE, after=3.0, until=4.0), 0.0, 10.0
     ),
@@ -266,10 +266,10 @@ QUOTED = (
         10,
         20,
     ),
-    Quoted("deadlines/2", "the limit of stability is where it was, between 2 and 2.5", _of(RADIUS), 0.5, 1.0),
+    Quoted("deadlines/2", "the limit of stability is still between 2 and 2.5", _of(RADIUS), 0.5, 1.0),
     Quoted(
         "deadlines/2",
-        "the limit of stability is where it was, between 2 and 2.5",
+        "the limit of stability is still between 2 and 2.5",
         _of(RADIUS),
         1.0,
         9.0,
@@ -301,7 +301,12 @@ QUOTED = (
         None,
     ),
     Quoted(
-        "how-strict-is-strict/2", "allow a third and more", _of(Signal("step/base"), "mean"), 0.34, 0.9, None
+        "how-strict-is-strict/2",
+        "at least a third of a step",
+        _of(Signal("step/base"), "mean"),
+        0.34,
+        0.9,
+        None,
     ),
     Quoted("deliveries/2", "three seconds to the second person", _of(Signal("place"), until=17.1), 4, 4),
     Quoted("deliveries/2", "needs nearly seven", _of(Signal("place"), until=21.1), 4, 4, None),

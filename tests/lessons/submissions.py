@@ -85,7 +85,7 @@ MISTAKES: dict[str, dict[str, Mistake]] = {
         "q̈₀ without T_s": Mistake("- now.q_ddot", "- now.T_s * now.q_ddot", 3, "not divided by T_s"),
         "the model instead": Mistake("now.tau_0 +", "now.gravity +", 3, "the model is used instead of τ₀"),
         "Ĥ from the model": Mistake("", PD, 3, "the model is used instead of Ĥ"),
-        "gravity as well": Mistake("now.tau_0 +", "now.tau_0 + now.gravity +", 2, "g(q) is in τ₀ already"),
+        "gravity as well": Mistake("now.tau_0 +", "now.tau_0 + now.gravity +", 2, "τ₀ contains it already"),
         "no M̄": Mistake("now.M_bar *", "", 3, "M̄ is missing"),
         "sign of K_p": Mistake("- level.K_p", "+ level.K_p", 3, "K_p has the wrong sign"),
         "no K_v": Mistake("level.K_v *", "0.0 *", 5, "K_v is missing"),
@@ -106,7 +106,9 @@ MISTAKES: dict[str, dict[str, Mistake]] = {
         ),
         "no velocity bound": Mistake("- now.q_dot)", ") * 1e6", 8, "the velocity bound (32e) is missing"),
         "bound on Δτ": Mistake("- now.tau_0, (share", ", (share", 7, "is imposed on Δτ"),
-        "approached at once": Mistake("min(1.0, now.bounds.approach * now.T_s or 1.0)", "1.0", 8, "at once"),
+        "approached at once": Mistake(
+            "min(1.0, now.bounds.approach * now.T_s or 1.0)", "1.0", 8, "the whole distance"
+        ),
         "sign of f": Mistake("G.T @ (level.Q * e)", "-G.T @ (level.Q * e)", 2, "f has the wrong sign"),
         "no R": Mistake("np.diag(level.R)", "1e-9 * np.eye(now.n)", 9, "R is missing"),
         "no Q": Mistake("level.Q * e", "e", 5, "Q is missing in f"),
@@ -140,17 +142,17 @@ MISTAKES: dict[str, dict[str, Mistake]] = {
             "    D, slopes, v_stop, speed = D[:0], slopes[:0], 0, 0\n    return D, share",
             4,
             "no pair has a row",
-            "the arm keeps clear",
+            "the arm still touches nothing",
         ),
         "sign of ∇d": Mistake(
             "near.gradient, near.d, near", "-near.gradient, near.d, -near", 2, "∇d has the wrong sign: "
         ),
         "no M̄": Mistake("slopes / now.M_bar", "slopes", 5, "M̄ is missing in D", "as near"),
         "no d_safe": Mistake(
-            "distance - near.d_safe", "distance", 4, "d_safe is missing", "the arm keeps clear"
+            "distance - near.d_safe", "distance", 4, "d_safe is missing", "the arm still touches nothing"
         ),
         "constant bound": Mistake(
-            "-v_stop - speed", "-speed", 3, "the bound is constant", "reaches a target that is free"
+            "-v_stop - speed", "-speed", 3, "the bound is constant", "reaches a target in free space"
         ),
         "no reaction": Mistake(
             "np.sqrt(t**2 + 2.0 * room / a) - t", "np.sqrt(2.0 * room / a)", 4, "t is missing"
@@ -173,8 +175,8 @@ MISTAKES: dict[str, dict[str, Mistake]] = {
             "-v_stop - speed",
             "v_stop - speed",
             3,
-            "the arm stops altogether",
-            "reaches a target that is free",
+            "the arm stops completely",
+            "reaches a target in free space",
         ),
     },
 }

@@ -193,7 +193,7 @@ def test_a_direction_that_is_nobodys_keeps_its_torque(change: str, kept: bool) -
     """Step *A motion without a task*: during a push, Δτ has no component in a direction that moves no task,
     unless a bound or another level requires one."""
     lesson = load_lesson("one-task")
-    assert "in that direction the torque stays what it is, as long as no bound changes it" in " ".join(
+    assert "in that direction the torque does not change, as long as no bound changes it" in " ".join(
         lesson.steps[3].text.split()
     )
     off = () if change == "limits.velocity=true" else ("limits.velocity=false",)

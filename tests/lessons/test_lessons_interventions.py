@@ -112,7 +112,7 @@ def test_a_multiplier_is_half_of_what_a_bound_costs_a_level() -> None:
 def test_clipped_torques_do_not_lie_on_the_line() -> None:
     """*Inside the QP*: if the torque of OSF is clipped joint by joint, the acceleration of level 1
     changes."""
-    assert "the clipped torques no longer lie on the orange line" in told("inside-the-qp/2")
+    assert "The clipped torques would no longer lie on the orange line" in told("inside-the-qp/2")
     scene = load_lesson("inside-the-qp").run_of(step_of("inside-the-qp/2")).but("controller=osf").prepared()
     found = run(scene)
     tau, limit = found["tau_demand"], 0.25 * np.array(scene.robot.tau_limit)

@@ -1,4 +1,4 @@
-"""Takes rights away from the process of a submission before its code runs, as far as the system allows."""
+"""Restricts the process of a submission before its code runs, as far as the operating system allows."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ _SYSCALLS = (
 
 
 class RefusedCalls(list[str]):
-    """The refused calls, in order."""
+    """The calls that were refused, in order."""
 
 
 def limited(memory: int, parent: int) -> None:
@@ -76,8 +76,8 @@ def limited(memory: int, parent: int) -> None:
 
 
 def readable() -> list[Path]:
-    """The places that imports of a solution may read: Python, libraries, and installed packages except the
-    lab's."""
+    """Returns the paths that imports of a solution may read: Python, libraries, and installed packages except
+    the lab's."""
     found = [Path(each) for each in _SINGLE]
     folders = [Path(each) for each in (*sys.path, *(f"{base}/lib" for base in (sys.base_prefix, sys.prefix)))]
     for folder in dict.fromkeys((*folders, *map(Path, _LIBRARIES))):
@@ -87,24 +87,24 @@ def readable() -> list[Path]:
 
 
 def _hidden(path: Path) -> bool:
-    """Whether an entry of a folder is left out: the lab itself, tests, and folders of packages, whose entries
-    are checked one by one."""
+    """Returns whether an entry of a folder is left out. These are the lab itself, tests, and folders of
+    packages, whose entries are checked one by one."""
     name = path.name
     return name in (*LAB, "site-packages", "dist-packages") or name.startswith(("python", "tests"))
 
 
 def confine(places: Sequence[Path]) -> tuple[str, ...]:
-    """Gives up, for the rest of this process, all access to the network, to other processes, and to files
-    except for reading in some places. Returns the names of the mechanisms of the operating system that
+    """Removes this process's access to the network, to other processes and to files until the process ends.
+    Reading in `places` remains allowed. Returns the names of the mechanisms of the operating system that
     enforce this."""
-    calls = _calls()  # before Landlock: loading it looks for a library
+    calls = _calls()  # before Landlock: loading seccomp searches for a library
     steps = (("Landlock", partial(_files, places)), ("seccomp", calls))
     return tuple(name for name, step in steps if step())
 
 
 def _files(places: Sequence[Path]) -> bool:
-    """Forbids reading outside `places`, all writing, signals to other processes and TCP, by Landlock; returns
-    whether that was possible."""
+    """Forbids, by Landlock, reading outside `places`, all writing, signals to other processes and TCP.
+    Returns whether this was possible."""
     try:
         from py_landlock import AccessFs, Landlock
     except ImportError:
@@ -133,16 +133,16 @@ def _calls() -> Callable[[], bool]:
 
 def _without_calls(sec: Any) -> bool:
     """Forbids, by seccomp, all calls that start, signal or read other processes, open sockets or change
-    files; returns whether that was possible."""
+    files. Returns whether this was possible."""
     no, unknown = sec.ERRNO(EPERM), sec.ERRNO(ENOSYS)
     thread = 0x10000  # CLONE_THREAD
     try:
         rules = sec.SyscallFilter(sec.ALLOW)
         for name in _SYSCALLS:
-            with suppress(OSError, ValueError):  # not every processor has all of them
+            with suppress(OSError, ValueError):  # not every processor has all of these calls
                 rules.add_rule(no, name)
         rules.add_rule(no, "clone", sec.Arg(0, sec.MASKED_EQ, thread, 0))
-        rules.add_rule(unknown, "clone3")  # its flags cannot be seen; the C library then uses clone
+        rules.add_rule(unknown, "clone3")  # seccomp cannot read its flags; the C library then uses clone
         rules.add_rule(unknown, "openat2")
         rules.add_rule(no, "tgkill", sec.Arg(0, sec.NE, os.getpid()))
         rules.add_rule(no, "prlimit64", sec.Arg(0, sec.NE, 0))
@@ -177,12 +177,12 @@ def hide_the_lab() -> None:
 
 
 def refuse(places: Sequence[Path], refused: RefusedCalls) -> None:
-    """Makes Python refuse four things in every thread: to open files that no import reads, to start programs,
-    to send signals, and to use the network. It is needed where the operating system does not refuse them. It
-    does not stop hostile code alone.
+    """Makes Python refuse four actions in every thread: opening files that no import reads, starting
+    programs, sending signals, and using the network. This is needed where the operating system does not
+    refuse these actions. By itself it does not stop hostile code.
 
     Args:
-        places: places that imports may read.
+        places: paths that imports may read.
         refused: list to which refused calls are added.
     """
     archives = (each for each in sys.path if not os.path.isdir(each))
@@ -196,7 +196,7 @@ def refuse(places: Sequence[Path], refused: RefusedCalls) -> None:
             writing = bool(set("wax+") & set(mode or "")) or bool((flags or 0) & _CHANGING)
             if not writing and os.path.realpath(os.fsdecode(path)).startswith(allowed):
                 return
-            if not writing and str(path).endswith(".py"):  # as Python itself does, to quote a line
+            if not writing and str(path).endswith(".py"):  # Python itself does this to quote a line
                 raise PermissionError(f"a submission may not read {path}")
         elif not event.startswith(_EVENTS):
             return

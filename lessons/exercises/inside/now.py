@@ -13,18 +13,19 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Ask = Callable[[str, int, list[Array]], Array]
-"""Calls a function of the model on the lab's side: its name, the number of the level, its arguments."""
+"""A call of a function of the model on the lab's side, by its name, the number of the level, and
+arguments."""
 
 OF_TICK = ("q", "q_dot", "q_ddot", "tau_0", "M_bar", "M", "bias", "gravity")
 OF_BOUNDS = ("tau_lower", "tau_upper", "v_lower", "v_upper", "q_lower", "q_upper")
 OF_NEAR = ("d", "gradient", "d_safe", "moving")
 OF_LEVEL = ("error", "x_dot", "x_ddot", "J", "J_dot_q_dot", "displacement_d", "x_dot_d", "x_ddot_d",
             "K_p", "K_v", "Q", "R")  # fmt: skip
-"""The arrays of `himpc.controllers.view`, in the order in which they are sent."""
+"""The names of the arrays of `himpc.controllers.view`, in the order in which they are sent."""
 
 
 def numbers_of(now: Any) -> list[Array]:
-    """The arrays of a `View`, in order."""
+    """Returns the arrays of a `View`, in this order."""
     bounds = now.bounds
     found = [getattr(now, name) for name in OF_TICK]
     found += [getattr(bounds, name) for name in OF_BOUNDS]
@@ -36,7 +37,7 @@ def numbers_of(now: Any) -> list[Array]:
 
 
 def shape_of(now: Any) -> dict[str, Any]:
-    """The data needed to read the arrays: their names and shapes, and the values that are not arrays."""
+    """Returns the data needed to read the arrays: names, shapes, and the values that are not arrays."""
     return {
         "T_s": now.T_s,
         "N": now.N,
@@ -53,7 +54,7 @@ def _read_only(_: object, name: str, __: Any) -> None:
 
 @final
 class Part(SimpleNamespace):
-    """A level, the bounds, or the distances: names and numbers, in the symbols of the HIMPC paper."""
+    """A level, the bounds, or the distances. The names of the attributes are those of the HIMPC paper."""
 
     __setattr__ = _read_only
 
@@ -72,7 +73,7 @@ class Now(SimpleNamespace):
         return self.q.size
 
     def level(self, name: str) -> Part:
-        """A level by its name. Raises KeyError with the names of all levels."""
+        """Returns the level with this name. Raises KeyError with the names of all levels."""
         for level in self.levels:
             if level.name == name:
                 return level
@@ -80,12 +81,12 @@ class Now(SimpleNamespace):
 
 
 def rebuilt(shape: dict[str, Any], data: bytes, ask: Ask) -> Now:
-    """`now` of a tick; its arrays are read-only.
+    """Returns `now` of a tick, with read-only arrays.
 
     Args:
-        shape: `shape_of` the `View`.
+        shape: the result of `shape_of` for the `View`.
         data: the numbers of its arrays, one after the other.
-        ask: calls a function of the model.
+        ask: function that calls a function of the model.
     """
     numbers, arrays, at = np.frombuffer(data, float), [], 0
     for sides in shape["shapes"]:

@@ -1,7 +1,7 @@
 """The process of a submission: it receives the numbers of `now` and answers with a torque.
 
-It imports everything that a solution may need, and no code that runs or judges a robot: the plant, the checks
-and the right answers are in another process, which a submission cannot read, replace or end.
+It imports everything that a solution may need, but no code that simulates or grades a robot. The plant, the
+checks and the right answers are in another process, which a submission cannot read, replace or end.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ from robots import InputError
 
 Law = Callable[[Any], Any]
 ROOT = str(Path(__file__).parents[3])
-"""The folder of the lab; the starting process puts it first in `sys.path`."""
+"""The folder of the lab; the parent process puts this folder first in `sys.path`."""
 
 
 def serve(parent: int, memory: int, kernel: bool) -> None:
     """Answers messages until the pipe closes.
 
     Args:
-        parent: id of the process with which this one ends.
-        memory: bytes of address space that it may have.
+        parent: id of the parent process; this process ends when its parent ends.
+        memory: largest address space of this process, bytes.
         kernel: whether to use the mechanisms of the operating system besides Python's.
     """
     heard, told = os.dup(0), os.dup(1)
@@ -103,4 +103,4 @@ def _answered(found: Any) -> tuple[bytes, bytes]:
 
 
 def _nothing(_: Now) -> None:
-    """The control law before a file was loaded."""
+    """The control law until a file is loaded."""

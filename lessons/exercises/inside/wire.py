@@ -1,4 +1,4 @@
-"""Messages between the lab and the process of a submission: a kind, a length, bytes. Nothing is unpickled."""
+"""Messages between the lab and the process of a submission: kind, length and bytes. Nothing is unpickled."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 LOAD = b"L"
-"""To the submission: execute the file anew. The answer is READY or FAULT."""
+"""To the submission: execute the file again. The answer is READY or FAULT."""
 SHAPE = b"S"
-"""To the submission: the description of the numbers of the next ticks, see `now.shape_of`. No answer."""
+"""To the submission: the description of the numbers of the next ticks, see `now.shape_of`. There is no
+answer."""
 TICK = b"T"
 """To the submission: the numbers of a tick. The answer is TORQUE, OTHER or FAULT, after any ASK."""
 REPLY = b"R"
@@ -29,16 +30,16 @@ OTHER = b"O"
 FAULT = b"F"
 """From the submission: one sentence about its fault."""
 ASK = b"A"
-"""From the submission: JSON of a function of the model that is to be called. The answer is REPLY or FAULT."""
+"""From the submission: a call of a function of the model, in JSON. The answer is REPLY or FAULT."""
 
 HEADER = Struct("<cI")
-LARGEST = 1 << 20  # bytes of a message: far more than the torques of any robot
+LARGEST = 1 << 20  # bytes of a message, far more than the torques of any robot need
 _RANK = Struct("<B")
 _SIDE = Struct("<I")
 
 
 def packed(kind: bytes, data: bytes) -> bytes:
-    """A message as it is written."""
+    """Returns a message as bytes for a pipe."""
     return HEADER.pack(kind, len(data)) + data
 
 
@@ -47,13 +48,13 @@ def of_json(value: Any) -> bytes:
 
 
 def of_array(values: Array) -> bytes:
-    """An array with its shape."""
+    """Returns an array and its shape as bytes."""
     sides = b"".join(_SIDE.pack(side) for side in values.shape)
     return _RANK.pack(values.ndim) + sides + np.ascontiguousarray(values, float).tobytes()
 
 
 def array_of(data: bytes) -> Array:
-    """The array, read-only. Raises ValueError for bytes that do not contain an array."""
+    """Returns the array, read-only. Raises ValueError for bytes that do not contain an array."""
     if not data or len(data) < 1 + 4 * data[0]:
         raise ValueError("no shape")
     begin = 1 + 4 * data[0]
@@ -62,14 +63,14 @@ def array_of(data: bytes) -> Array:
 
 
 def write(pipe: int, kind: bytes, data: bytes) -> None:
-    """Writes a message, however long it takes. Raises OSError."""
+    """Writes a message, without a deadline. Raises OSError."""
     left = memoryview(packed(kind, data))
     while left:
         left = left[os.write(pipe, left) :]
 
 
 def read(pipe: int) -> tuple[bytes, bytes]:
-    """The next message, however long it takes. Raises EOFError if the other side is gone."""
+    """Returns the next message, without a deadline. Raises EOFError if the other side has closed the pipe."""
     kind, length = HEADER.unpack(_exactly(pipe, HEADER.size))
     return kind, _exactly(pipe, length)
 

@@ -1,1 +1,1 @@
-"""The exercises' files with missing lines; they run, and fail their checks."""
+"""The files of the exercises, with missing lines. The files run, but do not pass their checks."""

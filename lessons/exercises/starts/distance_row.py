@@ -15,8 +15,8 @@ EXERCISE = "distance-row"
 
 
 def distance_rows(now):
-    """Rows D (r, n) and their lower bounds (r,): D Δτ ≥ lower, one row for each pair."""
-    # `now.near` has d and d_safe (r,), gradient (r, n), reaction (t, s) and deceleration (a, m/s²).
+    """Returns the rows D (r, n) and their lower bounds (r,): D Δτ ≥ lower, one row for each pair."""
+    # `now.near` has d and d_safe (r,), gradient (r, n), reaction (t in s) and deceleration (a in m/s²).
     # TODO: the next velocity is q̇ + T_s (q̈₀ + M̄⁻¹ Δτ). Which D and which lower bound follow from this?
     return np.zeros((0, now.n)), np.zeros(0)
 
@@ -26,11 +26,11 @@ def torque(now):
     return cascade(now, D, lower)
 
 
-# ------------------------------------------------------------ the levels: exercise two-levels, nothing to add
+# ------------------------------------------------------------ the levels, as in exercise two-levels: complete
 
 
 def cascade(now, D, least):
-    """The torques of the levels under all bounds, D Δτ ≥ least among them."""
+    """Returns the torques of the levels under all bounds, including D Δτ ≥ least."""
     torques, found = [], np.zeros(now.n)
     for level in now.levels:
         H, f = quadratic(now, level)
@@ -43,15 +43,15 @@ def cascade(now, D, least):
             B = above.J / now.M_bar
             rows, lower, upper = np.vstack([rows, B]), np.r_[lower, B @ found], np.r_[upper, B @ found]
         solution = solve_qp(H, f, rows, lower, upper)
-        if not solution.solved:  # no torque meets all rows: come to rest
+        if not solution.solved:  # no torque meets all rows: brake the joints
             return now.tau_0 - now.M_bar * (now.q_ddot + 5.0 * now.q_dot)
         found = solution.x
         torques.append(now.tau_0 + found)
-    return torques  # one row per level: the last one acts
+    return torques  # one row per level: the last row acts
 
 
 def quadratic(now, level):
-    """H and f of ½ΔτᵀHΔτ + fᵀΔτ for ‖e⁰ + G Δτ‖²_Q + ‖Δτ‖²_R: exercise one-level-qp."""
+    """Returns H and f of ½ΔτᵀHΔτ + fᵀΔτ for ‖e⁰ + G Δτ‖²_Q + ‖Δτ‖²_R, as in exercise one-level-qp."""
     T = now.T_s
     G = (1.0 + level.K_v * T)[:, None] * level.J / now.M_bar
     e = (
@@ -64,7 +64,8 @@ def quadratic(now, level):
 
 
 def bounds(now):
-    """lower ≤ rows Δτ ≤ upper: the torque, and the next velocity in N·m."""
+    """Returns rows, lower and upper of lower ≤ rows Δτ ≤ upper: the bounds of the torque, and of the next
+    velocity in N·m."""
     T, limit, share = now.T_s, now.bounds, min(1.0, now.bounds.approach * now.T_s or 1.0)
     scale = now.M_bar / T
     lower = [limit.tau_lower - now.tau_0, (share * (limit.v_lower - now.q_dot) - T * now.q_ddot) * scale]

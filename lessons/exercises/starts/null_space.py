@@ -1,4 +1,4 @@
-"""Exercise null-space: a second task that leaves the first alone (OSF).
+"""Exercise null-space: a second task that does not disturb the first (OSF).
 
 himpc-lab grade FILE.py
 himpc-lab --scene planar3-circle --controller FILE.py
@@ -25,4 +25,4 @@ def torque(now):
         # TODO: project J on the freedom that the levels above leave, and subtract their effect on ẍ.
         tau = tau + J.T @ Lambda @ wanted
         torques.append(now.bias + tau)
-    return torques  # one row per level: the last one acts
+    return torques  # one row per level: the last row acts

@@ -20,11 +20,11 @@ def torque(now):
         rows, lower, upper = bounds(now)
         # TODO: for the second level the rows J₁ M̄⁻¹ with lower = upper = J₁ M̄⁻¹ Δτ₁.
         torques.append(now.tau_0 + solve_qp(H, f, rows, lower, upper).x)
-    return torques  # one row per level: the last one acts
+    return torques  # one row per level: the last row acts
 
 
 def quadratic(now, level):
-    """H and f of ½ΔτᵀHΔτ + fᵀΔτ for ‖e⁰ + G Δτ‖²_Q + ‖Δτ‖²_R: exercise one-level-qp."""
+    """Returns H and f of ½ΔτᵀHΔτ + fᵀΔτ for ‖e⁰ + G Δτ‖²_Q + ‖Δτ‖²_R, as in exercise one-level-qp."""
     T = now.T_s
     G = (1.0 + level.K_v * T)[:, None] * level.J / now.M_bar
     e = (
@@ -37,7 +37,8 @@ def quadratic(now, level):
 
 
 def bounds(now):
-    """lower ≤ rows Δτ ≤ upper: the torque, and the next velocity in N·m."""
+    """Returns rows, lower and upper of lower ≤ rows Δτ ≤ upper: the bounds of the torque, and of the next
+    velocity in N·m."""
     T, limit, share = now.T_s, now.bounds, min(1.0, now.bounds.approach * now.T_s or 1.0)
     scale = now.M_bar / T
     lower = [limit.tau_lower - now.tau_0, (share * (limit.v_lower - now.q_dot) - T * now.q_ddot) * scale]
