@@ -65,9 +65,9 @@ DISTURBED = 0.03
 """m, rad: if the error of the first task grows by more than this, a disturbance has moved the robot, and the
 robot may move back."""
 STALLED, REST = 0.5, 0.02
-"""Shares of the velocity limits. Below the first, a robot stays stalled until something changes. Below the
-second, the robot has come to rest. Between the two shares, the robot brakes, and a change of errors is
-neither progress nor a disturbance."""
+"""Thresholds for `Stall.share`. Below STALLED, the robot stays slow until a reference moves, no obstacle is
+near, or its first task is disturbed. At REST or below, the robot has come to rest. Between the two, the robot
+brakes, and a change of errors is neither progress nor a disturbance."""
 SLOWEST = 0.02
 """rad/s: the velocity limit of a stalled robot's joint is not reduced below this."""
 LEAST_SHARE = 1e-9

@@ -128,7 +128,7 @@ def adapted(
 
 
 def wanted(M: Array, Phi: Array, payload_kg: float, M_bar: Array) -> Array:
-    """Returns the M̄, (n,), with λ_max(M̂⁻¹M̄) = 1, below LARGEST times the value that was set.
+    """Returns M̄, (n,), scaled to λ_max(M̂⁻¹M̄) = 1 and then limited to LARGEST times the M̄ of the settings.
 
     Args:
         M, Phi: the nominal inertia, and the additional inertia per kilogram of payload, (n, n).

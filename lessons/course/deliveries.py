@@ -133,7 +133,7 @@ THERE = Step(
             because="then both robots have the same settings",
         ),
         Claim(
-            "The gain is smaller than in the step before: more than 0.75 times the ghost's time.",
+            "Two tasks save less than in the step before: more than 0.75 of the ghost's time remains.",
             Measure(WORK, over_ghost=True),
             "at least",
             0.75,

@@ -180,10 +180,10 @@ FURTHER = Step(
 LARGE = Step(
     title="M̄ too large",
     text=r"""
-    Four times the $\bar M$ left less than a fifth of the error, and six times leaves even less. Now $\bar
-    M$ is eight times as large. For each eigenvalue $\lambda$ of $M^{-1}\bar M$ a component of the error is
-    multiplied by $1 - \lambda$ in every step. (Remark 4 prints the factor $1 - \bar M_i/\lambda_i(M)$,
-    which is the same for a diagonal $M$ only.)
+    With four times the $\bar M$, less than a fifth of the error remained. With six times the $\bar M$, even
+    less remains. Now $\bar M$ is eight times as large. For each eigenvalue $\lambda$ of $M^{-1}\bar M$ a
+    component of the error is multiplied by $1 - \lambda$ in every step. (Remark 4 prints the factor $1 -
+    \bar M_i/\lambda_i(M)$, which is the same for a diagonal $M$ only.)
     """,
     do="Reset, raise M̄ from 4 in small steps, and read the gauge each time before you run the simulation.",
     why=r"""

@@ -43,7 +43,7 @@ EARLY = Step(
     prediction=Choice(
         "The reference jumps at 8 s. How much of the way back does the base drive before 8 s?",
         (
-            Option("nothing: until 8 s the peak is the task", high=0.05),
+            Option("nothing: until 8 s the reference stays at the peak", high=0.05),
             Option("some centimetres", 0.05, 0.3),
             Option("about half a metre", low=0.3),
         ),

@@ -31,9 +31,9 @@ INVERSE = Step(
     A sideways motion alone needs almost no torque. But the path is curved: right after the start the circle
     demands 0.06 m/s² along the arm, where no joint can move the hand, and the inverse magnifies this
     acceleration many million times. With a gentle start the circle demands no acceleration along the arm at
-    first, and for a tenth of a second the demanded torque is small. Then, at 0.13 s, the demand still
-    exceeds a thousand times the limit, for one or two ticks. A damped inverse, `osf_damped`, demands a
-    fifth of the limit. Real motors clip torques above their limit.
+    first, and for a tenth of a second the demanded torque is small. Then, at 0.13 s, the demand exceeds
+    a thousand times the limit for one or two ticks. A damped inverse, `osf_damped`, demands a fifth of the
+    limit. Real motors clip torques above their limit.
     """,
     prediction=Choice(
         "The hand should only move sideways. What is the largest torque that OSF demands?",

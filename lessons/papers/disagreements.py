@@ -55,7 +55,7 @@ def page(found: Found) -> str:
 
 
 def _remembered() -> Measured:
-    """The stored numbers: a short reproduction does not measure every number of the texts."""
+    """Returns the stored numbers. They replace the numbers that a short reproduction does not measure."""
     return {
         (item, quantity): (ours, ratio)
         for item, memory in stored(False).items()

@@ -49,7 +49,7 @@ def iiwa14_circle() -> TorqueScene:
 
 
 def iiwa14_circle_paper() -> TorqueScene:
-    """`iiwa14-circle-paper`: the same reference, stack and weights as section VI most likely simulated them.
+    """`iiwa14-circle-paper`: `iiwa14-circle` with the plant and the limits that section VI most likely used.
 
     The paper does not describe its plant. We take a weightless robot without friction or armature. It starts
     with the reference's velocity, has no velocity limits, and keeps the position rows (32d) as printed. The

@@ -92,8 +92,8 @@ def _alive(group: int) -> list[psutil.Process]:
 
 
 def _end_marked(mark: tuple[str, str] | None) -> bool:
-    """Ends all processes that have an environment variable with this value, until none of them is left.
-    Returns whether there were any."""
+    """Ends all processes whose environment contains the variable and the value in `mark`, and repeats this
+    until no such process is left. Returns whether there were any."""
     any_found = False
     for _ in range(100 if mark else 0):
         found = []

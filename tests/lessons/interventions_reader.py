@@ -83,7 +83,7 @@ READER_ROWS = (
     ),
     # ---------------------------------------- stretched-out
     Intervention(
-        "stretched-out/0", "Then, at 0.13 s, the demand still exceeds a thousand times the",
+        "stretched-out/0", "Then, at 0.13 s, the demand exceeds a thousand times the limit",
         of("torque share", "%", "largest", 0.12, 0.14), (1e5, INF), ("controller=osf_damped",), (0, 5),
         of=("smooth=true",),
     ),

@@ -50,7 +50,7 @@ def climb_down(
     """Finds increments of level i that satisfy all rows if the rows are feasible; returns the fallback that
     was used."""
     if i > 0 and not t.level[i, ALONE]:
-        # If U_{i−1} is almost the only feasible point, a small slack separates the rows.
+        # If U_{i−1} is almost the only feasible point, opposite bounds nearly coincide: widen them a little.
         if solve_level(data, where, whole, whole_where, i, TOLERANCE):
             return SOLVE
         copy_rows(t.U[i], p.wanted)

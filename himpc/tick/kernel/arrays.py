@@ -17,13 +17,13 @@ class TickArrays(NamedTuple):
     """The arrays of a tick. Each annotation contains the shape, the unit, and "files that write the array →
     files that read it"; files that write an array may also read it.
 
-    Units are those of revolute joints and of positions. For prismatic joints and for angles, rad is exchanged
-    with m, and N·m with N.
+    The units are those of revolute joints and of positions. For prismatic joints, read m for rad and N for
+    N·m; for tasks that are angles, read rad for m.
 
     Sizes: n joints, N knots, N1 = N + 1; M rows of all tasks, m of those that are solved; r levels; T tasks;
     F frames; G rows of tasks that Python computes; J = n + 1 placements, the world first; b rows of bounds, N
     per constraint; g constraints with directions of their own, whose rows are the last ones; w = N · n
-    coordinates of a level; k = w + 1 active rows at most, one of which is about to be replaced.
+    coordinates of a level; k = w + 1 active rows at most: w, and a new row that replaces one of them.
     """
 
     # The input of a tick.

@@ -152,5 +152,5 @@ def predict(
 
 @inline_kernel
 def finite(x: Array) -> bool:
-    """Whether all numbers are finite, and small enough for finite squares and differences of bounds."""
+    """Whether all numbers are finite, and so small that their squares and differences cannot overflow."""
     return dot(x, x, x.size) < 1e18
