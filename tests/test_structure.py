@@ -297,7 +297,7 @@ def test_robots_have_no_other_parts() -> None:
     assert {(part, each) for part, below in ROBOTS.items() for each in below} <= used
 
 
-@pytest.mark.parametrize("package", ["robots", "lessons"])
+@pytest.mark.parametrize("package", ["robots", "himpc", "lessons", "app"])
 def test_files_do_not_import_each_other(package: str) -> None:
     """There are no import cycles; imports for types and inside functions count as well."""
     below = {

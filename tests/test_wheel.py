@@ -58,7 +58,7 @@ def command(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     venv.create(home, with_pip=False, symlinks=True)
     with zipfile.ZipFile(wheel) as archive:
         script = next(name for name in archive.namelist() if name.endswith("entry_points.txt"))
-        assert "himpc-lab = app.commands.early:main" in archive.read(script).decode()
+        assert "himpc-lab = app.commands.console:main" in archive.read(script).decode()
     pip = [
         sys.executable,
         "-m",

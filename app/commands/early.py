@@ -15,10 +15,3 @@ if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
 # No command draws with MuJoCo's own renderer. Without this line, MuJoCo's import would start processes that
 # search for a window library. They take half a second, and Ctrl-C would reach them before our code.
 os.environ.setdefault("MUJOCO_GL", "disable")
-
-
-def main() -> int:
-    """The entry point of the console script."""
-    from app.__main__ import main as run
-
-    return run()

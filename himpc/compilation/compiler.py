@@ -11,9 +11,6 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
-from importlib import import_module
-
-from robots.processes.orphans import end_with
 
 _COMPILES = "HIMPC_LAB_COMPILES"  # variable that is set in the environment of a compiling process
 
@@ -34,7 +31,7 @@ def compile_apart(module: str, tell: Callable[[str], None]) -> None:
     """
     code = (
         f"import sys; sys.path[:] = {sys.path!r}; "
-        f"from himpc.compilation.compiler import serve; serve({module!r})"
+        f"from himpc.compilation.compiler_process import serve; serve({module!r})"
     )
     with subprocess.Popen(
         (sys.executable, "-c", code),
@@ -50,19 +47,3 @@ def compile_apart(module: str, tell: Callable[[str], None]) -> None:
                 tell(line.strip())
         finally:
             child.kill()
-
-
-def serve(module: str) -> None:
-    """Runs in the new process: imports the module and reports every compiled function on standard output."""
-    end_with(0)
-    # A module may print text, which must not be mixed with the reports.
-    with os.fdopen(os.dup(1), "w", buffering=1) as out:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-        from himpc.compilation.compiled import on_compiled
-
-        with on_compiled(lambda name: print(name, file=out)):
-            import_module(module)
-            if module.startswith("himpc."):
-                from himpc.compilation.compiling import compile_all
-
-                compile_all(lambda *_: None)

@@ -18,7 +18,7 @@ from himpc.formulation.forms import StackForm, measure, prepare, usable
 from himpc.formulation.settings import Settings, check_solver
 from himpc.kinematics.configuration import Configuration
 from himpc.limits import LimitsInForce, in_force, ramp, viability_bounds
-from himpc.limits.distance import Near
+from himpc.limits.near import Near
 from himpc.limits.velocity import reaction
 from himpc.plan import Evidence, Plan
 from himpc.references import Preview

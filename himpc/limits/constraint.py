@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from himpc.limits.limits import Limits, LimitsInForce
+from himpc.limits.near import Near
 from himpc.prediction.joint import JointState
-
-if TYPE_CHECKING:
-    from himpc.limits.distance import Near
 
 Array = NDArray[np.float64]
 

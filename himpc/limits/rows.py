@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from himpc.limits.constraint import Constraint, Directions, Moment
 from himpc.limits.constraints import bit_of, imposed
-from himpc.limits.distance import Near
 from himpc.limits.limits import Limits, LimitsInForce
+from himpc.limits.near import Near
 from himpc.limits.position import POSITION
 from himpc.limits.velocity import VELOCITY
 from himpc.prediction.joint import JointState

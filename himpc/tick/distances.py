@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from himpc.constants import PROGRESS, WITHIN
 from himpc.kinematics.geometry import Geometry, geometry
 from himpc.limits.avoidance import Avoidance
-from himpc.limits.distance import Near, row_count
+from himpc.limits.distance import row_count
+from himpc.limits.near import Near
 from himpc.references.observed import NOTHING, Observed
 from himpc.tick.kernel.arena import Arena
 from himpc.tick.kernel.distance_rows import (

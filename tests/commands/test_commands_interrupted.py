@@ -165,7 +165,10 @@ def python(*arguments: str, before: Callable[[], None] | None = None) -> subproc
 
 @pytest.mark.parametrize(
     "start",
-    ["runpy.run_module('app', run_name='__main__')", "from app.commands.early import main; sys.exit(main())"],
+    [
+        "runpy.run_module('app', run_name='__main__')",
+        "from app.commands.console import main; sys.exit(main())",
+    ],
     ids=["module", "script"],
 )
 def test_ctrl_c_while_the_first_modules_load(start: str) -> None:

@@ -16,8 +16,9 @@ from hypothesis import strategies as st
 from himpc.constants import SLOWEST
 from himpc.limits import Limits, in_force
 from himpc.limits.avoidance import Avoidance
-from himpc.limits.distance import Near, least_rates
+from himpc.limits.distance import least_rates
 from himpc.limits.load import loaded, spared
+from himpc.limits.near import Near
 from himpc.limits.overrun import anticipated, followed
 from himpc.limits.stall import going, slowed, stalled
 from himpc.references.observed import Observed
