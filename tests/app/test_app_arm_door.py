@@ -150,7 +150,9 @@ def test_the_door_reads_the_torque_without_gravity(library: FakeLibrary) -> None
 
 
 def test_the_door_tells_what_the_library_tells(library: FakeLibrary) -> None:
-    with pytest.raises(InputError, match="--robot nowhere: Connection error: Host not found; is this"):
+    with pytest.raises(
+        InputError, match="--robot nowhere: Connection error: Host not found; check the address of the arm"
+    ):
         door.Franka("nowhere")
     arm = door.Franka("arm", real_time=True)
     assert library.config == "enforce"

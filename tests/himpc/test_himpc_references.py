@@ -84,7 +84,7 @@ def test_waypoints_are_met_at_rest() -> None:
         np.testing.assert_allclose(preview.value, points[point], atol=1e-12)
         np.testing.assert_allclose(preview.velocity, 0.0, atol=1e-12)
         np.testing.assert_allclose(preview.acceleration, 0.0, atol=1e-9)
-    with pytest.raises(ValueError, match="increasing"):
+    with pytest.raises(ValueError, match="must increase strictly"):
         Waypoints(points, np.array([1.0, 1.0, 2.0]))
 
 

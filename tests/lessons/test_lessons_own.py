@@ -108,11 +108,11 @@ FAULTS = {
     "crashes at import": ("import ctypes\nctypes.string_at(0)\n", "SIGSEGV"),
     "forks at import": (
         "import os\nfor _ in range(4):\n    os.fork()\n",
-        r"line 3: .*no process \(os.fork\)",
+        r"line 3: .*must not start or signal a process \(os.fork\)",
     ),
     "signals at import": (
         "import os, signal\nos.kill(os.getppid(), signal.SIGINT)\n",
-        r"line 2: .*no process \(os.kill\)",
+        r"line 2: .*must not start or signal a process \(os.kill\)",
     ),
     "interrupts at import": ("import _thread\n_thread.interrupt_main()\nwhile True: pass\n", "loading it"),
     "runs a program at import": (
@@ -125,7 +125,7 @@ FAULTS = {
     ),
     "signals in a tick": (
         "import os\ndef torque(now):\n    os.kill(os.getpid(), 2)\n",
-        r"line 3: .*no process \(os.kill\)",
+        r"line 3: .*must not start or signal a process \(os.kill\)",
     ),
     "memory at import": ("x = [0] * 10**12\n", "line 1: .*memory"),
     "no function": ("torque = 3\n", "torque must be a function"),
