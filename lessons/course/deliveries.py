@@ -47,7 +47,7 @@ OVERLAP = Step(
     reaches. By itself, leaving early saves 9 of the ghost's 31 seconds, and reaching early saves 7 (with
     the second task active in one phase only). Both together save 11, less than the sum: once the base is
     there, no driving is left during which the hand could reach. The distance is shorter because the robot's
-    base stays behind its hand. The ghost's only task is the hand, so its base moves with the hand.
+    base stays behind its hand. The ghost's only task is the hand, and its base moves with the hand.
     """,
     prediction=Choice(
         "With the same places and the same speed of the paths, two tasks at a time take …",
