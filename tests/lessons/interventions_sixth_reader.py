@@ -87,7 +87,7 @@ SIXTH_ROWS = (
         for column, bound in ((1, (79.9, 80.1)), (3, (43.9, 44.1)))
     ),
     Intervention(
-        "a-blind-arm/1", "With all its torque the arm presses with 650 N after 4 s",
+        "a-blind-arm/1", "With the full torque of its motors the arm presses with 650 N after 4 s",
         FORCE, (207, 215), ("limits.torque_scale=1",), (645, 655), seconds=4.0,
     ),
     Intervention(
