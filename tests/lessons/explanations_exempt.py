@@ -142,7 +142,7 @@ TEXTS = (
     Exempt("software", (
         HIMPC + "adaptation.py::test_the_largest_eigenvalue_is_one_at_the_payload_and_less_at_a_heavier_one"
     ), (
-        ("results", "`M_bar_adapt=true` finds the payload from the torque that gravity asks for"),
+        ("results", "`M_bar_adapt=true` estimates the payload from the torque that balances gravity"),
     )),
     Exempt("software", "tests/app/test_app_guard.py::test_without_the_token_nothing_opens", (
         ("serving", "Everybody who can open the page can run simulations"),
