@@ -32,7 +32,7 @@ class PoseHistory:
 
     def add(self, frame: Frame) -> None:
         """Adds the newest frame. If the previous frame is closer than 1/RATE to the frame before it, the
-        newest frame replaces it. Thus slow motion needs no more memory."""
+        newest frame replaces the previous frame. Thus slow motion needs no more memory."""
         frames = self._frames
         if frames and frame.t < frames[-1].t:
             frames.clear()

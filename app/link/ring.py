@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 MAX_ROWS = 8192
 MIN_ROWS = 1024
 """Number of rows of about one second of ticks. With fewer rows, a page that is briefly late would miss
-some."""
+rows."""
 _MAX_BYTES = 12_000_000  # of each session
 _MARGIN = 256  # rows the writer may add while a reader copies
 _HEAD = 64  # bytes

@@ -88,7 +88,7 @@ class ConnectionGuard:
                 return self._to_class(self._class, connection, request)
             answer = self._judge(connection, request)
             if answer is None and of_a_class and is_upgrade(request):
-                answer = NO_CLASS  # a proxy may let this address through without a password
+                answer = NO_CLASS  # some proxies ask for no password at this address
             if answer is not None:
                 self.refused += answer.status >= HTTPStatus.BAD_REQUEST
                 return as_response(answer)

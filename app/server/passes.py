@@ -17,7 +17,7 @@ from websockets.datastructures import Headers
 from robots import InputError
 
 QUERY = "himpc-token"
-"""The name of the parameter in the address. The name `token` is used by Jupyter, which may serve a lab."""
+"""The name of the parameter in the address. It differs from `token`, the name that Jupyter uses."""
 HEADER = "X-Himpc-Lab-Token"
 """The name of the header in which a proxy may send the token of its visitors."""
 USER_HEADER = "X-Himpc-Lab-User"

@@ -133,7 +133,7 @@ class PageServer:
             raise address_in_use(host, port)
         self.url = local_url(host, found)
         self.outside = self.proxies[0] if self.proxies else seen_from_outside(host, self.url)
-        """The address for other machines, in numbers: phones rarely find a machine by its name."""
+        """The address for other machines, in numbers, as phones rarely find a machine by its name."""
         self._viser.gui.configure_theme(show_share_button=False, show_logo=False)
         self._viser.on_client_connect(self._connect)
         self._viser.on_client_disconnect(self._disconnect)

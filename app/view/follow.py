@@ -18,8 +18,8 @@ class FollowBase:
 
     A browser's camera message is late: while the base moves, the message is some pictures old, and its
     position lacks the motion since then. Therefore only the direction and distance of the camera are taken
-    from the message while the base moves; following does not change them. The point that the camera looks at
-    is taken from the message only while the base is at rest.
+    from the message while the base moves; following the base does not change them. The point that the
+    camera looks at is taken from the message only while the base is at rest.
     """
 
     def __init__(self, camera: viser.CameraHandle) -> None:
@@ -29,8 +29,8 @@ class FollowBase:
         self._rests = 0
 
     def follow(self, base: np.ndarray, on: bool) -> None:
-        """base: the base's position, (3,) m; on: whether the camera follows the base, from its position at
-        that time on."""
+        """base: the base's position, (3,) m; on: whether the camera follows the base. When `on` becomes
+        true, the motion is measured from the present position."""
         if not on:
             self._at = None
             return

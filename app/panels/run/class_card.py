@@ -21,7 +21,7 @@ _SAYS = {
 }
 _NAME = "Your name"
 _CUT_OFF = (
-    "<b>Class.</b> The connection to your teacher's computer is interrupted. Go on: your teacher gets "
+    "<b>Class.</b> The connection to your teacher's computer is interrupted. Continue: your teacher gets "
     "your results when the connection is back."
 )
 

@@ -26,7 +26,7 @@ from lessons.teaching.measure import Measure, Signal
 from lessons.teaching.prediction import Choice, PredictionResult, Sketch, Value
 from robots import InputError
 
-_JUDGE_EVERY = 5  # reports; this is twice a second
+_JUDGE_EVERY = 5  # number of reports between two judgements, which are made twice a second
 _CHUNK = 0.01  # s: the longest computation of the ghost between two checks for commands
 FAST = 50.0
 """Simulation speed for a run that should end as soon as possible. No computer can reach this speed."""
