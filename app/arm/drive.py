@@ -268,8 +268,8 @@ def hurry(priority: int) -> None:
 
 
 def _work(plan: Drive, controller: NativeController, orders: Orders, block: Block, pipe: Any) -> None:
-    """The process of the loop. It ignores interrupts: the watcher gets them and asks the loop to end
-    gently."""
+    """The process of the loop. It ignores interrupts, because the watcher gets them and asks the loop to
+    end gently."""
     signal.set_wakeup_fd(-1)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, lambda *_: orders.stop())

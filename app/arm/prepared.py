@@ -68,7 +68,7 @@ def prepared(scene: TorqueScene, start: Array, limits: ArmLimits, texts: Sequenc
 
 def nominal(scene: TorqueScene, plain: TorqueScene) -> TorqueScene:
     """Returns `scene` with the plant of the scene `plain`. `--set plant.…` thus changes only
-    the arm that replaces a real arm, and not the simulation beside the arm."""
+    the simulated arm (see `himpc-lab arm`), and not the model beside the arm."""
     return replace(scene, settings=replace(scene.settings, plant=plain.settings.plant))
 
 

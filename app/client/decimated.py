@@ -93,7 +93,7 @@ class History:
         return len(rows)
 
     def _take(self, rows: np.ndarray) -> None:
-        self.latest = rows[-1].copy()  # a copy: a view would keep all rows in memory
+        self.latest = rows[-1].copy()  # a copy, as a view would keep all rows in memory
         bits = rows[:, self.layout.fields["at_bound"]]
         bits = np.where(np.isfinite(bits), bits, 0).astype(np.int64)
         for k in range(self.bound_ticks.shape[1]):

@@ -39,7 +39,7 @@ class PoseHistory:
         if len(frames) > 1 and frames[-1].t - frames[-2].t < 1 / RATE - 1e-9:
             frames.pop()
         frames.append(frame)
-        # The limit is a time, not a number of frames: a busy machine gives fewer frames per second.
+        # The limit is a time, not a number of frames, as a busy machine gives fewer frames per second.
         del frames[: self._index(frame.t - KEPT)]
 
     def clear(self) -> None:

@@ -41,7 +41,7 @@ def interruptible() -> Iterator[Interrupted]:
         interrupted.set()
         if frame is None or frame.f_code is not unraisable.__code__:
             raise KeyboardInterrupt
-        signal.setitimer(signal.ITIMER_REAL, _LATER)  # Python would only report an exception of its hook
+        signal.setitimer(signal.ITIMER_REAL, _LATER)  # an exception in Python's hook is only reported
 
     def unraisable(report: UnraisableHookArgs) -> None:
         if interrupted.is_set():

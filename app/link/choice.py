@@ -32,8 +32,8 @@ class SceneChoice:
         exercise: the step of a lesson, if the choice is one.
         mine: the learner's changes to that step, as assignments; they are applied once when the step is
             loaded.
-        scenes: Python files that may be the scene. Of all Python files, only these and the run's `files` and
-            `tasks` are executed: the person who started the program named them.
+        scenes: Python files that can be chosen as the scene. Of all Python files, only these and the run's
+            `files` and `tasks` are executed: the person who started the program named them.
         within: the folder that must contain the URDF and its meshes, if the URDF was named on the page.
     """
 

@@ -32,8 +32,8 @@ _HEAD = 64  # bytes
 
 class Block:
     """A ring of telemetry rows (width float64) and the poses of joints 1 … n and the tip, (n + 1, 7):
-    position, m, and quaternion wxyz. The memory has no name: it is freed with the last process that uses it,
-    however that process ends."""
+    position, m, and quaternion wxyz. The memory has no name, so it is freed when the last process that
+    uses it ends for any reason."""
 
     def __init__(self, width: int, bodies: int, handle: Handle | None = None) -> None:
         """Creates the memory, as large as the machine allows, or attaches to the memory of `handle` and

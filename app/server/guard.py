@@ -286,7 +286,7 @@ def _nothing(_: ServerConnection, __: Request) -> Response | None:
 
 
 def _log() -> logging.Logger:
-    """Returns a silent logger: malformed requests from outside are not reported on the terminal."""
+    """Returns a silent logger, so that malformed requests from outside are not reported on the terminal."""
     log = logging.getLogger("himpc-lab.connections")
     log.propagate = False
     log.setLevel(logging.CRITICAL)

@@ -271,8 +271,8 @@ _HAND_IN = "The lab stops in {:.0f} s: save your data, or hand in your progress 
 
 
 def _check_choice(choice: SceneChoice) -> None:
-    """Checks a choice before the server starts: a wrong name or file then gives one sentence on the terminal.
-    If the names are not enough for the check, the scene is loaded, which takes a second."""
+    """Checks a choice before the server starts, so that a wrong name or file gives one sentence on the
+    terminal. If the names are not enough for the check, the scene is loaded, which takes a second."""
     if not choice.known:
         from app.worker.reports.start import start
 

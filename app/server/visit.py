@@ -89,7 +89,7 @@ class Visit:
             self._own_files = None
         self._teaches = isinstance(connection, GuardedConnection) and connection.teaches
         self._account = connection.account if isinstance(connection, GuardedConnection) else ""
-        # All accounts of a hub have one origin, so a browser stores their values together, by different keys.
+        # All accounts of a hub have one origin. A browser stores their values together, under different keys.
         self._progress_key, self._tokens_key = (
             f"{key}-{self._account}" if self._account else key for key in (_PROGRESS, _TOKENS)
         )

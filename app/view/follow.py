@@ -8,7 +8,7 @@ import viser
 from app.view.camera import turn
 
 _STEP = 0.02
-"""Motion of the base, m, below which the camera stays: a trembling camera is unpleasant."""
+"""Motion of the base, m, below which the camera stays, since a trembling camera is unpleasant."""
 _REST = 30
 """Number of calls with the base at rest after which the browser's last camera message is up to date."""
 

@@ -40,7 +40,7 @@ class ClassCard:
         if call is None and name:
             gui.add_html(block(f"Your teacher sees your account, <b>{esc(name)}</b>."))
         elif call is not None:
-            typed = gui.add_text(_NAME, name, hint="Only your teacher sees your name. It may be empty.")
+            typed = gui.add_text(_NAME, name, hint="Only your teacher sees your name. It is optional.")
 
             @typed.on_update
             async def _(_: object) -> None:

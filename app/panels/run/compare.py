@@ -45,7 +45,7 @@ class ComparePanel:
         self._settings = [self._row(gui, place) for place in range(1, _ROWS + 1)]
         self._start = gui.add_button("Start the ghost", color=button(GHOST))
         self._swap = gui.add_button(
-            "Swap robot and ghost", hint="They swap their settings and start again", visible=False
+            "Swap robot and ghost", hint="Robot and ghost swap settings and start again", visible=False
         )
         self._end = gui.add_button("Remove the ghost", visible=False)
         self._table = gui.add_html("", visible=False)

@@ -25,8 +25,8 @@ class Controls(Generic[S]):
     """Adds controls and binds each to the path of a setting: a control shows the setting and posts its
     changes.
 
-    Each control is in an unnamed folder: if two inputs of the same container change at once, viser loses one
-    of the changes.
+    Each control is in an unnamed folder, because viser loses a change if two inputs of the same container
+    change at once.
     """
 
     def __init__(self, gui: viser.GuiApi, bindings: Bindings[S], settings: S) -> None:

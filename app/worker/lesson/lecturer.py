@@ -147,8 +147,8 @@ class Lecturer:
         return True
 
     def _foreign_change(self) -> str:
-        """Returns a sentence if an attempt at a challenge cannot count: another setting than those of the
-        challenge was changed, or a setting of the challenge is outside its range. Otherwise returns ""."""
+        """Returns a sentence if an attempt at a challenge cannot count: a setting that does not belong to
+        the challenge was changed, or one that belongs to it is outside its range. Otherwise returns ""."""
         assert isinstance(self._part, Challenge)
         now = self._session.settings
         allowed = self._own
