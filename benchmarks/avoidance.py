@@ -4,12 +4,12 @@ distances.
     python -m benchmarks.avoidance [--chains 25] [--robots iiwa14 panda baxter generated] [--off] [--balls]
                                    [--seed 1] [--controller himpc] [--set PATH=VALUE …]
 
-Every chain drags the hands of a robot four times, once a second, in position alone or in pose. Each new
-target is 0.1 to 0.6 m from the present target in a random direction, so that many targets lie in the floor,
-in the robot or out of reach. Then the robot has three seconds to come to rest. With `--balls`, a ball is
-dragged through the arm four times instead, at 0.15 to 0.5 m/s, from 0.6 m before a moving link to 0.6 m
-behind it. The ball does not pass through the first three joints, which cannot move out of its way. Any
-controller can run.
+Every chain drags the hands of a robot four times, once a second, in position alone or in position and
+orientation. Each new target is 0.1 to 0.6 m from the present target in a random direction, so that many
+targets lie in the floor, in the robot or out of reach. Then the robot has three seconds to come to rest. With
+`--balls`, a ball is dragged through the arm four times instead, at 0.15 to 0.5 m/s, from 0.6 m before a
+moving link to 0.6 m behind it. The ball does not pass through the first three joints, which cannot move out
+of its way. Any controller can run.
 
 The program prints a line of a Markdown table for each robot: the drags; the deepest penetration between
 bodies whose distance is kept, by MuJoCo's geometry; the chains in which this penetration exceeds 1 mm; the
@@ -54,8 +54,8 @@ DEEP_M, AT_REST = 1e-3, 0.05
 BALL_M, BESIDE_M, BALL_SPEED = 0.08, 0.6, (0.15, 0.5)
 """Radius of a dragged ball, the length of its path before and behind a link, and its range of speeds, m/s."""
 PAST_M, CLEAR_M = 0.25, 0.35
-"""The smallest distance, m, of the ball's path from the first three joints of an arm, and of its start from
-the whole arm."""
+"""The smallest distance, m, between the ball's path and the first three joints of an arm, and between the
+start of the path and the whole arm."""
 AWAY = np.array([0.0, 0.0, 10.0])
 """The position at which the ball waits, m."""
 SCENES = {"iiwa14": "iiwa14-hold", "panda": "panda-hold", "baxter": "baxter-hold"}

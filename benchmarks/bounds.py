@@ -9,8 +9,8 @@ and, if it has a target, once with a target that jumps every 50 ms. For each run
 a Markdown table: the number of QPs without a verified optimum, the largest joint velocity as a share of its
 limit, the processor time of the longest step, and the largest share of its budget that a tick of the compiled
 route used. --quick runs only the few hardest cases; --alone leaves out the explicit route. The exit code is 1
-if the compiled route leaves a larger share of QPs unsolved than the explicit route, if a joint exceeds its
-limit and its speed with the explicit route by more than 2 %, or if a step takes more than 20 ms.
+if the compiled route leaves a larger share of QPs unsolved than the explicit route, if it moves a joint more
+than 2 % faster than the joint's limit and than the explicit route does, or if a step takes more than 20 ms.
 """
 
 from __future__ import annotations

@@ -79,8 +79,8 @@ class Viewer:
         address = urlsplit(self._url)
         line.connect((address.hostname, address.port))
         queue = 1 if slow or self._delay else 16
-        # The page's clients send no pings: on a machine that is too busy to answer a ping, this library would
-        # close the connection.
+        # Like a browser, this client sends no pings. If the machine were too busy to answer a ping, this
+        # library would close the connection.
         connection = connect(
             self._url,
             sock=line,
@@ -94,8 +94,8 @@ class Viewer:
         return connection
 
     def watch(self, client: int, asked: SimpleQueue[int]) -> None:
-        """Stays connected until it is cancelled, and prints a line of JSON every second. asked: receives the
-        numbers of reloads to make."""
+        """Stays connected until it is cancelled, and prints a line of JSON every second. asked: a
+        queue of requests, each with the number of reloads to make."""
         while self._watch(client, asked):
             came = sum(self.visit() for _ in range(asked.get()))
             _tell({"client": client, "came": came})

@@ -30,7 +30,7 @@ from robots.mechanics import model
 LOW = {
     "iiwa14-hold": ("position", (0.6, 0.1, -0.3)),
     "panda-hold": ("position", (0.55, 0.1, -0.15)),
-    "baxter-hold": ("right", (0.1, -0.3, 0.8)),  # inside its own chest, because it cannot reach the floor
+    "baxter-hold": ("right", (0.1, -0.3, 0.8)),  # in the robot's chest, because it cannot reach the floor
 }
 """Targets that lie inside the floor or the robot."""
 BENT = {"iiwa14": (0, 60, 0, -30, 0, 30, 0), "panda": (0, 60, 0, -60, 0, 90, 45)}
@@ -88,8 +88,8 @@ def timed(plant: Plant) -> list[float]:
 
 
 def press(seconds: float) -> list[dict[str, object]]:
-    """Lets each arm fall on its floor, with viscous friction, for several contacts and steps; returns the
-    results."""
+    """Lets each arm fall on its floor, with viscous friction, for several time constants of the contact and
+    several steps of the plant. Returns the results."""
     found: list[dict[str, object]] = []
     for name in BENT:
         robot = load_robot(name)

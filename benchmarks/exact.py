@@ -2,9 +2,9 @@
 the reference for the compiled and the explicit route.
 
 Only the problem's data come from `himpc`. For a set of active rows the optimality conditions of (32) or (34),
-with (33) as printed, are linear. They are solved in doubles. The solution is then corrected until the
-residuals vanish, which are evaluated in integers of several hundred bits. The dual method of Goldfarb and
-Idnani finds the set of active rows. It starts from a guess if all multipliers of the guess have the right
+with (33) as printed, are linear. They are solved in doubles. The solution is then corrected until its
+residuals vanish. The residuals are evaluated in integers of several hundred bits. The dual method of Goldfarb
+and Idnani finds the set of active rows. It starts from a guess if all multipliers of the guess have the right
 signs. Otherwise it starts without any row. The cost is strictly convex, so a point that satisfies the
 conditions is the optimum for any guess.
 """
@@ -29,8 +29,8 @@ Fixed = NDArray[Any]
 
 _BITS = 300
 _RANK = 1e-10
-"""If a direction has an effect on a level below this share of the level's rows, lower levels may use the
-direction, as in himpc."""
+"""Lower levels may use a direction, as in himpc, if its effect on a level is less than this share of the
+level's rows."""
 _DEPENDENT = 1e-13
 """A bound counts as dependent on the held rows if at most this share of it is independent of these rows."""
 _BEYOND = 1e-11

@@ -7,8 +7,8 @@
 franka-sim has an environment of its own, because it needs an older MuJoCo and NumPy than himpc-lab;
 without the package robot_descriptions, franka-sim cannot download anything. Both sides run in a network
 namespace of their own that has only a loopback interface (`unshare`, `ip`). The robot is our own panda,
-without friction; franka-sim enforces its limits on communication and motion. The drive on a page needs
-Chromium; `--picture FILE` stores a picture of that page.
+without friction; franka-sim enforces its limits on communication and motion. The run that drives the
+arm from a page needs Chromium; `--picture FILE` stores a picture of that page.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
     python franka_server.py ROBOT.xml ROBOT.urdf M_BAR Q_0 CLOCK
 
 This script runs in another Python environment, because franka-sim needs an older MuJoCo and NumPy. M_BAR and
-Q_0 are numbers separated by commas. M_BAR is in proportion to the gains with which the arm itself holds its
+Q_0 are numbers separated by commas. M_BAR is proportional to the gains with which the arm itself holds its
 posture, and Q_0 is the arm's initial posture. If CLOCK is "step", the arm waits for the answer to its last
 state, moves by one period and sends the next state, as if its drives and its network shared a clock. If CLOCK
 is "own", franka-sim works as usual: the simulation runs beside the network.

@@ -51,7 +51,8 @@ BOUNDED = ("himpc", "hiqp", "nhimpc", "weighted", "hqp")
 """Controllers that impose the torque bounds."""
 LONGEST_S = 0.020
 _KNOTS = 150
-"""Largest product of joints and knots. With it, an undisturbed step must take much less than LONGEST_S."""
+"""Largest product of joints and knots. An undisturbed step of this size must take much less than
+LONGEST_S."""
 
 
 @dataclass

@@ -33,7 +33,7 @@ SETTLE = 5.0  # s
 LONG = 120.0  # s
 HOLDS, PLOTS_HZ = 0.99, 10.0
 """Smallest real-time factor and plot rate. The factor is the ratio of two clocks that are read a moment
-apart, so that more digits would be noise."""
+apart, so that a stricter limit would judge noise."""
 
 
 def main() -> int:

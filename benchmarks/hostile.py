@@ -86,12 +86,12 @@ class HostileUser:
                 case 4:
                     said[self._random.choice(("fov", "near", "far"))] = self._random.number()
                 case _:
-                    # From the position that the page itself set.
+                    # The camera looks at the position that the page gave to it.
                     said["look_at"] = self.page.eye or self._random.place()
         self._send("ViewerCameraMessage", said)
 
     def _look_while_built(self) -> None:
-        """Loads another scene. Until it is built, the camera looks at its own position or has no size."""
+        """Loads another scene. Until that is built, the camera looks at its own position or has no size."""
         odd, before = self._random.choice(LOOKS), len(self.page.made)
         self._choose_scene()
         for _ in range(100):

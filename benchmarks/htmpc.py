@@ -30,7 +30,7 @@ PLACES = (
     ("lessons.session.velocity", "VelocitySession", "lessons.scenes.missions", "velocity_scene"),
     ("lessons.mobile.session", "MobileSession", "lessons.scenes.mobile", "mobile_scene"),
 )
-"""The modules of session and scenes, now and in older checkouts."""
+"""The modules and names of the session and of its scenes, in this checkout and in older ones."""
 
 
 def child(scene: str) -> None:

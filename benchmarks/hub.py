@@ -3,9 +3,10 @@
     PATH=FOLDER/node_modules/.bin:$PATH python -m benchmarks.hub [--pictures FOLDER]
 
 The program needs the hub's own proxy (`npm install configurable-http-proxy`) and a Chromium. The exit code is
-0 under two conditions. Both texts are signed and name only the account of the hub and the step. Every request
-that does not come through the user's own Jupyter server is refused: over the port itself, over Jupyter's path
-for any port, and without a login. The program prints the waiting times of the two users.
+0 if two conditions hold. First, both handed-in texts are signed and name only the account of the hub and the
+step. Second, every request that does not come through the user's own Jupyter server is refused: over the port
+itself, over Jupyter's path for any port, and without a login. The program prints the waiting times of the two
+users.
 """
 
 from __future__ import annotations

@@ -230,7 +230,7 @@ class Monkey:
                 if status is None
                 else f", speed {status.speed:g}, {status.real_time_factor:.2g} × real time"
             )
-            self.found.blame(f"no tick after {ticks} for {ANSWER:g} s in {self._where()}{asked}")
+            self.found.blame(f"no new tick after tick {ticks} for {ANSWER:g} s in {self._where()}{asked}")
         try:
             self.page.evaluate("() => document.title")
         except Error as error:

@@ -19,7 +19,7 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # threads wait for each other on matrices this small
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # several threads are slower on such small matrices
 
 import numpy as np
 from numpy.typing import NDArray
@@ -152,7 +152,7 @@ def stacks(count: int, seed: int, longest: int, robots: tuple[str, ...]) -> Iter
 def table(found: list[Found]) -> str:
     """Returns one row per robot, in Markdown."""
     lines = [
-        "| robot | levels, held by bounds | compiled: none, worst error | explicit: none, worst error |",
+        "| robot | levels, at a bound | compiled: no point, worst error | explicit: no point, worst error |",
         "|---|--:|--:|--:|",
     ]
     for robot in [*dict.fromkeys(each.robot for each in found), "all"]:

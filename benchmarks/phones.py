@@ -40,7 +40,7 @@ def main() -> int:
     parser.add_argument("--scene", default="iiwa14-circle")
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--json", choices=["-"], default=None)
-    parser.add_argument("--at", default=None, help="runs only the phones, of the class at this address")
+    parser.add_argument("--at", default=None, help="runs only phones; they join the class at this address")
     options = parser.parse_args()
     if options.at is not None:
         asyncio.run(be_phones(options.at, options.phones))

@@ -69,7 +69,7 @@ def _processor_time(server: PageServer) -> float:
 def _follow(
     server: PageServer, runs: dict[tuple[str, LessonPlace], list[float]], over: threading.Event
 ) -> None:
-    """Records when the run of each learner begins and ends, to 0.02 s, and its duration in simulated time."""
+    """Records when each learner's run begins and ends (accuracy 0.02 s), and its simulated duration."""
     while not over.wait(0.02):
         for learner in server.sessions.learners:
             lecture = learner.lecture

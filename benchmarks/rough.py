@@ -144,7 +144,7 @@ def _hang(learner: SimulationClient) -> None:
 def _recovers(
     learner: SimulationClient, page: Wire, harm: Callable[[SimulationClient], None], by_reset: bool
 ) -> bool:
-    """Returns whether the page says what is wrong, and whether its button starts a running robot again."""
+    """Returns whether the page reports the fault, and whether its button makes the robot run again."""
 
     def says() -> bool:
         return any(page.shows(badge) for badge in ("STOPPED", "SILENT", "LOADING"))

@@ -4,10 +4,10 @@ prints.
     python -m benchmarks.several [--picture FILE]
 
 Six learners connect, one of them in a browser, and the seventh learner is asked to wait. Two learners leave.
-Then the server of the browser is killed. Its two learners continue on another server, at the same step of the
-lesson. The program prints after how many seconds they continue. At the end, a server receives SIGTERM. It
-admits nobody, and its page is informed and continues on another server. The exit code is 0 if all of this
-happened and each learner of the killed server continued within 10 s.
+Then the server of the learner in the browser is killed. Its two learners continue on another server, at the
+same step of the lesson. The program prints after how many seconds they continue. At the end, another server
+receives SIGTERM. It then admits nobody, and its page is informed and continues on another server. The exit
+code is 0 if all of this happened and each learner of the killed server continued within 10 s.
 """
 
 from __future__ import annotations

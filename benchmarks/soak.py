@@ -11,9 +11,9 @@ since the histories were full, the numbers of threads and handles are the same a
 at most 5 MB.
 
 The measured memory is the memory that a process has written and does not share with other processes. Free
-memory is returned to the system first. Without this, the memory that an allocator keeps would vary by more
-than a leak. The pages of libraries also vary, because they are shared only as long as another program on the
-machine uses them; they are not counted.
+memory is returned to the system first. Otherwise the memory that an allocator keeps would vary by more than a
+leak adds. The pages of libraries are not counted: their memory also varies, because they are shared only as
+long as another program on the machine uses them.
 """
 
 from __future__ import annotations
@@ -143,12 +143,12 @@ def rested(client: int) -> float:
 
 
 def watched(minutes: float, client: int, after: float = 0.0) -> list[Sample]:
-    """Returns samples over a number of minutes, and enough of them for a verdict. after: the minute of the
-    first sample."""
+    """Returns samples over a number of minutes, or over a longer time if these are too few for a verdict.
+    after: the minute of the first sample."""
     began, found = time.monotonic(), list[Sample]()
     while (minute := (time.monotonic() - began) / 60) < minutes or len(found) < 2 * NEAR:
         found.append(sample(after + minute, client))
-        if len(found) % 12 == 1:  # because a run takes an hour and may fail at its end
+        if len(found) % 12 == 1:  # a run takes an hour and may fail at its end
             print(json.dumps(asdict(found[-1])), file=sys.stderr, flush=True)
         time.sleep(EVERY)
     return found

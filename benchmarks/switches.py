@@ -58,7 +58,7 @@ BASE, EACH = 300.0, 50.0
 
 @dataclass
 class Period:
-    """Samples of memory, MB, since `began`, minutes."""
+    """Samples of the memory, MB, from the minute `began` on."""
 
     began: float
     megabytes: list[float] = field(default_factory=list)

@@ -1,4 +1,4 @@
-"""Measures that visitors without access read nothing, and that silent or flooding connections delay nobody.
+"""Checks that visitors without access read nothing, and that silent or flooding connections delay nobody.
 
     python -m benchmarks.visitors [--silent 200] [--seconds 5] [--no-browser]
 

@@ -148,8 +148,8 @@ def _scale(path: str, words: str, ends: tuple[float, float], value: float) -> st
 def _slider(
     words: str, unit: str, ends: tuple[float, float], value: Any, *, log: bool = False, **given: str
 ) -> str:
-    """Returns a slider. With `log`, its position is the logarithm of the value. It shows the first of several
-    values."""
+    """Returns a slider. With `log`, its position is the logarithm of the value. If there are
+    several values, the slider shows the first one."""
     first = float(value[0] if isinstance(value, list | tuple) else value)
     low, high, at = ((math.log10(max(each, 1e-9)) if log else each) for each in (*ends, first))
     told = f"{float(f'{first:.3g}'):g} {unit}".strip()

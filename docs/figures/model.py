@@ -101,7 +101,7 @@ def _joint(model: mujoco.MjModel, joint: int, k: int) -> str:
 
 def _geom(model: mujoco.MjModel, robot: Robot, geom: int) -> str:
     """Returns a geom as text. A hull is written in the coordinates of its body. In MuJoCo's compiled model
-    its origin is the centre of the hull."""
+    the origin of the geom is the centre of the hull."""
     solids = robot.collision.solids
     told: dict[str, object] = {"name": model.geom(geom).name, "priority": model.geom_priority[geom]}
     told |= {"friction": model.geom_friction[geom], "solref": model.geom_solref[geom]}

@@ -12,8 +12,8 @@ LEFT, RIGHT, TOP, BOTTOM = 58, 8, 8, 22
 _DECADES = 300.0
 """Nonnegative values are drawn on a logarithmic axis if most of them span more than this factor."""
 _MOST = 0.05
-"""The share of the smallest values that are not counted for this span: an error or a distance is zero at the
-start of a run."""
+"""The share of the smallest values that are not counted for this span, because an error or a distance is zero
+at the start of a run."""
 FLOORS = {"m": 1e-6, "mm": 1e-3, "deg": 1e-3, "%": 1e-2, "m/s²": 1e-6, "N·m": 1e-4}
 """The lower end of a logarithmic axis for each unit. Smaller values are rounding errors and are drawn at that
 end."""
@@ -92,7 +92,7 @@ def _values(plot: Mapping[str, Any]) -> list[float]:
 
 
 def _floor_words(plot: Mapping[str, Any]) -> str:
-    """Returns a sentence about the values that are below the end of the axis; "" if there are none."""
+    """Returns a sentence about the values that are below the lower end of the axis; "" if there are none."""
     values, unit = _values(plot), plot["unit"]
     if not values:
         return ""

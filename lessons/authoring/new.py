@@ -27,8 +27,8 @@ TASKS: tuple[str, ...] = (
     "plane_distance",
 )
 """Kinds of tasks that can be used as a template. Two kinds are left out. Tasks on joints have little to
-change. The target of a pointing task is not a value of the task's coordinates, as a task in a file needs.
-"""
+change. The target of a task in a file must be a value of the task's coordinates, which is not true of a
+pointing task."""
 
 
 def choices(kind: Kind) -> Sequence[str]:

@@ -110,8 +110,8 @@ def _spread(times: list[float]) -> dict[str, float]:
 
 
 def ratios(timings: Sequence[Timing]) -> dict[str, Any]:
-    """Returns two ratios per horizon: the step time of each route to that of the compiled route, and ProxQP's
-    QP time to DAQP's."""
+    """Returns, for each horizon, the ratio of each route's step time to that of the compiled route, and the
+    ratio of ProxQP's QP time to DAQP's."""
     found = {(t.horizon, t.route, t.solver): t for t in timings}
     result = {}
     for N in sorted({t.horizon for t in timings}):

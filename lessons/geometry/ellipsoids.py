@@ -41,7 +41,7 @@ class Ellipsoid:
 def ellipsoids(configuration: Configuration, stack: Stack) -> list[Ellipsoid]:
     """The ellipsoids of all frame tasks of the enabled levels, highest priority first.
 
-    An ellipsoid has the axes that its task controls: that of a task that controls x alone is a line along x.
+    An ellipsoid has only the axes that its task controls. If the task controls x alone, it is a line along x.
     """
     n = configuration.q.size
     free, found = np.eye(n), []

@@ -63,7 +63,7 @@ def tick_of(session: TorqueSession) -> TickProblems:
 
 
 def plane_of(session: TorqueSession, joints: tuple[int, int], through: str, shift: float = 0.0) -> Plane:
-    """The cut through the last tick along the first increments of two joints.
+    """The cut through the QPs of the last tick in the plane of the first increments of two joints.
 
     Args:
         session: the session.

@@ -54,8 +54,8 @@ class Allowed:
     span: Array
 
     def segment(self, box: TorqueBox) -> Array | None:
-        """The ends (2, 2) of the part of a line that is in the box, ±inf for an end without a bound; None if
-        there is no such part, or if this is not a line."""
+        """The ends (2, 2) of the part of the line that is in the box, ±inf for an end without a bound. None
+        if there is no such part, or if the allowed points are not a line."""
         if self.at is None or self.span.shape[1] != 1:
             return None
         low, high = _stretch(self.at, self.span[:, 0], box)

@@ -17,7 +17,7 @@ _T = TypeVar("_T")
 
 
 class TooLong(BaseException):
-    """Ends a call. User code does not catch a BaseException by mistake."""
+    """Is raised to end a call. It is a BaseException, which user code does not catch by mistake."""
 
 
 def within(seconds: float, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:

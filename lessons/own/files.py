@@ -91,7 +91,7 @@ def with_fingerprint(mark: str, files: Iterable[str], kind: str) -> str:
     if alike:
         raise InputError(
             f"{Path(alike[0]).name} differs from the {shortened(name, 60)} with which this was made: "
-            f"its content is another, {fingerprint(alike[0])} not {shortened(mark, 100)}; get that file"
+            f"its fingerprint is {fingerprint(alike[0])} instead of {shortened(mark, 100)}; get that file"
         )
     raise InputError(
         f"this was made with a user's file of a {kind}, {shortened(mark, 100)}: get that file and add "

@@ -46,7 +46,7 @@ def expected(module: ModuleType, kind: Kind) -> None:
     """Raises InputError if a file is not of the expected kind."""
     found = kind_of(module)
     if found != kind:
-        raise InputError(f"{module.__file__}: is {_a(found)}, and {_a(kind)} is needed: {_DEFINES[kind]}")
+        raise InputError(f"{module.__file__}: is {_a(found)}, but {_a(kind)} is needed: {_DEFINES[kind]}")
 
 
 def _a(kind: Kind) -> str:

@@ -50,7 +50,7 @@ BAND = 0.05
 
 def banded(panel: Panel) -> Panel:
     """Returns the panel with each curve as a band between the least and the largest value in windows of BAND.
-    As a line, a signal that chatters would fill an area."""
+    A signal that chatters would fill an area if it were drawn as a line."""
     return replace(panel, curves=tuple(_band(each) for each in panel.curves))
 
 

@@ -26,9 +26,9 @@ HIMPC's paper prints neither its plants (masses, friction, how a velocity is mea
 paper prints neither its weights (ours are from the authors' published set-up) nor its targets. So if two
 numbers differ, neither of them need be wrong, but the difference must have a reason that can be examined.
 Here is every row that does not agree within its tolerance (10 % if none is named), ordered by what we think
-is the cause. *Opposite* means that an effect has the other direction. `reproduce` judges each row on both
-sides: it also fails if a disagreement shrinks or vanishes and this page is not changed. Every number of ours,
-in the tables and in the texts below them, is measured by `reproduce` and compared with the stored number.
+is the cause. *Opposite* means that an effect has the other direction. `reproduce` also fails if a
+disagreement shrinks or vanishes and this page is not changed. Every number of ours, in the tables and in the
+texts below them, is measured by `reproduce` and compared with the stored number.
 """
 _NO_TOPIC = Topic("", "Not explained yet", "none.", "not known.", "run the item.")
 

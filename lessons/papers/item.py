@@ -91,8 +91,8 @@ class Row:
 
     @property
     def remark(self) -> str:
-        """How well the two numbers agree; `why` if they do not agree, or if the paper states only a
-        direction."""
+        """A text that says how well the two numbers agree. It is `why` if they do not agree, or if the paper
+        states only a direction."""
         if self.verdict == "agrees" and self.says is None:
             return (
                 f"agrees within {self.within:.4g}"

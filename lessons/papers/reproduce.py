@@ -196,7 +196,7 @@ def _markdown(reports: Sequence[Report], quick: bool) -> str:
         "",
         "Ratio: ours over the paper's. – : no such number. *agrees*: the ratio is within 10 % of 1, if no "
         "other tolerance is named, since neither paper prints its plant; *opposite*: an effect has the other "
-        "direction. Every number is also compared with the stored one; deviations to both sides count.",
+        "direction. Every number is also compared with the stored one; deviations in both directions count.",
     ]
     for report in reports:
         lines += ["", f"## {report.item.name}: {report.item.title}", "", f"*{report.item.source}*"]

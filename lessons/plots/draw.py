@@ -82,8 +82,7 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
     if panel.y_range is not None:
         axes.set_ylim(*panel.y_range)
     elif panel.bounds and not panel.log_y:
-        # The range is that of the curve, so that distant bounds do not flatten it, but includes nearby
-        # bounds.
+        # The range includes the curves and all bounds, with a margin beyond the outermost bounds.
         low, high = min(panel.bounds), max(panel.bounds)
         margin = 0.08 * (high - low or abs(high) or 1.0)
         bottom, top = axes.get_ylim()

@@ -158,7 +158,7 @@ def read_handed_in(text: str, key: bytes | None) -> tuple[HandedIn, Proof]:
         )
     version, signed, body, seal = matched.groups()
     if int(version) != VERSION:
-        raise InputError(f"the text has format {version}, and this himpc-lab reads {VERSION}: update it")
+        raise InputError(f"the text has format {version}, this himpc-lab reads {VERSION}: update himpc-lab")
     whole = f"hp{version}{signed}-{body}".encode()
     if not signed and not hmac.compare_digest(seal, _seal(whole, None)):
         raise _damaged()

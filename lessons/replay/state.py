@@ -41,7 +41,7 @@ class State:
         run: the run; its assignments contain all differences from the scene's own settings. It has no events
             and lasts as long as the scene.
         lesson: name of the active lesson.
-        step: its place in the lesson; the first step has place 1.
+        step: place of the active step in the lesson; the first step has place 1.
     """
 
     run: RunSpec
@@ -142,7 +142,7 @@ def _body(code: str) -> str:
         )
     if int(found[1]) > VERSION:
         raise InputError(
-            f"the code was made by a newer himpc-lab (format {found[1]}, this one reads {VERSION}): update it"
+            f"the code was made by a newer himpc-lab (format {found[1]}, yours reads {VERSION}): update yours"
         )
     if int(found[1]) < 1:
         raise InputError(f"this is not a state code: there is no format {found[1]}, the first one is 1")

@@ -14,7 +14,7 @@ from robots.errors import shortened
 def check_scene(scene: Scene) -> None:
     """Raises InputError if a scene cannot begin or has an impossible event. Exceptions of the scene's own
     code are passed on."""
-    from lessons.session.start import begin  # a page looks scenes up by name without loading any controller
+    from lessons.session.start import begin  # only here: to find a scene by name must load no controller
 
     check_duration(scene.duration)
     for each in scene.events:
@@ -29,8 +29,8 @@ def check_scene(scene: Scene) -> None:
         names = [task.name for level in scene.settings.levels for task in level.tasks]
         if not isinstance(given, dict) or not given.keys() <= set(names):
             raise InputError(
-                f"its references are {shortened(repr(given), 80)}: return a reference per task name, of "
-                f"{', '.join(names)}"
+                f"its references are {shortened(repr(given), 80)}: return a dict of references by task name; "
+                f"the tasks are {', '.join(names)}"
             )
     session = begin(scene)
     for _, event in scene.events:

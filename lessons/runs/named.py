@@ -54,7 +54,7 @@ def _scene_of(source: Source) -> Scene:
     if not isinstance(found, Scene):
         raise InputError(
             f"{source.path}: its scene is a {type(found).__name__}: make it with TorqueScene or "
-            "VelocityScene, or change one of lessons.load_scene"
+            "VelocityScene, or change a scene from lessons.load_scene"
         )
     called(source, partial(check_scene, found))
     return replace(found, name=source.path)

@@ -26,7 +26,7 @@ class Nearest(NamedTuple):
     Attributes:
         distance: m, negative if the two penetrate each other; NaN if no pair is near.
         kept: the distance that the pair must keep, d_safe plus its margin, m; NaN unless distances are kept.
-        pair: its names.
+        pair: the names of its two members.
     """
 
     distance: float = math.nan

@@ -100,7 +100,7 @@ class GhostDriver:
 
 
 def swapped(settings: SceneSettings, own: Sequence[str]) -> tuple[tuple[str, ...], tuple[Set, ...]]:
-    """The settings of leader and ghost after they are exchanged.
+    """The changes with which leader and ghost exchange the values of the ghost's assignments.
 
     Args:
         settings: the leader's.

@@ -144,7 +144,7 @@ class Session(ABC):
 
     @property
     def settings_now(self) -> SceneSettings:
-        """The settings in force, including the part of the run's state with which a scene can start."""
+        """The settings in force. They include those parts of the run's state that a scene has as settings."""
         return self.settings
 
     @abstractmethod

@@ -225,7 +225,7 @@ class TorqueSession(Session):
         if self.diverged_at is None:
             wild = self._is_wild(q, v)
             if wild or self._is_far(row):
-                # A target that was dragged out of reach also makes the level-1 error large: no notice.
+                # No notice if only the error is large: a target may have been dragged out of reach.
                 self._lost(t, notice=wild)
         return row
 
@@ -287,7 +287,7 @@ class TorqueSession(Session):
         return path
 
     def ranks(self) -> dict[str, tuple[int, int]]:
-        """Per enabled level, the number of directions that it can control now, and of its rows."""
+        """Per enabled level, the number of directions that it can control now, and the number of its rows."""
         q = np.asarray(self.plant.q)
         return ranks(self.settings.levels, Configuration(self.robot, self._data, q, q))
 

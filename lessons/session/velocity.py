@@ -61,7 +61,7 @@ class VelocitySession(Session):
 
     @property
     def t(self) -> float:
-        # The rounding of added command periods must not put a tick before its exact time.
+        # Rounding errors of the sum of command periods must not put a tick before its exact time.
         return round(self.plant.t, 9)
 
     def reset(self) -> None:

@@ -147,7 +147,7 @@ def test_own_code_is_known_by_its_content(body: SimulationRunner, file: Path) ->
     text = script(state.run, (), 0.1)
     assert f"CONTROLLER = {str(file)!r}" in text
     file.write_text(HOLDS + "# changed\n")
-    with pytest.raises(InputError, match="its content is another"):
+    with pytest.raises(InputError, match="its fingerprint is"):
         found.prepared()
 
 

@@ -196,7 +196,7 @@ def test_a_code_opens_no_file_and_does_not_say_where_files_lie(own: Path, mark: 
         assert eventually(lambda: page.find("Somebody's code") is not None, LONG)
         for setting, word in (
             (f'controller="{other}"', "may not open files"),
-            ('controller="mine.py@0123456789ab"', "its content is another"),
+            ('controller="mine.py@0123456789ab"', "its fingerprint is"),
             ("controller=himcp", "Choose one of"),
         ):
             page.write(str(page.find("Somebody's code")), value=encoded(setting))

@@ -86,7 +86,7 @@ DOCUMENT_ROWS = (
         of=("plant.friction=0.4",),
     ),
     RT1(
-        "disagreements", "Without dry friction our errors are less than a third of what they are with ours",
+        "disagreements", "Without dry friction our errors are less than a third of those with our friction",
         HAND_RMS, (0.02, 0.045), ("plant.friction=0",), (0.003, 0.0125), seconds=4.0,
     ),
     RT1(
@@ -115,7 +115,7 @@ DOCUMENT_ROWS = (
     ),
     # ---------------------------------------- horizon
     RT4(
-        "disagreements", "Ours decreases only where joints meet their position limits",
+        "disagreements", "Our error decreases only where joints meet their position limits",
         X, (0.47, 0.475), ("horizon=15",), (0.47, 0.475), of=("horizon=5", "limits.position=off"),
         seconds=4.0, stays=True,
     ),
@@ -196,7 +196,8 @@ DOCUMENT_ROWS = (
         of("error/ee", "mm", "mean"), (0, 0.1), ("formulation=paper",), (8, 15),
     ),
     SQUARE(
-        "disagreements", "with a thousandth of the weight of speed its error is less than half as large",
+        "disagreements",
+        "if the weight of speed is a thousandth as large, the hand's error is less than half as large",
         of("error/ee", "mm", "mean"), (8, 15), ("velocity_effort=0.001",), (3, 5), of=("formulation=paper",),
     ),
     SQUARE(

@@ -196,7 +196,7 @@ READER_ROWS = (
     ),
     # ---------------------------------------- documents
     Intervention(
-        "disagreements", "with 0.4 N·m at every joint it is about half as large again",
+        "disagreements", "with 0.4 N·m at every joint it grows by about a half",
         of("error/position", "mm", "rms", 1.0), (0.33, 0.38), ("plant.friction=0.4",), (0.5, 0.6),
         on="planar3-conflict", seconds=4.0,
     ),

@@ -75,7 +75,7 @@ def test_a_code_tells_an_own_task_by_its_content(file: str) -> None:
     ):
         opened.prepared()
     Path(file).write_text(Path(file).read_text() + "# changed\n")
-    with pytest.raises(InputError, match="its content is another"):
+    with pytest.raises(InputError, match="its fingerprint is"):
         replace(opened, tasks=(file,)).prepared()
 
 

@@ -32,8 +32,8 @@ acceleration = -posture.K_p * posture.error - posture.K_v * posture.x_dot
 return now.gravity + now.M_bar * acceleration
 """
 
-# Wrong lines, each after a sentence that names the mistake. A student whose torques are the same reads this
-# sentence.
+# Wrong lines, each after a sentence that names the mistake. A student whose file gives the same torques as
+# the wrong lines reads this sentence.
 MISTAKES = {
     "the damping K_v is missing": """
         return now.gravity - now.M_bar * posture.K_p * posture.error

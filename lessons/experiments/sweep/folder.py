@@ -92,7 +92,7 @@ def carry_on(
             if sweep.files() != files:
                 raise InputError(
                     f"{', '.join(files['files'])}: was changed during the sweep, and the cells before and "
-                    "after cannot be compared: repeat the command with another folder for --out"
+                    "after this change cannot be compared: repeat the command with another folder for --out"
                 )
             if isinstance(outcome, FailedJob):
                 cell = Cell(missing[place], None, outcome.reason)

@@ -115,7 +115,9 @@ def _axis(text: str, settings: SceneSettings) -> Axis:
     spaced = np.geomspace(low, high, count) if log else np.linspace(low, high, count)
     values = tuple(round(float(value)) if whole else float(f"{value:.9g}") for value in spaced)
     if len(set(values)) < count:
-        raise InputError(f"--over {text}: {path} has whole numbers, and the range has fewer than {count}")
+        raise InputError(
+            f"--over {text}: {path} has whole numbers, and the range contains fewer than {count} of them"
+        )
     for value in values:
         settings.changed(path, value)
     return Axis(path, values, log)

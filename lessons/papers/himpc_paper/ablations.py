@@ -62,7 +62,7 @@ def _remark_8(results: Results, quick: bool) -> Section:
     panels = (
         Panel("median step (ms)", (PlotCurve(x, np.array(medians), colour="0"),), "knots of levels 2 and 3"),
         Panel(
-            "RMSE over that with all knots",
+            "RMSE / RMSE with all knots",
             tuple(
                 PlotCurve(x, np.array([each[k] / errors[0][k] for each in errors]), label, str(k))
                 for k, label in enumerate(("level 1, worst axis", "$o_Z$", "$q_1$"))
@@ -74,9 +74,9 @@ def _remark_8(results: Results, quick: bool) -> Section:
     return Section(
         notes=(
             f"**Remark 8, shorter horizons for lower levels.** The horizon of level 1 has {_N} knots, those "
-            "of levels 2 and 3 have fewer; R weighs Δτ as printed. With one knot there, a step takes "
-            f"{number(medians[-1] / medians[0])} of the time with all knots: most of a step is spent on "
-            "kinematics and null spaces, which level 1 needs at every knot.",
+            "of levels 2 and 3 have fewer; R weighs Δτ as printed. With one knot for levels 2 and 3, a step "
+            f"takes {number(medians[-1] / medians[0])} of the time with all knots: most of a step is spent "
+            "on kinematics and null spaces, which level 1 needs at every knot.",
         ),
         tables=(Table("Remark 8: time against accuracy", columns, tuple(rows)),),
         pictures=(Picture("himpc-remark-8", "Shorter horizons for lower levels, RT4.", panels, 2),),
@@ -218,12 +218,12 @@ def _section_4c(results: Results, quick: bool) -> Section:
         tables=(Table("Section IV-C: level-1 RMSE, worst axis (mm)", columns, tuple(rows)),),
         checks=(
             PaperCheck(
-                f"with ‖Δτ‖² some R keeps all references within {_FINE:g} mm: how many of the tried",
+                f"with ‖Δτ‖²: number of the tried R that keep all references within {_FINE:g} mm",
                 float(len(usable["Δτ"])),
                 len(usable["Δτ"]) > 0,
             ),
             PaperCheck(
-                "with ‖τ‖² fewer of the tried R do",
+                "with ‖τ‖²: number of such R, smaller than with ‖Δτ‖²",
                 float(len(usable["τ"])),
                 len(usable["τ"]) < len(usable["Δτ"]),
             ),

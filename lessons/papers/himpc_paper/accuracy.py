@@ -119,10 +119,10 @@ def _section(results: Results, quick: bool) -> Section:
     caption = "Errors of the nominal model (20 % too light, no friction) and of the incremental one on RT1."
     return Section(
         notes=(
-            "The error of each model's next acceleration along HIMPC's own motion, from the definitions of "
-            "the errors. The nominal model is 20 % too light and has no friction. On the iiwa the advantage "
-            "is smaller: bounds that become active and inactive change q̈ from tick to tick, and M̄ is far "
-            "below M.",
+            "The error of the next acceleration that each model predicts along HIMPC's own motion, from the "
+            "definitions of the errors. The nominal model is 20 % too light and has no friction. On the iiwa "
+            "two things reduce the advantage of the incremental model: bounds that become active and "
+            "inactive change q̈ from tick to tick, and M̄ is far below M.",
         ),
         tables=(table,),
         checks=tuple(checks),

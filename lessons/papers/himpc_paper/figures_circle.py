@@ -176,8 +176,8 @@ def _fig_8(results: Results, quick: bool) -> Section:
     )
     return Section(
         notes=(
-            "The cost (41), with e from measurements that are differentiated numerically. With an encoder e "
-            "is mostly noise, in which the controllers hardly differ.",
+            "The cost (41), with e from measurements that are differentiated numerically. With an encoder, e "
+            "is mostly noise, which is nearly the same for all controllers.",
         ),
         rows=compared,
         tables=(Table("Average cost (41)", ("controller", "level 1", "level 2", ""), rows),),

@@ -95,7 +95,7 @@ def _fig_20(results: Results, quick: bool) -> Section:
         (str(N), number(value), trouble(run)) for N, value, run in zip(Ns, average, runs, strict=True)
     )
     note = (
-        "The paper shows bars without numbers, which grow exponentially with N (8.05 ms at N = 5, Table "
+        "The paper shows bars without numbers; they grow exponentially with N (8.05 ms at N = 5, Table "
         "VII). Here the time for bases and bounds is proportional to N, that for the least squares to N³."
     )
     return Section(

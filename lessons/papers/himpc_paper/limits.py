@@ -16,9 +16,9 @@ MODES = {
     "barrier": ("limits.position=paper", "limits.velocity_approach=15"),
     "barrier and margin": (),
 }
-"""Three kinds of limits. The first: rows as printed. The second: velocity bounds that are approached at
-15 1/s. The third, the lab's default, also bounds each velocity by the position limit: the joint can still
-stop 7 mrad before the limit, with a reaction time of a third of a second."""
+"""Three kinds of limits. The first kind has the rows as printed. In the second, the velocity bounds are
+approached at a rate of 15 1/s. The third, the lab's default, also bounds each velocity by the position limit:
+the joint can still stop 7 mrad before the limit, with a reaction time of a third of a second."""
 PLANTS = {
     "nominal": (),
     "payload 1 kg": ("plant.payload_kg=1",),

@@ -33,7 +33,7 @@ _OTHERS = {
         f"plant.inertia_scale={_WRIST.format(0.2)}",
     ),
     _TWICE: ("M_bar_scale=2",),
-    "position limits as the velocity from which one can stop": ("limits.position=viability",),
+    "position limits before which the joint can stop": ("limits.position=viability",),
 }
 """Other plants and settings, which show what the errors depend on."""
 
@@ -90,7 +90,7 @@ def _why_table_5(task: str, reading: str) -> str:
         return "our errors scale with diag M(q), as estimation errors do; the printed errors do not"
     if task == "orientation":
         return "depends on the wrist's unprinted inertias: see the lighter wrist below"
-    return "depends on the unprinted inertias and M̄, but not on a common factor: see the other plants below"
+    return "depends on the unprinted inertias and M̄, but no common factor fits: see the other plants below"
 
 
 def _topic(task: str, reading: str) -> str:

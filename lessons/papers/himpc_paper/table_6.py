@@ -75,7 +75,7 @@ def _table_6(results: Results, quick: bool) -> Section:
                             "1",
                             printed_value / paper["himpc"]["5"] if printed_value else None,
                             errors[N] / base,
-                            trouble(run) or "the quantity that R weighs decides whether a horizon helps",
+                            trouble(run) or "it depends on what R weighs whether a longer horizon helps",
                             turns_at=1.0,
                             topic="horizon",
                         )
@@ -84,15 +84,15 @@ def _table_6(results: Results, quick: bool) -> Section:
             chain = [base, *errors.values()] if controller == "nhimpc" else list(errors.values())
             worst = float(np.max([b / a for a, b in pairwise(chain)]))
             text = f"R on {what}: {name(controller)}'s RMSE of x, next N over this N, at worst"
-            # In 2 s no joint comes near its limit, and with R as printed the gain comes from the limits only.
+            # In 2 s no joint comes near its limit; with R as printed a longer horizon helps only near limits.
             checks.append(between(text, worst, 0.8, 1.0 if extra or not quick else 1.01))
     return Section(
         notes=(
             f"RMSE of x over the whole run. {OPEN} With R on Δτ as printed, one step removes nearly "
             "all of the error. A longer horizon then improves x by only a third of the paper's improvement, "
-            "and only where joints meet their limits, which it predicts earlier. With R on M̄⁻¹Δτ, the "
-            "accelerations, the result shows the paper's trend; the position limits are then those before "
-            "which a joint can stop.",
+            "and only where joints meet their limits: it predicts a limit earlier. With R on the "
+            "accelerations M̄⁻¹Δτ, and with position limits before which a joint can stop, the result shows "
+            "the paper's trend.",
             *(("Quick version: 2 s of 4 s, without N = 30 and most of NHIMPC.",) if quick else ()),
         ),
         rows=tuple(rows),

@@ -59,9 +59,9 @@ def _section(results: Results, quick: bool) -> Section:
         ),
     )
     caption = (
-        "Value functions of the three levels from rest on RT4, and that of level 1 from tick to tick. That "
-        "of level 3 rises: joint 1 may not turn as fast as its reference, and (39) guarantees nothing for "
-        "lower levels."
+        "Value functions of the three levels from rest on RT4, and the ratio of successive values for level "
+        "1. The value of level 3 rises: its reference is faster than joint 1 is allowed to turn, and (39) "
+        "guarantees nothing for lower levels."
     )
     return Section(
         notes=(

@@ -23,10 +23,11 @@ RULES = {"80 cm": (), "5 cm, at rest": ("base_tolerance=0.05", "base_at_rest=tru
 ARCHITECTURES = {"HT": "hierarchical", "ST": "single_task", "decoupled": "decoupled"}
 CASES = (
     *((a, rule) for rule in RULES for a in ("HT", "ST")),
-    ("decoupled", "5 cm, at rest"),  # 80 cm away from its goal, a folded arm cannot reach every hand
+    ("decoupled", "5 cm, at rest"),  # with the base 80 cm from its goal, a folded arm cannot reach every hand
 )
 EVERY = 6
-"""Every sixth of the 20 layouts (three seats out of six) is measured: all layouts need a hundred runs."""
+"""Every sixth of the 20 layouts (three seats out of six) is measured. All of them would need a hundred
+runs."""
 
 
 def _layouts(quick: bool) -> list[tuple[int, ...]]:

@@ -145,7 +145,7 @@ def _fig_6(results: Results, quick: bool) -> Section:
             "Part 2: better than HTIDKC with the authors' gains", 1 - ours[1].mean() / authors, 0.6, 0.95
         ),
         at_most(
-            "Part 1 apart from the matched HTIDKC's",
+            "Part 1: relative difference from the matched HTIDKC",
             _apart(ours[0], errors[matched][0]),
             0.02 if not quick else 0.05,
             band=None,
