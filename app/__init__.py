@@ -24,6 +24,6 @@ The path of a row of telemetry from the tick to the browser:
 
 import os
 
-# One thread per matrix product, here and in every child: the matrices are tiny, and every session has its own
-# process. NumPy reads these variables when it is imported, so this line stands before every other import.
+# One thread per matrix product, here and in every child, as the matrices are tiny and every session has its
+# own process. NumPy reads these variables when it is imported, so this line precedes every other import.
 os.environ.update(dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1"))

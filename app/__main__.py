@@ -37,7 +37,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         try:
             return _run(list(sys.argv[1:] if argv is None else argv))
         except BrokenPipeError:
-            # The reader of our output has closed the pipe (e.g. `| head`): no message can be shown.
+            # The reader of our output has closed the pipe (e.g. `| head`), so no message can be shown.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return 0
         except BaseException:

@@ -185,8 +185,8 @@ def tab(page: Page, name: str) -> None:
 
 
 def unfold(page: Page, title: str, at: int = 0) -> None:
-    """Opens a folder and waits until it has its full height. Before, a control may move between the press
-    and the release of the mouse, and would then receive no click."""
+    """Opens a folder and waits until it has its full height. Before that, a control may move between the
+    press and the release of the mouse, and would then receive no click."""
     folder = page.get_by_text(title, exact=True).nth(at)
     folder.click()
     assert eventually(page, lambda: folder.evaluate("(title) => !title.nextElementSibling.style.height"))

@@ -1,6 +1,6 @@
 """Starts a Firefox and evaluates expressions in it by its protocol, WebDriver BiDi.
 
-Firefox runs on a virtual screen: without a screen it has no WebGL.
+Firefox runs on a virtual screen, since it has no WebGL without a screen.
 """
 
 from __future__ import annotations

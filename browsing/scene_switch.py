@@ -13,12 +13,12 @@ from app.link.messages import Load, Status
 from browsing.browser_actions import eventually, press, tab, wait_for_scene
 
 _SOON = 2.0
-"""Simulated time, s; up to this time a run is not distinguished from a new run."""
+"""Simulated time, s, up to which every run is accepted as a new run."""
 
 
 def reset_all(page: Page, learner: SimulationClient) -> None:
     """Presses "Reset all", and waits until the simulation runs from the beginning and the page shows it.
-    Before, the page may replace a control, and a click on it has no effect."""
+    Before that, the page may replace a control, and a click on it has no effect."""
     before = learner.status
     press(page, "Reset all")
     if before is not None:
@@ -29,8 +29,8 @@ def reset_all(page: Page, learner: SimulationClient) -> None:
 
 
 def _began_after(status: Status | None, before: Status) -> bool:
-    """Returns whether the run began after a status. A process that replaces a failed one counts its resets
-    from 1."""
+    """Returns whether the run began after the status `before`. A process that replaces a failed process
+    counts its resets from 1."""
     return status is not None and (status.resets != before.resets or status.t < before.t)
 
 

@@ -3,8 +3,8 @@
 M̄ replaces the robot's mass matrix M. Time-delay estimation multiplies its error by I − M⁻¹M̄ from tick to
 tick, so the spectral radius of that matrix has to stay below 1. A smaller M̄ keeps it below 1, but makes
 control less accurate. Prints a line per N and a line per factor on M̄: the RMS error of level 1 after the
-first quarter, the median time of a step, and the spectral radius at the start. The result "control lost" is
-valid.
+first quarter, the median time of a step, and the spectral radius at the start. If control is lost, the line
+gives the time of the loss instead.
 """
 
 from __future__ import annotations

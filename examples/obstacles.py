@@ -1,8 +1,8 @@
 """Obstacles: HTMPC drives a mobile manipulator up to a post and under a ball.
 
-The task of level 1 keeps the hand in its position. The task of level 2 moves the base towards a post, which
-it must not touch. Prints the smallest distance to an obstacle along the path, the largest distance of the
-hand from this position, and the final position of the base.
+The task of level 1 keeps the hand in its initial position. The task of level 2 moves the base towards a post,
+which it must not touch. Prints the smallest distance to an obstacle along the path, the largest distance of
+the hand from its initial position, and the final position of the base.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ def main(seconds: float = 8.0) -> None:
             plant.step(plan.motion.velocity(0.01 * k), 0.01)
         nearest = min(nearest, plan.clearance)
         farthest = max(farthest, float(np.linalg.norm(_points(plant)["hand"] - hand)))
-    print(f"nearest: {nearest:.3f} m to an obstacle, of which {settings.margin_m} m are asked for")
-    print(f"hand: at most {1e3 * farthest:.1f} mm from its place")
+    print(f"nearest: {nearest:.3f} m to an obstacle (required: {settings.margin_m} m)")
+    print(f"hand: at most {1e3 * farthest:.1f} mm from its initial position")
     print(f"base: at {np.round(_points(plant)['base'], 3)} m after {plant.t:.1f} s")
 
 

@@ -69,8 +69,8 @@ OF_THE_PAGE = (
 
 
 def check_names() -> None:
-    """Checks the names that exist before a server is made. Raises InputError if viser lacks one of these
-    names."""
+    """Checks the names that can be checked without a server. Raises InputError if viser lacks one of
+    them."""
     for place, names in OF_VISER.items():
         for name in names:
             require(reaches(viser, f"{place}.{name}"), name)

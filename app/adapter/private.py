@@ -234,7 +234,7 @@ Inlet = Callable[[Any, Callable[[Any], Awaitable[None]]], Awaitable[None]]
 
 def intercept(client: viser.ClientHandle, take: Inlet) -> None:
     """Passes every message of this browser to `take` first. `take` also receives the exceptions of callbacks;
-    viser would only print those of callbacks of the 3D view."""
+    viser itself would only print the exceptions of callbacks of the 3D view."""
     connection, scene = client._websock_connection, client.scene
     plain = connection._handle_incoming_message
 
@@ -283,8 +283,8 @@ def send_again(handle: viser.GuiInputHandle[Any]) -> None:
 
 
 def send_curves(chart: viser.GuiUplotHandle, arrays: Sequence[np.ndarray]) -> None:
-    """Sends new curves to a chart, abscissas first, with the type that they have; an assignment would send
-    float64."""
+    """Sends new curves to a chart, abscissas first. The arrays keep their type; an assignment would convert
+    them to float64."""
     chart._queue_update("data", tuple(np.ascontiguousarray(each) for each in arrays))
 
 

@@ -40,6 +40,6 @@ def require(found: bool, what: str) -> None:
     """Raises InputError if a check failed; the server does not start then."""
     if not found:
         raise InputError(
-            f"viser {viser.__version__} does not fit this page ({what} has changed). The page is not served: "
-            "requests without permission could not be refused. Install viser 1.1."
+            f"viser {viser.__version__} does not fit this page ({what} has changed). The page is not served, "
+            "as requests without permission could not be refused. Install viser 1.1."
         )

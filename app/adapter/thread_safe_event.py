@@ -9,11 +9,11 @@ import contextlib
 class ThreadSafeEvent(asyncio.Event):
     """An asyncio event that is always set on its event loop.
 
-    asyncio's own event may only be set on its loop. viser 1.1 sets the event of its sender directly from any
+    asyncio's own event must only be set on its loop. viser 1.1 sets the event of its sender directly from any
     thread, and then asks the loop to set the event as well. Every few hours, the direct call occurs between
     the sender's last check and its wait. The event is then set although the sender waits, and the loop's call
-    has no effect: the page is never updated again. An event of this class ignores calls from other threads,
-    so that only the loop sets the event. A picture of many messages then wakes the sender once.
+    has no effect, so the page is never updated again. An event of this class ignores calls from other
+    threads, so that only the loop sets the event. A picture of many messages then wakes the sender once.
     """
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:

@@ -14,8 +14,8 @@ Array = NDArray[np.float64]
 
 
 class Audience(Protocol):
-    """A page that shows a drive and can drag its targets. No method may block: the arm is stopped if the
-    watching process is silent."""
+    """A page that shows a drive and can drag its targets. No method may block, because the arm
+    is stopped if the watching process is silent."""
 
     def look(self) -> list[Order]:
         """Returns the targets that were dragged since the last call. Called continually."""

@@ -63,7 +63,7 @@ def _read(text: str) -> tuple[float, str, Array, str]:
 
 
 def order_to(session: TorqueSession, manifest: dict[str, Any], name: str) -> Order | None:
-    """Returns the order that gives the arm's target of a task the value that it has in the session; None if
+    """Returns the order that moves the arm's target of a task to the session's target of this task; None if
     this target cannot be moved on an arm."""
     (entry,) = (each for each in manifest["tasks"] if each["name"] == name)
     target = session.target(name)

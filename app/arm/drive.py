@@ -207,8 +207,8 @@ class _Watcher:
             self._audience.given(order)
 
     def _look(self) -> float:
-        """Reads the new rows and advances the model to the time of each; returns the time from the first row
-        to the last, s."""
+        """Reads the new rows and advances the model to the time of each row; returns the time from the
+        first row to the last, s."""
         first, rows = self._block.since(self._count)
         self._behind = len(rows) > _AT_ONCE
         for place, row in enumerate(rows[:_AT_ONCE]):
@@ -251,8 +251,8 @@ class _Watcher:
 
 
 def _started(plan: Drive, controller: NativeController, orders: Orders, block: Block) -> tuple[Any, Any]:
-    """Starts the process of the loop; returns the process and, before it, the connection on which the process
-    reports its end."""
+    """Starts the process of the loop. Returns the connection on which the process reports its end, and the
+    process."""
     ours, theirs = multiprocessing.Pipe(duplex=False)
     fork = multiprocessing.get_context("fork")  # the child shares the memory and the imported modules
     child = fork.Process(target=_work, args=(plan, controller, orders, block, theirs), daemon=False)
@@ -268,8 +268,8 @@ def hurry(priority: int) -> None:
 
 
 def _work(plan: Drive, controller: NativeController, orders: Orders, block: Block, pipe: Any) -> None:
-    """The process of the loop. It ignores interrupts: the watcher gets them and asks the loop to end
-    gently."""
+    """The process of the loop. It ignores interrupts, because the watcher gets them and asks the loop to
+    end gently."""
     signal.set_wakeup_fd(-1)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, lambda *_: orders.stop())

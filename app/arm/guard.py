@@ -18,7 +18,7 @@ _HOLD = FALLBACKS.index("hold")
 
 @dataclass(frozen=True)
 class Tolerances:
-    """The limits of the guard. Beyond each of them the control ends.
+    """The limits of the guard. The control ends when one of them is exceeded.
 
     Attributes:
         missed: number of periods that may be missed one after another.

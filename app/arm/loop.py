@@ -28,7 +28,7 @@ MOST_SECONDS = 1.5
 ASKED = "the watcher requested it"
 """The reason of an end that the watcher requested."""
 _STILL = 0.02  # rad/s
-_CALMING = 0.3  # share of the largest torque that brakes a joint at its largest velocity
+_CALMING = 0.3  # torque that brakes a joint at its largest velocity, as a share of its largest torque
 _MOVED = 0.02  # rad, allowed motion between the first reading of the arm and the start of the loop
 
 

@@ -29,7 +29,7 @@ class Model:
 
     def __init__(self, plant: Plant, controller: NativeController, limits: ArmLimits, period: float) -> None:
         """plant: the simulated robot, in the pose of the arm; controller: an independent controller; limits:
-        those of the arm's loop; period: the control period, s."""
+        the limits of the arm's loop; period: the control period, s."""
         self._arm = SimulatedArm(plant, period, in_step=False)
         self._controller, self._limits, self._period = controller, limits, period
         controller.set(LIMITS, 0, [*limits.tau, *limits.v, *limits.q_lower, *limits.q_upper])

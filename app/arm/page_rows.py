@@ -24,8 +24,8 @@ class PageRows:
     def __init__(
         self, layout: Layout, manifest: dict[str, Any], robot: Robot, limits: ArmLimits, period: float
     ) -> None:
-        """layout: the layout of the page's rows; manifest: that of the exported controller; limits: those in
-        force; period: the control period, s."""
+        """layout: the layout of the page's rows; manifest: the manifest of the exported controller;
+        limits: the limits in force; period: the control period, s."""
         self._tasks = manifest["tasks"]
         self._at = Columns.of(robot.n, sum(task["rows"] for task in self._tasks))
         self._fields = fields = layout.fields

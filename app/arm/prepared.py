@@ -67,8 +67,8 @@ def prepared(scene: TorqueScene, start: Array, limits: ArmLimits, texts: Sequenc
 
 
 def nominal(scene: TorqueScene, plain: TorqueScene) -> TorqueScene:
-    """Returns `scene` with the plant of the scene `plain`. `--set plant.…` thus changes the simulated arm
-    only, and not the simulation that runs beside it."""
+    """Returns `scene` with the plant of the scene `plain`. `--set plant.…` thus changes only
+    the simulated arm (see `himpc-lab arm`), and not the model beside the arm."""
     return replace(scene, settings=replace(scene.settings, plant=plain.settings.plant))
 
 

@@ -184,7 +184,7 @@ class Shown:
                 self._leads, self._told = True, 0
                 self._leading = Begin(self._choice, self._session.settings, self._start)
             case WaitAt(until):
-                self._reached = until  # an arm does not wait
+                self._reached = until  # stored only: an arm does not wait for its ghost
             case Tell():
                 self._wire.send(Told(self._choice, self._session.settings, tuple(self._log), self._t))
             case Post() | StepTicks() | Speed():

@@ -88,7 +88,7 @@ class Gathering:
         nothing to vote on, or if the run has already shown the answer."""
         asked = question_of(self.place)
         if self.stage in ("running", "decided"):
-            raise InputError("this step has run: choose it again for a new vote, or choose another one")
+            raise InputError("this step has run: choose it again for a new vote, or choose another step")
         return replace(self, poll=Poll(asked) if self.poll is None else self.poll.again())
 
     def closed(self) -> Gathering:
@@ -127,8 +127,9 @@ class Gathering:
 
     def entered(self, who: str, kind: Kind, now: float, account: str = "") -> Gathering:
         """Returns the class with one more member, or with a member who came back. account: the account with
-        which the member signed in; it becomes the member's name if the class uses names. Raises InputError if
-        the class is full; before that, a phone that left without a vote is removed."""
+        which the member signed in; it becomes the member's name if the class uses names. If the
+        class is full, a person who left without a vote or a run is removed. Raises InputError if there is no
+        such person."""
         known, account = self.members.get(who), account if self.named else ""
         if known is not None and (known.here, known.account) == (True, account):
             return self
@@ -234,7 +235,7 @@ def question_of(place: LessonPlace | None) -> Choice | Value:
     if isinstance(found, Sketch):
         raise InputError("this step asks for a curve, which is not counted: let everybody draw, then run")
     if found is None:
-        raise InputError("this step asks nothing beforehand: run it, or choose another one")
+        raise InputError("this step asks no question before its run: run it, or choose another step")
     return found
 
 

@@ -42,7 +42,7 @@ class Hall(Room):
         """The lessons of the teacher's list."""
         self._runs = 0  # number of runs of the teacher's robot before the present one
         self._shape: tuple[object, Shape | None] = (None, None)
-        self._far: dict[str, str] = {}  # by learner: the server, if it is another one
+        self._far: dict[str, str] = {}  # by learner: the server, if the learner is on another one
         self._servers: set[str] = set()  # the other servers that are connected
         self._replaced: dict[str, None] = {}  # old identities of learners who have a new one
 

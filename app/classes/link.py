@@ -20,14 +20,14 @@ from robots import InputError
 FIRST, LAST = 1.0, 15.0
 """Time, s, until the first new attempt to connect, and the longest time between two attempts."""
 PERIOD = 0.2
-"""Time, s, between two messages that this server sends. A quarter of it is the shortest time between two
-messages that it reads."""
+"""Time, s, between two messages that this server sends. A quarter of this time is the shortest time
+between two messages that this server reads."""
 _AGAIN = "this server tries again, and its learners can continue"
 _REFUSED = (
     f"the class's server refuses this server: start the class's server with --class, and both servers with "
     f"the same --class-key FILE; {_AGAIN}"
 )
-_QUESTIONS = 4  # largest number that are answered at the same time
+_QUESTIONS = 4  # largest number of requests that are answered at the same time
 
 
 class _Direct(connect):

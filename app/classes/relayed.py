@@ -93,7 +93,7 @@ class ClassNow(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_fiel
     Attributes:
         rounds: the votes of each round: each answer with its number of voters. The round that is still open
             is empty.
-        is_open: whether a vote is open; None if there is none.
+        is_open: whether a vote is open; None if there is no vote.
         truth: None if nothing was measured.
     """
 
@@ -123,7 +123,7 @@ of_class = msgspec.json.Decoder(OfClass)
 
 
 def is_secret(text: str) -> bool:
-    """Whether a text can be the identity of a learner. A browser may have stored any other text there."""
+    """Whether a text can be the identity of a learner. It comes from a browser, which can store any text."""
     return re.match(_SECRET, text) is not None
 
 

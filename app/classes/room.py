@@ -79,8 +79,8 @@ class Room(ABC):
     # ---------------------------------------------------------------- the learners
 
     def recognise(self, who: str, before: Sequence[str], account: str = "") -> None:
-        """Adds a learner to the class before the learner's page is built: the name that is typed there can
-        then be stored. A learner who comes back with another robot gets the earlier votes and progress.
+        """Adds a learner to the class before the learner's page is built, so that the name that is typed
+        there can be stored. A learner who comes back with another robot gets the earlier votes and progress.
         before: the earlier identities of the browser; account: the account with which the learner signed
         in."""
         with self._lock:

@@ -20,9 +20,8 @@ COLUMNS = (
 
 
 def table(gathering: Gathering) -> str:
-    """Returns the table: one line for each person and each step on which the person voted or which the person
-    ran. A person without such a step has one line without a step. A class without names has no column for
-    names."""
+    """Returns the table: one line for each person and each step that the person ran or voted on. A person
+    without such a step has one line without a step. A class without names has no column for names."""
     columns = COLUMNS if gathering.named else tuple(each for each in COLUMNS if each != "name")
     text = io.StringIO()
     writer = csv.DictWriter(text, columns, extrasaction="ignore", lineterminator="\n")

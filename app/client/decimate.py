@@ -34,8 +34,8 @@ def decimate(curves: np.ndarray, tolerance: float, phase: int = 0) -> np.ndarray
             break
         end = start + blocks * size
         middle, ends = curves[:, start + half : end : size], curves[:, start : end + 1 : size]
-        # Near the middle, a curve is farthest from the chord of its half block, and this chord is farthest
-        # from the chord of the whole block. At worst the two distances add up.
+        # The distance from the chord of the whole block is at most the distance from the chord of a half
+        # block plus the distance between the two chords, which is largest in the middle.
         halves = bent[:, (start - first) // half :][:, : 2 * blocks]
         bent = np.maximum(halves[:, ::2], halves[:, 1::2])
         bent += np.abs(middle - 0.5 * (ends[:, :-1] + ends[:, 1:]))

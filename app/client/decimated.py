@@ -22,7 +22,7 @@ _AGES = np.linspace(-WINDOW, 0.0, 2 * BUCKETS)
 _SLOTS = round((KEPT + WINDOW) / _SPAN)
 _HELD = round(
     1.0 / _SPAN
-)  # largest number of buckets without a row (slow controller) that repeat the bucket before them
+)  # largest number of buckets without a row (slow controller) that are filled from the bucket before them
 
 Take = Callable[[np.ndarray], None]
 
@@ -32,9 +32,9 @@ class History:
     their times, and the bucket's last row.
 
     If the controller is slower than the buckets, some buckets have no row; a row is then valid until the next
-    row. Buckets are aligned to simulated time: curves scroll without shimmering, and two robots on one clock
-    have the same buckets. Each row is read once, for any window. A reset sets the time back and clears the
-    curves, since a jump would look like a motion.
+    row. Buckets are aligned to simulated time, so that curves scroll without shimmering, and two robots on
+    one clock have the same buckets. Each row is read once, for any window. A reset sets the time back and
+    clears the curves, since a jump would look like a motion.
     """
 
     def __init__(self, block: Block, layout: Layout, *takers: Take) -> None:
@@ -93,7 +93,7 @@ class History:
         return len(rows)
 
     def _take(self, rows: np.ndarray) -> None:
-        self.latest = rows[-1].copy()  # a copy: a view would keep all rows in memory
+        self.latest = rows[-1].copy()  # a copy, as a view would keep all rows in memory
         bits = rows[:, self.layout.fields["at_bound"]]
         bits = np.where(np.isfinite(bits), bits, 0).astype(np.int64)
         for k in range(self.bound_ticks.shape[1]):

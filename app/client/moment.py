@@ -13,7 +13,7 @@ from app.client.simulation_client import SimulationClient
 from app.link.messages import Status
 
 TRACE_SECONDS = 6.0
-_FAR = 0.5  # s; the picture does not wait for a ghost that lags by more
+_FAR = 0.5  # s; the picture does not wait for a ghost that lags by more than this
 
 
 @dataclass(frozen=True, eq=False)

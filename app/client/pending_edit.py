@@ -20,8 +20,8 @@ T = TypeVar("T")
 
 
 class PendingEdit(Generic[T]):
-    """The last edit that was sent, for the time in which the session may not have answered. A second key
-    press or click in this time changes the edit instead of the old value that the page still shows."""
+    """Stores the last edit that was sent, for the time HOLD in which the session may not have answered. A
+    second key press or click in this time changes this edit, not the old value that the page still shows."""
 
     def __init__(self) -> None:
         self._asked: tuple[float, T] | None = None

@@ -32,14 +32,14 @@ class PoseHistory:
 
     def add(self, frame: Frame) -> None:
         """Adds the newest frame. If the previous frame is closer than 1/RATE to the frame before it, the
-        newest frame replaces it. Thus slow motion needs no more memory."""
+        newest frame replaces the previous frame. Thus slow motion needs no more memory."""
         frames = self._frames
         if frames and frame.t < frames[-1].t:
             frames.clear()
         if len(frames) > 1 and frames[-1].t - frames[-2].t < 1 / RATE - 1e-9:
             frames.pop()
         frames.append(frame)
-        # The limit is a time, not a number of frames: a busy machine gives fewer frames per second.
+        # The limit is a time, not a number of frames, as a busy machine gives fewer frames per second.
         del frames[: self._index(frame.t - KEPT)]
 
     def clear(self) -> None:

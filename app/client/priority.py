@@ -11,5 +11,5 @@ BEHIND = 10
 
 def let_go_first(pid: int) -> None:
     """Gives a process a lower priority than this one."""
-    with suppress(OSError):  # the process has ended, or its priority may not be changed
+    with suppress(OSError):  # the process has ended, or the system forbids the change
         os.setpriority(os.PRIO_PROCESS, pid, os.getpriority(os.PRIO_PROCESS, 0) + BEHIND)

@@ -25,8 +25,8 @@ class RowHistory:
         self.layout = layout
         self._t = layout.fields["t"].start
         # Two blocks are allocated once. A separate array per row would live for minutes among arrays that
-        # live for an instant, and would fragment the memory. The blocks are not filled: the system provides a
-        # memory page at the first write, and most scenes are shown for less than a minute.
+        # live for an instant, and would fragment the memory. The blocks are not filled, as the system
+        # provides a memory page at the first write, and most scenes are shown for less than a minute.
         self._recent = np.empty((round(KEPT * RATE), layout.size))
         self._whole = np.empty((MOST, layout.size))
         self._clear()

@@ -151,8 +151,8 @@ class Simulation(ABC):
             return refusals, notices
 
     def settings_of(self, ready: Ready) -> SceneSettings:
-        """Returns the settings of a loaded scene: the newest settings, or those at its start if another scene
-        was loaded since."""
+        """Returns the settings of a loaded scene: the newest settings, or the settings at the scene's start
+        if another scene was loaded since."""
         with self._lock:
             return ready.settings if self.settings is None or self.ready is not ready else self.settings
 
@@ -173,7 +173,7 @@ class Simulation(ABC):
         def take(block: Block, history: History) -> float:
             t, poses = block.moment()
             if rows:
-                history.pull()  # read after the moment: the rows then reach up to it
+                history.pull()  # read after the moment, so that the rows reach up to it
             self.tape.add(Frame(t, poses, self.status))
             return t
 

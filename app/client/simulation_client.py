@@ -127,7 +127,7 @@ class SimulationClient(Simulation):
 
     def load_for_class(self, choice: SceneChoice, patience: float = DEADLINE) -> None:
         """As `load`, also for a learner who is kept at a step. A robot that has been silent for less than
-        `patience`, s, is not replaced: the computer is busy, and a new process would make it busier."""
+        `patience`, s, is not replaced, as the computer is busy, and a new process would make it busier."""
         choice = choice.admitting(self._start_choice)
         self._start_choice = self._start_choice.admitting(choice)
         with self._lock:
@@ -188,7 +188,7 @@ class SimulationClient(Simulation):
 
     def lecture_of(self, ready: Ready) -> Lecture | None:
         """Returns the state of the lesson in a scene; None if another scene was loaded since. A page that
-        will be rebuilt must not show the next lesson yet: a button pressed there would have no effect."""
+        will be rebuilt must not show the next lesson yet, as a button pressed there would have no effect."""
         with self._lock:
             if self.ready is not ready:
                 return None

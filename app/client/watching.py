@@ -1,4 +1,4 @@
-"""The page's request for internal data of a tick, and whether the simulation has received it."""
+"""The page's request for internal data of a tick, and whether the simulation has received the request."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""The first module that is imported. With it, Ctrl-C during the other imports also ends without a traceback.
+"""The first module that is imported. With it, Ctrl-C ends the program without a traceback also during the
+other imports.
 
 At that time, nothing is running that must be ended. A Ctrl-C before the import of this module cannot be
 handled here.

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 PATIENCE = 4.5
 """Time, s, within which a command must end by itself."""
 _AGAIN = 0.05  # s; after that, an interrupt that a library ignored is raised again
-_LATER = 0.02  # s; the same if Python is still reporting the ignored exception at that time
+_LATER = 0.02  # s; time until the next attempt if Python is still reporting the ignored exception
 
 Interrupted = threading.Event
 """Set once a signal has arrived."""
@@ -25,8 +25,8 @@ Interrupted = threading.Event
 
 @contextmanager
 def interruptible() -> Iterator[Interrupted]:
-    """Within this context both signals raise KeyboardInterrupt in the main thread: results are stored and no
-    process is left running. If a library (e.g. a compiler) takes long or swallows the exception, the
+    """Within this context both signals raise KeyboardInterrupt in the main thread, so that results are stored
+    and no process is left running. If a library (e.g. a compiler) takes long or swallows the exception, the
     exception is raised again. After PATIENCE the process and its children are ended at once.
 
     Yields a flag that is set when a signal has arrived. An interrupted import may then fail with any
@@ -41,7 +41,7 @@ def interruptible() -> Iterator[Interrupted]:
         interrupted.set()
         if frame is None or frame.f_code is not unraisable.__code__:
             raise KeyboardInterrupt
-        signal.setitimer(signal.ITIMER_REAL, _LATER)  # Python would report an exception of its hook
+        signal.setitimer(signal.ITIMER_REAL, _LATER)  # an exception in Python's hook is only reported
 
     def unraisable(report: UnraisableHookArgs) -> None:
         if interrupted.is_set():

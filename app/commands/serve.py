@@ -46,8 +46,8 @@ def serve(
     Args:
         lesson: lesson to start with, see himpc-lab lessons, or a Python file of your own.
         scene: scene to start with, or a Python file of your own; iiwa14-hold by default, hold with --urdf.
-        controller: controller to start with, or a Python file of your own; its code is used again whenever
-            you save it.
+        controller: controller to start with, or a Python file of your own; its code is reloaded whenever
+            you save the file.
         task: Python file with a task of your own, which can then be added to the stack.
         urdf: URDF file of your own robot.
         tip: end-effector frame of that robot.
@@ -62,8 +62,8 @@ def serve(
         class_key: file with the key that the servers of one class have in common; the environment variable
             HIMPC_LAB_CLASS_KEY may contain the key instead.
         no_names: do not ask people in a class for their names.
-        host: address to listen on; only this machine can reach the default. The page asks for a token; it is
-            part of the printed address.
+        host: address to listen on; only this machine can reach the default address. The page asks for a
+            token, which is part of the printed address.
         port: port to listen on.
         no_browser: do not open a browser.
         trusted_origin: address at which a reverse proxy serves the page, e.g. https://lab.example.org;
@@ -94,7 +94,7 @@ def serve(
     if no_own_files and own_files is not None:
         raise InputError("--own-files DIR and --no-own-files contradict each other: leave one out")
     if no_names and not class_:
-        raise InputError("--no-names is for a class: add --class, or leave it out")
+        raise InputError("--no-names is for a class: add --class, or omit --no-names")
     of_class = given_token(class_key, os.environ, "--class-key", CLASS_VARIABLE)
     if class_of is not None and (class_ or classroom):
         raise InputError(
@@ -105,7 +105,7 @@ def serve(
             "--class-of ADDRESS needs the key of the class: add --class-key FILE, with the key of that server"
         )
     if class_key is not None and class_of is None and not class_:
-        raise InputError("--class-key is for a class: add --class or --class-of ADDRESS, or leave it out")
+        raise InputError("--class-key is for a class: add --class or --class-of ADDRESS, or omit --class-key")
     if class_ and proxy_only and not trusted_origin:
         raise InputError(
             "--class with --proxy-only needs the address of the proxy, where teacher and phones open their "

@@ -37,7 +37,7 @@ class Surroundings:
 
     def source(self, port: int, query: str) -> str:
         """Returns the address of a frame that shows the server at a port of this machine. Through Jupyter,
-        the address contains no host name: it works under any name of the machine."""
+        the address contains no host name, so that it works under any name of the machine."""
         parts = urlsplit(self.address)
         if self.proxied:
             return f"{parts.path.rstrip('/')}/proxy/{port}/?{query}"
@@ -45,8 +45,8 @@ class Surroundings:
 
     @property
     def embedders(self) -> tuple[str, ...]:
-        """Returns the origins of the pages that may show the frame: through Jupyter, the frame's own
-        origin."""
+        """Returns the origins of the pages that may show the frame. If Jupyter passes on requests, this is
+        only the frame's own origin."""
         if self.proxied:
             return (SELF,)
         return () if self.origin is None else (self.origin,)

@@ -26,8 +26,8 @@ from robots import InputError
 from robots.errors import unknown_name
 
 _PATIENCE = 120.0
-"""Time, s, within which the simulation must answer. It is long, since the first start of an installation
-compiles."""
+"""Time, s, within which the simulation must answer. It is long, since the first start after an
+installation compiles the controllers."""
 _PERIOD = 0.2  # s between two readings of the telemetry
 
 
@@ -46,8 +46,8 @@ def show(
         set: settings as assignments, e.g. "horizon=10".
         height: height of the frame in the cell, pixels.
         embed_in: the origin of the notebook's page, e.g. https://hub.example.org, if it cannot be detected.
-            This is so behind a hub whose public address is unknown here, or if Jupyter is opened under
-            another name.
+            It cannot be detected behind a hub whose public address is unknown here, or if Jupyter is opened
+            under another name.
 
     Raises:
         InputError: there is no such scene, lesson or setting, or the origin is not valid.
@@ -118,7 +118,7 @@ class Lab:
         if len(value) != target.size or not np.isfinite(value).all():
             raise InputError(f"the target of '{task}' has {target.size} finite numbers, and {to} were given")
         self._learner.send(Post(MoveTarget(task, value)))
-        asked = self._learner.ask(_PATIENCE)  # answers come in order: the target is then in the mailbox
+        asked = self._learner.ask(_PATIENCE)  # answered after the target is in the mailbox
         ticks = self._ticks()
         self._until(lambda: asked is not None and self._ticks() != ticks, "the target did not arrive")
 

@@ -25,8 +25,8 @@ def launcher() -> dict[str, Any]:
     """
     token = new_token()
     more = [_literal(option) for option in shlex.split(os.environ.get(OPTIONS, ""))]
-    # localhost has two addresses, and jupyter-server-proxy may use both: no other program may listen at
-    # either.
+    # localhost has two addresses, and jupyter-server-proxy may use either of them. Therefore the server
+    # listens at both, and no other program can.
     serving = ["--no-browser", "--host", "localhost", "--port", "{port}", "--proxy-only", "--no-own-files"]
     return {
         "command": [sys.executable, "-P", "-m", "app", *serving, *more],
@@ -45,5 +45,5 @@ def launcher() -> dict[str, Any]:
 
 
 def _literal(option: str) -> str:
-    """Escapes an option: jupyter-server-proxy then replaces nothing in it."""
+    """Escapes an option, so that jupyter-server-proxy replaces nothing in it."""
     return option.replace("{", "{{").replace("}", "}}")

@@ -32,8 +32,8 @@ class SceneChoice:
         exercise: the step of a lesson, if the choice is one.
         mine: the learner's changes to that step, as assignments; they are applied once when the step is
             loaded.
-        scenes: Python files that may be the scene. Of all Python files, only these and the run's `files` and
-            `tasks` are executed: the person who started the program named them.
+        scenes: Python files that can be chosen as the scene. Of all Python files, only these and the run's
+            `files` and `tasks` are executed: the person who started the program named them.
         within: the folder that must contain the URDF and its meshes, if the URDF was named on the page.
     """
 
@@ -157,7 +157,7 @@ class SceneChoice:
         return frozenset(filter(is_file, (self.exercise.lesson,)))
 
     def without_places(self, sentence: str) -> str:
-        """Returns the sentence with file names instead of full paths: it then reveals no folders of the
+        """Returns the sentence with file names instead of full paths, so that it reveals no folders of the
         machine."""
         for path in sorted(self.paths, key=len, reverse=True):
             sentence = sentence.replace(path, Path(path).name)
@@ -187,8 +187,8 @@ class SceneChoice:
         return choice.run.prepared(choice._bare())
 
     def fitted(self) -> tuple[SceneChoice, Scene, tuple[str, ...]]:
-        """Returns the choice without those tasks of files that the robot cannot have, the scene, and one
-        reason per omitted task. A file that was opened for one robot thus does not prevent the use of other
+        """Returns the choice, the scene, and one reason per omitted task. Tasks from files are omitted if the
+        robot cannot have them. A file that was opened for one robot thus does not prevent the use of other
         robots. Raises InputError if the choice cannot be loaded, or if the stack names an omitted task."""
         from lessons.runs.named import misfits
 

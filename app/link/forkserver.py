@@ -182,8 +182,8 @@ def serve(control: int, life: int, worker: str) -> NoReturn:
     wire = Wire(socket.socket(fileno=control))
     module = import_module(worker)
     module.warm(lambda sentence: wire.send(Preparing(sentence)))
-    # Children share the present memory as long as no process writes to it: the garbage collector must not
-    # touch it.
+    # Children share the present memory as long as no process writes to it. Therefore the garbage collector
+    # must not touch this memory.
     gc.collect()
     gc.freeze()
     gc.disable()

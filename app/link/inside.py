@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 class InsideRequest:
     """The internal data of a tick that the page shows; the answer comes with every `Status`.
 
-    plane: the two joints whose increments span the plane of the cut, None: no plane; through: name of a
-    level: the plane contains the solution of this level, "" for the applied solution; shift: offset of the
+    plane: the two joints whose increments span the plane of the cut, None: no plane; through: name of
+    the level whose solution the plane contains, "" for the applied solution; shift: offset of the
     other joints' increments from that solution, N·m; matrix: name of the level whose QP is shown as a
     picture, None: no picture; spectrum: whether to send the eigenvalues of I − M⁻¹M̄.
     """

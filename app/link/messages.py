@@ -174,8 +174,8 @@ class ArmView:
 
 @dataclass(frozen=True)
 class ContactPoint:
-    """A point at which the robot touches an object or itself. between: name of the object or of the other
-    link, and of the link on which the force acts; position, m, and force, N, in the world frame."""
+    """A point at which the robot touches an object or itself. between: two names, first the object or the
+    other link, then the link on which the force acts; position, m, and force, N, in the world frame."""
 
     between: tuple[str, str]
     position: tuple[float, float, float]

@@ -80,7 +80,7 @@ class Process:
             self._closed = True
             self._ended.wait(patience)
         self.kill()
-        # The last reports of the child must still be read: they may name shared memory that must be freed.
+        # The last reports of the child must still be read, as they may name shared memory that must be freed.
         if self._hearing is not threading.current_thread():
             self._hearing.join(2 * _END)
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 MAX_ROWS = 8192
 MIN_ROWS = 1024
 """Number of rows of about one second of ticks. With fewer rows, a page that is briefly late would miss
-some."""
+rows."""
 _MAX_BYTES = 12_000_000  # of each session
 _MARGIN = 256  # rows the writer may add while a reader copies
 _HEAD = 64  # bytes
@@ -32,8 +32,8 @@ _HEAD = 64  # bytes
 
 class Block:
     """A ring of telemetry rows (width float64) and the poses of joints 1 … n and the tip, (n + 1, 7):
-    position, m, and quaternion wxyz. The memory has no name: it is freed with the last process that uses it,
-    however that process ends."""
+    position, m, and quaternion wxyz. The memory has no name, so it is freed when the last process that
+    uses it ends for any reason."""
 
     def __init__(self, width: int, bodies: int, handle: Handle | None = None) -> None:
         """Creates the memory, as large as the machine allows, or attaches to the memory of `handle` and

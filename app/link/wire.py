@@ -106,7 +106,7 @@ class Wire:
         try:
             size, count = _HEAD.unpack(head)
             if count != len(files):
-                raise OSError(f"{len(files)} of {count} open files arrived: this process may open no more")
+                raise OSError(f"{len(files)} of {count} open files arrived: this process cannot open more")
             content = bytearray(size)
             self._fill(memoryview(content))
             return _Unpickler(io.BytesIO(content), files).load()

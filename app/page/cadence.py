@@ -9,7 +9,7 @@ POSES, PLOTS, TEXTS = 30.0, 12.0, 3.75  # Hz, while simulated time is as fast as
 CALM = 6.0  # Hz, the rate of poses, plots and texts when the robot has stood still for STILL
 STILL = 1.0  # s
 LEAST = 1 / 3
-"""The smallest share of these rates, used when simulated time runs at this share of real time or slower."""
+"""The smallest factor by which POSES and PLOTS are multiplied while simulated time is slowed down."""
 
 
 @final

@@ -16,7 +16,7 @@ from app.link.messages import Play
 from app.page import accessible
 from app.panels.run.narration import Narration, facts_of
 
-if TYPE_CHECKING:  # for types only: the server listens before it loads modules that compute
+if TYPE_CHECKING:  # for types only, as the server listens before it loads modules that compute
     from app.panels.widgets.snapshot import SessionSnapshot
     from lessons.settings.settings import SceneSettings
 
@@ -33,8 +33,8 @@ ASK_MOTION = """try {
 ASK_WINDOW = """try {
   localStorage.setItem("%s%s", `${window.innerWidth}x${window.innerHeight}`);
 } catch {}"""
-"""Stores the size of the window under a key. When a page connects again, its panels are docked, and the size
-of its scene is smaller than that of the window."""
+"""Stores the size of the window under a key. When a page connects again, its panels are docked, and its scene
+is smaller than the window."""
 
 # A screen reader announces only changes of a region that already exists. Therefore the region stays when a
 # scene is replaced.

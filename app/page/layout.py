@@ -192,9 +192,9 @@ class Stage:
         self._playback.show_trouble(trouble)
 
     def follow(self, plots: bool, texts: bool) -> None:
-        """Shows the newest poses. If `plots` or `texts` is true, it also updates the plots or the texts. A
-        page in a hidden tab gets only texts. While a browser has not received the last messages, this method
-        is not called."""
+        """Shows the newest poses. Also updates the plots if `plots` is true, and the texts if `texts` is
+        true. A page in a hidden tab gets only texts. While a browser has not received the last
+        messages, this method is not called."""
         learner = self._learner
         if learner.status is not None:
             self._time_line.update(learner.status.running)

@@ -61,8 +61,8 @@ class Context:
 
 
 class Face(Protocol):
-    """The user interface of a kind of scene, built in this order: first plot, tabs, plots, scene. `follow` is
-    called for every frame."""
+    """The user interface of a kind of scene. It is built by `open_plots`, `add_tabs`, `add_plots` and
+    `add_scene`, in this order. `follow` is called for every frame."""
 
     fastest: ClassVar[float]
     """The highest useful speed of the simulation, simulated seconds per second."""

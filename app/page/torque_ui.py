@@ -79,7 +79,7 @@ class TorqueFace:
         self._start.on_recall = self._recall
 
     def open_plots(self, plots: viser.PanelHandle | viser.GuiTabGroupHandle) -> None:
-        # The QP of one knot is small enough for beginners; in this case its tab comes first.
+        # If the horizon has one knot, the QP is small enough for beginners, and its tab comes first.
         if self._context.settings.horizon == 1:
             self._inside_tab = plots.add_tab("Inside")
 

@@ -21,7 +21,7 @@ def allowed(handle: viser.GuiInputHandle[Any], updates: Any) -> Any:
     update changes more than the value, or if the control cannot have this value."""
     label = str(getattr(handle, "label", "") or "A control")
     if not isinstance(updates, dict) or list(updates) != ["value"]:
-        raise NotAllowed(f"{label}: a page may only change its value.")
+        raise NotAllowed(f"{label}: a page can only change the value of this control.")
     value = updates["value"]
     if isinstance(handle, viser.GuiUploadButtonHandle):
         raise NotAllowed(f"{label}: upload a file instead of writing a value.")

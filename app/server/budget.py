@@ -11,7 +11,7 @@ MESSAGES = 200.0
 second."""
 BURST = 400.0
 BYTES = 4e6
-"""Largest rate of bytes, B/s; below, the largest burst, B."""
+"""Largest rate of bytes, B/s. BYTES_BURST is the largest burst, B."""
 BYTES_BURST = 24e6
 UPLOADS = 10_000_000
 """Largest total size of incomplete uploads, B."""
@@ -20,8 +20,8 @@ MESSAGE = 12 * 2**20
 PATIENCE = 10.0
 """Time, s, for which a connection may exceed its limits without a pause."""
 CONTROL_FRAMES = 20.0
-"""Largest rate of control frames such as pings, 1/s. Pages send no control frames; a program sends one every
-20 s."""
+"""Largest rate of control frames such as pings, 1/s. Pages send no control frames; client programs send one
+every 20 s."""
 WAITING = 2000
 """Largest number of frames that wait to be processed."""
 _ENTRY = 1024  # B of memory for each part of an upload, in addition to its content

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 TOTAL = 256
 PER_ADDRESS = 96
-"""Largest number of connections from one address: enough for two per learner of a class behind one
-address."""
+"""Largest number of connections from one address: enough for two connections per learner of a class
+behind one address."""
 
 OF_A_CLASS = 1000, 800
 """TOTAL and PER_ADDRESS for a class, whose phones may all be behind one address."""

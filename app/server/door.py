@@ -136,7 +136,7 @@ class Door:
         try:
             address = ipaddress.ip_address(name)
         except ValueError:
-            # Any name may resolve to this machine (DNS rebinding): names that are not ours are refused.
+            # Any name may resolve to this machine (DNS rebinding), so names that are not ours are refused.
             return name == "localhost" or (not self.local and name in self.names)
         return address.is_loopback or not self.local
 

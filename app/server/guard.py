@@ -88,7 +88,7 @@ class ConnectionGuard:
                 return self._to_class(self._class, connection, request)
             answer = self._judge(connection, request)
             if answer is None and of_a_class and is_upgrade(request):
-                answer = NO_CLASS  # a proxy may let this address through without a password
+                answer = NO_CLASS  # some proxies ask for no password at this address
             if answer is not None:
                 self.refused += answer.status >= HTTPStatus.BAD_REQUEST
                 return as_response(answer)
@@ -286,7 +286,7 @@ def _nothing(_: ServerConnection, __: Request) -> Response | None:
 
 
 def _log() -> logging.Logger:
-    """Returns a silent logger: malformed requests from outside are not reported on the terminal."""
+    """Returns a silent logger, so that malformed requests from outside are not reported on the terminal."""
     log = logging.getLogger("himpc-lab.connections")
     log.propagate = False
     log.setLevel(logging.CRITICAL)

@@ -17,7 +17,7 @@ from websockets.datastructures import Headers
 from robots import InputError
 
 QUERY = "himpc-token"
-"""The name of the parameter in the address. The name `token` is used by Jupyter, which may serve a lab."""
+"""The name of the parameter in the address. It differs from `token`, the name that Jupyter uses."""
 HEADER = "X-Himpc-Lab-Token"
 """The name of the header in which a proxy may send the token of its visitors."""
 USER_HEADER = "X-Himpc-Lab-User"
@@ -55,7 +55,7 @@ def given_token(
         return None
     if not re.fullmatch(rf"[A-Za-z0-9_-]{{{SHORTEST},200}}", text.strip()):
         raise InputError(
-            f"{place}: a {kind} has {SHORTEST} characters or more, letters, digits, - and _: make one with "
+            f"{place}: a {kind} has {SHORTEST} characters or more (letters, digits, - and _): make one with "
             "python -c 'import secrets; print(secrets.token_urlsafe())'"
         )
     return text.strip()
@@ -127,7 +127,7 @@ class Passes:
         return hmac.new(key, f"{role} {who}".encode(), hashlib.sha256).hexdigest()
 
     def _cookies(self, headers: Headers) -> Iterable[str]:
-        # Parsed by hand: the library rejects the whole header if another server of this host has set an
+        # Parsed here, because the library rejects the whole header if another server of this host has set an
         # unusual cookie.
         for part in ";".join(headers.get_all("Cookie")).split(";"):
             name, _, value = part.strip().partition("=")

@@ -2,9 +2,9 @@
 
 viser's page opens its web socket at its own address without the slash at the end. A proxy that serves the
 page below a path redirects this address to the address with the slash, but browsers do not follow redirects
-of web sockets. Therefore the page has a name below a path. viser's page then also writes the address of its
-web socket into its own address, which a reload sends. It could be the address of another server, and is
-removed.
+of web sockets. Therefore the page has a name (`NAME`) below a path, and its address has no slash at the end.
+viser's page then also writes the address of its web socket into its own address, and a reload sends this
+parameter. It could name another server, and is removed.
 """
 
 from __future__ import annotations

@@ -133,7 +133,7 @@ class PageServer:
             raise address_in_use(host, port)
         self.url = local_url(host, found)
         self.outside = self.proxies[0] if self.proxies else seen_from_outside(host, self.url)
-        """The address for other machines, in numbers: phones rarely find a machine by its name."""
+        """The address for other machines, in numbers, as phones rarely find a machine by its name."""
         self._viser.gui.configure_theme(show_share_button=False, show_logo=False)
         self._viser.on_client_connect(self._connect)
         self._viser.on_client_disconnect(self._disconnect)
@@ -271,8 +271,8 @@ _HAND_IN = "The lab stops in {:.0f} s: save your data, or hand in your progress 
 
 
 def _check_choice(choice: SceneChoice) -> None:
-    """Checks a choice before the server starts: a wrong name or file then gives one sentence on the terminal.
-    If the names are not enough for the check, the scene is loaded, which takes a second."""
+    """Checks a choice before the server starts, so that a wrong name or file gives one sentence on the
+    terminal. If the names are not enough for the check, the scene is loaded, which takes a second."""
     if not choice.known:
         from app.worker.reports.start import start
 

@@ -65,7 +65,7 @@ class Visit:
     ) -> None:
         """own_files: folder of the files that the owner's page may name; key: signs the learners' progress;
         room: the class, if there is one; refers: if all places are taken, the page connects again, perhaps
-        with another server."""
+        to another server."""
         self._server = server
         self._client = client
         self._sessions = sessions
@@ -89,7 +89,7 @@ class Visit:
             self._own_files = None
         self._teaches = isinstance(connection, GuardedConnection) and connection.teaches
         self._account = connection.account if isinstance(connection, GuardedConnection) else ""
-        # All accounts of a hub have one origin: a browser stores their values together, under different keys.
+        # All accounts of a hub have one origin. A browser stores their values together, under different keys.
         self._progress_key, self._tokens_key = (
             f"{key}-{self._account}" if self._account else key for key in (_PROGRESS, _TOKENS)
         )

@@ -14,7 +14,7 @@ target."""
 _NARROW = 0.75
 """Usual ratio of width to height of the scene on a desktop, with the panels docked beside it."""
 _SLIM = 0.2
-"""Smallest ratio of width to height that is used: with a smaller ratio the camera would be too far away."""
+"""Smallest ratio of width to height that is used. With a smaller ratio the camera would be too far away."""
 _ASIDE = np.array([1.0, 0.75, 0.55])
 """Default direction from the points to the camera."""
 _THICK = 0.07

@@ -8,7 +8,7 @@ import viser
 from app.view.camera import turn
 
 _STEP = 0.02
-"""Motion of the base, m, below which the camera stays: a trembling camera is unpleasant."""
+"""Motion of the base, m, below which the camera stays, since a trembling camera is unpleasant."""
 _REST = 30
 """Number of calls with the base at rest after which the browser's last camera message is up to date."""
 
@@ -18,8 +18,8 @@ class FollowBase:
 
     A browser's camera message is late: while the base moves, the message is some pictures old, and its
     position lacks the motion since then. Therefore only the direction and distance of the camera are taken
-    from the message while the base moves; following does not change them. The point that the camera looks at
-    is taken from the message only while the base is at rest.
+    from the message while the base moves; following the base does not change them. The point that the
+    camera looks at is taken from the message only while the base is at rest.
     """
 
     def __init__(self, camera: viser.CameraHandle) -> None:
@@ -29,8 +29,8 @@ class FollowBase:
         self._rests = 0
 
     def follow(self, base: np.ndarray, on: bool) -> None:
-        """base: the base's position, (3,) m; on: whether the camera follows the base, from its position at
-        that time on."""
+        """base: the base's position, (3,) m; on: whether the camera follows the base. When `on` becomes
+        true, the motion is measured from the present position."""
         if not on:
             self._at = None
             return

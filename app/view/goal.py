@@ -66,7 +66,7 @@ class Goal:
         return hear
 
     def put(self, place: np.ndarray) -> None:
-        """Moves the goal like its arrows do, only along the directions of its arrows."""
+        """Moves the goal as its arrows do, along the directions of the arrows only."""
         if self._moved is not None:
             active = ["xyz".index(axis) for axis in self._axes]
             at = self.place

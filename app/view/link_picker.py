@@ -11,7 +11,7 @@ from robots import Robot
 
 
 class LinkPicker:
-    """Makes links clickable, but only on request: a clickable link hides objects behind it from the mouse."""
+    """Makes links clickable on request only, as a clickable link hides objects behind it from the mouse."""
 
     def __init__(self, view: RobotView, robot: Robot, chosen: Callable[[str], None]) -> None:
         """chosen: called with the name of the link that was clicked."""

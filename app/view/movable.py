@@ -11,7 +11,7 @@ import viser.transforms as vtf
 
 @dataclass(frozen=True)
 class Movable:
-    """A target that is moved on viser's loop, with the same effect as by its arrows or rings.
+    """A target that code moves on viser's loop, with the same effect as a drag of its arrows or rings.
 
     Attributes:
         name: the name of its task or role.

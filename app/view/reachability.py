@@ -81,7 +81,7 @@ class ReachabilityWorker:
         data = self._robot.model.createData()
         q = self._robot.home
         while (question := self._next()) is not None:
-            # The initial guess is the last posture: a dragged target moves little between two questions.
+            # The initial guess is the last posture, as a dragged target moves little between two questions.
             found = judge.solve(question.position, None, q, question.frame)
             q = found.q
             accepted, missing = question.position, 0.0

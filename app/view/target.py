@@ -121,7 +121,7 @@ class TargetGizmo:
 
     def show_accepted(self, accepted: np.ndarray, missing: float) -> None:
         """Shows the result of the reachability check: the position that the controller gets, and its distance
-        from the dragged one, m."""
+        from the dragged position, m."""
         out = missing > 0.0
         for handle in (self._ghost, self._accepted, self._gap):
             handle.visible = out

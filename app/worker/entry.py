@@ -1,5 +1,5 @@
 """The module with which simulation processes start. The server refers to this module by its name. The module
-imports little: it can then report the progress of the other imports."""
+imports little, so that it can report the progress of the other imports."""
 
 from __future__ import annotations
 

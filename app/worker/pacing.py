@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 BACKLOG = 0.1
-"""Largest debt, s: of real time if the simulation is faster than real time, otherwise of simulated time.
-Beyond this debt, simulated time slows down and no further work accumulates."""
+"""Largest time, s, by which the simulation may be late: real time if the requested speed is above 1,
+otherwise simulated time. If it is later, simulated time slows down and no further work accumulates."""
 _MEMORY = 1.0
 """Time, s, over which the real-time factor is averaged and for which a slowdown is shown."""
 

@@ -215,7 +215,7 @@ class SimulationRunner:
         self.over_budget += bool(row[outlet.step_us] > 1e6 * self.session.settings.T_s)
         self.late += outlet.late is not None and bool(row[outlet.late])
         if self.lecturer is not None and self.lecturer.follow(row):
-            # The run is paused if control was lost: the learner then sees the pose at that time.
+            # The run is paused if control was lost, so that the learner sees the pose at that time.
             self.running = self.session.diverged_at is None
         return True
 

@@ -65,9 +65,9 @@ FURTHER = Further(
         ),
         Line(
             r"For $\delta = 0$ the line search accepts no step at all. A cost without slope does not "
-            "explain the short steps under (11). In the third step of the lesson, where level 1 pays for "
-            "its effort, the cost has a slope, and the steps are as short. The cost has no slope only where "
-            "level 1 is at its optimum with $e^* = 0$:",
+            "explain the short steps under (11). The third step of the lesson also tests a cost of "
+            "level 1 that contains effort. This cost has a slope, but the steps are as short as before. "
+            "Without effort the cost has no slope where level 1 is at its optimum with $e^* = 0$:",
             r"\nabla \mathcal J_1 = J^\top Q\, e^* = 0",
             _flat,
         ),

@@ -108,8 +108,9 @@ FURTHER = Further(
             "how many milliseconds is a tenth of the slowest component of an error left? What does the last "
             "line of the derivation say about an error along a curve?",
             r"It takes $⟨slow⟩$ ms with $\bar M$ and $⟨fast⟩$ ms with four times this $\bar M$. Along a "
-            r"curve the error is about $M/\bar M$ times the change of acceleration per step, so four times "
-            r"the $\bar M$ leaves a quarter or less: *Further than the proof* measures ⟨left⟩.",
+            r"curve the error is about $M/\bar M$ times the change of acceleration per step, so with four "
+            r"times this $\bar M$ a quarter of the error or less is left: *Beyond the proof* measures "
+            "⟨left⟩.",
             {
                 "left": (measured("no-model-needed", "The largest error is at most a quarter"), ".2f"),
                 "slow": (math.log(0.1) / math.log(0.985), ".0f"),

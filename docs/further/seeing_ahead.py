@@ -85,7 +85,7 @@ FURTHER = Further(
             "HTIDKC drives the base home with $K = 0.3$ 1/s, from 1.5 m away. How far is it from home after "
             "8 s, if it always reaches the desired velocity?",
             r"$1.5\,e^{-0.3 \cdot 8} = ⟨left⟩$ m, but the lesson measures 16 cm. The base does not reach "
-            r"the desired velocity: each level also pays $\rho \lVert \dot q \rVert^2$ for its speed. With "
+            r"the desired velocity: the cost of each level also contains $\rho \lVert \dot q \rVert^2$. With "
             r"a thousandth of this $\rho$ the difference disappears.",
             {"left": (1.5 * math.exp(-0.3 * 8), ".2f")},
         ),

@@ -82,7 +82,7 @@ FURTHER = Further(
             "bounds are to stop the joint in time? How many unknowns does the QP of a seven-joint arm then "
             "have?",
             r"$v/(2 N T_s) \le 20$ gives $N \ge ⟨N⟩$. A horizon that contains the whole braking has $v/(a "
-            "T_s)$, ⟨all⟩ knots. With seven joints the smaller number gives ⟨size⟩ unknowns per level, five "
+            "T_s) = ⟨all⟩$ knots. With seven joints the smaller number gives ⟨size⟩ unknowns per level, five "
             "times as many as with $N = 5$.",
             {
                 "N": (float(math.ceil(V / (2 * A * T_S))), ".0f"),

@@ -95,10 +95,10 @@ FURTHER = Further(
             "18.2$. Which share of $e$ is left after one step with $R = 10$, and which with $R = 1000$ as "
             "in the lesson's ghost? Does the ghost need other tuning?",
             "The share $R/(Q g^2 + R)$ is ⟨small⟩ % and ⟨large⟩ %. With both values $e$ vanishes within a "
-            "few milliseconds, which is why the ghost does as well: no tuning is needed between the two "
-            "values. With $R = 10^5$ the share would be ⟨more⟩ %, and with $10^7$ it takes ⟨slow⟩ ms until "
-            "a third of $e$ is left. In such a long time $e$ does not stay constant, and the run with $R = "
-            "10^7$ swings by decimetres.",
+            "few milliseconds, which is why the ghost performs equally well: no tuning is needed between the "
+            "two values. With $R = 10^5$ the share would be ⟨more⟩ %, and with $10^7$ it takes ⟨slow⟩ ms "
+            "until a third of $e$ is left. In such a long time $e$ does not stay constant, and the run with "
+            "$R = 10^7$ swings by decimetres.",
             {
                 "small": (100 * 10 / (200 * G**2 + 10), ".3f"),
                 "large": (100 * 1000 / (200 * G**2 + 1000), ".1f"),

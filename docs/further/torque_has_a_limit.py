@@ -91,7 +91,7 @@ FURTHER = Further(
         Question(
             r"The present torque is $\tau_0 = 0.10$ N·m, the limit is 0.16 N·m, and $N = 5$. How large may "
             r"the first $\Delta\tau$ be, and how large may the sum of all five be?",
-            r"Each of them may be ⟨room⟩ N·m: (32f) bounds every partial sum. If the first $\Delta\tau$ "
+            r"Both may be at most ⟨room⟩ N·m: (32f) bounds every partial sum. If the first $\Delta\tau$ "
             "alone reaches the limit, each partial sum of the others is zero or negative.",
             {"room": (0.16 - 0.10, ".2f")},
         ),

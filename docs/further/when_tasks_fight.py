@@ -94,9 +94,9 @@ FURTHER = Further(
         Question(
             "The last line bounds a change of torque. Is this bound small with $Q = 200$, $R = 10$ and $e = "
             "50$ rad/s²? Which other part of HIMPC keeps the torque within its limits?",
-            r"The bound is $\tfrac12\sqrt{Q/R}\,e = ⟨cap⟩$ N·m, far beyond any motor: a finite torque is "
-            "not always possible. $R$ makes the problem well posed at the singularity (Lemma 1). The bounds "
-            "(34f) keep the torque within its limits. A projection does not have such bounds.",
+            r"The bound is $\tfrac12\sqrt{Q/R}\,e = ⟨cap⟩$ N·m, far beyond any motor: a finite torque can "
+            "still be too large for a motor. $R$ makes the problem well posed at the singularity (Lemma 1). "
+            "The bounds (34f) keep the torque within its limits. A projection does not have such bounds.",
             {"cap": (0.5 * math.sqrt(200 / 10) * 50, ".0f")},
         ),
     ),

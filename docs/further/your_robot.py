@@ -54,7 +54,8 @@ def _worst() -> float:
 
 
 def _least_inertia(rng: np.random.Generator) -> tuple[float, float]:
-    """Returns the torque over the acceleration of joint 1 while the other joints are free, and 1/(M⁻¹)₁₁."""
+    """Returns the ratio of torque to acceleration of joint 1 while the other joints are free, and
+    1/(M⁻¹)₁₁."""
     M = inertia(rng, 4)
     tau = np.array([1.0, 0, 0, 0])
     return 1.0 / float(np.linalg.solve(M, tau)[0]), 1.0 / float(np.linalg.inv(M)[0, 0])
@@ -89,8 +90,9 @@ FURTHER = Further(
             _least_inertia,
         ),
         Line(
-            r"The least $D_i$ over 200 poses gives $\bar M$ its shape. Its size follows from stability. The "
-            r"eigenvalues of $M^{-1} \bar M$ are those of a symmetric matrix, so they are real and positive:",
+            r"The least $D_i$ over 200 poses give the diagonal of $\bar M$, up to a common factor that "
+            r"follows from stability. The eigenvalues of $M^{-1} \bar M$ are those of a symmetric matrix, so "
+            "they are real and positive:",
             r"\operatorname{eig}(M^{-1} \bar M) = \operatorname{eig}(\bar M^{1/2} M^{-1} \bar M^{1/2}) > 0",
             _similar,
         ),

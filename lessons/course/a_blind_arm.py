@@ -91,9 +91,9 @@ BOUND = Step(
     why=r"""
     The torque and the force grow until joints 2 and 4 are at their bounds. Stiffness does not limit the
     force: with half of $K_p$ both bounds are reached, too, up to 0.9 s later and at the same force. With
-    all its torque the arm presses with 650 N after 4 s, and joint 2 is at its bound again. A bound of the
-    torque does not replace a bound of the force: the bound of the torque also limits the deceleration of
-    the arm, and the load that it can carry.
+    the full torque of its motors the arm presses with 650 N after 4 s, and joint 2 is at its bound again. A
+    bound of the torque does not replace a bound of the force: the bound of the torque also limits the
+    deceleration of the arm, and the load that it can carry.
     """,
     prediction=Value(
         "With a quarter of the torque: how hard does the arm press at the end, in N?",

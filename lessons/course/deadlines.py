@@ -30,12 +30,12 @@ ONE_MORE = Step(
     text=r"""
     So far the simulated time stopped while the controller computed. Now the time continues: measuring,
     solving and applying the torque must all fit in $T_s = 1$ ms. If the torque is not ready when it is due,
-    the motors hold the previous torque, and the late torque acts at the next tick. On every machine, the
-    computer of this lesson is assumed to need 0.1 ms for each of the $N$ knots. (This is slow: this lab's
-    own step takes about 0.01 ms per knot.) With $N = 10$ the torque is just in time. Now $N = 11$. The
-    target moves by 13 cm in half a second.
+    the motors hold the previous torque, and the late torque acts at the next tick. The lesson simulates a
+    computer that needs 0.1 ms for each of the $N$ knots, on whichever machine the lab runs. (The lab's own
+    step is faster and takes about 0.01 ms per knot.) With $N = 10$ the torque is just in time. Now $N =
+    11$. The target moves by 13 cm in half a second.
     """,
-    do="If the deadline is 2 ms, what is the largest N in time? What happens at N = 20 and N = 30?",
+    do="With a deadline of 2 ms, which N is the largest that is in time? What happens at N = 20 and N = 30?",
     why=r"""
     The error more than doubles with one additional knot. The longer horizon brings no gain, and every
     torque is one tick late. Each $\Delta\tau$ is computed as a change of the torque that acts at that
@@ -63,7 +63,7 @@ ONE_MORE = Step(
             because="ten knots take exactly the available millisecond",
         ),
         Claim(
-            "The largest error is at least 1.8 times that with a torque in time.",
+            "The largest error is at least 1.8 times as large as with a torque in time.",
             Measure(HAND, over_ghost=True),
             "at least",
             1.8,
@@ -93,10 +93,10 @@ SLOWER = Step(
     of 0.005° the error of the hand is 47 mm in the late loop, and 3.2 mm in the loop of half the rate. In
     time and at the full rate, the hand is off by 1.5 mm with the same encoders, although the torque reaches
     its limit in that case, too. Besides the lateness, two conditions are necessary for so large an error.
-    The first is the division by 1 ms: if the late controller divides by 2 ms instead, 6.6 mm are left of
-    the 47. The second is the torque limit: without this limit, in the bounds and in the motors, the late
-    hand is off by 3.4 mm. The error grows with the period (Remark 6): that is why the paper requires 1 ms,
-    and why it calls its own 8 ms per step on seven joints, at $N = 5$, too long.
+    The first is that measured differences are divided by 1 ms: if the late controller divides by 2 ms
+    instead, the error is 6.6 mm. The second is the torque limit: without this limit, in the bounds and in
+    the motors, the late hand is off by 3.4 mm. The error grows with the period (Remark 6): that is why the
+    paper requires 1 ms, and why it calls its own 8 ms per step on seven joints, at $N = 5$, too long.
     """,
     prediction=Value(
         "A torque every 2 ms in time, against a torque every 1 ms that is one tick late: the ratio of the "
@@ -108,7 +108,7 @@ SLOWER = Step(
     ),
     claims=(
         Claim(
-            "The largest error is at most 10 % above that with the full rate and a late torque.",
+            "The largest error is at most 10 % larger than with the full rate and a late torque.",
             Measure(HAND, over_ghost=True),
             "at most",
             1.1,
@@ -141,7 +141,7 @@ REPAIR = Step(
     """,
     do="Try factors of 2.5 and 3. What happens if the torque is in time again, with N = 10?",
     why=r"""
-    The error of the late controller is now as small as that of the controller in time, to the third digit.
+    To three digits, the late controller now has the same error as the controller in time.
     But its stability margin is smaller: the limit of stability is still between 2 and 2.5 times the old
     $\bar M$. The effect of noise doubles.
     """,
@@ -157,7 +157,7 @@ REPAIR = Step(
     ),
     claims=(
         Claim(
-            "The largest error is at most 10 % above that with a torque in time.",
+            "The largest error is at most 10 % larger than with a torque in time.",
             Measure(HAND, over_ghost=True),
             "at most",
             1.1,

@@ -40,14 +40,14 @@ OVERLAP = Step(
     hand has been within 2 cm of its goal for a second. A task of the base is done as soon as the base is
     within 80 cm of its place.
     """,
-    do="Is the ghost as fast if its paths have a higher speed? What does its base do at each stop?",
+    do="With faster paths, is the ghost as fast as the robot? What does the ghost's base do at each stop?",
     why=r"""
     The robot needs less than two thirds of the ghost's time and distance. While the hand holds the ball
-    out, the base already leaves for the next person, as far as the arm allows. While the base drives, the
-    hand reaches. By itself, leaving early saves 9 of the ghost's 31 seconds, and reaching early saves 7
-    (measured with a second task active only at times). Both together save 11, less than the sum: once the
-    base is there, no driving is left during which the hand could reach. The distance is shorter because the
-    base stays behind its hand: the ghost's only task is the hand, so its base moves with the hand.
+    out, the base leaves for the next person, as far as the arm allows. While the base drives, the hand
+    reaches. By itself, leaving early saves 9 of the ghost's 31 seconds, and reaching early saves 7 (with
+    the second task active in one phase only). Both together save 11, less than the sum: once the base is
+    there, no driving is left during which the hand could reach. The distance is shorter because the robot's
+    base stays behind its hand. The ghost's only task is the hand, and its base moves with the hand.
     """,
     prediction=Choice(
         "With the same places and the same speed of the paths, two tasks at a time take …",
@@ -108,10 +108,10 @@ THERE = Step(
     go all the way. The condition of 5 cm alone, at any speed, costs the ghost 8 s and the other robot 12.
     The condition of rest alone, within 80 cm, costs as much as the whole rule: the base comes to rest only
     at its place. So the factor between the two ways of working depends on the rule: it was 1.6 before and
-    is 1.2 now. Two tasks at a time under the first rule save 22 s of the 41 s that one task at a time takes
-    under the strict rule. About half of that is due to the rule: 11 s if the rule is changed first, and 14
-    s if the rule is changed last. The paper measured a factor of 2.3 over four rounds, against a robot
-    whose base and arm move in turn. The paper does not say when a task of the base is done.
+    is 1.2 now. Two tasks at a time under the first rule take 22 s less than the 41 s of one task at a time
+    under the strict rule. About half of this saving is due to the rule: 11 s if the rule is changed first,
+    and 14 s if the rule is changed last. The paper measured a factor of 2.3 over four rounds, against a
+    robot whose base and arm move in turn. The paper does not say when a task of the base is done.
     """,
     prediction=Choice(
         "Both robots have to stop at every place. Two tasks at a time now take …",
@@ -221,10 +221,10 @@ MOVES = Step(
     """,
     do="Move the people yourself, while the ball waits and while the robot is on its way.",
     why=r"""
-    Until 8 s the base waits at the limit of the arm's reach for the old place. Then it moves along this
-    limit to the point nearest to the new place. At 16.5 s the hand turns to the new goal, and a second
-    later it is there within two centimetres. The goals changed twice, and the controller received only new
-    references. The goals are positions in the space in which the people move.
+    Until 8 s the base waits as near to the old place as the arm's reach allows. Then it moves along the
+    limit of this reach to the point nearest to the new place. At 16.5 s the hand turns to the new goal, and
+    a second later the hand is within two centimetres of this goal. The goals changed twice, and the
+    controller received only new references. The goals are positions in the room in which the people move.
     """,
     prediction=Choice(
         "At 16.5 s the goal jumps by 36 cm, when the hand has almost arrived. One second later the hand is …",

@@ -51,7 +51,7 @@ BOTH = Step(
     which task may have an error on the way.
     """,
     prediction=Choice(
-        "The base drives 64 cm away under the hand. The largest error of the hand is …",
+        "The base drives 64 cm, and the hand must not move. The largest error of the hand is …",
         (
             Option("less than a millimetre", high=1.0),
             Option("about a centimetre", 1.0, 50.0),
@@ -155,8 +155,8 @@ SWAP = Step(
     do="Swap the tasks once more while the base is on its way. Does the hand return?",
     why=r"""
     The base drives the missing 1.63 m, and the hand is left behind by exactly these 1.63 m. The conflict is
-    as large as before, but now the other task has the error: in a hierarchy the last task in the list has
-    it.
+    as large as before, but now the hand has the error. In a hierarchy the last task in the list has the
+    error.
     """,
     prediction=Value(
         "The base now reaches its target. How large is the error of the hand in the end, in m?",

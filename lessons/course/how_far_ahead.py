@@ -63,7 +63,7 @@ FURTHER = Step(
             "at most",
             1.05,
             fails_with=("limits.position=viability",),
-            because="with this lab's own bound on the speed towards an end, the error with N = 20 is larger",
+            because="with this lab's own bound on the speed towards a position limit, N = 20 is worse",
         ),
     ),
     set=("horizon=20",),
@@ -87,12 +87,12 @@ REASON = Step(
     all later knots. With $N = 20$ its cost counts once and its effect counts at twenty knots, so $R$ weighs
     less: $R = 10$ acts like 1.7 with $N = 1$. It does not act like $10/20$: the plan's later changes remove
     a part of $e$ as well, so the first change counts for fewer than twenty knots. A smaller $R$ has the
-    same effect: with a hundredth, $R = 0.1$, the error of one step ahead is smaller than that of twenty
-    steps with $R = 10$, and its torque is as smooth. At $R = 0.1$ the errors of the two horizons are equal.
-    Even here another weight gives the same improvement as the longer horizon.
+    same effect. With $R = 0.1$, a hundredth, one step ahead has a smaller error than twenty steps with $R =
+    10$, and its torque is as smooth. At $R = 0.1$ the errors of the two horizons are equal. Even here
+    another weight gives the same improvement as the longer horizon.
     """,
     prediction=Value(
-        "R on accelerations: the RMS error with N = 20 is how many times that with N = 1?",
+        "R on accelerations: how many times as large is the RMS error with N = 20 as with N = 1?",
         Measure(HAND, "rms", over_ghost=True),
         low=0.1,
         high=10.0,

@@ -40,8 +40,8 @@ NOTHING = Step(
     why=r"""
     The base does not move: with $\delta = 0$ the second task has no effect, and the line search accepts no
     step. Rounding errors do not explain this: with $\delta = 10^{-12}$ m the base does not move either, and
-    with $10^{-6}$ m it drives 14 cm. A step along a tangent departs from the curve immediately (given), so
-    that only very small steps are accepted.
+    with $10^{-6}$ m it drives 14 cm. A step along a tangent departs from the curve immediately (given by
+    geometry), so that only very small steps are accepted.
     """,
     prediction=Choice(
         "The hierarchy is as strict as possible, δ = 0. How far does the base drive in 8 s?",
@@ -82,8 +82,8 @@ LITTLE = Step(
     title="A tolerance of one centimetre",
     text=r"""
     Now $\delta = 1$ cm: a plan of the base is accepted if the error of the hand exceeds its best value by
-    at most a centimetre, at every knot of the coming second. In (13), $\delta$ is the additional error of
-    the first task that is allowed to improve the second task.
+    at most a centimetre, at every knot of the coming second. In (13), $\delta$ limits the additional error
+    of the first task, by which the second task can improve.
     """,
     do="Watch the hand while you raise δ from 1 mm to 5 cm. Does the base get faster?",
     why=r"""
@@ -143,8 +143,8 @@ SUM = Step(
     $$\mathcal J_i(\bar x, \bar u) \le \mathcal J_i(\bar x^{i*}, \bar u^{i*}) \quad (11)$$
 
     the second meaning bounds each error, (12). Every plan that satisfies (12) also satisfies (11): (12) is
-    stricter. This step uses (11), with a $\delta$ that allows the cost of an error of 1 cm at every knot.
-    The ghost uses (12).
+    stricter. This step uses (11). Its $\delta$ allows the cost to exceed the best value by the cost of an
+    error of 1 cm at every knot. The ghost uses (12).
     """,
     do="Raise the δ of (11) until the base is as fast as the ghost. How large is the error of the hand?",
     why=r"""

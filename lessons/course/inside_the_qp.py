@@ -139,20 +139,20 @@ BOUND = Step(
     """,
     do="Reduce the torque further, to 0.1. At what time does disc 1 reach the frame, too?",
     why=r"""
-    Level 1 moves along its valley, where other points are as good, and its error does not grow: it is no
-    larger than with all the torque. Level 2 moves along the line only to the frame, before the point where
-    its ellipse touches the line. Such a bound is *active*. If the bound were a little wider, the cost (31)
-    of level 2 would fall by twice the bound's multiplier, per N·m. With a tenth of the torque the whole
-    valley is outside the frame for a while: then the error of level 1 grows as well.
+    Level 1 moves along its valley, where other points are as good, and its error is no larger than with the
+    full torque. Level 2 moves along the line only to the frame, before the point where its ellipse touches
+    the line. Such a bound is *active*. If the bound were a little wider, the cost (31) of level 2 would
+    fall by twice the bound's multiplier, per N·m. With a tenth of the torque the whole valley is outside
+    the frame for a while: then the error of level 1 grows as well.
 
     A projection separates torques by priority, but it contains no bounds: the triangle leaves the frame,
     here by a third of the limit. Real motors would clip their torques joint by joint. The clipped torques
     would no longer lie on the orange line, and would change the result of level 1.
     """,
     prediction=Choice(
-        "With all of the torque the wrist is never more than 1.1 mm off. With a quarter of the torque …",
+        "With the full torque the wrist is never more than 1.1 mm off. With a quarter of the torque …",
         (
-            Option("more than 3 mm: it needs the torque most", low=3.0),
+            Option("more than 3 mm: the wrist needs the torque most", low=3.0),
             Option("a little more, 1.5 to 3 mm", 1.5, 3.0),
             Option("the same", high=1.5),
         ),
@@ -204,11 +204,11 @@ SUM = Step(
     do="Give level 1 a larger Q, and watch the diamond come nearer to the line; it never reaches the line.",
     why=r"""
     The diamond lies between the valley and the ring, where the slopes of the two costs cancel. In the end
-    the wrist is left 5 cm short of its 10 cm, and the joints are off by 7 degrees instead of 14 with a
-    strict order: half of each. The disc 2 never leaves the line: the leak is zero, up to rounding. But this
-    line is computed with $\bar M$. With the true $M$ a leak remains, which the second meter shows: $\bar M$
-    is not the arm's true inertia. Time-delay estimation measures the leak at the next tick and corrects it
-    over tens of ticks.
+    the wrist is 5 cm from its target, which was 10 cm away at the start, and the joints are off by 7
+    degrees instead of 14 with a strict order: each task is half done. The disc 2 never leaves the line: the
+    leak is zero, up to rounding. But this line is computed with $\bar M$, which is not the arm's true
+    inertia. With the true $M$ a leak remains, and the second meter shows this leak. Time-delay estimation
+    measures the leak at the next tick and corrects it over tens of ticks.
     """,
     prediction=Choice(
         "With the arm's true inertia instead of M̄, the leak of the same torques is …",

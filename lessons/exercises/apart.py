@@ -98,7 +98,7 @@ class Apart:
         if child is None:
             return
         self._before += spent(child.pid)[0]
-        # With seccomp the process could not start other processes.
+        # Seccomp has prevented the process from starting other processes.
         if "seccomp" in self.protection:
             child.kill()
         else:

@@ -59,7 +59,7 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
         ),
         GradeCheck(
             "Then the hand reaches a target in free space, 6 cm above the table.",
-            "the bound is tighter than the stopping distance, or the arm goes out of control",
+            "the bound is tighter than the stopping distance requires, or the arm goes out of control",
             INTO,
             15.0,
             measure=Measure(Signal("error/position", "mm"), "last"),
@@ -125,7 +125,7 @@ MISTAKES: tuple[Mistake, ...] = (
     wrong("M̄ is missing in D = T_s ∇dᵀM̄⁻¹", _law, M_bar=False),
     wrong("T_s is missing in D = T_s ∇dᵀM̄⁻¹", _law, T_s=False),
     wrong("d_safe is missing: the distance for stopping is d − d_safe", _law, d_safe=0.0),
-    wrong("the arm stops completely: a bound of −v_stop lets d shrink to d_safe", _law, v_stop="upwards"),
+    wrong("v_stop has the wrong sign: a bound of −v_stop lets d shrink to d_safe", _law, v_stop="upwards"),
     wrong("the bound is constant: d can never shrink, not even far from d_safe", _law, v_stop="none"),
     wrong("the bound is linear in d − d_safe: v_stop contains a square root", _law, v_stop="linear"),
     wrong("the reaction time t is missing in v_stop", _law, v_stop="no reaction"),
@@ -146,7 +146,7 @@ EXERCISE = Exercise(
     hints=(
         "`now.near.gradient @ now.q_dot` is the rate at which each distance grows. The next velocity is "
         "q̇ + T_s (q̈₀ + M̄⁻¹Δτ).",
-        "The factor of Δτ is D = T_s ∇dᵀM̄⁻¹, a row for each pair. All other terms go to the right.",
+        "The factor of Δτ is D = T_s ∇dᵀM̄⁻¹, a row for each pair. All other terms go to the right-hand side.",
         "The largest speed from which the arm can still stop within the distance s is "
         "v_stop(s) = a (√(t² + 2s/a) − t); here s = max(d − d_safe, 0).",
         "As for a bound of a joint, one period uses at most the share min(1, approach · T_s) of the distance "

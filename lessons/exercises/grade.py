@@ -161,7 +161,7 @@ def judged_by(exercise: Exercise, shown: Shown, seed: int) -> tuple[CheckResult,
     recordings: dict[RunSpec, Recording | str] = {}
     diagnosis = Diagnosis(exercise.mistakes)
     lines: list[CheckResult] = []
-    general: list[tuple[int, str]] = []  # places of lines that name a possible cause, and beginnings
+    general: list[tuple[int, str]] = []  # index of a failed check, and the beginning of its sentence
     for check in exercise.checks(seed):
         begins = ""
         try:

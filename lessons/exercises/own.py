@@ -153,6 +153,6 @@ def _checked(path: str, found: Exercise) -> None:
         raise InputError(f"{path}: checks(seed) must return one GradeCheck or more, as a tuple")
     for each in checks:
         if each.measure is None and not each.beside:
-            raise InputError(f"{path}: the check '{each.text}' needs measure=…, or beside=… a controller")
+            raise InputError(f"{path}: the check '{each.text}' needs measure=…, or a controller as beside=…")
         if each.points < 1:
             raise InputError(f"{path}: the check '{each.text}' must give one point or more")

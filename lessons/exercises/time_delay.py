@@ -1,6 +1,6 @@
 """Time-delay estimation
 
-How, and how accurately, do the last torque and acceleration show how heavy a robot is?
+The last torque and acceleration are known: how accurately do they show the weight of a robot?
 
 Minutes: 20
 You need: exercise "joint-pd"; lesson "no-model-needed"

@@ -21,7 +21,7 @@ class ProcessDeadline:
         seconds: time that the answer may take, s.
         what: the activity, as the beginning of an error message.
         began: time at which the request was sent.
-        slept: time up to the last check in which the process neither computed nor waited for a core, s.
+        slept: time, s, in which the process neither computed nor waited for a core, up to the last check.
     """
 
     def __init__(self, pid: int, seconds: float, what: str) -> None:

@@ -111,7 +111,7 @@ def test_only_the_user_of_the_jupyter_server_gets_in(jupyter: tuple[str, Path]) 
         with pytest.raises(InvalidStatus):
             Wire(way, headers)
     with Wire(f"{url}himpc-lab/page", {**MINE, **FORGED}) as wire:
-        assert eventually(lambda: wire.shows("It names your account, <b>zoe</b>"), LONG)
+        assert eventually(lambda: wire.shows("The text names your account, <b>zoe</b>"), LONG)
         assert not wire.shows("ben")
 
 

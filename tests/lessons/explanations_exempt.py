@@ -125,12 +125,12 @@ TEXTS = (
     Exempt("measured", (
         LESSONS + "architectures.py::test_a_base_that_stays_behind_the_hand_drives_no_farther"
     ), (
-        ("deliveries/0", "The distance is shorter because the base stays behind its hand"),
+        ("deliveries/0", "The distance is shorter because the robot's base stays behind its hand"),
         ("deliveries/1", "The ghost's base drives only a tenth farther"),
     )),
     Exempt("measured", LESSONS + "architectures.py::test_the_factor_hangs_on_the_rule", (
         ("deliveries/1", "So the factor between the two ways of working depends on the rule"),
-        ("deliveries/1", "About half of that is due to the rule"),
+        ("deliveries/1", "About half of this saving is due to the rule"),
     )),
     # ---------------------------------------- behaviour of the program
     Exempt("software", LESSONS + "grade_attacks.py::test_a_table_of_grades_is_no_program_of_a_spreadsheet", (
@@ -142,7 +142,7 @@ TEXTS = (
     Exempt("software", (
         HIMPC + "adaptation.py::test_the_largest_eigenvalue_is_one_at_the_payload_and_less_at_a_heavier_one"
     ), (
-        ("results", "`M_bar_adapt=true` finds the payload from the torque that gravity asks for"),
+        ("results", "`M_bar_adapt=true` estimates the payload from the torque that balances gravity"),
     )),
     Exempt("software", "tests/app/test_app_guard.py::test_without_the_token_nothing_opens", (
         ("serving", "Everybody who can open the page can run simulations"),

@@ -93,7 +93,7 @@ FOURTH_ROWS = (
         HAND, (45, 49), ("limits.torque=false", "plant.saturate=false"), (3.3, 3.5), of=LATE,
     ),
     Intervention(
-        "deadlines/1", "if the late controller divides by 2 ms instead, 6.6 mm are left of the 47",
+        "deadlines/1", "if the late controller divides by 2 ms instead, the error is 6.6 mm",
         HAND, (45, 49), ("T_s=0.002",), (6.4, 6.8), of=LATE,
     ),
     # ---------------------------------------- how-strict-is-strict

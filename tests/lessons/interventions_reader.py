@@ -143,7 +143,7 @@ READER_ROWS = (
         HAND_RMS, (0.93, 1.07), ("horizon=1",), (0.93, 1.07), of=("R=0.1",), stays=True,
     ),
     Intervention(
-        "how-far-ahead/1", "the error of one step ahead is smaller than that of twenty steps with $R = 10$",
+        "how-far-ahead/1", "one step ahead has a smaller error than twenty steps with $R = 10$",
         HAND_RMS, (1.35, 1.6), ("horizon=1", "R=0.1"), (0.93, 1.07),
     ),
     Intervention(

@@ -69,7 +69,7 @@ SIXTH_ROWS = (
             "house", says, measure, there, without, gone, of=of_run, on="stopping-takes-distance/2",
         )
         for says, measure, there, of_run, without, gone in (
-            ("The 5/15 s are there for that bound", LATE_SPEED, (17.5, 18.5), (), NO_DELAY, (57, 58)),
+            ("That bound needs the additional 5/15 s", LATE_SPEED, (17.5, 18.5), (), NO_DELAY, (57, 58)),
             ("which brakes late and then harder than a", TORQUE, (76.5, 77.5), NO_DELAY, ("M_bar_scale=2",),
              (66.5, 67.5)),
         )
@@ -87,7 +87,7 @@ SIXTH_ROWS = (
         for column, bound in ((1, (79.9, 80.1)), (3, (43.9, 44.1)))
     ),
     Intervention(
-        "a-blind-arm/1", "With all its torque the arm presses with 650 N after 4 s",
+        "a-blind-arm/1", "With the full torque of its motors the arm presses with 650 N after 4 s",
         FORCE, (207, 215), ("limits.torque_scale=1",), (645, 655), seconds=4.0,
     ),
     Intervention(
@@ -121,7 +121,7 @@ SIXTH_ROWS = (
         EE, (39.5, 40.4), ("limits.velocity=false",), (5.35, 5.5), of=("Q=1000",), seconds=1.2,
     ),
     Intervention(
-        "further/how-strict-is-strict", "where level 1 pays for its effort, the cost has a slope",
+        "further/how-strict-is-strict", "This cost has a slope, but the steps are as short as before",
         of("step/base", "", "mean"), (0.02, 0.025), ("formulation=paper", "Q=10"), (0.02, 0.025),
         on="how-strict-is-strict/2", stays=True,
     ),

@@ -219,12 +219,14 @@ TASK_ROWS = (
         of=("R=1e7",), on="stretched-out/1",
     ),
     Intervention(
-        "further/stretched-out", "is why the ghost does as well: no tuning is needed between the two values",
+        "further/stretched-out",
+        "is why the ghost performs equally well: no tuning is needed between the two values",
         of("error/position", "mm", "largest", 1.0), (0.15, 0.3), ("R=1000",), (0.15, 0.3),
         on="stretched-out/1", stays=True,
     ),
     Intervention(
-        "further/stretched-out", "is why the ghost does as well: no tuning is needed between the two values",
+        "further/stretched-out",
+        "is why the ghost performs equally well: no tuning is needed between the two values",
         of("error/position", "mm", "largest", 1.0), (0.15, 0.3), ("R=1e5",), (0.5, 50), of=("R=1000",),
         on="stretched-out/1",
     ),

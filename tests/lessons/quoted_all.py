@@ -158,7 +158,7 @@ QUOTED = (
     Quoted("deadlines/1", "The error is the same", _ratio(HAND), 0.95, 1.05),
     Quoted(
         "deadlines/2",
-        "as small as that of the controller in time, to the third digit",
+        "To three digits, the late controller now has the same error as the controller in time",
         _ratio(HAND),
         0.995,
         1.005,
@@ -185,7 +185,7 @@ QUOTED = (
     ),
     Quoted(
         "inside-the-qp/2",
-        "it is no larger than with all the torque",
+        "its error is no larger than with the full torque",
         _of(Signal("error/reach", "mm")),
         1.0,
         1.1,
@@ -193,7 +193,7 @@ QUOTED = (
     Quoted("inside-the-qp/2", "here by a third of the limit", _of(TORQUE), 128, 138, None),
     Quoted(
         "inside-the-qp/3",
-        "the wrist is left 5 cm short",
+        "the wrist is 5 cm from its target",
         _of(Signal("error/reach", "mm"), after=1.95),
         45,
         55,
@@ -261,7 +261,7 @@ QUOTED = (
     ),
     Quoted(
         "deliveries/3",
-        "a second later it is there within two centimetres",
+        "a second later the hand is within two centimetres of this goal",
         _of(EE, after=17.5, until=19.5),
         10,
         20,

@@ -175,7 +175,7 @@ MISTAKES: dict[str, dict[str, Mistake]] = {
             "-v_stop - speed",
             "v_stop - speed",
             3,
-            "the arm stops completely",
+            "v_stop has the wrong sign",
             "reaches a target in free space",
         ),
     },

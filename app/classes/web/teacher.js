@@ -37,7 +37,7 @@ function write(told) {
   follow(mine.place);
   const open = all.stage === "open";
   put("title", all.title);
-  put("question", all.asked ? all.asked.question : all.title ? "This step is only run." : "Choose a lesson and a step.");
+  put("question", all.asked ? all.asked.question : all.title ? "This step has no question: run it." : "Choose a lesson and a step.");
   const options = all.asked && all.asked.options && !(all.rounds.length && !open);
   put("options", !options ? "" : all.asked.options.map((text, k) => `<li><b>${"ABCDEFG"[k]}</b>${text}</li>`).join(""));
   ID("stage").textContent = {
@@ -102,7 +102,7 @@ function people(rows, named) {
 
 function servers({ servers, lost }) {
   const others = (count) => `${count} other server${count === 1 ? "" : "s"}`;
-  const away = lost ? `; ${others(lost)} cannot be reached: the learners there go on, and are counted again later` : "";
+  const away = lost ? `; ${others(lost)} cannot be reached: the learners there continue, and are counted again later` : "";
   return `${servers ? `, ${others(servers)}` : ""}${away}`;
 }
 

@@ -54,7 +54,7 @@ class PlanePanel:
         self._fewer = gui.add_button(
             "Look one knot ahead (N = 1)",
             visible=False,
-            hint="Without later knots, the plane of two joints shows more of the QP",
+            hint="The QP then has fewer variables, and the plane of two joints shows more of it",
         )
         with gui.add_folder("Choice of the plane", expand_by_default=False):
             self._pair = gui.add_dropdown(

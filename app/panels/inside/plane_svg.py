@@ -17,12 +17,11 @@ if TYPE_CHECKING:
 SIZE = (420, 408)
 _LEFT, _TOP, _SIDE = 50.0, 10.0, 360.0
 _FAR = 6.0
-"""The unconstrained optimum of a level enlarges the picture only up to this multiple of the other
-distances."""
+"""The largest factor by which the unconstrained optimum of a level enlarges the picture."""
 _SMALLEST = 0.12  # N·m: half the width at the largest magnification
 _NEAR = 8.0
-"""Sides of the box that are farther away than this multiple of the farthest point's distance do not enlarge
-the picture."""
+"""A side of the box enlarges the picture only if its distance is at most this multiple of the distance of the
+farthest point."""
 _LOOSE = 0.55
 """The picture shrinks only if it can shrink by this factor, so that small changes do not rescale it."""
 _RINGS = (1.0, 2.0, 3.0)

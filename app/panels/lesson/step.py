@@ -30,7 +30,7 @@ _BACK, _SKIP, _ALL = "◀ Back", "Skip ▶", "All lessons"
 
 
 class LessonPanel:
-    """The panel of a step, rebuilt for every step in a tab that stays. Callbacks only send commands."""
+    """The panel of a step. It is rebuilt for every step; its tab remains. Callbacks only send commands."""
 
     def __init__(
         self,
@@ -116,7 +116,7 @@ class LessonPanel:
                 self._fast = bool(self._hurry.value)
 
         @self._second.on_update
-        def _(event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:  # on a thread: it starts processes
+        def _(event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:  # on a thread, as it starts processes
             if event.client is not None:
                 self._beside = bool(self._second.value)
                 self._show_ghost()

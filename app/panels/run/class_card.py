@@ -21,7 +21,7 @@ _SAYS = {
 }
 _NAME = "Your name"
 _CUT_OFF = (
-    "<b>Class.</b> The connection to your teacher's computer is interrupted. Go on: your teacher gets "
+    "<b>Class.</b> The connection to your teacher's computer is interrupted. Continue: your teacher gets "
     "your results when the connection is back."
 )
 
@@ -40,7 +40,7 @@ class ClassCard:
         if call is None and name:
             gui.add_html(block(f"Your teacher sees your account, <b>{esc(name)}</b>."))
         elif call is not None:
-            typed = gui.add_text(_NAME, name, hint="Only your teacher sees your name. It may be empty.")
+            typed = gui.add_text(_NAME, name, hint="Only your teacher sees your name. It is optional.")
 
             @typed.on_update
             async def _(_: object) -> None:

@@ -25,8 +25,8 @@ _ROWS = 3
 
 
 class ComparePanel:
-    """The panel of the ghost. Callbacks only start and end ghosts; the state is read from the learner, so
-    that a ghost that a lesson started is also shown."""
+    """The panel of the ghost. Callbacks only start and end ghosts; the state is read from the
+    learner's simulation, so that a ghost that a lesson started is also shown."""
 
     def __init__(
         self,
@@ -45,7 +45,7 @@ class ComparePanel:
         self._settings = [self._row(gui, place) for place in range(1, _ROWS + 1)]
         self._start = gui.add_button("Start the ghost", color=button(GHOST))
         self._swap = gui.add_button(
-            "Swap robot and ghost", hint="Both swap their settings and start again", visible=False
+            "Swap robot and ghost", hint="Robot and ghost swap settings and start again", visible=False
         )
         self._end = gui.add_button("Remove the ghost", visible=False)
         self._table = gui.add_html("", visible=False)
@@ -59,7 +59,7 @@ class ComparePanel:
             self._change_sides(event.client)
 
         @self._end.on_click
-        def _(_: object) -> None:  # on a thread: it waits for a process to end
+        def _(_: object) -> None:  # on a thread, as it waits for a process to end
             learner.stop_ghost()
 
     def _row(self, gui: viser.GuiApi, place: int) -> tuple[viser.GuiDropdownHandle[str], viser.GuiTextHandle]:

@@ -91,7 +91,7 @@ class ExportPanel:
         run = self._rows(self._learner)
         if run is None:
             return None
-        from lessons.plots.draw import draw  # imported here: few pages make plots, and Matplotlib is large
+        from lessons.plots.draw import draw  # late, as few pages make plots, and Matplotlib is large
 
         ghost = self._learner.ghost
         beside = None if ghost is None else self._rows(ghost)

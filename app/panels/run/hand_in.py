@@ -17,7 +17,7 @@ from robots import InputError
 def add_hand_in(gui: viser.GuiApi, learner: SimulationClient, notebook: Notebook) -> None:
     """Adds a folder to the current container. The text is made on request, on viser's threads."""
     with gui.add_folder("Hand in your progress", expand_by_default=False):
-        told = f" It names your account, <b>{escape(notebook.account)}</b>." if notebook.account else ""
+        told = f" The text names your account, <b>{escape(notebook.account)}</b>." if notebook.account else ""
         gui.add_html(block((_SIGNED if notebook.signs else _NOT_SIGNED) + told))
         name = gui.add_text("Your name", notebook.account[:LONGEST_NAME])
         make = gui.add_button("Write the text")

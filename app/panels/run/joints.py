@@ -175,8 +175,8 @@ class JointPlots:
             (-_SHARE, _SHARE),
             height=170,
             bands=((n, n + 1, GOOD),),
-            # One legend is enough for the three charts. With a ghost there is no legend: it would name each
-            # joint twice.
+            # One legend is enough for the three charts. With a ghost there is no legend, as a legend would
+            # name each joint twice.
             legend=last and not ghost,
         )
 

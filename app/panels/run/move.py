@@ -1,5 +1,4 @@
-"""Moves targets with the keyboard: in its fields the arrow keys make a step, and its buttons turn a
-target."""
+"""Moves targets with the keyboard: the arrow keys change a field by one step, and buttons turn a target."""
 
 from __future__ import annotations
 
@@ -96,6 +95,6 @@ class MovePanel:
             if field.visible != movable:
                 field.visible = movable
             shown = round(float(value), _DIGITS)
-            # A field that was just used keeps its value: a limit of reach does not undo the user's steps.
+            # A field that was just used keeps its value, even if the robot's reach limits the target.
             if at is not None and time.monotonic() - self._touched > HOLD and field.value != shown:
                 field.value = shown

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from app.html.text import quantity
 
-if TYPE_CHECKING:  # for types only: the server listens before it loads modules that compute
+if TYPE_CHECKING:  # for types only, as the server listens before it loads modules that compute
     from app.panels.widgets.snapshot import SessionSnapshot
     from lessons.settings.settings import SceneSettings
 

@@ -25,7 +25,7 @@ from lessons.settings.settings import SceneSettings
 
 _PAUSE, _RUN, _STEP, _RESET, _RESET_ALL = "Pause", "Run", "Step", "Reset", "Reset all"
 _STOP = "Stop gently"
-_LATE = 0.5  # s: a delay of an arm's ghost is shown only if it is longer
+_LATE = 0.5  # s: a delay of an arm's ghost is shown only if it is longer than this
 
 
 class PlaybackPanel:

@@ -110,7 +110,7 @@ class RobotPanel:
 
         @load.on_click
         def _(_: object) -> None:
-            """Opens the file on a thread: the file is first loaded in a separate process, which takes a
+            """Opens the file on a thread, as the file is first loaded in a separate process, which takes a
             second."""
             name = path.value.strip()
             self._wait(answer)

@@ -16,7 +16,7 @@ from app.panels.widgets.command import add_command, on_click
 
 _STEP = 0.05  # s
 _SHORT, _LONG = 0.1, 1.0  # s per key press
-_LEAST = 0.2  # s: the slider is shown only if the history is longer
+_LEAST = 0.2  # s: the slider is shown only if the history is longer than this
 
 
 class TimeLine:

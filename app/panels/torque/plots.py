@@ -99,7 +99,7 @@ class LevelPlots:
             near.show(window, lambda: _distances(window, windows))
 
     def _only_simulated(self, ghost: bool) -> bool:
-        """Whether the chart shows only the leaks of the simulation: the leaks of a measured arm are
+        """Whether the chart shows only the leaks of the simulation. The leaks of a measured arm are
         unknown."""
         return self._measured and ghost
 

@@ -35,7 +35,7 @@ class TasksPanel:
         in_lesson: bool,
     ) -> None:
         """bindings: for controls that exist in every stack; loop: viser's event loop; current, targets:
-        return the present settings and targets; in_lesson: true if the stack may not be changed."""
+        return the present settings and targets; in_lesson: true if a lesson forbids other stacks."""
         self._gui, self._loop, self._colours = gui, loop, colours
         self._current, self._targets = current, targets
         self._robot, self._in_lesson = robot, in_lesson

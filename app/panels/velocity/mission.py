@@ -90,8 +90,8 @@ class MissionPanel:
         return () if status is None or status.mission is None else status.mission.rows
 
     def _start(self) -> tuple[float, float, float]:
-        """Returns the position at which the role's goal is drawn now. It is the initial value of another
-        goal."""
+        """Returns the position at which the role's goal is drawn now. A new goal of this role begins at this
+        position."""
         x, y, z = self._places().get(str(self._role.value), np.zeros(3))
         return round(float(x), 2), round(float(y), 2), round(float(z), 2)
 

@@ -154,7 +154,7 @@ _WATCH = (
     "Drag the ball or the disc: the present task of hand or base gets this goal at the next control step.",
 )
 _NEXT_DRAG = (
-    "Now swap which comes first.",
+    "Now swap which task comes first.",
     "As long as the hand comes first, the base stops where the arm is stretched. After a swap, the base "
     "reaches its target and moves the hand with it. Then change δ and N in <b>Control</b>.",
 )
@@ -169,6 +169,6 @@ _FIRST_ARM = (
     "that level 1 leaves.",
 )
 _NEXT_ARM = (
-    "Now swap which comes first.",
+    "Now swap which task comes first.",
     "Then drag the target out of reach, or limit the speed in the tab <b>Control</b>.",
 )

@@ -25,8 +25,8 @@ class Controls(Generic[S]):
     """Adds controls and binds each to the path of a setting: a control shows the setting and posts its
     changes.
 
-    Each control is in an unnamed folder: if two inputs of the same container change at once, viser loses one
-    of the changes.
+    Each control is in an unnamed folder, because viser loses a change if two inputs of the same container
+    change at once.
     """
 
     def __init__(self, gui: viser.GuiApi, bindings: Bindings[S], settings: S) -> None:
@@ -190,12 +190,12 @@ def _words(value: Any) -> str:
 
 
 def _step(low: float, high: float) -> float:
-    """At most a two-hundredth of the range: 1 or 5 times a power of ten."""
+    """The step of a slider: 1 or 5 times a power of ten, at most a two-hundredth of the range."""
     rough = (high - low) / 200
     power = 10.0 ** math.floor(math.log10(rough))
     return float(f"{(5 if rough >= 5 * power else 1) * power:.3g}")
 
 
 def _tenth(value: float) -> float:
-    """A tenth of the value's decade. One click then visibly changes a value of any size."""
+    """The step of a number input: a tenth of the value's decade. One click visibly changes any value."""
     return 10.0 ** (len(f"{1 / max(value, 1e-6):.0f}") * -1.0) if value < 1 else 0.1

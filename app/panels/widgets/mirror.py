@@ -115,7 +115,7 @@ def on_scale(handle: viser.GuiInputHandle[Any]) -> Any:
 
 
 def scalar(value: object) -> float:
-    """The number that a slider shows. If the setting has one value per coordinate, it is their mean."""
+    """The number that a slider shows. If the setting has one value per coordinate, this is their mean."""
     if isinstance(value, (tuple, list)):
         return float(sum(value) / len(value))
     return float(value)  # pyright: ignore[reportArgumentType]

@@ -14,8 +14,8 @@ from app.panels.widgets.in_view import InView
 
 _EVERY = 0.15  # s between two updates: a moving picture needs several kilobytes per second
 _AGAIN = 15
-"""Number of updates after which the whole picture is sent again: a tab that was closed has lost its
-picture."""
+"""Number of updates after which the whole picture is sent again, since a tab that was closed has lost
+its picture."""
 
 # If the panel is folded or its tab is hidden, the element does not exist, and the script does nothing.
 _PAINT = """

@@ -26,7 +26,7 @@ from lessons.teaching.measure import Measure, Signal
 from lessons.teaching.prediction import Choice, PredictionResult, Sketch, Value
 from robots import InputError
 
-_JUDGE_EVERY = 5  # reports; this is twice a second
+_JUDGE_EVERY = 5  # number of reports between two judgements, which are made twice a second
 _CHUNK = 0.01  # s: the longest computation of the ghost between two checks for commands
 FAST = 50.0
 """Simulation speed for a run that should end as soon as possible. No computer can reach this speed."""
@@ -147,8 +147,8 @@ class Lecturer:
         return True
 
     def _foreign_change(self) -> str:
-        """Returns a sentence if an attempt at a challenge cannot count: another setting than those of the
-        challenge was changed, or a setting of the challenge is outside its range. Otherwise returns ""."""
+        """Returns a sentence if an attempt at a challenge cannot count: a setting that does not belong to
+        the challenge was changed, or one that belongs to it is outside its range. Otherwise returns ""."""
         assert isinstance(self._part, Challenge)
         now = self._session.settings
         allowed = self._own

@@ -12,7 +12,7 @@ from lessons.session.torque import TorqueSession
 from robots import InputError
 
 Stamp = tuple[str, int, int]
-"""Path, time and size of the file. If the stamp changes, the file was saved."""
+"""The stamp of a file: its path, time and size. If the stamp changes, the file was saved."""
 
 
 class File:

@@ -30,7 +30,7 @@ export class Engine {
     this.mujoco = await this.call("load", packed("mujoco"), packed("kernel"));
   }
 
-  /** Calls a function of the simulation and waits for its answer; throws an Error with a sentence if it refuses. */
+  /** Calls a function of the simulation and waits for its answer; throws an Error with a sentence if the simulation refuses. */
   call<K extends keyof Simulation>(name: K, ...given: Parameters<Simulation[K]>): Promise<Answer<K>> {
     this.worker.postMessage({ name, given });
     return this.waiting[this.waiting.push(Promise.withResolvers<never>()) - 1].promise;

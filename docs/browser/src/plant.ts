@@ -66,7 +66,7 @@ export class Plant {
     return Float64Array.from(probe.qfrc_bias.subarray(0, this.n) as Vector);
   }
 
-  /** Applies changed settings and keeps the state. The robot's numbers come first; objects exist only with contacts. */
+  /** Applies changed settings and keeps the state. In qpos and qvel the robot comes first; objects exist only with contacts. */
   configure(): void {
     const { t } = this, kept = (["qpos", "qvel", "qacc_warmstart"] as const).map((name) => [name, [...this.data[name]]] as const);
     this.build();

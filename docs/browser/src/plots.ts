@@ -44,7 +44,7 @@ export class Plots {
   }
 
   take({ curves, width, restarted, running, t }: Frame): void {
-    // Plots are drawn at every third frame: a higher rate is not visible in a moving curve.
+    // Plots are drawn at every third frame, as a higher rate is not visible in a moving curve.
     const redrawn = this.frames++ % 3 === 0 || !running;
     for (const { plot, data, first, lines } of this.drawn) {
       if (restarted) for (const column of data) column.length = 0;

@@ -40,7 +40,7 @@ const share = (value: string, bound: string): OfRow => (rows, row) => {
 };
 const bit = (wanted: number): OfRow => (rows, row) =>
   rows.at(row, "at_bound").some((bits) => (finite(bits) & wanted) !== 0) ? 1 : 0;
-/** Returns the largest value of a formula over the joints, of a joint's speed and its distance to the limit ahead. */
+/** Returns the largest value, over all joints, of a formula of the joint's velocity and its distance to the limit ahead. */
 const towards = (formula: (v: number, left: number) => number): OfRow => (rows, row) => {
   const q = rows.at(row, "q"), low = rows.at(row, "q_lower"), high = rows.at(row, "q_upper");
   const found = rows.at(row, "v").map((v, a) => formula(v, Math.max(v > 0 ? high[a] - q[a] : q[a] - low[a], 0)));

@@ -125,7 +125,7 @@ export class Session {
     this.controller.set(TARGET, index, whole);
   }
 
-  /** Returns the target of a task of a position, m. */
+  /** Returns the target of a position task, m. */
   target(task: string): Float64Array {
     const { index, rows } = named(this.manifest.tasks, task, "task"), samples = this.controller.view("samples");
     const at = index * (samples.length / this.manifest.tasks.length);

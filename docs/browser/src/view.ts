@@ -18,7 +18,7 @@ const FLAT: Moves = { ArrowLeft: [-1, 0, 0], ArrowRight: [1, 0, 0], ArrowUp: [0,
 
 export class View {
   readonly canvas = element("canvas", { tabIndex: 0, role: "application", ariaLabel: "The robot. Arrow keys and Page Up, " +
-    "Page Down move the target by 2 cm; with Shift the arrow keys turn the camera; plus and minus move it closer or away." });
+    "Page Down move the target by 2 cm; with Shift the arrow keys turn the camera; plus and minus move the camera closer or away." });
   private scene = new Scene();
   private camera = new PerspectiveCamera(42, 1, 0.02, 60);
   private renderer = new WebGLRenderer({ canvas: this.canvas, antialias: true, alpha: true });

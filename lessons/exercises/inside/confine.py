@@ -87,8 +87,8 @@ def readable() -> list[Path]:
 
 
 def _hidden(path: Path) -> bool:
-    """Returns whether an entry of a folder is left out. These are the lab itself, tests, and folders of
-    packages, whose entries are checked one by one."""
+    """Returns whether an entry of a folder is left out. Entries that are left out are the lab itself, tests,
+    and folders of packages; the entries of these folders are checked one by one."""
     name = path.name
     return name in (*LAB, "site-packages", "dist-packages") or name.startswith(("python", "tests"))
 
@@ -97,7 +97,7 @@ def confine(places: Sequence[Path]) -> tuple[str, ...]:
     """Removes this process's access to the network, to other processes and to files until the process ends.
     Reading in `places` remains allowed. Returns the names of the mechanisms of the operating system that
     enforce this."""
-    calls = _calls()  # before Landlock: loading seccomp searches for a library
+    calls = _calls()  # Landlock would prevent the search for seccomp's library
     steps = (("Landlock", partial(_files, places)), ("seccomp", calls))
     return tuple(name for name, step in steps if step())
 
@@ -115,7 +115,7 @@ def _files(places: Sequence[Path]) -> bool:
             reading = AccessFs.READ_FILE | AccessFs.READ_DIR if path.is_dir() else AccessFs.READ_FILE
             rules.add_path_rule(path, access=reading)
         for folder in filter(os.path.isdir, sys.path):
-            rules.add_path_rule(folder, access=AccessFs.READ_DIR)  # an import lists folders
+            rules.add_path_rule(folder, access=AccessFs.READ_DIR)  # an import lists the entries
         rules.apply()
     except Exception:  # the reasons differ between kernels, containers and versions
         return False
@@ -142,7 +142,7 @@ def _without_calls(sec: Any) -> bool:
             with suppress(OSError, ValueError):  # not every processor has all of these calls
                 rules.add_rule(no, name)
         rules.add_rule(no, "clone", sec.Arg(0, sec.MASKED_EQ, thread, 0))
-        rules.add_rule(unknown, "clone3")  # seccomp cannot read its flags; the C library then uses clone
+        rules.add_rule(unknown, "clone3")  # a filter cannot read its flags; the C library then uses clone
         rules.add_rule(unknown, "openat2")
         rules.add_rule(no, "tgkill", sec.Arg(0, sec.NE, os.getpid()))
         rules.add_rule(no, "prlimit64", sec.Arg(0, sec.NE, 0))
@@ -196,7 +196,7 @@ def refuse(places: Sequence[Path], refused: RefusedCalls) -> None:
             writing = bool(set("wax+") & set(mode or "")) or bool((flags or 0) & _CHANGING)
             if not writing and os.path.realpath(os.fsdecode(path)).startswith(allowed):
                 return
-            if not writing and str(path).endswith(".py"):  # Python itself does this to quote a line
+            if not writing and str(path).endswith(".py"):  # Python opens the file of an error to quote a line
                 raise PermissionError(f"a submission may not read {path}")
         elif not event.startswith(_EVENTS):
             return

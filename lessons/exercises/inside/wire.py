@@ -18,7 +18,7 @@ SHAPE = b"S"
 """To the submission: the description of the numbers of the next ticks, see `now.shape_of`. There is no
 answer."""
 TICK = b"T"
-"""To the submission: the numbers of a tick. The answer is TORQUE, OTHER or FAULT, after any ASK."""
+"""To the submission: the numbers of a tick. The answer is TORQUE, OTHER or FAULT; ASK may come first."""
 REPLY = b"R"
 """To the submission: the requested matrix."""
 READY = b"Y"

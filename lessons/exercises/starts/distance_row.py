@@ -64,8 +64,8 @@ def quadratic(now, level):
 
 
 def bounds(now):
-    """Returns rows, lower and upper of lower ≤ rows Δτ ≤ upper: the bounds of the torque, and of the next
-    velocity in N·m."""
+    """Returns rows, lower and upper of lower ≤ rows Δτ ≤ upper: the bounds of the torque, and the bounds of
+    the next velocity, multiplied by M̄/T_s."""
     T, limit, share = now.T_s, now.bounds, min(1.0, now.bounds.approach * now.T_s or 1.0)
     scale = now.M_bar / T
     lower = [limit.tau_lower - now.tau_0, (share * (limit.v_lower - now.q_dot) - T * now.q_ddot) * scale]

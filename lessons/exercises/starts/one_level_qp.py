@@ -16,7 +16,7 @@ EXERCISE = "one-level-qp"
 def torque(now):
     level = now.levels[0]
     # TODO: e⁰ (m,) and G (m, n) of the residual (28) at the next knot:
-    # ẍ − ẍ_d + K_v (ẋ − ẋ_d) + K_p x̃ with ẍ = ẍ₀ + J M̄⁻¹ Δτ, ẋ = ẋ₀ + T_s ẍ, x̃ = x̃₀ + T_s ẋ₀ − (x_d moves).
+    # ẍ − ẍ_d + K_v (ẋ − ẋ_d) + K_p x̃ with ẍ = ẍ₀ + J M̄⁻¹ Δτ, ẋ = ẋ₀ + T_s ẍ, x̃ = x̃₀ + T_s ẋ₀ − (step of x_d).
     G = level.J / now.M_bar
     e = level.x_ddot + level.K_v * level.x_dot + level.K_p * level.error
     H = G.T @ (level.Q[:, None] * G) + np.diag(level.R)

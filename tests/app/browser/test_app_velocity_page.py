@@ -134,7 +134,7 @@ def test_the_base_stops_out_of_reach_and_goes_when_it_comes_first(
     assert eventually(page, stopped)
     assert worst < 0.01 and error(learner, "base") > 0.3
     expect(page.get_by_text("It rests: any further motion would disturb level 1")).to_be_visible()
-    expect(page.get_by_text("Now swap which comes first")).to_be_visible()
+    expect(page.get_by_text("Now swap which task comes first")).to_be_visible()
     press(page, "Swap which comes first")
     assert eventually(page, lambda: error(learner, "base") < 0.01)
     assert [each.name for each in mission(learner).rows] == ["base", "ee"]
