@@ -80,14 +80,15 @@ FIRST_TASK = Step(
     title="The task ranks first",
     text=r"""
     Now the distance is level 1, and the hand's target is moved to 5 cm above the table: a place where the
-    arm touches nothing. A task requires an equality, $x = x_d$, and this task holds the initial distance of
-    20 cm.
+    arm touches nothing. A task requires an equality, $x = x_d$. The task of level 1 holds the initial
+    distance of 20 cm.
     """,
     do="Drag the target sideways, then up. In which directions can the hand still move?",
     why=r"""
     The hand stays where it is, 15 cm above a target that is safe. Safety requires an inequality, a minimum
-    distance. A task fixes the whole direction, even where there is enough distance. This task also holds
-    only the distance of one frame from one plane: it does not include the elbow and the post.
+    distance. A task fixes the whole direction: it also prevents motions that only make a sufficient distance
+    larger. Besides, the task of level 1 refers to one frame and one plane only: it does not include the elbow
+    and the post.
     """,
     claims=(
         Claim(
@@ -122,9 +123,9 @@ INSIDE = Step(
 
     $$\nabla d^\top \dot q_{k+j} \ge -a\left(-t + \sqrt{t^2 + 2\,(d - d_s)/a}\right),$$
 
-    by the speed from which the arm can still stop. The seven pairs that could reach $d_s$ first have rows,
-    and each level is solved under these rows. The hand is sent to the other side of the post, and the elbow
-    has to pass the post.
+    by the speed from which the arm can still stop. Only the seven pairs that could reach $d_s$ soonest have
+    rows, and each level is solved under these rows. The hand is sent to the other side of the post, and the
+    elbow has to pass the post.
     """,
     do="Open the list of active bounds: which pairs are at their bound? Then put the orientation first.",
     why=r"""
@@ -136,7 +137,7 @@ INSIDE = Step(
     prediction=Choice(
         "The post blocks the straight way. At the end the hand …",
         (
-            Option("waits far before its target", low=50.0),
+            Option("stops far away from its target", low=50.0),
             Option("has come near its target", 5.0, 50.0),
             Option("is at its target", high=5.0),
         ),
@@ -182,8 +183,8 @@ INSIDE = Step(
 BEHIND = Step(
     title="Behind all levels",
     text=r"""
-    Many robots have a safety filter instead: the controller itself uses no distances. After the controller,
-    a QP changes the torque as little as possible,
+    In many robots the controller itself uses no distances, and a safety filter follows the controller. This
+    filter is a QP that changes the torque as little as possible,
 
     $$\min_\tau \lVert \bar M^{-1} (\tau - \tau_{\mathrm{nom}}) \rVert^2,$$
 
@@ -195,10 +196,10 @@ BEHIND = Step(
     The filter is as safe as the rows: the arm touches nothing. But the filter does not use the order of the
     tasks. The tasks of orientation and posture move the elbow towards the post, the filter changes the sum
     of all torques as little as possible, and the hand has the error: it stops 27 cm before its target. The
-    lower levels are to blame: with both of them switched off the hand is 5 cm away by then, and comes
-    closer. One of them is enough to hold the hand back: if only the posture is off, 23 cm are left, and if
-    only the orientation is off, 19 cm are left. An order of tasks does not hold if the bounds are applied
-    after it.
+    lower levels are to blame: with both of them switched off the hand is 5 cm away at that time, and still
+    comes closer. One of these two levels is enough to hold the hand back: if only the posture is switched
+    off, 23 cm are left, and if only the orientation is switched off, 19 cm are left. An order of tasks does
+    not hold if the bounds are applied after it.
     """,
     prediction=Choice(
         "The rows are the same, but a filter after all levels imposes them. At the end the hand …",
@@ -233,7 +234,7 @@ BEHIND = Step(
             "at least",
             1.0,
             fails_with=("controller=himpc",),
-            because="there no level changes the levels above it (33)",
+            because="inside the hierarchy no level changes the levels above it (33)",
         ),
     ),
     set=("avoidance.on=true", "controller=himpc_filtered"),

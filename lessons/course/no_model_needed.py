@@ -133,15 +133,15 @@ SMALL = Step(
 FURTHER = Step(
     title="Beyond the proof",
     text=r"""
-    Now $\bar M$ is larger. Twice the $\bar M$ leaves 0.41 of the error; here $\bar M$ is four times as
-    large. Remark 4 guarantees that the errors stay bounded if $\lVert I - M^{-1} \bar M \rVert < 1$. For
-    four times $\bar M$ this norm is 1.21 at the start.
+    With twice the original $\bar M$, 0.41 of the error is left. Now $\bar M$ is four times the original.
+    Remark 4 guarantees that the errors stay bounded if $\lVert I - M^{-1} \bar M \rVert < 1$. For four times
+    $\bar M$ this norm is 1.21 at the start.
     """,
     do="Raise M̄ from 1. Which of the two numbers begins to rise first, norm or radius?",
     why=r"""
-    The error is less than a fifth of the ghost's, and the arm does not vibrate. A norm below 1 is
-    sufficient, but not necessary: it means that *no* error grows, not even for a single step. In the long
-    run the eigenvalues decide, and the largest of them is 0.94.
+    The error is less than a fifth of the ghost's, and the arm does not vibrate. A norm below 1 is sufficient
+    for stability, but not necessary: such a norm means that *no* error grows, not even for a single step. In
+    the long run the eigenvalues decide, and the largest of them is 0.94.
     """,
     claims=(
         Claim(
@@ -189,10 +189,10 @@ LARGE = Step(
     why=r"""
     The smallest $1 - \lambda$ has passed −1: each correction is more than twice as large as it should be,
     and every millisecond the error grows by half and changes its sign. The arm chatters, reaches full
-    torque and becomes unstable. At × 6 the gauge read 0.91, its smallest value: the slowest component had
-    0.91, the fastest −0.89. From there on the fastest component is the largest in size, up to −1.21 at × 7.
-    So start small, go up in small steps, and stop when the gauge begins to rise: there the limit of
-    stability is near.
+    torque and becomes unstable. At × 6 the gauge read 0.91, its smallest value: the factor of the slowest
+    component was 0.91, that of the fastest −0.89. With a larger $\bar M$ the factor of the fastest component
+    is the largest in size: −1.21 at × 7. So start small, go up in small steps, and stop when the gauge begins
+    to rise: there the limit of stability is near.
     """,
     prediction=Choice(
         "M̄ × 2, × 4 and × 6 were better each time. What happens at × 8?",

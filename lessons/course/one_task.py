@@ -165,8 +165,8 @@ FREE = Step(
     limit, and the torques change to hold this speed. When the push ends, the part of the torques along the
     free motion stays as it is, and this part reverses joint 2. 0.2 s later joint 2 turns with 80°/s in the
     opposite direction. Without speed limits joint 2 continues in the direction of the push, with more than
-    300°/s. It reverses only 0.75 s after the push. There the held hand allows no further motion: the last
-    link lies on the line from joint 1 to the hand. A last level with the task $\ddot q + K_V \dot q = 0$
+    300°/s. It reverses only 0.75 s after the push. At that moment the held hand allows no further motion: the
+    last link lies on the line from joint 1 to the hand. A last level with the task $\ddot q + K_V \dot q = 0$
     brings the elbow to rest, with hardly any effect on the hand.
     """,
     prediction=Choice(

@@ -38,7 +38,7 @@ EARLY = Step(
     The base has already driven more than half a metre of the way back at 8 s. A base that leaves early has
     a larger error at the end of Part 1 and a smaller one at the beginning of Part 2. Summed over all knots
     of the plan, leaving early is cheaper. The mean error of Part 2 is about a quarter of the ghost's. The
-    hand stays in place in both cases: with and without preview in level 2, (12) holds.
+    hand stays in place with and without preview in level 2: (12) holds in both cases.
     """,
     prediction=Choice(
         "The reference jumps at 8 s. How much of the way back does the base drive before 8 s?",
@@ -85,16 +85,16 @@ SHORT = Step(
     do="From which N on is the hand within 1 mm? Compare this horizon with the time the base needs to stop.",
     why=r"""
     The hand ranks first, but is off by 3 cm. On its way home the base drives at its top speed along both
-    axes. The hand needs a slower base, but the plan contains this need too late: by then the acceleration
-    of the base cannot change in time. Without the bound on this change, the hand is off by 6 mm with the
-    same 0.2 s. With this bound and half the top speed, it is off by 4 mm. A limit of the acceleration that
-    is three times as high hardly helps. A priority selects the best plan within the horizon; it cannot
-    select a plan for events beyond the horizon.
+    axes. The hand needs a slower base, but this need appears in the plan too late: the acceleration of the
+    base can no longer change fast enough. Without the bound on this change, the hand is off by 6 mm with the
+    same horizon of 0.2 s. With this bound and half the top speed, it is off by 4 mm. A limit of the
+    acceleration that is three times as high hardly helps. A priority selects the best plan within the
+    horizon; it cannot prepare for events beyond the horizon.
     """,
     prediction=Choice(
         "With N = 2 instead of 10, the hand still ranks first. The hand is off by at most …",
         (
-            Option("less than 1 mm, as before: it ranks first", high=1.5),
+            Option("less than 1 mm, as before: the hand ranks first", high=1.5),
             Option("some millimetres", 1.5, 10.0),
             Option("centimetres", low=10.0),
         ),
@@ -134,13 +134,13 @@ NO_PLAN = Step(
     why=r"""
     Neither of the two knows the new reference before 8 s, but HTIDKC is much slower: it is 16 cm from home
     at the end, when the ghost has long arrived. A velocity in proportion to the error is small at the end,
-    and with 0.3 1/s it is small for a long time: without any limit on speed and acceleration HTIDKC is
-    hardly nearer home. But with a gain of 2 1/s it arrives. A planner has weights instead of a gain. With
-    our $Q = 10$ it is nearly as quick as the limits allow: with half the speed limit, or a third of the
-    acceleration, it comes home later. These limits do not slow HTIDKC down: it never drives faster than
-    half the limit, and comes home as late as before. With $Q = 1$ and the scene's own limits the planner is
-    still 22 cm away at the time when it is home with $Q = 10$. In the paper both methods were tuned to have
-    equal errors in Part 1, and in Part 2 the error of HTMPC is 42 % smaller.
+    and with 0.3 1/s it is small for a long time. Even without any limit on speed and acceleration HTIDKC is
+    hardly nearer home at the end. But with a gain of 2 1/s it arrives. A planner has weights instead of a
+    gain. With our $Q = 10$ it is nearly as quick as the limits allow: with half the speed limit, or a third
+    of the acceleration, it comes home later. These limits do not slow HTIDKC down: it never drives faster
+    than half the limit, and comes home as late as before. With $Q = 1$ and the scene's own limits the planner
+    is still 22 cm away at the time when it is home with $Q = 10$. In the paper both methods were tuned to
+    have equal errors in Part 1, and in Part 2 the error of HTMPC is 42 % smaller.
     """,
     prediction=Value(
         "In Part 2, the mean error of the base with HTIDKC is how many times the ghost's?",
@@ -187,14 +187,14 @@ GAINS = Step(
     hand drifts. It drifts most at the edge of the arm's reach, 20 mm, where the arm's joints turn fastest.
     It drifts nearly as far on the way home, 16 mm, where the base is at full speed. With a peak that the
     arm can just reach the hand is off by 14 mm, with a near peak by 4 mm. If velocities are computed a
-    hundred times a second, the hand drifts half as far. At two hundred times the hand is off by 8 mm, not
-    5: on the way home a part of the error is due to the limits on acceleration and its change, and does not
-    shrink with the period. Without these limits 4.5 mm are left. The hand returns with a velocity in
-    proportion to $K$: with 5 1/s for the hand its error is half as large, with 20 1/s it is 3 mm, and the
-    base is as quick as before. The limits act both ways: without the limits on acceleration and its change
-    the hand is off by 18.5 mm, without the limits on speed by 28 mm, without any limits by 37 mm. A good
-    pair exists, but it must be found. The paper says (given, not tried here) that HTIDKC needs different
-    parameters in the two parts, whereas one set of weights is enough for HTMPC.
+    hundred times a second, the hand drifts half as far. With two hundred velocities a second the hand is off
+    by 8 mm, not 5: on the way home a part of the error is due to the limits on acceleration and its change,
+    and does not shrink with the period. Without these limits 4.5 mm are left. The hand returns with a
+    velocity in proportion to $K$: with 5 1/s for the hand its error is half as large, with 20 1/s it is 3 mm,
+    and the base is as quick as before. Some limits increase the error, others reduce it: without the limits
+    on acceleration and its change the hand is off by 18.5 mm, without the limits on speed by 28 mm, without
+    any limits by 37 mm. A good pair exists, but it must be found. The paper says (given, not tried here) that
+    HTIDKC needs different parameters in the two parts, whereas one set of weights is enough for HTMPC.
     """,
     prediction=Choice(
         "The gains are four and seven times as high. The largest error of the hand, the first task, …",

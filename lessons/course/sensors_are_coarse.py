@@ -28,15 +28,16 @@ ROUNDING = Step(
     title="Two differences",
     text=r"""
     The encoders round to $\delta = 0.005°$: at the hand this is 0.08 mm. Velocity is the difference of two
-    positions divided by $T_s$, and acceleration is the difference of two velocities divided by $T_s$. A
-    change by one digit is an acceleration of $\delta / T_s^2$, and the torque change in (13) is $\bar
-    M\,\delta / T_s^2$.
+    positions divided by $T_s$, and acceleration is the difference of two velocities divided by $T_s$. If one
+    position changes by $\delta$, the computed acceleration changes by $\delta / T_s^2$, and the torque change
+    in (13) is $\bar M\,\delta / T_s^2$.
     """,
     do="Make the encoders finer until you cannot see the noise in the torque any more.",
     why=r"""
-    A single digit changes the torque by $\bar M \delta / T_s^2 = 0.033 \cdot 8.7 \cdot 10^{-5} / 10^{-6} =
-    2.9$ N·m, and 4 N·m are available. With finer encoders the noise decreases in proportion. The hand
-    hardly moves in spite of the noise. The paper finds the same limit (Table VIII) and calls it chattering.
+    A single step $\delta$ changes the torque by $\bar M \delta / T_s^2 = 0.033 \cdot 8.7 \cdot 10^{-5} /
+    10^{-6} = 2.9$ N·m, and 4 N·m are available. With finer encoders the noise decreases in proportion. The
+    hand hardly moves in spite of the noise. The paper measures the same noise (Table VIII) and calls it
+    chattering.
     """,
     prediction=Choice(
         "Without rounding the motion needs 3 % of the torque limit. With rounding, the largest demand is …",
@@ -87,7 +88,7 @@ SQUARE = Step(
     by little more than half.
     """,
     prediction=Value(
-        "With T_s twice as long, the torque changes become how many times as large?",
+        "T_s is twice as long. How many times as large are the changes of torque?",
         Measure(ROUGH, "rms", over_ghost=True),
         low=0.05,
         high=5.0,

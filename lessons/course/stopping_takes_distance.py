@@ -95,9 +95,10 @@ LONGER = Step(
     title="Look further?",
     text=r"""
     The rows are the same, with $N = 20$. Braking from $v$ with deceleration $a$ takes the time $v/a$ and
-    the distance $v^2/2a$: from 1 rad/s with the 20 rad/s² for which this arm is rated, 50 ms and 1.4°.
+    the distance $v^2/2a$. With $v = 1$ rad/s and the 20 rad/s² for which this arm is rated, these are 50 ms
+    and 1.4°.
     """,
-    do="Raise N to 40. Which horizon is needed to brake gently, and how long does a step then take?",
+    do="Raise N to 40. Which horizon is needed to brake gently? How long does a tick then take to compute?",
     why=r"""
     The joint just stays within its range, with full torque: 20 ms are enough for an emergency stop, not for
     a gentle one. A horizon that covers the whole braking distance has 50 steps.
@@ -138,10 +139,10 @@ VIABLE = Step(
     A joint that continues at this speed for a time $t$ and then brakes with $a = 20$ rad/s² stops at $q_s$.
     Such a state is called viable: a motion exists that keeps the limit. With immediate braking and an exact
     model, $t = T_s$ and $q_s = q_{\max}$ would be enough. But the rows on speed delay the braking: in a
-    second the speed may change by at most 15 times its distance from its bound. So $t = T_s + 5/15$ s $=
-    0.33$ s. Our model is estimated, so the joint brakes late, and then harder than with $a$. To allow for
-    this late braking, $q_s$ lies 0.4° before the limit. Beyond $q_s$ the joint must come back: its speed in
-    °/s is five times its distance from $q_s$ in degrees. Again $N = 5$.
+    second the speed may change by at most 15 times the difference between the speed and its bound. So $t =
+    T_s + 5/15$ s $= 0.33$ s. Our model is estimated, so the joint brakes late, and then harder than with $a$.
+    To allow for this late braking, $q_s$ lies 0.4° before the limit. Beyond $q_s$ the joint must come back:
+    its speed in °/s is five times its distance from $q_s$ in degrees. Again $N = 5$.
     """,
     do="Raise the approach rate to 60 and 200 1/s. What improves, and how large is the torque?",
     why=r"""
@@ -150,12 +151,12 @@ VIABLE = Step(
     bound a little late. The rows on speed are the reason, not the estimate: with twice the $\bar M$ the
     joint also turns with 18°/s. Without the rows on speed ($t = T_s$) the delay of the estimate has a
     visible effect: the joint brakes with 28 instead of 20 rad/s² and passes $q_s$ by 0.002°. With twice the
-    $\bar M$ it brakes with 24 rad/s². With 0.3 of the $\bar M$ it needs all the torque and passes $q_s$ by
+    $\bar M$ it brakes with 24 rad/s². With 0.3 times the $\bar M$ it needs all the torque and passes $q_s$ by
     0.03°. So 0.4° are more than enough for the estimate. A stop before the limit with constant deceleration
     would never take more than 1.5 of the 20 rad/s², and every QP has a solution. The disadvantage is time:
-    the joint moves slowly over the last degrees. A limit beyond a short horizon must be part of the bounds
-    within the horizon. The bound on speed is the default of this lab, and a deliberate departure from
-    (32d).
+    the joint moves slowly over the last degrees. If a limit lies beyond a short horizon, the bounds within
+    the horizon must take the limit into account. The bound on speed is the default of this lab, and a
+    deliberate departure from (32d).
     """,
     prediction=Choice(
         "With a horizon of 5 ms and the bound on speed, the largest torque is …",
@@ -185,7 +186,7 @@ VIABLE = Step(
             because="the late stop takes all the torque",
         ),
         Claim(
-            "A stop before the limit would never take more than 2 rad/s².",
+            "The deceleration needed to stop before the limit is never more than 2 rad/s².",
             Measure(STOP),
             "at most",
             2.0,

@@ -22,8 +22,8 @@ SMOOTH = Control("smooth", "Start gently", choices=(False, True))
 INVERSE = Step(
     title="The limit of reach",
     text=r"""
-    The arm starts straight, and the circle starts sideways at the limit of its reach. All three columns of
-    $J$ are parallel there: no joint moves the hand along the arm, and $J M^{-1} J^\top$ loses its rank.
+    The arm starts straight, and the circle starts sideways at the limit of the arm's reach. All three columns
+    of $J$ are parallel there: no joint moves the hand along the arm, and $J M^{-1} J^\top$ loses its rank.
     Operational-space control needs $(J M^{-1} J^\top)^{-1}$.
     """,
     do="Start the circle gently. Then try OSF with a damped inverse, TDEOSF, HQP and HIMPC.",
@@ -76,7 +76,7 @@ REGULAR = Step(
     = 10^{-12}$. Without bounds $R$ keeps the torque small: with $R = 10^{-5}$ and no bounds HIMPC demands
     more than a hundred times the limit. $R$ is a damping factor, too. But $R$ damps the *change* of torque:
     at rest the cost of the change is zero, so $R$ need not be small for accuracy. The ghost, with a hundred
-    times the $R$, is as accurate; with a million times the hand swings by centimetres and more.
+    times the $R$, is as accurate; with a million times the $R$ the hand swings by centimetres and more.
     """,
     claims=(
         Claim(
@@ -96,7 +96,7 @@ REGULAR = Step(
             because="HQP also keeps control, but its model has no friction",
         ),
         Claim(
-            "From 1 s on the error with R = 10 is that with R = 1000, within 10 %.",
+            "From 1 s on the error with R = 10 exceeds the error with R = 1000 by at most 10 %.",
             Measure(HAND, after=1.0, over_ghost=True),
             "at most",
             1.1,
@@ -117,13 +117,13 @@ BLAME = Step(
     reference, which starts with a jump of its velocity to 0.08 m/s? Now the same circle starts gently, at
     the same singular pose. The ghost starts with the jump.
     """,
-    do="Look at 8 s: the arm is straight again, and the circles change.",
+    do="Look at 8 s: the arm is straight again, and the second circle begins.",
     why=r"""
     Nearly all of the error was due to the jump. The size of this error is mostly due to the desired motion:
     (4) brings the hand back slowly. With four times the $K_P$ and twice the $K_V$ the error after the jump
     is 1.7 mm. In a singular pose HIMPC follows the reference in the directions in which the arm can move.
-    Where an experiment has two possible causes at once, it does not show which of them acts; so remove one
-    of them.
+    Where an error has two possible causes at once, an experiment does not show which of them acts; so remove
+    one of them.
     """,
     prediction=Choice(
         "With the same singular pose and a gentle start, the largest error becomes …",

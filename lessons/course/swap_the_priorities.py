@@ -18,7 +18,8 @@ from lessons.teaching.prediction import Choice, Option, Value
 HAND = Signal("error/position", "mm")
 POSTURE = Signal("error/posture", "deg")
 PLOTS = (HAND, Signal("error/orientation", "deg"), POSTURE)
-# Shoulder and elbow turn by 25° and 20° in the plane of the arm, where the hand leaves no freedom.
+# Shoulder and elbow turn by 25° and 20° in the plane of the arm, in which the task of the hand leaves no
+# freedom.
 BENT = (0.0, 0.9599, 0.0, -1.2217, 0.0, 1.0472, 0.0)
 ASK = (0.1, MoveTarget("posture", BENT))
 PROMOTE = (1.2, MoveLevel("posture", 0))
@@ -121,9 +122,9 @@ BACK = Step(
     """,
     do="Swap levels as fast as you can. Try to make the arm jump.",
     why=r"""
-    In any order, the controller computes a change $\Delta\tau$ of the torque that acts already (12). The
-    torque may still jump: by 4.7 N·m in the first millisecond. The bounds do not explain the smooth motion:
-    without any of them the run is nearly the same. We have not tested what keeps the motion smooth.
+    In any order, the controller computes a change $\Delta\tau$ of the torque that acts already (12).
+    Nevertheless the torque jumps, by 4.7 N·m in the first millisecond. The bounds do not explain the smooth
+    motion: without any of them the run is nearly the same. We have not tested what keeps the motion smooth.
     """,
     claims=(
         Claim(

@@ -36,8 +36,8 @@ EXACTLY = Step(
     """,
     do="Add a little dry friction.",
     why=r"""
-    With a perfect model the error is far smaller: the model predicts the dynamics, whereas time-delay
-    estimation measures them afterwards. The question is how long such a model stays perfect.
+    With a perfect model the error is far smaller than HIMPC's: the model predicts the dynamics, whereas
+    time-delay estimation measures them afterwards. The question is how long such a model stays perfect.
     """,
     prediction=Choice(
         "OSF has the exact model and HIMPC has no model. OSF's error is …",
@@ -56,7 +56,7 @@ EXACTLY = Step(
             "at most",
             0.1,
             fails_with=("plant.friction=0.05",),
-            because="with this dry friction the error is no longer below a tenth",
+            because="with this dry friction the error is no longer below a tenth of HIMPC's",
         ),
     ),
     set=("controller=osf", "plant.friction=0", *EXACT),
@@ -80,7 +80,7 @@ REALITY = Step(
     friction. HIMPC needs no model of friction: it measures the effect of the torque of a millisecond ago.
     """,
     prediction=Value(
-        "The model is 20 % light and has no friction: how many times larger is OSF's error than HIMPC's?",
+        "The model is 20 % too light and has no friction: how many times larger is OSF's error than HIMPC's?",
         Measure(HAND, over_ghost=True),
         low=0.1,
         high=1000.0,
@@ -120,7 +120,7 @@ HEAVIER = Step(
     larger $\bar M$ makes the whole error as small as before. Lighter links make corrections faster and the
     error smaller. They do not lead to instability, since the inertia of the motors is left: with links of a
     twentieth of the mass the gauge reads 0.47. The gauge passes 1 only if the motors are lighter, too, with
-    0.01 kg·m² each. As long as $\lVert I - M^{-1}\bar M \rVert$ is below 1 errors stay bounded (Remark 4).
+    0.01 kg·m² each. As long as $\lVert I - M^{-1}\bar M \rVert$ is below 1, errors stay bounded (Remark 4).
     This condition is sufficient, not necessary: in the long run the spectral radius decides, which the
     gauge shows.
     """,
@@ -149,7 +149,7 @@ HEAVIER = Step(
             "at most",
             1.0,
             fails_with=("M_bar_scale=4",),
-            because="for links of this weight so large an M̄ is beyond the limit of stability",
+            because="with links of this weight the loop is unstable with such a large M̄",
         ),
         Claim(
             "The hand stays within 0.3 mm.",

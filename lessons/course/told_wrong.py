@@ -45,7 +45,7 @@ NOT_THERE = Step(
     first the hand swings out by 48 cm. The controller does not store old reports. After the correction the
     next plan uses the true place of the crate, and from 9 s on the base is within 2 cm of its line. The
     only task of the ghost is the hand. The ghost makes way as well, but its base comes back only as far as
-    its hand needs: at 12 s its base is still 71 cm away.
+    its hand needs: at 12 s its base is still 71 cm away from its line.
     """,
     prediction=Choice(
         "The base cannot pass the reported place of the crate. The hand leaves its line by …",
@@ -109,7 +109,7 @@ THERE = Step(
     simulation has no contacts: the crate does not stop the robot, and the distance becomes negative where
     the two overlap.
     """,
-    do="How late may the report be corrected? Find the latest time with which 5 cm are kept.",
+    do="How late can the report be corrected? Find the latest time with which the robot keeps its 5 cm.",
     why=r"""
     The robot drives 40 cm into the crate; until 7 s its base is never more than 3 mm from its line. The
     bound keeps a distance from the reported crate, not from the true one. The time of the
@@ -117,7 +117,7 @@ THERE = Step(
     line. A correction at 5.4 s is nearly too late: 2 cm are left. The hand swings out by 12 cm meanwhile:
     (7c) bounds level 1, too. A correction at 5.6 s is too late: the robot overlaps the crate by 7 cm. A
     larger margin helps against small errors of a report. The authors of HTMPC keep a map instead, and infer
-    with Bayes' rule from the observations which objects still stand where the map has them (given, not
+    with Bayes' rule from the observations which objects still stand at their places in the map (given, not
     measured here).
     """,
     prediction=Choice(

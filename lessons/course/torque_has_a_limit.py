@@ -34,8 +34,8 @@ ENOUGH = Step(
     do="Lower the limit until something changes. Which error changes first?",
     why=r"""
     The run needs nine tenths of the 0.24 N·m, and most of this torque is friction: without any friction the
-    same motion needs a third of the 0.24 N·m, and without dry friction alone it needs half of this torque.
-    A bound that is not active has no effect: with all the torque the errors are the same.
+    same motion needs a third of the 0.24 N·m, and with viscous friction only it needs half of the 0.24 N·m.
+    A bound that is not active has no effect: with the full torque of the motors the errors are the same.
     """,
     prediction=Value(
         "What is the largest torque during the motion, as a share of the reduced limit?",
@@ -136,17 +136,18 @@ LESS = Step(
     title="Too little torque for one task",
     text=r"""
     The limit is three per cent, 0.12 N·m. Now even the circle by itself, together with the dry friction,
-    needs more torque. Joint 1 swings to the other side, by 60°. The ghost has the task of joint 1 switched
-    off.
+    needs more torque than that. Joint 1 swings to the other side, by 60°. The ghost has the task of joint 1
+    switched off.
     """,
     do="Find the least torque with which the hand stays on its circle. How much is enough without friction?",
     why=r"""
     The hand leaves its circle: bounds rank above level 1. Without dry friction the circle by itself would
-    need 0.07 N·m, and the hand would stay on it. Level 2 does not increase the error of the hand, in either
-    order: with joint 1 first the hand is off as far. In both orders joint 1's motor is at the same limit
-    nearly all the time. The order holds at each tick. Over a run a second task may still lead the arm to
-    poses in which the error of the hand is larger: with a swing of −30° the error of the hand is larger
-    than the ghost's, 16 mm instead of 10. With joint 1 first the hand is off by 9 mm there.
+    need 0.07 N·m, and the hand would stay on it. The task of joint 1 does not increase the error of the
+    hand: with joint 1 first the hand is off as far as with the hand first. In both orders joint 1's motor
+    is at the same limit nearly all the time. The order holds at each tick. Over a run a second task may
+    still lead the arm to poses in which the error of the hand is larger: with a swing of −30° the error of
+    the hand is larger than the ghost's, 16 mm instead of 10. With this swing and joint 1 first the hand is
+    off by 9 mm.
     """,
     prediction=Choice(
         "The ghost has no second task. How much larger is the error of the hand than the ghost's?",

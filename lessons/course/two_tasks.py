@@ -54,7 +54,7 @@ BOTH = Step(
             because="with such a large swing of joint 1, the links cannot reach the circle",
         ),
         Claim(
-            "With priorities the error of the hand is that of equal weights, within 5 %.",
+            "With priorities the error of the hand exceeds the error with equal weights by at most 5 %.",
             Measure(HAND, "rms", over_ghost=True),
             "at most",
             1.05,
@@ -110,7 +110,7 @@ WEIGHTED = Step(
             "at least",
             200.0,
             fails_with=("tasks.q1.K_p=5", "tasks.q1.K_v=1.6"),
-            because="with a tenth of its K_P, an error of joint 1 counts a tenth with the same Q",
+            because="with a tenth of the K_P of joint 1, its error counts a tenth, although Q is the same",
         ),
     ),
     set=("controller=weighted",),
@@ -139,7 +139,7 @@ STRICT = Step(
     motion, too: with $Q_2 = 0.01$ the hand is off by 1.8 mm.
     """,
     prediction=Choice(
-        "With strict priorities, which task has the error of the conflict?",
+        "With strict priorities, which of the two tasks has an error in the conflict?",
         (
             Option("the hand, a little", low=3.0),
             Option("only joint 1", high=3.0),
@@ -162,7 +162,7 @@ STRICT = Step(
             "at least",
             30.0,
             fails_with=("controller=weighted",),
-            because="in a weighted sum most of the error is that of the hand",
+            because="in a weighted sum the hand has most of the error",
         ),
     ),
     duration=SECONDS,
@@ -189,7 +189,7 @@ LIMIT = Step(
     reference, although this would be possible. With a smaller $R$ it would follow.
     """,
     prediction=Choice(
-        "The hand counts 200 times as much as joint 1. Its largest error is …",
+        "The hand counts 200 times as much as joint 1. The largest error of the hand is …",
         (
             Option("the same as with strict priorities", high=1.5),
             Option("several times larger", 1.5, 30.0),
@@ -200,7 +200,7 @@ LIMIT = Step(
     ),
     claims=(
         Claim(
-            "The largest error of the hand is more than twice that of strict priorities.",
+            "The largest error of the hand is more than twice its error with strict priorities.",
             Measure(HAND, over_ghost=True),
             "at least",
             2.0,

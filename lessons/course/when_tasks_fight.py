@@ -29,7 +29,8 @@ PROJECTION = Step(
     J_{2|1}^\top$. Here the hand follows its circle and joint 1 swings to −120°, beyond what the circle
     allows. From 1.3 s on links 2 and 3 come into line. When they are in line, they can no longer compensate
     for joint 1, so any motion of joint 1 moves the hand: $J_{2|1}$ vanishes. The controller is OSF, with a
-    model that is 20 % too light. The torque limit of the motors is only measured here, not enforced.
+    model that is 20 % too light. Here the demanded torque is only compared with the limit of the motors; the
+    limit is not enforced.
     """,
     do="While the arm moves, switch to HIMPC before the conflict, and back.",
     why=r"""
@@ -131,16 +132,16 @@ EQUALITY = Step(
     text=r"""
     HIMPC never forms $J_{2|1}$. Level 2 is a problem of its own with the equality (34g), which keeps the
     result of level 1. If nothing is left for level 2, that problem is still solvable: $\Delta\tau_2 =
-    \Delta\tau_1$ satisfies everything (Theorem 2), and its Hessian is positive definite because of $R$
+    \Delta\tau_1$ satisfies all constraints (Theorem 2), and its Hessian is positive definite because of $R$
     (Lemma 1).
     """,
     do="Watch joint 1 at 1.4 s and again when it comes back.",
     why=r"""
-    Level 2 has a target that it cannot reach. It moves joint 1 to the limit that level 1 allows, where
-    links 2 and 3 are in line, and the arm does not come to rest there: from 2 s on joint 3 swings about
-    this limit, to and fro with 94°/s, a little more than once a second, until the reference of joint 1
-    comes back. A strict order does not prevent such oscillations, but it does not sustain them: in a
-    weighted sum with $Q_2 = 0.01$ joint 3 swings as well, with up to 73°/s. The estimation does not sustain
+    Level 2 has a target that it cannot reach. It moves joint 1 to the limit that level 1 allows, where links
+    2 and 3 are in line. There the arm does not come to rest: from 2 s on joint 3 swings about this limit, to
+    and fro with 94°/s, a little more than once a second. This continues until the reference of joint 1 comes
+    back. A strict order does not prevent such oscillations, but it does not sustain them: in a weighted sum
+    with $Q_2 = 0.01$ joint 3 swings as well, with up to 73°/s. The estimation does not sustain
     the swing either: with twice the $\bar M$ it swings as before. With our weights the horizon of level 2
     sustains the swing: with $N = 1$ at level 2 alone the swing decays to an oscillation of 12°/s, with $N =
     1$ at level 1 alone it swings as before. Another weight changes this result. With $R_2 = 10^5$ the swing
@@ -181,7 +182,7 @@ EQUALITY = Step(
             "at least",
             150.0,
             fails_with=("q1_amplitude_deg=20",),
-            because="without a conflict there is no limit to swing about",
+            because="without a conflict the arm does not reach the limit about which joint 3 swings",
         ),
         Claim(
             "Joint 3 swings about the straight pose: from 1.75 s on it is within 20° of straight.",

@@ -61,7 +61,7 @@ LOAD = Step(
             "at most",
             0.2,
             fails_with=("controller=weighted",),
-            because="in a sum the orientation and the posture hold the head back, each of them alone as well",
+            because="in a sum the orientation and the posture hold the head back, even one of the two alone",
         ),
         Claim(
             "The head is tilted by more than 5°.",
@@ -163,8 +163,8 @@ TUNE = Step(
 
 CHALLENGE = Challenge(
     text=(
-        "The lamp is the heavy one again, and the motion is the same. Keep the head within 7 mm of its "
-        "target all the time."
+        "The links of the lamp are heavier than in its file again, and the motion is the same. Keep the head "
+        "within 7 mm of its target all the time."
     ),
     goals=(
         Claim("The head stays within 7 mm.", Measure(HAND), "at most", 7.0),

@@ -91,8 +91,8 @@ def as_torque_scene(scene: Scene, what: str) -> TorqueScene:
 
 
 def attached(scene: Scene, controllers: Iterable[str], tasks: Mapping[str, Task]) -> Scene:
-    """Returns a torque-level scene with users' files attached: its controller may be one of `controllers`,
-    and its stack may name `tasks` by the paths of their files. Returns other scenes unchanged."""
+    """Returns a torque-level scene with users' files attached: its controller can be one of `controllers`,
+    and its stack can name `tasks` by the paths of their files. Returns other scenes unchanged."""
     if not isinstance(scene, TorqueScene):
         return scene
     settings = admitted(scene.settings, controllers)
@@ -121,8 +121,8 @@ def prepared(scene: AnyScene, controller: str | None, assignments: Iterable[str]
 
 
 def admitted(settings: AnySettings, files: Iterable[str]) -> AnySettings:
-    """Returns the settings with additional Python files that may be the controller. The files are named by
-    the person who started the program.
+    """Returns the settings with additional Python files that can be selected as the controller. The person
+    who started the program has named these files.
 
     Raises:
         InputError: the scene takes velocities, but a user's controller gives torques.

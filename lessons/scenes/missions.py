@@ -74,7 +74,7 @@ def _among_people(scene: VelocityScene) -> VelocityScene:
 
 def _handover() -> VelocityScene:
     """Returns the scene in which the hand holds every ball until it is taken, the first ball until 14 s.
-    Meanwhile the second person moves, and later shifts the place for the ball."""
+    Meanwhile the second person moves, and later also moves the hand that receives the ball."""
     events = (
         (8.0, MoveTarget("base 2", (-1.2, -0.4))),
         (8.0, MoveTarget("ee 2", (-1.9, -0.7, 0.8))),

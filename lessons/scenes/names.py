@@ -13,7 +13,7 @@ SCENES: dict[str, str] = {
     "baxter-tray": "Baxter's hands move along a square as if they carried a tray; the grip is level 1",
     "baxter-conflict": "Baxter's hands keep their relative pose, but have targets at two different places",
     "hold": "any robot: the same three levels; levels without freedom have no effect (needs --urdf)",
-    "planar3-plane": "the same arm, N = 1: the whole QP is drawn; the wrist's x comes before two joints",
+    "planar3-plane": "the same arm, N = 1: the whole QP is drawn; the wrist's x ranks above two joints",
     "planar3-circle": "planar 3-joint arm on RT1 of the HIMPC paper: a circle while joint 1 swings a little",
     "planar3-conflict": "the same arm on RT2: joint 1 swings so far that the hand cannot keep to the circle",
     "planar3-singular": "the same arm on RT3: two circles through the straight, singular arm",

@@ -18,8 +18,8 @@ def planar3_plane() -> TorqueScene:
 
     Level 1 is the wrist's x (one coordinate), level 2 the angles of joints 1 and 2, level 3 holds joint 3.
     The wrist is where joint 3 sits, and M̄ is diagonal: neither of the first two levels uses joint 3, so the
-    results of these levels lie in the plane of Δτ₁ and Δτ₂. The two levels cannot both be met, and a conflict
-    is always visible.
+    results of these levels lie in the plane of Δτ₁ and Δτ₂. The first two levels cannot both be met, and
+    their conflict is always visible.
     """
     robot = load_robot("planar3", tip="link_3")
     first, second, third = robot.joint_names

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from lessons.scenes.scene import Scene
 
 _TASK_FILE = re.compile(r'"task"\s*:\s*("(?:[^"\\]|\\.)*\.py")')
-"""A task of a stack that is named by the path of its file, in JSON."""
+"""Pattern for a task in a stack, as JSON, that is named by the path of its file."""
 
 
 @final
@@ -25,13 +25,15 @@ class RunSpec:
         scene: name of a scene, or path of a file that creates a scene.
         urdf: for the scene "hold": name of a catalog robot, or path of a URDF file.
         tip: end-effector frame, for the scene "hold".
-        controller: name of a controller, or path of a file; None: that of the scene, or of `set`.
+        controller: name of a controller, or path of a file; None: the controller that `set` names, or that of
+            the scene.
         set: assignments "PATH=VALUE" as of `himpc-lab run --set`, in order.
         events: (time in s, event) in order; None: the scene's own.
         duration: simulated seconds; None: the scene's own.
         seed: seed of the run.
-        files: Python files that may be the controller, named by the person who started the program.
-        tasks: Python files whose tasks the stack may name, named by the same person.
+        files: Python files that can be selected as the controller, named by the person who started the
+            program.
+        tasks: Python files whose tasks the stack can name; the same person has named these files.
     """
 
     scene: str
@@ -73,7 +75,7 @@ class RunSpec:
 
     def admitting(self, *assignments: str) -> RunSpec:
         """Returns the same run with further assignments by the person who started the program: the Python
-        files that the stacks in them name are admitted as tasks."""
+        files that the stacks in these assignments name are admitted as tasks."""
         stacks = (text for text in assignments if text.startswith(("stack=", "stack.add=")))
         words = (word for text in stacks for word in _TASK_FILE.findall(text))
         return replace(self.but(*assignments), tasks=(*self.tasks, *dict.fromkeys(map(_unquoted, words))))

@@ -29,17 +29,18 @@ EDGE_S = 1.2
 _SCRIPT_S = 0.05
 """Time between two targets of the tray in the script, s."""
 PLANT = replace(TOUCHING, armature=0.1)
-"""Geared motors: 0.1 kg·m² is what MuJoCo Menagerie gives arms of this size. Without armature, the inertia of
-an empty gripper is so small that no constant M̄ suits both the wrist and the shoulder.
+"""Geared motors: 0.1 kg·m² is the armature that MuJoCo Menagerie uses for arms of this size. Without
+armature, the inertia of an empty gripper is so small that no constant M̄ suits both the wrist and the
+shoulder.
 """
 NOMINAL = NominalSettings(armature=0.1)
-"""M̄ includes the armature, and so do the models of OSF and HQP. The URDF alone gives the last wrist joint
-6e-4 kg·m²: its motor then gets 1/180 of the torque that (4) requires, and the joint oscillates around its
-target with 7 % of critical damping (2° after 4 s)."""
+"""M̄ includes the armature, and so do the models of OSF and HQP. With the URDF alone, the inertia of the last
+wrist joint is 6e-4 kg·m²: its motor then gets 1/180 of the torque that (4) requires, and the joint oscillates
+around its target with 7 % of critical damping (2° after 4 s)."""
 _M_BAR = (0.21, 0.87, 0.143, 0.242, 0.118, 0.134, 0.11) * 2
 """0.9 times the least 1/(M⁻¹)ᵢᵢ over the work space with this armature: the loop is stable everywhere."""
 _APART = 0.15
-"""Distance, m, by which the target of the left hand is moved away from the right one."""
+"""Distance, m, by which the target of the left hand is moved away from the right hand."""
 
 
 def baxter_hold() -> TorqueScene:

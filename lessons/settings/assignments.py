@@ -75,15 +75,15 @@ def _parsed(text: str) -> Any:
 def differences(own: SceneSettings, settings: SceneSettings) -> tuple[str, ...]:
     """The assignments that turn a scene's own settings into other settings of the same scene.
 
-    The controller comes first, so that a setting that changes with it (its rate) is listed only if it
-    differs.
+    The controller comes first, so that a setting that the controller determines (its rate) is listed only if
+    it differs from that of the controller.
 
     Args:
         own: settings of the scene as it is loaded.
         settings: settings after some events.
 
     Raises:
-        InputError: no assignment can express them.
+        InputError: assignments cannot express the difference.
     """
     now, found = own, list[str]()
 

@@ -17,11 +17,11 @@ class Entry:
         label: a few words or a symbol.
         help: one or two sentences; empty if the label is enough.
         unit: of the value.
-        low, high, step: of a slider, in the unit `shown`; a value outside the range extends it. step 0: about
-            a hundredth of the range.
+        low, high, step: range and step of a slider, in the unit `shown`; a value outside extends the range.
+            step 0: about a hundredth of the range.
         log: whether the slider is logarithmic; then low > 0.
         shown: the unit that the page shows instead; empty: `unit`.
-        factor: the number of `shown` in one `unit`.
+        factor: how many units `shown` are equal to one `unit`.
         tries: typical values for comparisons, as the user types them; the first is rarely a scene's own
             value.
         name: used instead of the label if no heading names the group.
@@ -52,7 +52,7 @@ class Entry:
         return f"{self.label} [{unit}]" if unit else self.label
 
     def at(self, path: str) -> Entry | None:
-        """The entry of one setting, with names instead of "*"; None if the path is that of another entry."""
+        """The entry of one setting, with names instead of "*"; None if the path belongs to another entry."""
         found = self.pattern.fullmatch(path)
         if found is None:
             return None

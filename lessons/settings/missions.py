@@ -23,7 +23,7 @@ Architecture = Literal["hierarchical", "single_task", "decoupled"]
 """How a sequence is carried out: two tasks at a time (L = 2), one task at a time by the whole body (L = 1),
 or one task at a time by base or arm. In the last architecture the base drives with the arm at rest, then the
 arm moves and the base may turn. This architecture has no plan for the arm: if the arm is folded against its
-limits, it may not reach a goal behind it."""
+limits, it sometimes cannot reach a goal behind itself."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ class ArchitectureOptions(MissionOptions):
 
 @dataclass(frozen=True)
 class OrderOptions(MissionOptions):
-    """Scenes whose tasks last for the whole run, so that one may choose which comes first.
+    """Scenes whose tasks last for the whole run, so that the user can choose which task comes first.
 
     Attributes:
         order: the roles, highest priority first; empty: the scene's own order.
@@ -217,8 +217,8 @@ class WaypointOptions(ArchitectureOptions):
         ee_2 = MissionTask("ee 2", "ee", Go(second, CRUISE), HAND_TOLERANCE, self.hold_s)
         if self.architecture != "hierarchical":
             return (self.drive("base 1", Go((2.0, 1.4), CRUISE)), ee_1, self.drive("base 2", base), ee_2)
-        # Without a task below it, the last EE task would move the base, too. This task of the base is
-        # completed anywhere: the mission ends with the last EE task, as with one task at a time.
+        # Without a task below it, the last EE task would move the base, too. The task `stay` is
+        # completed wherever the base is: the mission ends with the last EE task, as with one task at a time.
         stay = MissionTask("stay", "base", base, _ANYWHERE)
         return (ee_1, self.drive("base 2", base), ee_2, stay)
 
@@ -275,5 +275,5 @@ class DeliveryOptions(ArchitectureOptions):
 
 
 def _visit(role: str, number: int) -> str:
-    """The name of a task of a delivery's visit."""
+    """The name of the task of a role in one visit of a delivery."""
     return f"{role} {number}"

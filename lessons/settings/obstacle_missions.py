@@ -1,5 +1,5 @@
-"""The missions of the scenes with obstacles: one passes obstacles on both sides of the way, and one
-passes an obstacle that is reported at a wrong place."""
+"""The missions of the scenes with obstacles. In one mission the robot passes obstacles on both sides of its
+way, in the other an obstacle that is reported at a wrong place."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ class PerceptionOptions(OrderOptions):
         return (self.report_start, self.report_end) if wrong else None
 
     def reported(self, obstacles: tuple[Obstacle, ...], t: float) -> tuple[Obstacle, ...]:
-        # Times are multiples of a control period up to rounding.
+        # Times are multiples of the control period, except for rounding errors.
         if self.misreported is None or not self.report_start <= t + 1e-9 < self.report_end:
             return obstacles
         return tuple(self._moved(each) for each in obstacles)

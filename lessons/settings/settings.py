@@ -45,8 +45,8 @@ class Place:
         return self.form.fit(path, value) if self.own_fit is None else self.own_fit(settings, path, value)
 
     def element(self, at: int, count: int) -> Place:
-        """The place of one of the `count` numbers of a list. If the settings have fewer numbers, the last
-        number is repeated first."""
+        """The place of one of the `count` numbers of a list. If the settings have fewer numbers, the list is
+        first filled up with its last number."""
 
         def spread(settings: Any) -> list[Any]:
             now = self.read(settings)
@@ -125,8 +125,8 @@ class SceneSettings(ABC):
         return []
 
     def recomposed(self, wanted: Any) -> list[tuple[str, Any]]:
-        """Paths and values that give these settings the same paths as `wanted`; [] if they already have
-        them."""
+        """Paths and values that give these settings the same paths as `wanted`; [] if both have the same
+        paths already."""
         return []
 
     def takes(self, event: Event) -> bool:
@@ -193,8 +193,8 @@ def field_places(
 
 @dataclass(frozen=True, eq=False)
 class LevelKey:
-    """A key of a level: functions that return its value and the level with another value, and the form as in
-    `Place`."""
+    """A key of a level: a function that returns its value, a function that returns the level with another
+    value, and the allowed values, as in `Place`."""
 
     read: Callable[[Level], Any]
     write: Callable[[Level, Any], Level]

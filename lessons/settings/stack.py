@@ -40,8 +40,8 @@ def read_stack(value: Any, before: Stack, own: Own = NONE) -> Stack:
 
     Args:
         value: the list.
-        before: the stack that is replaced. A task without gains keeps its gains in that stack; a new task
-            gets the gains of that stack's first task, which suit the robot.
+        before: the stack that is replaced. A task whose entry has no gains keeps the gains that it has in
+            that stack; a new task gets the gains of that stack's first task, which suit the robot.
         own: tasks of users' files that may be named.
 
     Raises:
@@ -77,8 +77,8 @@ def _tasks(stack: Stack) -> dict[str, list[Task]]:
 
 
 def level_of(entry: Any, before: Stack, taken: list[str], own: Own) -> Level:
-    """A level from an entry; see `read_stack`. taken: names of tasks, to which the names of its tasks are
-    added."""
+    """A level from an entry; see `read_stack`. taken: names of tasks, to which the names of the new level's
+    tasks are added."""
     given = (
         {"tasks": list(entry)}
         if isinstance(entry, (list, tuple))
@@ -123,8 +123,8 @@ def _made(entry: Any, before: Stack, taken: list[str], own: Own) -> list[Task]:
 
 
 def _of_file(word: Any, own: Own) -> Task | None:
-    """The task of a user's file, by the path of the file, by its fingerprint in a code, or by the name of its
-    class; None for one of the lab's kinds."""
+    """The task of a user's file. The word is the path of the file, the file's fingerprint in a code, or the
+    name of the task's class. None for one of the lab's kinds."""
     if not isinstance(word, str) or word in KINDS:
         return None
     if ".py@" in word:

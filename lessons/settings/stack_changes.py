@@ -16,9 +16,9 @@ from robots.errors import shortened, unknown_name
 
 
 def add(stack: Stack, value: Any, own: Own = NONE) -> Stack:
-    """Adds a task: {"task": KIND, …}. With "level" the task gets a level of its own at that place; place 1
-    has the highest priority. With "with", the name of a task or level, the task gets that priority. Otherwise
-    it gets a level directly above the last level."""
+    """Adds a task: {"task": KIND, …}. The key "level" gives the task a level of its own at that place; place
+    1 has the highest priority. The key "with" gives the task the priority of the task or level of that name.
+    Without these keys, the task gets a level directly above the last level."""
     given = entry_of(value, "stack.add")
     place, beside = given.pop("level", None), given.pop("with", None)
     taken = [task.name for level in stack for task in level.tasks]

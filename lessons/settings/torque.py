@@ -72,9 +72,9 @@ class TorqueSettings(SceneSettings):
             everywhere. 0: the measured computing time, and then no two runs are the same.
         plant: the parameters of the simulated plant.
         options: the scene's own choices, if it has any.
-        files: users' Python files that may be the controller. They have no path: data from elsewhere (a code,
-            a page) must not choose which files are executed.
-        own_tasks: (path of the file, task) of users' Python files whose tasks the stack may name; no
+        files: users' Python files that can be selected as the controller. No setting's path changes them:
+            data from elsewhere (a code, a page) must not choose which files are executed.
+        own_tasks: (path of the file, task) of users' Python files whose tasks the stack can name; no
             setting's path changes them.
     """
 
@@ -126,8 +126,8 @@ class TorqueSettings(SceneSettings):
     def is_late(self, measured_ms: float) -> bool:
         """Whether a torque with this computing time misses its deadline."""
         assumed = self.solve_ms_per_knot * self.horizon
-        # A torque that exactly meets its deadline must not be late by the rounding of N times a decimal
-        # fraction.
+        # N times a decimal fraction has a rounding error. A torque that exactly meets its deadline must
+        # not count as late.
         return 0.0 < self.deadline_ms < (assumed or measured_ms) - 1e-9
 
     @property
@@ -148,8 +148,8 @@ class TorqueSettings(SceneSettings):
         highest priority first ("a,b,c" or a list); "Q" or "R" for all levels (one number, or one per level);
         "levels.NAME.KEY" with the level's name or its place 1 … r, KEY one of Q, R, horizon, enabled, K_p,
         K_v (gains of all its tasks); "tasks.NAME.K_p|K_v"; "limits.KEY"; "avoidance.KEY"; "nominal.KEY";
-        "plant.KEY". If a value has one number per joint, a place 1 … n after it is the number of that joint:
-        "M_bar.3"."""
+        "plant.KEY". If a value has one number per joint, a place 1 … n after the path selects the number of
+        that joint: "M_bar.3"."""
         levels = tuple((level.name, tuple(task.name for task in level.tasks)) for level in self.levels)
         return _places(levels, type(self.options), tuple(self.controllers))
 
@@ -241,7 +241,7 @@ def _gain(name: str, key: str) -> Place:
 
 
 def _stack_place(change: Callable[[TorqueSettings, Any], Stack], read: Callable[..., Any] = _levels) -> Place:
-    """A place whose value changes the stack."""
+    """A place at which a written value changes the stack."""
     return Place(
         read, _with("levels"), Form(None, WORD), lambda s, _, value: change(s, value), shorthand=True
     )

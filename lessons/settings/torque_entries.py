@@ -8,8 +8,8 @@ _BELIEVED = "Value in the nominal model, which model-based controllers use"
 
 TORQUE_ENTRIES = (
     Entry("controller", "Controller",
-          "You can switch the controller while the robot moves; the torque changes over to the new "
-              "controller within a few tenths of a second"),
+          "You can switch the controller while the robot moves; within a few tenths of a "
+              "second, the torque becomes that of the new controller"),
     Entry("horizon", "N", "Number of knots of the prediction horizon; 1 is the inverse dynamics hierarchy",
           low=1, high=30, tries=("1", "2", "5", "10", "20"), name="horizon N"),
     Entry("T_s", "T_s", "Control period; also the time allowed for each control step", "s", 0.5, 5.0, 0.5,
@@ -43,29 +43,29 @@ TORQUE_ENTRIES = (
               "distance; 0: (32e) as printed",
           "1/s", 0.0, 100.0, 1.0),
     Entry("limits.torque_rate", "Torque rate",
-          "Largest change of each joint's torque per second; himpc, hiqp, nhimpc and weighted keep this "
-              "limit above all levels. 0: not imposed",
+          "Largest change of each joint's torque per second; in himpc, hiqp, nhimpc and weighted this "
+              "limit ranks above all levels. 0: not imposed",
           "N·m/s", 0.0, 2000.0, 10.0, name="torque rate limit"),
     Entry("avoidance.on", "Keep distances",
           "Keep distances between links, and between links and objects. himpc, hiqp, nhimpc and weighted "
-              "do this above all levels, himpc_filtered by a filter behind its levels",
+              "do this by bounds above all levels, himpc_filtered by a filter behind its levels",
           tries=("true", "false"), name="distances kept"),
-    Entry("avoidance.d_safe", "d_safe", "The distance that is kept", "m", 0.0, 100.0, 1.0, shown="mm",
+    Entry("avoidance.d_safe", "d_safe", "Smallest distance that is allowed", "m", 0.0, 100.0, 1.0, shown="mm",
           factor=1e3, name="safe distance"),
     Entry("avoidance.margin", "Margin",
           "Added to d_safe, for the delay of time-delay estimation", "m", 0.0, 100.0, 1.0, shown="mm",
           factor=1e3, name="margin of distances"),
-    Entry("avoidance.reaction", "Reaction", "Time before the robot brakes, as the bound assumes", "s",
+    Entry("avoidance.reaction", "Reaction", "Time that the bound assumes before the robot brakes", "s",
           0.0, 1.0, 0.01, name="reaction of distances"),
     Entry("avoidance.deceleration", "Deceleration",
-          "Deceleration of the approach to an object, as the bound assumes", "m/s²", 0.1, 20.0,
+          "Deceleration that the bound assumes for the approach to an object", "m/s²", 0.1, 20.0,
           0.1, name="deceleration of distances"),
     Entry("avoidance.pull", "Pull",
-          "While distances are kept, a task of a position acts on at most this error; other tasks act on "
-              "up to five times as many rad. 0: no limit",
+          "While distances are kept, a larger error of a position has the effect of this error. For other "
+              "tasks the limit is five times this number, in rad. 0: no limit",
           "m", 0.0, 2.0, 0.01, name="pull of targets"),
     Entry("avoidance.velocity_margin", "Free velocity",
-          "Share of the velocity limits that is kept free while distances are kept, for the delay of "
+          "Share of the velocity limits that is not used while distances are kept, for the delay of "
               "time-delay estimation",
           "", 0.0, 0.5, 0.01, name="margin of velocities"),
     Entry("route", "Route", "Method that computes the torque; both methods give the same torque"),
@@ -74,9 +74,9 @@ TORQUE_ENTRIES = (
               "compiled route with its own method, accept daqp only. qpoases needs the extra 'bench'"),
     Entry("R_on", "R weighs", "Quantity that R weighs: Δτ as printed, or M̄⁻¹Δτ"),
     Entry("damping", "Damp what no level controls",
-          "R weighs changes of torque only, so a direction without a task keeps its torque and does not "
-              "stop when pushed. This last level brings it to rest. To see the effect, switch it off and "
-              "push the robot.",
+          "R weighs changes of torque only, so a motion without a task keeps its torque and does not "
+              "stop after a push. The last level brings this motion to rest. To see the effect, switch it "
+              "off and push the robot.",
           tries=("false", "true"), name="damping level"),
     Entry("order", "Order", "The levels, highest priority first: a,b,c or a list"),
     Entry("stack", "Stack",
@@ -118,10 +118,10 @@ TORQUE_ENTRIES = (
           tries=("false", "true"), name="torque bound of the motors"),
     Entry("plant.gravity", "Gravity", "Whether gravity acts on the plant"),
     Entry("plant.contacts", "Contacts",
-          "The robot touches itself and the objects around it; otherwise it passes through them",
+          "The robot touches itself and the objects around it. If switched off, it passes through them",
           tries=("false", "true"), name="contacts"),
     Entry("plant.joint_stops", "Joint stops",
-          "A joint that is pushed to its limit stops there; otherwise it moves on"),
+          "A joint that is pushed to its limit stops there. If switched off, it moves on"),
     Entry("nominal.payload_kg", "Believed payload", _BELIEVED, "kg", 0.0, 10.0, 0.1),
     Entry("nominal.damping", "Believed viscous friction", _BELIEVED, "N·m·s/rad", 0.0, 10.0, 0.1),
     Entry("nominal.armature", "Believed armature", _BELIEVED, "kg·m²", 0.0, 1.0, 0.01),

@@ -50,8 +50,8 @@ VELOCITY_ENTRIES = (
     Entry("hold", "Hold", "Names of the joints that stay at rest"),
     Entry("base", "Base", "Type of motion of the base"),
     Entry("solver", "QP solver",
-          "daqp: used by HTIDKC, and by the others if the compiled method finds no solution. proxqp and "
-              "qpoases solve all QPs"),
+          "daqp: used by HTIDKC, and by the other controllers if the compiled method finds no solution. "
+              "proxqp and qpoases solve all QPs"),
     Entry("compensate_delay", "Compensate delay",
           "Predict the measured state forward by the plant's lag before planning", tries=("false", "true"),
           name="delay compensated"),
@@ -98,7 +98,7 @@ VELOCITY_ENTRIES = (
     Entry("height", "Height", "Height of the first waypoint of the hand", "m", 0.3, 1.5, 0.05),
     Entry("hold_s", "Hold", "Time that the hand stays at each goal; null: until it is released", "s", 0.0,
           5.0, 0.25),
-    Entry("seats", "Seats", "Seats of the people, numbers 0 to 5 out of six, in the order of the visits"),
+    Entry("seats", "Seats", "Numbers of the people's seats, 0 to 5, in the order of the visits"),
     Entry("rounds", "Rounds", "Number of visits to each person", low=1, high=10),
     Entry("cruise", "Cruise", "Speed along the planned paths of the base", "m/s", 0.1, 1.0, 0.05),
     Entry("goal", "Goal", "Goal of the base, x and y", "m"),

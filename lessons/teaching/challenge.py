@@ -47,7 +47,7 @@ class Challenge:
         knobs: the settings that may be changed; any other change disqualifies the attempt.
         score: the points for the quality of a solution.
         solutions: at least two different sets of assignments "PATH=VALUE" to knobs with which the challenge
-            passes. Without them it does not pass.
+            passes. With no assignments it does not pass.
         set: assignments in addition to the lesson's, made before the learner begins.
         duration: s.
         events: the script of the run.

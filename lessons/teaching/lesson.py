@@ -107,7 +107,7 @@ class Step:
             raise ValueError(f"step '{self.title}' has no claims: give at least one Claim(…)")
         for claim in self.claims:
             if not claim.fails_with or not claim.because:
-                raise ValueError(f"claim '{claim.text}' has no fails_with=…, or no explanation for it")
+                raise ValueError(f"claim '{claim.text}': fails_with=… is missing or not explained")
             if claim.measure.over_ghost and self.ghost is None:
                 raise ValueError(f"claim '{claim.text}' compares with a ghost: give the step ghost=Ghost(…)")
 

@@ -42,7 +42,7 @@ TEXTS = (
     Exempt("instruction", "", (
         ("no-model-needed/3", "So start small, go up in small steps"),
         ("further/no-model-needed", "That is why $\\bar M$ is raised in small steps"),
-        ("stretched-out/2", "Where an experiment has two possible causes"),
+        ("stretched-out/2", "Where an error has two possible causes"),
         ("deadlines/2", "So let $\\bar M$ be twice as large."),
         ("inside-the-qp/1", "It has targets for *two* numbers, so look"),
         ("further/deliveries", "So ask whether they were"),

@@ -62,7 +62,7 @@ FOURTH_ROWS = (
         HAND, (15.5, 17), ("levels.q1.enabled=false",), (9.5, 11), of=("q1_amplitude_deg=-30",),
     ),
     Intervention(
-        "torque-has-a-limit/2", "With joint 1 first the hand is off by 9 mm there",
+        "torque-has-a-limit/2", "With this swing and joint 1 first the hand is off by 9 mm",
         HAND, (15.5, 17), FIRST, (8.4, 9), of=("q1_amplitude_deg=-30",),
     ),
     # ---------------------------------------- stopping-takes-distance

@@ -112,12 +112,12 @@ LIMIT_ROWS = (
     ),
     Intervention(
         "keeping-clear/3",
-        "The lower levels are to blame: with both of them switched off the hand is 5 cm away by then",
+        "The lower levels are to blame: with both of them switched off the hand is 5 cm away at that time",
         AT_THE_END, (265, 275), ("levels.orientation.enabled=false", "levels.posture.enabled=false"),
         (45, 58),
     ),
     Intervention(
-        "keeping-clear/3", "if only the posture is off, 23 cm are left",
+        "keeping-clear/3", "if only the posture is switched off, 23 cm are left",
         AT_THE_END, (265, 275), ("levels.posture.enabled=false",), (225, 235),
     ),
     # ---------------------------------------- how-far-ahead
@@ -218,7 +218,7 @@ LIMIT_ROWS = (
         of=("plant.mass_scale=0.05", "plant.inertia_scale=0.05"), seconds=0.05,
     ),
     Intervention(
-        "the-model-is-wrong/2", "for links of this weight so large an M̄ is beyond the limit of stability",
+        "the-model-is-wrong/2", "with links of this weight the loop is unstable with such a large M̄",
         RADIUS, (1.5, 4), ("plant.mass_scale=10", "plant.inertia_scale=10"), (0.5, 0.98),
         of=("M_bar_scale=4",), seconds=0.05,
     ),

@@ -49,7 +49,8 @@ MOBILE_ROWS = (
         of=("controller=htmpc_wpt",), seconds=8.0,
     ),
     Intervention(
-        "seeing-ahead/1", "Without the bound on this change, the hand is off by 6 mm with the same 0.2 s",
+        "seeing-ahead/1",
+        "Without the bound on this change, the hand is off by 6 mm with the same horizon of 0.2 s",
         EE, (25, 40), ("limits.jerk=false",), (5.5, 6.9),
     ),
     Intervention(

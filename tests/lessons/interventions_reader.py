@@ -36,7 +36,7 @@ READER_ROWS = (
         of=("controller=weighted", "levels.posture.enabled=false"),
     ),
     Intervention(
-        "your-robot/0", "each of them alone as well",
+        "your-robot/0", "even one of the two alone",
         HAND_LAST, (90, 105), ("levels.posture.enabled=false",), (0, 1),
         of=("controller=weighted", "levels.orientation.enabled=false"),
     ),
@@ -93,7 +93,7 @@ READER_ROWS = (
         TORQUE, (85, 92), NO_FRICTION, (32, 36),
     ),
     Intervention(
-        "torque-has-a-limit/0", "without dry friction alone it needs half of this torque",
+        "torque-has-a-limit/0", "with viscous friction only it needs half of the 0.24 N·m",
         TORQUE, (85, 92), ("plant.friction=0",), (48, 54),
     ),
     Intervention(

@@ -51,7 +51,7 @@ SIXTH_ROWS = (
         measure=TORQUE, there=(76.5, 77.5), without=("M_bar_scale=2",), gone=(66.5, 67.5), of=NO_DELAY,
     ),
     VIABLE(
-        says="With 0.3 of the $\\bar M$ it needs all the torque",
+        says="With 0.3 times the $\\bar M$ it needs all the torque",
         measure=TORQUE, there=(76.5, 77.5), without=("M_bar_scale=0.3",), gone=(99.9, 100.1), of=NO_DELAY,
     ),
     *(
@@ -96,7 +96,7 @@ SIXTH_ROWS = (
     ),
     # ---------------------------------------- keeping-clear
     Intervention(
-        "keeping-clear/3", "if only the orientation is off, 19 cm are left",
+        "keeping-clear/3", "if only the orientation is switched off, 19 cm are left",
         HAND_LAST, (265, 275), ("levels.orientation.enabled=false",), (190, 199),
     ),
     # ---------------------------------------- deadlines
@@ -139,7 +139,8 @@ SIXTH_ROWS = (
             seconds=9.0,
         )
         for says in (
-            "At two hundred times the hand is off by 8 mm, not 5: on the way home a part of the error is due",
+            "With two hundred velocities a second the hand is off by 8 mm, not 5: on the way home a part of "
+            "the error is due",
             "Without these limits 4.5 mm are left",
         )
     ),

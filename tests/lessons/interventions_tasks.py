@@ -206,7 +206,7 @@ TASK_ROWS = (
         HAND, (2, 10), ("smooth=true",), (0, 0.5), of=("smooth=false",),
     ),
     Intervention(
-        "stretched-out/1", "with a million times the hand swings by centimetres and more",
+        "stretched-out/1", "with a million times the $R$ the hand swings by centimetres and more",
         of("error/position", "mm", "largest", 1.0), (50, INF), ("R=1000",), (0, 0.5), of=("R=1e7",),
     ),
     Intervention(
