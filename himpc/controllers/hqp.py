@@ -80,7 +80,7 @@ class HQP(OneStepController):
             )
             if not found.usable:
                 # A lower level keeps the solution of the levels above, which satisfies every priority. The
-                # first level brings the robot to rest.
+                # first level, which has no level above, brings the robot to rest.
                 braking = np.clip(-_REST * (M @ v), rows.lower[0], rows.upper[0])
                 fallback = "inherit" if i else "brake"
                 found = VerifiedOptimum(y if i else braking, status=found.status, qp_us=found.qp_us)

@@ -199,8 +199,8 @@ class OneStepController(TorqueController):
         return [Demand(level, J[level.rows], acceleration[level.rows]) for level in form.levels]
 
     def _blended(self, law: Law) -> tuple[Array, list[LevelSolution]]:
-        """Returns the torque, and the levels relative to τ₀; the effect of the last change of settings fades
-        in."""
+        """Returns the torque, and the levels relative to τ₀. The torque changes gradually after a change of
+        settings."""
         lead = law.levels[-1].U[0] if law.levels else np.zeros(self.robot.n)
         if self._changed:
             self._offset = (self._lead if self.incremental else self._tau_0 - law.bias) - lead
@@ -260,7 +260,7 @@ class WithJacobian(Protocol):
 
 
 def leak(demands: Sequence[WithJacobian], accelerations: list[Array], level: int) -> float:
-    """Returns ‖J_p (q̈_i − q̈_p)‖∞ over the levels p above level i.
+    """Returns the largest ‖J_p (q̈_i − q̈_p)‖∞ over all levels p above level i.
 
     accelerations: q̈_p (n,) that the levels down to each p cause in the model.
     """

@@ -232,7 +232,8 @@ class OwnController(TorqueController):
     # ---------------------------------------------------------------- the use of the law's torque
 
     def _opened(self, answers: Array) -> Array:
-        """Blends the torque after a change of settings to the law's new torque."""
+        """Returns torques that, after a change of settings, change gradually from the present torque to the
+        law's torques."""
         share, T_s = self._share, self._settings.T_s
         if share >= 1.0:
             return answers

@@ -30,7 +30,7 @@ PROXIMAL = 0.03
 level would have errors of centimetres late in its horizon. By (12), the levels below would then be allowed
 the same errors."""
 _RIDGE = 1e-8
-"""A ridge: keeps the Hessian positive definite when effort weights are zero."""
+"""Added to the diagonal of the Hessian, which is then positive definite even if effort weights are zero."""
 
 
 @dataclass(frozen=True, eq=False)
