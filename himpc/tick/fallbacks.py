@@ -52,9 +52,9 @@ def perform(arena: Arena, parts: int, like: Rows, budget: FallbackBudget) -> int
     the problems or the torque are not finite.
 
     The fallbacks are those of `solve_cascade` and one more, "feasible": if the kernel ran out of budget, the
-    level moves towards the last point of the kernel as far as the rows allow. All levels share the budget of
-    the arena, which bounds the time of a tick. If one level uses most of the budget, the next levels may need
-    fallbacks as well.
+    increments move from a feasible point towards the last point of the kernel, as far as the rows allow. All
+    levels share the budget of the arena, which bounds the time of a tick. If one level uses most of the
+    budget, the next levels may need fallbacks as well.
 
     Args:
         arena: its rows may be wider afterwards: if a fallback widens rows, the levels below use the wider

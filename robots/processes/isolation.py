@@ -189,7 +189,8 @@ def _let_go(out: int) -> None:
     nowhere = os.open(os.devnull, os.O_RDWR)
     for number in range(3):
         os.dup2(nowhere, number)
-    # Only open descriptors are closed: in containers the highest possible number may be a billion.
+    # Only open descriptors are closed. In containers there may be a billion possible descriptors, and a loop
+    # over all of them would take too long.
     for number in map(int, os.listdir("/proc/self/fd")):
         if number > 2 and number != out:
             with suppress(OSError):  # the descriptor of the listing itself is closed already
@@ -255,7 +256,7 @@ def _answer(request: bytes, within: Allowance) -> bytes:
     except RecursionError:
         fault = "it is nested too deeply; give a file with fewer nested elements"
     except Exception as error:
-        fault = f"the import failed on it ({type(error).__name__}: {shortened(str(error), 100)})"
+        fault = f"the import raised an error ({type(error).__name__}: {shortened(str(error), 100)})"
     return pickle.dumps((None, fault, None))
 
 
