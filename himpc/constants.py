@@ -52,11 +52,10 @@ INSIDE = -0.03
 """m: a pair that is nearer than d_safe by more than this must move apart, and the robot is not slowed down. A
 robot with a smaller violation counts as stalled if the violation does not decrease."""
 PROGRESS = 0.05
-"""m/s, rad/s: an error that decreases at least at this rate counts as progress. A reference that is faster
-than this counts as moving."""
+"""m/s, rad/s: an error makes progress if it decreases faster than this plus PROGRESS_SHARE times the error. A
+reference that is faster than this constant counts as moving."""
 PROGRESS_SHARE = 0.25
-"""1/s: an error must decrease at least at this rate, relative to its size, to count as progress. Without an
-obstacle, errors decrease ten times as fast."""
+"""1/s: see PROGRESS. Without an obstacle, errors decrease ten times as fast as this share requires."""
 CLOSE_ENOUGH = 0.01
 """m, rad: a task with a smaller error has reached its target."""
 SLOWING, RECOVERY = 0.1, 0.05
@@ -64,7 +63,7 @@ SLOWING, RECOVERY = 0.1, 0.05
 later speed up again."""
 DISTURBED = 0.03
 """m, rad: if the error of the first task grows by more than this, a disturbance has moved the robot, and the
-robot may move back."""
+robot is no longer slowed down."""
 STALLED, REST = 0.5, 0.02
 """Thresholds for `Stall.share`. Below STALLED, the robot stays slow until a reference moves, no obstacle is
 near, or its first task is disturbed. At REST or below, the robot has come to rest. Between the two, the robot

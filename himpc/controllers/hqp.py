@@ -43,8 +43,8 @@ class HQP(OneStepController):
     """Level i: min over y = τ − N_n of ‖J_i M_n⁻¹ y − (ẍ_i − J̇_i q̇)‖²_Q + ‖y‖²_R within the torque bounds.
 
     Priority: J_p M_n⁻¹ y_i = J_p M_n⁻¹ y_p for all levels p above, as in (34g) with the nominal M_n
-    (`settings.nominal`) in place of M̄. ẍ_i closes (4) with the gains of the tasks. As in section V only the
-    torque is bounded; velocity and position limits are not imposed.
+    (`settings.nominal`) in place of M̄. ẍ_i is the acceleration that (4) demands with the gains of the tasks.
+    As in section V only the torque is bounded; velocity and position limits are not imposed.
 
     [16] writes the same cost with the force Λ_n (ẍ_i − J̇_i q̇), and Λ_n = (J M_n⁻¹ Jᵀ)⁻¹ does not exist at a
     singularity. This form needs no inverse of a product of Jacobians, and R > 0 keeps every Hessian positive

@@ -64,7 +64,8 @@ class Law(NamedTuple):
 
 
 class OneStepController(TorqueController):
-    """State, settings and their bumpless change for OSF, TDEOSF and HQP; subclasses implement the law.
+    """The common part of OSF, TDEOSF and HQP: state, settings and bumpless changes of settings. Subclasses
+    implement the law.
 
     A change of settings is bumpless: the jump of the torque that would occur is subtracted, and this
     correction fades out over BLEND_SECONDS. After `reset` there is no correction.
@@ -75,7 +76,8 @@ class OneStepController(TorqueController):
     solves: bool = False
     """Whether the law solves QPs, with the solver in `Settings.solver`."""
     incremental: bool = False
-    """Whether the bias contains τ₀: the bias is then continuous, and only the rest of the torque can jump."""
+    """Whether the bias contains τ₀. If it does, the bias is continuous, and only the rest of the torque can
+    jump."""
 
     def reset(self, tau_0: Array) -> None:
         """Clears its memory; τ₀ (n,) N·m is the torque acting now, and q̈ starts at zero."""

@@ -169,7 +169,7 @@ class Problem:
 
     @property
     def softened(self) -> bool:
-        """Whether states and inputs are softened by barriers, as in the paper."""
+        """Whether barriers soften the constraints on states and inputs, as in the paper."""
         return self.tick.settings.formulation == "paper"
 
     @property

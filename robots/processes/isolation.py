@@ -261,8 +261,8 @@ def _answer(request: bytes, within: Allowance) -> bytes:
 
 
 def _restrict(within: Allowance, parent: int) -> None:
-    """Makes this process end with its parent, at the largest wall time and at the limit of memory, if the
-    system supports this."""
+    """Makes this process end when its parent ends, when the largest wall time has passed, and when the limit
+    of memory is reached, as far as the system supports this."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent notices this and ends the process
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
     signal.alarm(int(PATIENCE * within.seconds) + 1)

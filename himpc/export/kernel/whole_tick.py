@@ -200,7 +200,7 @@ def begin(t: TickArrays) -> None:
 
 @inline_kernel
 def restart(t: TickArrays, p: LoopArrays, tau: Array, known: int) -> int:
-    """Clears everything except the settings; targets are at rest at their raw targets.
+    """Clears everything except the settings, and sets the filtered targets to their raw targets, at rest.
 
     tau: the torque that acts now, (n,) N·m; if `known` is 0, the torque is zero.
     """

@@ -106,8 +106,8 @@ def widen(
     U: Array,
     room: float,
 ) -> bool:
-    """Computes the bounds of Problem i and the part of its increments that (33) fixes. If (33) fixes all of
-    them, it writes the increments to U[i] and returns False.
+    """Computes the bounds of Problem i and the part of its increments that (33) fixes. If (33) fixes all
+    increments, the function writes them to U[i] and returns False.
 
     Args:
         index, levels: i and the table of levels.
