@@ -2,8 +2,8 @@
 the callers, and machine code is generated only for the callers.
 
 By default Numba optimises every function three times, generates machine code for it, and adds wrappers for
-callers in Python and in C. Numba repeats all this work for each caller, since the caller's code contains the
-function.
+callers in Python and in C. The code of each caller contains the function, and Numba repeats all this work for
+each caller.
 """
 
 from __future__ import annotations

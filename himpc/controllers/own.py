@@ -232,8 +232,7 @@ class OwnController(TorqueController):
     # ---------------------------------------------------------------- the use of the law's torque
 
     def _opened(self, answers: Array) -> Array:
-        """Returns torques that, after a change of settings, change gradually from the present torque to the
-        law's torques."""
+        """After a change of settings, returns torques that gradually approach the law's."""
         share, T_s = self._share, self._settings.T_s
         if share >= 1.0:
             return answers

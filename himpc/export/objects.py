@@ -143,8 +143,8 @@ def _optimise(whole: llvm.ModuleRef, machine: llvm.TargetMachine, tuning: llvm.P
 
 
 def _retargeted(text: str, head: str) -> str:
-    """Returns a module for another target, without reference counts. A tick needs none, since it allocates
-    nothing."""
+    """Returns a module for another target, without reference counts. A tick allocates nothing and needs
+    none."""
     text = _COUNTS.sub(r"define linkonce_odr void @\1(ptr %p) {\n  ret void\n}\n", text)
     for name in re.findall(r"^define linkonce_odr void @(\w+)\(ptr %p\)", text, re.MULTILINE):
         text = re.sub(rf"^declare .*@{name}\(.*\n", "", text, flags=re.MULTILINE)

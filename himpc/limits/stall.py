@@ -32,7 +32,7 @@ class Stall(NamedTuple):
     Attributes:
         share: 1 if it is not stalled, 0 if it is completely stalled.
         due: (T,) the errors, m or rad, that the tasks should have reached by now.
-        least: the smallest error of the first task since the robot was last free to move.
+        least: the smallest error of the first task after the robot was last free to move.
     """
 
     share: float

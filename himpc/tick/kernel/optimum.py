@@ -32,7 +32,7 @@ _ROUNDING = 2e-14
 _MET = 1e-11
 """N·m: largest accepted violation of an active row."""
 _WORTH = 1e-8
-"""Largest accepted change of the cost that the violations of the active rows cause."""
+"""Largest accepted change of the cost by the violations of the active rows."""
 _ROUGH = 1e-6
 """N·m: a smaller violation at a point without refinement may be a rounding error. If such rows were added
 near a vertex of many rows, the same rows would be added and removed until the budget is used up."""
