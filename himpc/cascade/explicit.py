@@ -19,8 +19,8 @@ from himpc.qp import KKT_TOLERANCE, QPSolution, Solver, solve_qp
 Array = NDArray[np.float64]
 
 _BINDING = 1e-9
-"""A row is active if its multiplier exceeds this value and its distance from its bound, N·m, is smaller than
-a thousand times this value."""
+"""A row is active if two conditions hold: its multiplier exceeds _BINDING, and its distance from its bound is
+below 1000 · _BINDING, N·m."""
 _NOISE = 1e-11
 """If the projection of a row on the free directions of (33) is below this share of the row, the projection is
 rounding noise, and the row's joint is no longer free."""

@@ -19,8 +19,8 @@ from robots import NominalModel
 Array = NDArray[np.float64]
 
 _BINDING = 1e-9
-"""A row is active if its multiplier exceeds this value and its distance from its bound, N·m, is smaller than
-a thousand times this value."""
+"""A row is active if two conditions hold: its multiplier exceeds _BINDING, and its distance from its bound is
+below 1000 · _BINDING, N·m."""
 
 
 _REST = 5.0

@@ -60,8 +60,8 @@ def closest_to_rest(rows: Rows, rest: Array) -> Array:
     all rows, the rows that yield first give way by least squares. If no increments satisfy the remaining
     rows, all rows that are not hard give way too. If even the hard rows cannot be satisfied, only the torque
     rows do not give way. If the QPs are larger than _WORK, the torque changes only at some evenly spaced
-    knots, including the first. A group with more rows than _ROWS gets no QP. In all cases, rows of torque and
-    of its rate are satisfied if any increments satisfy them, see `_within`.
+    knots, including the first. A group with more rows than _ROWS gets no QP. In all cases, the rows of torque
+    and of torque rate are satisfied if any increments satisfy them, see `_within`.
     """
     U = steps(steps(rest))
     for group in groups(rows, rest.shape[1]):
@@ -171,7 +171,8 @@ def _given_way(part: _Part, rank: int) -> _Part:
 
 def _within(rows: Rows, wanted: Array) -> Array:
     """Returns increments whose torques are close to `wanted`, (N, n). They always satisfy the rows of torque.
-    They also satisfy the rows of its rate whenever any increments satisfy both, see `viable`.
+    They also satisfy the rows of the torque rate, whenever any increments satisfy both kinds of rows, see
+    `viable`.
     """
     N = len(wanted)
     blocks = {each: slice(k * N, (k + 1) * N) for k, each in enumerate(rows.constraints)}

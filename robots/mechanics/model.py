@@ -115,7 +115,8 @@ def _body(joint: int) -> str:
 
 
 def _stop(joint: mujoco.MjsJoint, lower: float, upper: float) -> None:
-    """Sets the limits of a joint that has one. In MuJoCo a joint has either two limits or no limits."""
+    """Sets the limits of a joint that has at least one limit. In MuJoCo a joint has either two limits or no
+    limits."""
     if np.isfinite(lower) or np.isfinite(upper):
         joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
         joint.range = (max(lower, -_FAR), min(upper, _FAR))

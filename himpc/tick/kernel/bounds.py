@@ -125,7 +125,8 @@ def constraint_values(U: Array, bounds: LevelBounds) -> None:
         for c in range(n):
             for j in range(N):
                 value[first + j, c] = dot(D[c], U[j], n)
-            # From the last knot to the first: each knot needs the increments of earlier knots.
+            # The values are replaced from the last knot to the first: each knot needs the earlier ones
+            # unreplaced.
             for j in range(N - 1, -1, -1):
                 total = 0.0
                 for s in range(j + 1):

@@ -28,7 +28,8 @@ Vector3 = tuple[float, float, float]
 
 _GOLDEN = 0.6180339887498949
 _NARROWER = 40
-"""Number of steps of the golden-section search. They reduce the segment to a share of 4e-9."""
+"""Number of steps of the golden-section search. They reduce the searched part to a share of 4e-9 of the
+segment."""
 _PARALLEL = 1e-9
 """Square of the sine of the angle below which segments count as parallel."""
 
