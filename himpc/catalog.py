@@ -9,13 +9,13 @@ CONTROLLERS: dict[str, str] = {
     "himpc": "hierarchical incremental MPC: torque level, strict priorities, no dynamic model",
     "hiqp": "HIMPC with a horizon of one knot: it optimises the next step only",
     "nhimpc": "HIMPC with the Jacobians along its own prediction: sequential QPs until they converge",
-    "weighted": "HIMPC without priorities: one cost for all tasks, in which each level has the weight Q",
+    "weighted": "HIMPC without priorities: one cost for all tasks, in which a level is weighted by its Q",
     "osf": "operational-space control with null-space projection on the nominal model; no bounds, no damping",
     "tdeosf": "OSF with time-delay estimation in place of the model; no bounds, no damping",
     "osf_damped": "OSF with damped least squares near singularities; the paper's OSF has no damping",
     "tdeosf_damped": "TDEOSF with damped least squares near singularities",
     "hqp": "one-step hierarchical QP on the nominal model, within the torque bounds",
-    "himpc_filtered": "HIMPC without distances in its levels; a QP then changes the torque to keep distances",
+    "himpc_filtered": "HIMPC without rows of distances; a further QP changes its torque to keep distances",
 }
 """Torque-level controllers: name and description."""
 

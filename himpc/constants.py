@@ -12,7 +12,7 @@ FADE = 0.05
 """m: from WITHIN − FADE to WITHIN, a bound fades out with growing distance. The bound of a pair that comes
 nearer than WITHIN appears without a jump."""
 RETREAT = 0.2
-"""m/s: the fastest retreat that a row of a distance demands."""
+"""m/s: a row of a distance never demands that the distance increases faster than this."""
 TURN_PULL = 5.0
 """rad/m: the largest error on which a task of angles acts, divided by the largest error on which a task of
 positions acts."""
@@ -34,7 +34,7 @@ FREE_LOAD, FULL_LOAD = 0.55, 0.95
 """Shares of the torque limit. Below the first, a motor does not slow its joints down. Above the second, its
 joints have their lowest velocity limit."""
 SLOWEST_SHARE = 0.03
-"""The velocity limit of a joint whose motor is loaded is not reduced below this share."""
+"""The velocity limit of a joint whose motor is loaded is not reduced below this share of the full limit."""
 HEAVY_LOAD = 0.85
 """If a motor has at least this load and the tasks make no progress, the robot counts as stalled."""
 
@@ -44,7 +44,7 @@ measure of the acceleration."""
 LEAD = 0.1
 """s: the velocity is extrapolated over this time, and the extrapolated velocity must be within its limit."""
 LEAST_WHILE_FASTER = 0.5
-"""The velocity limit of a joint that accelerates is not reduced below this share."""
+"""The velocity limit of a joint that accelerates is not reduced below this share of the full limit."""
 
 BLOCKED = 0.1
 """m: a robot counts as stalled only if the distance of a pair exceeds d_safe by less than this."""
@@ -52,18 +52,18 @@ INSIDE = -0.03
 """m: a pair that is nearer than d_safe by more than this must move apart, and the robot is not slowed down. A
 robot with a smaller violation counts as stalled if the violation does not decrease."""
 PROGRESS = 0.05
-"""m/s, rad/s: the least decrease of an error that counts as progress. A reference that is faster than this
-counts as moving."""
+"""m/s, rad/s: an error makes progress if it decreases faster than this plus PROGRESS_SHARE times the error. A
+reference that is faster than this constant counts as moving."""
 PROGRESS_SHARE = 0.25
-"""1/s: the least decrease that counts as progress, as a share of the error. Without an obstacle, errors
-decrease ten times as fast."""
+"""1/s: see PROGRESS. Without an obstacle, errors decrease ten times as fast as this share requires."""
 CLOSE_ENOUGH = 0.01
 """m, rad: a task with a smaller error has reached its target."""
 SLOWING, RECOVERY = 0.1, 0.05
-"""s: time constants with which the joints of a stalled robot slow down, and later speed up again."""
+"""s: time constant with which the joints of a stalled robot slow down, and time constant with which they
+later speed up again."""
 DISTURBED = 0.03
 """m, rad: if the error of the first task grows by more than this, a disturbance has moved the robot, and the
-robot may move back."""
+robot is no longer slowed down."""
 STALLED, REST = 0.5, 0.02
 """Thresholds for `Stall.share`. Below STALLED, the robot stays slow until a reference moves, no obstacle is
 near, or its first task is disturbed. At REST or below, the robot has come to rest. Between the two, the robot
@@ -71,4 +71,5 @@ brakes, and a change of errors is neither progress nor a disturbance."""
 SLOWEST = 0.02
 """rad/s: the velocity limit of a stalled robot's joint is not reduced below this."""
 LEAST_SHARE = 1e-9
-"""The least share of a velocity limit that remains. It is positive, and an infinite limit stays infinite."""
+"""Least factor on the velocity limits of a stalled robot. It is positive, and an infinite limit stays
+infinite."""

@@ -189,7 +189,7 @@ def _qpoases(
     casadi = import_module("casadi")
     shapes = {"h": casadi.Sparsity.dense(*H.shape), "a": casadi.Sparsity.dense(*A.shape)}
     options = {"printLevel": "none", "error_on_fail": False, "print_time": False}
-    # Every QP gets a new solver object: with a warm start, the point would depend on the QPs solved before.
+    # Every QP gets a new solver object. With a warm start, the point would depend on the QPs solved before.
     with redirect_stdout(StringIO()):  # qpOASES prints its licence
         qp = casadi.conic("qp", "qpoases", shapes, options)
         found = qp(h=H, g=f, a=A, lba=lower, uba=upper)
@@ -204,10 +204,11 @@ _ATTEMPTS = {"daqp": _DAQP, "proxqp": (_proxqp,), "qpoases": (_qpoases,)}
 def kkt_residual(
     H: Array, f: Array, A: Array, lower: Array, upper: Array, x: Array, multipliers: Array
 ) -> float:
-    """Returns the largest violation of the KKT conditions, in part scaled by max(1, ‖H‖‖x‖, ‖f‖).
+    """Returns the largest violation of the KKT conditions, of which some are scaled.
 
-    Stationarity, the multipliers' signs and complementarity are scaled; feasibility is absolute. A point that
-    is not finite has an infinite residual.
+    Violations of stationarity, of the multipliers' signs and of complementarity are divided by
+    max(1, ‖H‖‖x‖, ‖f‖). A violation of feasibility is not scaled. A point that is not finite has an infinite
+    residual.
     """
     gradient = H @ x + f + A.T @ multipliers
     scale = max(1.0, _norm(H) * _norm(x), _norm(f))
@@ -228,8 +229,8 @@ def row_residual(value: Array, lower: Array, upper: Array, multipliers: Array, s
     if not value.size:
         return 0.0
     gap = np.minimum(upper - value, value - lower)
-    # The sign of a multiplier selects one of the two bounds: the product with that bound's gap must be zero.
-    # The cap makes the product of an infinite gap and a zero multiplier zero.
+    # The sign of a multiplier selects one of the two bounds. The product of the multiplier and the gap to
+    # this bound must be zero. The cap makes the product of an infinite gap and a zero multiplier zero.
     own = np.where(multipliers > 0, upper - value, value - lower)
     product = np.abs(multipliers) * np.minimum(np.abs(own), 1e6)
     return max(-float(gap.min()), float(product.max()) / scale, 0.0)

@@ -87,9 +87,9 @@ class Layout:
     distance is kept.
 
     Fields of a task: `x/<task>` and `x_d/<task>` contain its coordinates, or a quaternion x y z w.
-    `error/<task>`, `v_d/<task>` and `a_d/<task>` have one number per coordinate; if the target is a point to
-    look at, `v_d` and `a_d` have three. Fields of a level: cost, kkt, rung (index into FALLBACKS), time_us,
-    leak and active (number of active constraints); NaN for a level that was not solved.
+    `error/<task>`, `v_d/<task>` and `a_d/<task>` have one number per coordinate; for a task that points an
+    axis at a point, `v_d` and `a_d` have three numbers. Fields of a level: cost, kkt, rung (index into
+    FALLBACKS), time_us, leak and active (number of active constraints); NaN for a level that was not solved.
     """
 
     size: int

@@ -20,8 +20,8 @@ WorldShape = Ball | Box | Post | Floor
 
 _POSTURES = 24
 _STILL = 1e-3
-"""A capsule whose height varies by less than this, m, over all postures cannot be kept away from the
-floor."""
+"""If the height of a capsule varies by less than this, m, over all postures, no motion can keep the capsule
+away from the floor."""
 
 
 def cover_surroundings(robot: Robot, cover: Cover, shapes: Sequence[WorldShape]) -> Surroundings:

@@ -1,5 +1,5 @@
-"""M̄ of time-delay estimation: suggests a value for any robot, and computes a measure of convergence for a
-given M̄."""
+"""Suggests M̄ of time-delay estimation for any robot, and computes a measure of convergence for a given
+M̄."""
 
 from __future__ import annotations
 

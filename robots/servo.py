@@ -63,8 +63,8 @@ class VelocityPlantSettings:
 
     @property
     def latency_ms(self) -> float:
-        """Delay of the motion after a steadily changing command, ms: the sum of delay, lag and the servos'
-        own delay."""
+        """Delay between a steadily changing command and the motion, ms: the sum of `delay_ms`, `lag_ms` and
+        the delay of the servos."""
         own = 1e3 / self.bandwidth if self.mode == "servo" else 0.0
         return self.delay_ms + self.lag_ms + own
 

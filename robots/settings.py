@@ -22,7 +22,7 @@ class PlantSettings:
     Attributes:
         payload_kg: kg, a point mass at the robot's tip frame.
         friction: N·m, Coulomb friction per joint (one number or one per joint; N for prismatic joints).
-            MuJoCo models friction as a soft constraint: a joint that sticks moves very slowly.
+            MuJoCo models friction as a soft constraint: a joint that should stick moves very slowly.
         damping: N·m·s/rad, viscous friction.
         armature: kg·m², reflected rotor inertia, added to M_ii.
         mass_scale: factor on the mass of the body that each joint moves.

@@ -79,8 +79,8 @@ class Encoders:
         """Returns the measured (q, v). q is rounded to multiples of `resolution`, (n,) rad; 0 means no
         rounding.
 
-        v is the backward difference of the rounded positions over one `period` (s). Before the reset, the
-        joints are assumed to have moved with the velocity of the reset. Reading changes nothing.
+        v is the backward difference of the rounded positions over one `period` (s). The joints are assumed to
+        have moved before the reset, with the velocity that the reset sets. Reading changes nothing.
         """
         now, q = self._samples[-1]
         then, before = self._at(now - period)

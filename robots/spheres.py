@@ -40,10 +40,10 @@ def covering_spheres(robot: Robot) -> tuple[Sphere, ...]:
     """Returns the spheres of a robot. Those of the catalog's mobile manipulator were placed by hand; for
     other robots they are generated along the links.
 
-    Generated spheres follow the straight lines from each joint to the next one and to the tip. Their distance
-    equals their radius, which is a twentieth of the chain's length. They approximate the links, as in the
-    HTMPC paper: parts of the links stand out of the spheres. Distances at torque level use the capsules of
-    `robots.covering.cover_of`, which contain the links.
+    Generated spheres lie on the straight lines from each joint to the next one and to the tip. The distance
+    between neighbouring spheres equals their radius, which is a twentieth of the chain's length. The spheres
+    approximate the links, as in the HTMPC paper: parts of the links stand out of the spheres. Distances at
+    torque level use the capsules of `robots.covering.cover_of`, which contain the links.
     """
     return _BY_ROBOT.get(robot.name) or _along_links(robot)
 

@@ -34,8 +34,8 @@ def true_model(robot: Robot, settings: PlantSettings) -> pin.Model:
 
 
 def joint_axis(model: pin.Model, joint: int) -> tuple[bool, np.ndarray]:
-    """Returns whether a one-axis joint is prismatic, and its unit axis in the joint's frame, which is the
-    same in every pose."""
+    """Returns whether a one-axis joint is prismatic, and its unit axis. The axis is given in the joint's
+    frame, in which it is constant."""
     motion = np.asarray(model.joints[joint].createData().S, dtype=float).reshape(6)
     prismatic = bool(np.abs(motion[:3]).max() > 0.5)
     return prismatic, motion[:3] if prismatic else motion[3:]

@@ -23,7 +23,7 @@ __all__ = [
 ]
 
 MOST = 50
-"""Largest number of objects of a world: each object increases the computing time of every step of the
+"""Largest number of objects of a world. Each object increases the computing time of every step of the
 plant."""
 _TABLE_TOP = 0.04  # m, thickness
 

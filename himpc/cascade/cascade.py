@@ -104,11 +104,12 @@ def _climb_down(
 
 
 def _leaks(upper: Sequence[Array], B: Array, increments: Sequence[Array]) -> list[float]:
-    """Returns ‖J_p M̄⁻¹(Δτ_i − Δτ_p)‖∞ over knots and levels p above, for every level i.
+    """Returns, for every level i, the largest ‖J_p M̄⁻¹(Δτ_i − Δτ_p)‖∞ over all knots and all levels p above
+    i.
 
     Args:
         upper: B_p of all levels but the last.
-        B: the same matrices, stacked.
+        B: these matrices, stacked.
         increments: U_i of all levels, (N, n) each.
     """
     if not upper:

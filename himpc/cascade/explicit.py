@@ -19,11 +19,11 @@ from himpc.qp import KKT_TOLERANCE, QPSolution, Solver, solve_qp
 Array = NDArray[np.float64]
 
 _BINDING = 1e-9
-"""A row is active if its multiplier exceeds this value and its distance from its bound, N·m, is smaller than
-a thousand times this value."""
+"""A row is active if two conditions hold: its multiplier exceeds _BINDING, and its distance from its bound is
+below 1000 · _BINDING, N·m."""
 _NOISE = 1e-11
 """If the projection of a row on the free directions of (33) is below this share of the row, the projection is
-rounding noise: the row's joint is no longer free."""
+rounding noise, and the row's joint is no longer free."""
 _ROOM = 1e-9
 """N·m by which bounds are widened for a last attempt. The optimum is then computed from the active rows of
 this attempt with their exact bounds."""
@@ -104,9 +104,9 @@ def solve_explicit(
 def _judged(
     solution: QPSolution, level: WhiteLevel, A: Array, low: Array, high: Array, length: Array, U_above: Array
 ) -> QPSolution:
-    """Returns the solution with its residual. The residual is the larger of two numbers: the distance by
-    which a Newton step on the active rows moves an increment, as a share of 1 N·m or of the increment, and
-    the violation of the rows, N·m."""
+    """Returns the solution with its residual. The residual is the larger of two numbers: the violation of the
+    rows in N·m, and the largest change of an increment by a Newton step on the active rows. The change is
+    divided by 1 N·m or by the increment, whichever is larger."""
     x, multipliers = solution.x, solution.multipliers
     if not (np.isfinite(x).all() and np.isfinite(multipliers).all()):
         return replace(solution, kkt_residual=float("inf"))
@@ -154,8 +154,8 @@ def _point(
 ) -> Point:
     value = rows.values(U).ravel()
     slack = np.where(multipliers > 0, upper - value, value - lower)
-    # Some solvers leave tiny multipliers at all rows: a row is active if it is near its bound and has a
-    # multiplier.
+    # Some solvers leave tiny multipliers at all rows. A row counts as active only if it is also near its
+    # bound.
     active = np.flatnonzero((np.abs(multipliers) > _BINDING) & (slack < 1e3 * _BINDING))
     row, joint = np.divmod(active, U.shape[1])
     return Point(

@@ -54,6 +54,6 @@ def towards(rows: Rows, U: Array, wanted: Array) -> Array | None:
 
 
 def containing(rows: Rows, U: Array) -> Rows:
-    """Returns the rows widened until U satisfies them: lower levels then start from a feasible point."""
+    """Returns the rows, widened until U satisfies them. Lower levels then start from the feasible point U."""
     value = rows.values(U)
     return rows._replace(lower=np.minimum(rows.lower, value), upper=np.maximum(rows.upper, value))

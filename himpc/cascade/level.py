@@ -102,7 +102,7 @@ class LevelSolution(NamedTuple):
         fallback: name of the fallback that gave U; "solve" if none was needed.
         time_us: wall time of this level, microseconds.
         qp_us: the QP solver's share of `time_us`; 0 if no solver was needed.
-        leak: ‖J_p M̄⁻¹(Δτ_i − Δτ_p)‖∞ over knots and levels p above, m/s² or rad/s².
+        leak: the largest ‖J_p M̄⁻¹(Δτ_i − Δτ_p)‖∞ over all knots and levels p above, m/s² or rad/s².
     """
 
     name: str

@@ -73,7 +73,8 @@ def shrink(Z: Array, B: Array) -> Array:
     for j in range(N):
         basis = Z[j] @ Vt[j, int((singular[j] > tolerance[j]).sum()) :].T
         if not Z[j].any(axis=0).all():
-            # Null vectors of zero columns of Z become zero; the others give an orthonormal basis.
+            # Null vectors that belong to zero columns of Z become zero. The other null vectors give an
+            # orthonormal basis.
             left, kept, _ = np.linalg.svd(basis, full_matrices=False)
             basis = left[:, kept > 0.5]
         free.append(basis)

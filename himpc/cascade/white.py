@@ -15,7 +15,8 @@ Array = NDArray[np.float64]
 
 
 _FELT = 1e-13
-"""The effect of a direction on a level is rounding if it is smaller than this share of the level's rows."""
+"""If the effect of a direction on a level is below this share of the size of the level's rows, the effect is
+a rounding error."""
 _APART = 1e-6
 """A singular value below this share of the previous singular value belongs to a direction that no row
 fixes."""
@@ -38,9 +39,8 @@ def white(problem: LevelProblem, U_above: Array, upper: Sequence[Array], Z: Arra
 
     H = GᵀQG + R is never computed: if weights or inertias differ greatly, its condition number is 10¹⁷ and R
     is lost in rounding. Instead, at each knot √R ∘ U is rotated into directions that change the level's
-    residual and directions that do not. A direction belongs to the second group if its effect is below _FELT
-    of the size of the rows, which is rounding. Only bounds need the second group. The first group is reduced
-    by a QR factorisation.
+    residual and directions that do not. A direction belongs to the second group if its effect is a rounding
+    error, see _FELT. Only bounds need the second group. The first group is reduced by a QR factorisation.
 
     Args:
         problem: the level's data.

@@ -1,8 +1,8 @@
 """Compiles functions in a process of its own, so that all other processes run the code that is on disk.
 
-A compiling process links the parts once more before it writes the code to disk. The code in its own memory
-therefore gives results that differ in the last digit. All processes that load the code from disk run the same
-code.
+A compiling process links the parts once more before it writes the code to disk. The results of the code in
+its own memory therefore differ from those of the code on disk in the last digit. All processes that load the
+code from disk run the same code.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def compile_apart(module: str, tell: Callable[[str], None]) -> None:
     )
     with subprocess.Popen(
         (sys.executable, "-c", code),
-        stdin=subprocess.PIPE,  # nothing is written to this pipe: the child ends when it closes
+        stdin=subprocess.PIPE,  # nothing is written to this pipe; the child ends when the pipe is closed
         stdout=subprocess.PIPE,
         env={**os.environ, _COMPILES: "1", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"},
         text=True,

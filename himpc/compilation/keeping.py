@@ -3,8 +3,8 @@
 Numba's own cache trusts every file in its folder. A truncated or damaged file stops every start of the
 program, a file of another user is executed, and a full disk stops the program. This cache writes a digest of
 the content, of the sources and of the target at the beginning of each file. If a file is incomplete, belongs
-to another user or has other sources, the function is compiled again and the file is replaced. Code that
-cannot be written to disk is used from memory.
+to another user or was made from other sources, the function is compiled again and the file is replaced. Code
+that cannot be written to disk is used from memory.
 """
 
 from __future__ import annotations
@@ -57,13 +57,13 @@ class Kept:
         return any(_written(folder / "room", bytes(_ROOM), keep=False) for folder in self._folders(make=True))
 
     def load_overload(self, signature: Any, context: Any) -> Any:
-        """Returns the compiled function for these types, or None if this user has no complete and current
-        file."""
+        """Returns the compiled function for these types. Returns None if there is no such file that is
+        complete, current and owned by this user."""
         name, made_for = self._file(signature, context.codegen())
         for folder in self._folders(make=False):
             body = _read(folder / name)
             if body is not None and body.startswith(made_for):
-                with suppress(Exception):  # a file of another build may raise any exception
+                with suppress(Exception):  # loading a file of another build may raise any exception
                     return CompileResult._rebuild(context, *pickle.loads(body[len(made_for) :]))
         return None
 

@@ -2,7 +2,8 @@
 the callers, and machine code is generated only for the callers.
 
 By default Numba optimises every function three times, generates machine code for it, and adds wrappers for
-callers in Python and in C. For each caller, whose code contains the function, Numba repeats all this work.
+callers in Python and in C. The code of each caller contains the function, and Numba repeats all this work for
+each caller.
 """
 
 from __future__ import annotations
@@ -55,7 +56,7 @@ class _Loose(_Linking):
         return self
 
     def set_env(self, name: str, environment: Any) -> None:
-        """Does nothing: the code that would read the environment does not exist yet."""
+        """Does nothing. The code that reads the environment is generated later."""
 
 
 class _Compiling(Compiler, ABC):
@@ -64,7 +65,7 @@ class _Compiling(Compiler, ABC):
     library: type[_Linking]
 
     def compile_extra(self, func: Any) -> Any:
-        """Overrides Numba's entry point: sets the library."""
+        """Overrides Numba's entry point, to set the library."""
         self.state.library = self.library(self.state.targetctx.codegen(), func.__qualname__)
         self.state.library.enable_object_caching()
         return super().compile_extra(func)
@@ -76,7 +77,7 @@ class Whole(_Compiling):
     library = _Linked
 
     def compile_extra(self, func: Any) -> Any:
-        """Overrides Numba's entry point: sets the addresses of all environments."""
+        """Overrides Numba's entry point, to set the addresses of all environments as well."""
         found = super().compile_extra(func)
         for each in found._find_referenced_environments():
             found.library.codegen.set_env(each.env_name, each)

@@ -30,7 +30,7 @@ except ImportError:  # on a system without fcntl, two processes may compile the 
 _OPTIONS: dict[str, Any] = {**OPTIONS, "no_cfunc_wrapper": True}
 _PIECE = {**_OPTIONS, "no_cpython_wrapper": True, "pipeline_class": Piece}
 _OPEN = {**_OPTIONS, "no_cpython_wrapper": True, "_nrt": False, "pipeline_class": Open}
-"""Options without reference counts, which are not needed: these functions allocate nothing."""
+"""Options for functions that allocate nothing and need no reference counts."""
 
 
 class _Inline(CPUDispatcher):
@@ -133,8 +133,8 @@ def kept(function: Function, key: str, make: Callable[[], bytes]) -> bytes:
 
 @contextmanager
 def _one_at_a_time(folder: str | None, what: str) -> Iterator[None]:
-    """Holds a lock: only the first of several processes makes the same code. The other processes wait, and
-    then find the code on disk."""
+    """Holds a lock while code is made. If several processes need the same code, the first one makes it. The
+    others wait, and then find the code on disk."""
     lock = None
     if fcntl is not None and folder is not None:
         with suppress(OSError):  # for example a full disk

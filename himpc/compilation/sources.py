@@ -25,8 +25,8 @@ def digest_of(function: Callable[..., Any]) -> bytes:
 def sources_of(function: Callable[..., Any]) -> list[Path]:
     """Returns the file of a function and all files that it imports, directly or through others. These files
     define the inline kernels and constants that the function uses. Only files of this package, of the
-    function's package and of the packages of its inline kernels are included. The files of the tool chain are
-    included too: they set the compiler's options."""
+    function's package and of the packages of its inline kernels are included. The files of the tool chain,
+    which set the compiler's options, are included too."""
     pieces = (getattr(each, "py_func", None) for each in function.__globals__.values())
     packages = {each.__module__.partition(".")[0] for each in (function, *filter(None, pieces))} | {_PACKAGE}
     files = {Path(function.__code__.co_filename)}

@@ -20,8 +20,8 @@ requires eigenvalues of M⁻¹M̄ between 0 and 2. By construction M̄ ⪯ M̂, 
 - no eigenvalue reaches 2 as long as M ≻ ½M̂; the bound is reached with links of half the mass, or after a
   payload is dropped, while it is still in the estimate.
 
-These statements hold for a constant M̄. Its change as the arm moves acts as a disturbance, like the change of
-M in Remark 4; `himpc-lab reproduce himpc-adaptation` shows its effect.
+These statements hold for a constant M̄. When the arm moves, the change of M̄ acts as a disturbance, like the
+change of M in Remark 4; `himpc-lab reproduce himpc-adaptation` shows its effect.
 
 The estimate uses no derivative, and a coarse encoder does not disturb it. The estimate is disturbed by
 lasting friction in τ and by a wrong nominal model; a payload whose weight loads no joint is not detected (m̂

@@ -127,8 +127,8 @@ class DistanceFilter:
 
 
 def _closest(A: Array, lower: Array, M: Array, box: tuple[Array, Array]) -> tuple[Array, Array] | None:
-    """Returns the shortest a, (n,) rad/s², with A a ≥ lower and M a within the box, and the multipliers; None
-    if no such a exists."""
+    """Returns the shortest vector a, (n,) rad/s², with A a ≥ lower and M a within the box, and the
+    multipliers; None if no such vector exists."""
     upper = np.concatenate([np.full(len(lower), np.inf), box[1]])
     found = solve_qp(
         np.eye(len(M)), np.zeros(len(M)), np.vstack([A, M]), np.concatenate([lower, box[0]]), upper

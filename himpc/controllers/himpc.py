@@ -238,8 +238,8 @@ class HIMPC(TorqueController):
         values: dict[str, Array],
         errors: dict[str, Array],
     ) -> tuple[list[LevelProblem] | None, Array]:
-        """Returns the QP data of all levels of a form, or None if the data are not finite; and ẋ_k of all
-        rows."""
+        """Returns two results: the QP data of all levels of a form (None if the data are not finite), and ẋ_k
+        of all rows."""
         J = form.jacobian(configuration)
         x_dot = J[0] @ configuration.v
         before = memory.x_dot
@@ -259,8 +259,9 @@ class HIMPC(TorqueController):
         return problems, x_dot
 
     def _faded(self, level: LevelForm) -> float | Array:
-        """Returns √ of the share of Q that is in effect for a level, one per row if its tasks differ. The
-        share of a task that is new or was just switched on grows to 1 over ENABLE_SECONDS."""
+        """Returns the square root of the share of Q that is in effect for a level: one number, or one per row
+        if the shares of its tasks differ. The share of a task that is new or was just switched on grows to 1
+        over ENABLE_SECONDS."""
         tasks = level.level.tasks
         if all(self._weight.get(task.name, 1.0) >= 1.0 for task in tasks):
             return 1.0

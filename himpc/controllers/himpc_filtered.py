@@ -102,7 +102,7 @@ class FilteredHIMPC(HIMPC):
 
 
 def _with_filter(done: AtOnce, increment: Array) -> AtOnce:
-    """Returns the data of the levels with the applied increment in place of the last level's increment."""
+    """Returns the data of the levels, in which the applied increment replaces the last level's increment."""
     if not len(done.increments):
         return done
     return AtOnce(np.vstack([done.increments[:-1], increment]), done.jacobians)

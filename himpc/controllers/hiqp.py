@@ -1,4 +1,5 @@
-"""HIQP: HIMPC with a horizon of one knot, the local optimum with which section V of the paper compares."""
+"""HIQP: HIMPC with a horizon of one knot, the local optimum with which section V of the paper compares
+HIMPC."""
 
 from __future__ import annotations
 

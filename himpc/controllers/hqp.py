@@ -19,8 +19,8 @@ from robots import NominalModel
 Array = NDArray[np.float64]
 
 _BINDING = 1e-9
-"""A row is active if its multiplier exceeds this value and its distance from its bound, N·m, is smaller than
-a thousand times this value."""
+"""A row is active if two conditions hold: its multiplier exceeds _BINDING, and its distance from its bound is
+below 1000 · _BINDING, N·m."""
 
 
 _REST = 5.0
@@ -43,8 +43,8 @@ class HQP(OneStepController):
     """Level i: min over y = τ − N_n of ‖J_i M_n⁻¹ y − (ẍ_i − J̇_i q̇)‖²_Q + ‖y‖²_R within the torque bounds.
 
     Priority: J_p M_n⁻¹ y_i = J_p M_n⁻¹ y_p for all levels p above, as in (34g) with the nominal M_n
-    (`settings.nominal`) in place of M̄. ẍ_i closes (4) with the gains of the tasks. As in section V only the
-    torque is bounded; velocity and position limits are not imposed.
+    (`settings.nominal`) in place of M̄. ẍ_i is the acceleration that (4) demands with the gains of the tasks.
+    As in section V only the torque is bounded; velocity and position limits are not imposed.
 
     [16] writes the same cost with the force Λ_n (ẍ_i − J̇_i q̇), and Λ_n = (J M_n⁻¹ Jᵀ)⁻¹ does not exist at a
     singularity. This form needs no inverse of a product of Jacobians, and R > 0 keeps every Hessian positive
@@ -80,7 +80,7 @@ class HQP(OneStepController):
             )
             if not found.usable:
                 # A lower level keeps the solution of the levels above, which satisfies every priority. The
-                # first level brings the robot to rest.
+                # first level, which has no level above, brings the robot to rest.
                 braking = np.clip(-_REST * (M @ v), rows.lower[0], rows.upper[0])
                 fallback = "inherit" if i else "brake"
                 found = VerifiedOptimum(y if i else braking, status=found.status, qp_us=found.qp_us)

@@ -19,7 +19,7 @@ ROUNDING = 1e-10
 
 DAMPED = 0.2
 """Value of `damping` in the damped variants. On RT2 of the HIMPC paper, OSF with 0.1 demands 18 times the
-torque limit; with 0.4 the error of level 1 is a quarter larger. RT1 never comes that close to a
+torque limit; with 0.4 the error of level 1 is a quarter larger than with 0.2. RT1 never comes that near to a
 singularity."""
 
 

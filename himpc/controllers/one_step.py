@@ -64,7 +64,8 @@ class Law(NamedTuple):
 
 
 class OneStepController(TorqueController):
-    """State, settings and their bumpless change for OSF, TDEOSF and HQP; subclasses implement the law.
+    """The common part of OSF, TDEOSF and HQP: state, settings and bumpless changes of settings. Subclasses
+    implement the law.
 
     A change of settings is bumpless: the jump of the torque that would occur is subtracted, and this
     correction fades out over BLEND_SECONDS. After `reset` there is no correction.
@@ -75,7 +76,8 @@ class OneStepController(TorqueController):
     solves: bool = False
     """Whether the law solves QPs, with the solver in `Settings.solver`."""
     incremental: bool = False
-    """Whether the bias contains τ₀: the bias is then continuous, and only the rest of the torque can jump."""
+    """Whether the bias contains τ₀. If it does, the bias is continuous, and only the rest of the torque can
+    jump."""
 
     def reset(self, tau_0: Array) -> None:
         """Clears its memory; τ₀ (n,) N·m is the torque acting now, and q̈ starts at zero."""
@@ -199,8 +201,8 @@ class OneStepController(TorqueController):
         return [Demand(level, J[level.rows], acceleration[level.rows]) for level in form.levels]
 
     def _blended(self, law: Law) -> tuple[Array, list[LevelSolution]]:
-        """Returns the torque, and the levels relative to τ₀; the effect of the last change of settings fades
-        in."""
+        """Returns the torque, and the levels relative to τ₀. The torque changes gradually after a change of
+        settings."""
         lead = law.levels[-1].U[0] if law.levels else np.zeros(self.robot.n)
         if self._changed:
             self._offset = (self._lead if self.incremental else self._tau_0 - law.bias) - lead
@@ -260,7 +262,7 @@ class WithJacobian(Protocol):
 
 
 def leak(demands: Sequence[WithJacobian], accelerations: list[Array], level: int) -> float:
-    """Returns ‖J_p (q̈_i − q̈_p)‖∞ over the levels p above level i.
+    """Returns the largest ‖J_p (q̈_i − q̈_p)‖∞ over all levels p above level i.
 
     accelerations: q̈_p (n,) that the levels down to each p cause in the model.
     """

@@ -18,9 +18,9 @@ class OSF(OneStepController):
 
     ẍ_i = ẍ_id − K_v (ẋ_i − ẋ_id) − K_p (x_i − x_id). Every level is feedback-linearised with the nominal M_n
     and N_n = C_n q̇ + G_n + F_n (`settings.nominal`), and decoupled from the levels above by dynamically
-    consistent projection. It closes (4) with the gains of the tasks. The law imposes no bounds: the torque of
-    the plan is its demand. Without `damping`, the demand grows without bound near a singularity of the
-    projected Jacobian.
+    consistent projection. Its closed loop is (4) with the gains of the tasks. The law imposes no bounds: the
+    torque of the plan is its demand. Without `damping`, the demand grows without bound near a singularity of
+    the projected Jacobian.
     """
 
     def __init__(self, robot: Robot, settings: Settings, damping: float = 0.0) -> None:

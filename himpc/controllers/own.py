@@ -232,7 +232,7 @@ class OwnController(TorqueController):
     # ---------------------------------------------------------------- the use of the law's torque
 
     def _opened(self, answers: Array) -> Array:
-        """Blends the torque after a change of settings to the law's new torque."""
+        """After a change of settings, returns torques that gradually approach the law's."""
         share, T_s = self._share, self._settings.T_s
         if share >= 1.0:
             return answers

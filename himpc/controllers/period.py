@@ -29,8 +29,8 @@ class PeriodState(NamedTuple):
 
 
 class PeriodResult(NamedTuple):
-    """The result of one control period: levels, ẋ_k of all rows, q at knots 0 … N, number of cascades
-    solved."""
+    """The result of one control period: levels, ẋ_k of all rows, q at knots 0 … N, and how many times the
+    cascade was solved."""
 
     solutions: list[LevelSolution]
     x_dot: Array

@@ -1,5 +1,5 @@
-"""Slows joints down while a controller keeps distances: joints of a stalled robot, joints with little torque
-left, and joints that accelerate."""
+"""Slows joints down while a controller keeps distances. It slows all joints of a stalled robot, joints with
+little torque left, and joints that accelerate."""
 
 from __future__ import annotations
 

@@ -37,9 +37,9 @@ class Weighted(HIMPC):
     but not its effort: R of (31) is the sum over all levels, up to the longest horizon.
 
     Evidence: entry p of the plan is the solution of the same problem with levels 1 … p alone; the last entry
-    is applied. The leak of an entry is, as for HIMPC, the largest change of a level p above it, compared with
-    entry p. `cost` is V_p under the applied U. `step_us` does not include the r − 1 QPs that only the
-    evidence needs.
+    is applied. As for HIMPC, the leak of an entry is computed from the differences between this entry and the
+    entries p above it. `cost` is V_p under the applied U. `step_us` does not include the r − 1 QPs that only
+    the evidence needs.
     """
 
     _evidence_us = 0.0
@@ -150,6 +150,6 @@ def _softened(problem: LevelProblem) -> LevelProblem:
 
 
 def _leak(above: Sequence[LevelProblem], increments: Sequence[Array], place: int) -> float:
-    """Returns ‖J_p M̄⁻¹(Δτ_i − Δτ_p)‖∞ over knots and the levels p above level i."""
+    """Returns the largest ‖J_p M̄⁻¹(Δτ_i − Δτ_p)‖∞ over all knots and all levels p above level i."""
     effects = (problem.B @ (increments[place] - increments[p])[:, :, None] for p, problem in enumerate(above))
     return max((float(np.abs(effect).max()) for effect in effects), default=0.0)

@@ -36,7 +36,7 @@ def entries_text(control_name: str, layout: int) -> str:
         layout: the number that a controller's memory must have for this kernel.
     """
     return (
-        # An exported controller reads no clock: the times of its levels are zero.
+        # An exported controller reads no clock, and the times of its levels are zero.
         "define i32 @clock_gettime(i32 %clock, i64 %stamp) {\n  ret i32 -1\n}\n"
         f"declare i32 @{control_name}(ptr, ptr, "
         f"{', '.join([_ARRAY] * 6)}, i64, i64, {', '.join([_ARRAY] * 4)})\n"

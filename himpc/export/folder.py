@@ -36,7 +36,8 @@ class Move(NamedTuple):
 
 
 class Recorded(NamedTuple):
-    """A recorded run: moves of targets; and q, v, τ applied and τ of every period, (ticks, 4, n)."""
+    """A recorded run: the moves of targets, and the rows (ticks, 4, n) with q, v, the applied τ and the
+    computed τ of every period."""
 
     moves: Sequence[Move]
     rows: Array

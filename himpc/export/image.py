@@ -44,7 +44,8 @@ from robots import InputError, Robot
 _LINE = 64
 """Arrays begin at multiples of this number of bytes."""
 _MOST_LEVELS = 10
-"""Largest number of levels: a table has an entry for every possible set of enabled levels."""
+"""Largest number of levels. Each further level doubles the size of the table of all sets of enabled
+levels."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,7 +174,8 @@ def _write_reference(
     if isinstance(reference, Target):
         value, rotates = reference.raw, reference.raw.ndim == 2
         if rotates and rows < 3:
-            # The motion of such a reference depends on the robot's configuration.
+            # For an orientation on fewer than three axes, the motion of the reference depends on the robot's
+            # configuration.
             arena.f["R_d"][place] = value
             return told | {"target": "fixed"}
         m = 3 if rotates else rows

@@ -23,7 +23,8 @@ def check_linker() -> None:
 
 
 def linked(code: bytes) -> bytes:
-    """Returns a module of an object file. Raises InputError if there is no linker."""
+    """Returns the WebAssembly module that is linked from an object file. Raises InputError if there is no
+    linker."""
     check_linker()
     with tempfile.TemporaryDirectory() as folder:
         given, made = Path(folder, "himpc.o"), Path(folder, "himpc.wasm")

@@ -23,7 +23,8 @@ _ALIGNMENT = 64
 
 
 def target_here() -> str:
-    """Returns the name of the export target that this machine runs. Raises InputError if there is none."""
+    """Returns the name of the export target whose code this machine can run. Raises InputError if there is
+    none."""
     system = {"linux": "linux", "darwin": "macos"}.get(sys.platform, sys.platform)
     machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(platform.machine().lower(), platform.machine())
     target_named(f"{machine}-{system}")

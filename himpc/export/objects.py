@@ -52,7 +52,7 @@ TARGETS: dict[str, Target] = {
 """The targets by the names that the command accepts."""
 
 MATHEMATICS = frozenset({"sin", "cos", "tan", "atan2", "hypot", "exp", "expm1", "log", "sqrt", "pow"})
-"""Functions of libm that the code may use."""
+"""Functions of libm that exported code is allowed to call."""
 _MEMORY = frozenset({"memcpy", "memset", "memmove"})
 _COUNTS = re.compile(r"^define [^\n]*@(NRT_incref|NRT_decref)\(.*?^\}\n", re.MULTILINE | re.DOTALL)
 
@@ -85,7 +85,7 @@ def _made(target: Target) -> bytes:
     foreign = {each.name for each in whole.functions if each.is_declaration}
     foreign = {each for each in foreign if not each.startswith("llvm.")} - MATHEMATICS - _MEMORY
     if foreign:
-        raise RuntimeError(f"the exported code would need {', '.join(sorted(foreign))}")
+        raise RuntimeError(f"the exported code must not call {', '.join(sorted(foreign))}")
     return machine.emit_object(whole)
 
 
@@ -93,8 +93,8 @@ def _portable() -> str:
     """Returns the text of all functions for all targets; it is kept on disk.
 
     Numba's text is for pointers of eight bytes. Here all calls that pass structures with pointers are
-    inlined, and the structures are replaced by their elements. The resulting text is the same for targets
-    with other pointers. Loops are not vectorised here: each target has its own vectors.
+    inlined, and the structures are replaced by their elements. The resulting text is also valid for targets
+    with pointers of another size. Loops are vectorised later, for each target.
     """
 
     def make() -> bytes:
@@ -111,7 +111,7 @@ def _portable() -> str:
         _optimise(whole, machine, tuning)
         text = str(whole)
         if _STRUCTURES.search(text):
-            raise RuntimeError("structures are left whose layout depends on the size of a pointer")
+            raise RuntimeError("the layout of a structure depends on the size of a pointer")
         return zlib.compress(text.encode())
 
     return zlib.decompress(kept(control.py_func, f"portable-{_own_digest()}", make)).decode()
@@ -143,8 +143,8 @@ def _optimise(whole: llvm.ModuleRef, machine: llvm.TargetMachine, tuning: llvm.P
 
 
 def _retargeted(text: str, head: str) -> str:
-    """Returns a module for another target, without reference counts: nothing that a tick uses is
-    allocated."""
+    """Returns a module for another target, without reference counts. A tick allocates nothing and needs
+    none."""
     text = _COUNTS.sub(r"define linkonce_odr void @\1(ptr %p) {\n  ret void\n}\n", text)
     for name in re.findall(r"^define linkonce_odr void @(\w+)\(ptr %p\)", text, re.MULTILINE):
         text = re.sub(rf"^declare .*@{name}\(.*\n", "", text, flags=re.MULTILINE)

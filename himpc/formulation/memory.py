@@ -37,7 +37,8 @@ class Memory(NamedTuple):
 
     @classmethod
     def start(cls, q: Array, v: Array, T_s: float) -> Memory:
-        """Returns the memory of a robot that has moved with constant velocity so far: q̈ and ẍ are zero."""
+        """Returns the memory of a robot that has moved with constant velocity so far. q̈ and ẍ are then
+        zero."""
         return cls(q, v, T_s)
 
     def knots(self, q: Array, v: Array, N: int, T_s: float) -> Array:

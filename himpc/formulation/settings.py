@@ -33,7 +33,7 @@ class Settings:
         solver: the solver of the QPs of the explicit route and of hqp: "daqp", "proxqp" or, with CasADi
             installed, "qpoases". If no QP solver is used, only "daqp" is accepted, see `check_solver`.
         R_on: the quantity that R in (31) weighs: the "torque" increments Δτ as printed, or the "acceleration"
-            M̄⁻¹Δτ (in HQP with M_n of its model).
+            M̄⁻¹Δτ (HQP uses M_n of its model in place of M̄).
         damping: whether the damping level is added if the enabled levels leave freedom.
         nominal: the dynamic model that model-based controllers and `M_bar_adapt` use; other controllers do
             not use it.

@@ -3,8 +3,8 @@
 With H = LLᵀ and z = Lᵀx the cost is ½‖z − z₀‖², and the coefficients of a row become L⁻¹a. The method starts
 at the unconstrained optimum and adds violated rows one by one, the most violated row first. HIMPC solves its
 levels by the same steps, see `himpc.tick.kernel.goldfarb_idnani`. Equalities are never removed. A row that
-depends linearly on the active rows does not enlarge their basis, so it replaces one of them, or the rows
-contradict each other.
+depends linearly on the active rows does not enlarge their basis, so either it replaces one of them or the
+rows contradict each other.
 """
 
 from __future__ import annotations

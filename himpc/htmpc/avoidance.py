@@ -18,8 +18,8 @@ Array = NDArray[np.float64]
 PENALTY = 1e3
 """Penalty per metre of violation of the margin at one knot; it exceeds every gain in tracking."""
 _LOOK = 0.35
-"""A pair gets no row if its distance exceeds the margin by more than this, m. The value exceeds the change of
-a knot's position in one step."""
+"""A pair gets no row if its distance exceeds the margin by more than this, m. This distance exceeds the
+change of a knot's position in one SQP step."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,8 +32,8 @@ def shifted(before: Motion, s: float, N: int, dt: float, bounds: MotionBounds) -
 
     Each input is the mean of the old input over the new interval. Therefore the velocities at the new knots
     are those of the old plan at the same times, for every control rate, also after a change of N or dt.
-    After its end the old plan is continued by braking. With constant velocity, hard limits would become
-    infeasible.
+    After its end the old plan is continued by braking. If it were continued at constant velocity, hard limits
+    would become infeasible.
     """
     reach = s + N * dt
     length = len(before.U) * before.dt

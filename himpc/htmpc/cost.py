@@ -69,8 +69,8 @@ class Effort:
         return value, (T_v.T @ v + u + D.T @ d).ravel()
 
     def about(self, rest: tuple[float, Array], U: Array) -> tuple[float, Array]:
-        """Returns value and gradient of (10) at U. They are computed from value and gradient at U = 0: (10)
-        is quadratic."""
+        """Returns value and gradient of (10) at U. (10) is quadratic: value and gradient at U = 0 are
+        sufficient for this."""
         value, slope = rest
         u = U.ravel()
         change = self.hessian @ u

@@ -126,8 +126,8 @@ class HTIDKC:
         return task.asked(here, preview).velocity[0] - gain * task.error(task.value(here), preview.value)
 
     def _level_zero(self, q: Array, last: Array) -> _Box:
-        """Returns the box of velocities that are allowed in this period: inside all bounds, or the nearest
-        reachable velocity."""
+        """Returns the box of reachable velocities inside all bounds in this period. If a joint has no such
+        velocity, its interval contains only the reachable velocity that is nearest to the bounds."""
         limits, T = self._bounds, self._settings.period
         reach = _Box(last - limits.a * T, last + limits.a * T)
         upper = np.minimum(limits.v, _approach(limits.q_upper - q, limits, T))
@@ -175,7 +175,8 @@ class HTIDKC:
 
 def _approach(room: Array, limits: MotionBounds, T: float) -> Array:
     """Returns the largest velocity from which a joint can still stop within `room`, with one command every T
-    seconds. Beyond a bound it is a velocity back to the bound, at most a fifth of the speed limit."""
+    seconds. For a joint beyond its bound, returns minus the speed at which the joint moves back, at most a
+    fifth of the speed limit."""
     braking = np.where(np.isfinite(limits.a), limits.a, 1e9)
     inside = braking * (np.sqrt(T * T + 2.0 * np.maximum(room, 0.0) / braking) - T)
     return np.where(room >= 0.0, inside, np.maximum(room, -0.2 * limits.v))

@@ -124,8 +124,8 @@ class HTMPC:
     def _start(self, q: Array, v: Array) -> Start:
         """Returns the initial state of the plan, predicted forward by the delay, and the input before that
         state."""
-        # The control rate may have changed since: the last plan was followed for the period that was set
-        # then.
+        # The robot has followed the last plan for one period of the previous control rate, which may differ
+        # from the present rate.
         period, past, still = self._since, self._past, np.zeros(self.robot.n)
         usable = plausible(self.robot, q, v)
         if not past and not usable:

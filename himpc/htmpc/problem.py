@@ -30,7 +30,7 @@ PROXIMAL = 0.03
 level would have errors of centimetres late in its horizon. By (12), the levels below would then be allowed
 the same errors."""
 _RIDGE = 1e-8
-"""A ridge: keeps the Hessian positive definite when effort weights are zero."""
+"""Added to the diagonal of the Hessian, which is then positive definite even if effort weights are zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,7 +169,7 @@ class Problem:
 
     @property
     def softened(self) -> bool:
-        """Whether states and inputs are softened by barriers, as in the paper."""
+        """Whether barriers soften the constraints on states and inputs, as in the paper."""
         return self.tick.settings.formulation == "paper"
 
     @property

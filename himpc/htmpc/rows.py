@@ -94,7 +94,8 @@ class ConstraintTable:
         about(self.A, self.bounds, u, count, self.room)
 
     def outside(self, count: int) -> float:
-        """Returns the largest violation of the bounds of the first `count` rows by the last u of `about`."""
+        """Returns the largest violation of the bounds of the first `count` rows by u, the argument of the
+        last call of `about`."""
         lower, upper = self.room[:, :count]
         return max(0.0, float(lower.max(initial=0.0)), -float(upper.min(initial=0.0)))
 

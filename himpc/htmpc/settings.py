@@ -62,8 +62,8 @@ class HTMPCSettings:
         input_effort: R of (10); None: 0.1 for the base's joints, 0.02 for all others.
         change_effort: W of (10) on Δu; None: 0.1 for the base's joints, 0 for all others.
         formulation: "proximal" (the effort of upper levels is their deviation from the shifted previous plan;
-            the rows are hard) or "paper" (every level has the absolute effort (10); states and inputs are
-            softened by relaxed log barriers).
+            the rows are hard) or "paper" (every level has the absolute effort (10); relaxed log barriers
+            soften the constraints on states and inputs).
         lexicographic: "per_coordinate" for constraint (12), "cost" for constraint (11).
         delta_m: δ of (13), m (or rad): the amount by which the error of a level at a knot may exceed its best
             value at this knot. For (11), δ is converted to the cost of an error δ at every knot.

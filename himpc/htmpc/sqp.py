@@ -25,7 +25,8 @@ UNCORRECTED = 0.2
 """Share of δ by which a step may increase the errors of the levels above without a second-order
 correction."""
 CORRECTIONS = 4
-"""Number of the longest steps that are corrected before they are shortened; see `_led_back`."""
+"""The line search corrects only its first steps, up to this number, see `_led_back`. Shorter steps are not
+corrected."""
 
 _STILL = 1e-9
 _FEASIBLE = 1e-7

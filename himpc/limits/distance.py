@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 
 def row_count(n: int) -> int:
-    """The largest number of pairs with a row, for n joints."""
+    """Returns the largest number of pairs with a row, for n joints."""
     return min(n, MOST)
 
 

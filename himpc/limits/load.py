@@ -1,4 +1,4 @@
-"""Lowers the velocity limits of joints that a motor close to its torque limit carries."""
+"""Lowers the velocity limits of all joints that are carried by a motor close to its torque limit."""
 
 from __future__ import annotations
 

@@ -14,8 +14,8 @@ from himpc.limits.viability import viability_bounds
 Array = NDArray[np.float64]
 
 REACTION = 5.0
-"""The viability bound assumes one period plus this number of time constants of the velocity barrier as
-reaction time."""
+"""The reaction time that the viability bound assumes is one period plus this number of time constants of the
+velocity barrier."""
 
 
 def reaction(limits: Limits, T_s: float) -> float:
@@ -26,8 +26,8 @@ def reaction(limits: Limits, T_s: float) -> float:
 
 @lru_cache(maxsize=64)
 def approached(N: int, share: float) -> Array:
-    """Returns the largest share of the distance to a velocity bound that a joint may use up to knots 1 … N,
-    (N, 1). `share` is the share for one period; 0 means no limit, and the result is 1."""
+    """Returns the largest shares of the distance to a velocity bound by which a joint may approach the bound
+    until knots 1 … N, (N, 1). `share` is the share for one period; 0 means no limit, and the result is 1."""
     return 1.0 - np.asarray((1.0 - min(1.0, share or 1.0)) ** np.arange(1.0, N + 1)[:, None], np.float64)
 
 

@@ -18,10 +18,10 @@ def viability_bounds(
 
     The upper bound is q̇_{k+1} ≤ min(q̇_max, a(−t + √(t² + 2 max(0, q_max − q_k)/a))); the lower bound is its
     mirror image. A joint at this speed stops exactly at the limit, with the reaction time t and then the
-    deceleration a. t = T_s is enough for a joint that may brake at once. Velocity rows that bound the change
-    of the speed delay the braking. Beyond a limit the joint must return: the bound is then −RETURN_RATE times
-    the excess. The printed position rows (32d) cannot ensure a stop: an N·T_s of 5 ms is far shorter than the
-    time that a joint needs to stop.
+    deceleration a. t = T_s is enough for a joint that may brake at once. The braking begins later if velocity
+    rows bound the change of the speed. Beyond a limit the joint must return: the bound is then −RETURN_RATE
+    times the excess. The printed position rows (32d) cannot ensure a stop: an N·T_s of 5 ms is far shorter
+    than the time that a joint needs to stop.
 
     Args:
         q: measured positions, (n,) rad.

@@ -30,7 +30,7 @@ _ROWS = 1000
 """Largest number of rows of a group of coupled joints. If the group has more rows, its joints brake with
 bounds on torque and torque rate only."""
 _FAINT = 1e-5
-"""Weight of the unknowns in the QP by which rows give way."""
+"""Weight of the unknowns in the QP that determines by how much rows give way."""
 
 
 class _Part(NamedTuple):
@@ -59,9 +59,9 @@ def closest_to_rest(rows: Rows, rest: Array) -> Array:
     Joints that share a direction are a group; each group is a strictly convex QP. If no increments satisfy
     all rows, the rows that yield first give way by least squares. If no increments satisfy the remaining
     rows, all rows that are not hard give way too. If even the hard rows cannot be satisfied, only the torque
-    rows do not give way. Beyond _WORK the torque changes only at some evenly spaced knots, including the
-    first. Beyond _ROWS there is no QP. In all cases, rows of torque and of its rate are satisfied if any
-    increments satisfy them, see `_within`.
+    rows do not give way. If the QPs are larger than _WORK, the torque changes only at some evenly spaced
+    knots, including the first. A group with more rows than _ROWS gets no QP. In all cases, the rows of torque
+    and of torque rate are satisfied if any increments satisfy them, see `_within`.
     """
     U = steps(steps(rest))
     for group in groups(rows, rest.shape[1]):
@@ -149,8 +149,8 @@ def _up_to(part: _Part, rank: int) -> _Part:
 
 
 def _given_way(part: _Part, rank: int) -> _Part:
-    """Returns the part with the rows of a rank widened, by their smallest violation in the sense of least
-    squares. Rows of lower ranks are satisfied, and rows of higher ranks are ignored."""
+    """Returns the part with the rows of a rank widened by their violations, whose sum of squares is minimal.
+    Rows of lower ranks are satisfied, and rows of higher ranks are ignored."""
     counted = _up_to(part, rank)
     A, lower, upper = counted.A, counted.lower, counted.upper
     yields = np.flatnonzero(counted.ranks == rank)
@@ -171,7 +171,8 @@ def _given_way(part: _Part, rank: int) -> _Part:
 
 def _within(rows: Rows, wanted: Array) -> Array:
     """Returns increments whose torques are close to `wanted`, (N, n). They always satisfy the rows of torque.
-    They also satisfy the rows of its rate whenever any increments satisfy both, see `viable`.
+    They also satisfy the rows of the torque rate, whenever any increments satisfy both kinds of rows, see
+    `viable`.
     """
     N = len(wanted)
     blocks = {each: slice(k * N, (k + 1) * N) for k, each in enumerate(rows.constraints)}

@@ -140,7 +140,7 @@ def release(progress: Progress, name: str) -> Progress:
     """
     task = progress.mission[find(progress.mission, name)]
     if task.hold is not None:
-        raise InputError(f"task '{name}' waits {task.hold:g} s at its goal: release tasks with hold null")
+        raise InputError(f"task '{name}' waits {task.hold:g} s at its goal: a release requires hold null")
     return replace(progress, released=progress.released | {name})
 
 

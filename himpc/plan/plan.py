@@ -56,8 +56,8 @@ class Behind(NamedTuple):
     """The effect of a filter that follows the levels on their torque.
 
     Attributes:
-        solution: the filter's step from τ₀, the bounds that stop this step, and the filter's leak into the
-            levels.
+        solution: the filter's step from τ₀, the bounds that are active at this step, and the filter's leak
+            into the levels.
         rows: the rows that the solution's indices refer to.
     """
 

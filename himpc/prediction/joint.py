@@ -19,7 +19,7 @@ class JointState(NamedTuple):
     a: Array
 
     def gained_velocity(self, N: int, T_s: float) -> Array:
-        """Returns q̇ at knots 1 … N minus q̇_k, for Δτ = 0, (N, n): (18) then keeps q̈ constant."""
+        """Returns q̇ at knots 1 … N minus q̇_k, (N, n), for Δτ = 0. In this case (18) keeps q̈ constant."""
         return _steps(N, T_s) * self.a
 
     def free_position(self, N: int, T_s: float) -> Array:

@@ -61,9 +61,9 @@ def _jerked(velocity: Array, acceleration: Array, wish: Array, caps: list[float]
     """Returns the change of the acceleration in one period towards the desired one, within the jerk cap.
 
     The speed must not exceed its cap. Along the motion the acceleration stays below √(jerk · (cap − speed)).
-    Motion along a straight line would allow twice this value, but along a curve other components of the
-    acceleration increase the speed too. If the acceleration already exceeds this limit, the jerk first
-    reduces the acceleration.
+    On a straight line twice this value would be possible, but on a curve other components of the acceleration
+    increase the speed too. If the acceleration already exceeds this limit, the jerk first reduces the
+    acceleration.
     """
     most_speed, _, most_jerk = caps
     budget, speed = most_jerk * T_s, _norm(velocity)

@@ -17,8 +17,9 @@ class CentreOfMass(OnAxes):
     """x = centre of mass of all moving links, along the chosen world axes, m (Pink and Mink: ComTask).
 
     Links that are fixed to the world do not count, such as Baxter's torso and head of 36.3 kg. With a fixed
-    mass m_fixed and a moving mass m, the centre of all masses moves only m/(m + m_fixed) as far. No other
-    task uses masses. The masses are those of the robot's description and do not include a payload.
+    mass m_fixed and a moving mass m, the centre of all masses moves m/(m + m_fixed) times as far as the
+    centre of the moving mass. No other task uses masses. The masses are those of the robot's description and
+    do not include a payload.
 
     Attributes:
         axes: world axes that are controlled, any non-empty subset of "xyz".

@@ -36,7 +36,8 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 _AT_HOME = 0.5
-"""Links must keep at most this share of their distance at home: d_safe must not forbid the home posture."""
+"""The distance that two links must keep is at most this share of their distance at home. Otherwise d_safe
+could forbid the home posture."""
 _GRID = 15
 """Number of positions of each joint between two links that are checked."""
 _NEVER = 0.03
@@ -79,7 +80,7 @@ class _Pairs:
 
 class _Links(NamedTuple):
     """The pairs of links of a robot that are checked, as two tables (S, S): which capsules form a pair, and
-    the largest distance, m, that a pair may have to keep."""
+    the upper limit of the distance, m, that a pair must keep."""
 
     meets: NDArray[np.bool_]
     kept: Array
@@ -88,7 +89,7 @@ class _Links(NamedTuple):
 @per_robot
 def _links(robot: Robot) -> _Links:
     """Returns all pairs of `cover_surroundings`, except links with at most two joints between them that are
-    never nearer than _NEVER. Such links would take up the rows of pairs that can touch."""
+    never nearer than _NEVER. With rows for such links, pairs that can touch would get fewer rows."""
     tree, around, data = (
         geometry(robot),
         cover_surroundings(robot, cover_of(robot), ()),

@@ -32,7 +32,7 @@ _TOLERATED = 1e-6
 """N·m: rows that must be widened by more than this have no solution on the printed route either."""
 
 LEAK = 1e-7
-"""m/s²: largest change that a point may cause at the levels above."""
+"""m/s²: largest acceptable change of the levels above by a point."""
 
 
 @dataclass
@@ -52,9 +52,9 @@ def perform(arena: Arena, parts: int, like: Rows, budget: FallbackBudget) -> int
     the problems or the torque are not finite.
 
     The fallbacks are those of `solve_cascade` and one more, "feasible": if the kernel ran out of budget, the
-    level moves towards the last point of the kernel as far as the rows allow. All levels share the budget of
-    the arena, which bounds the time of a tick. If one level uses most of the budget, the next levels may need
-    fallbacks as well.
+    increments move from a feasible point towards the last point of the kernel, as far as the rows allow. All
+    levels share the budget of the arena, which bounds the time of a tick. If one level uses most of the
+    budget, the next levels may need fallbacks as well.
 
     Args:
         arena: its rows may be wider afterwards: if a fallback widens rows, the levels below use the wider
@@ -95,7 +95,8 @@ def _climb_down(arena: Arena, place: int, like: Rows, budget: FallbackBudget) ->
         _put(arena, place, point)
         return "solve"
     if not alone:
-        # If U_{i−1} is almost the only feasible point, a small slack separates the rows.
+        # If U_{i−1} is almost the only feasible point, opposite bounds nearly coincide. A second attempt
+        # widens them a little.
         if solve_level(arena, place, TOLERANCE):
             return "solve"
         above = f["U"][place - 1]
@@ -120,7 +121,7 @@ def _climb_down(arena: Arena, place: int, like: Rows, budget: FallbackBudget) ->
 
 
 def _contradict(rows: Rows, widened: Rows) -> bool:
-    """Whether rows have no solution: `widened` is wider than they are by more than solvers tolerate."""
+    """Whether rows have no solution: in `widened`, they were widened by more than solvers tolerate."""
     return bool(
         (widened.lower < rows.lower - _TOLERATED).any() or (widened.upper > rows.upper + _TOLERATED).any()
     )

@@ -96,7 +96,8 @@ def write_effects(arena: Arena, rows: slice, root_Q: Array, weighted_C: Array) -
     f, K = arena.f, len(weighted_C)
     f["root_Q"][rows] = root_Q
     f["C"][rows, :K] = weighted_C[:, :, 0].T
-    # A row with fewer knots is padded with zeros. Its effect on the next knot is zero only in the padding.
+    # A row with fewer knots is padded with zeros. Only in the padding, its effect on the next knot is zero:
+    # this shows the number of its knots.
     arena.i["row_knots"][rows] = (np.diagonal(weighted_C, axis1=0, axis2=2) > 0.0).sum(axis=1)
     by_row = weighted_C.transpose(1, 0, 2)
     f["S"][rows, :K, :K] = by_row.transpose(0, 2, 1) @ by_row

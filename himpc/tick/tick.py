@@ -93,7 +93,7 @@ class CompiledTick:
         if memory.x_dot is not None and memory.form is self._form:
             f["x_dot_was"][: memory.x_dot.size], i["known"][0] = memory.x_dot, 1
         if memory.predicted_q is not None and len(memory.predicted_q) == N + 1:
-            f["path"][:] = memory.predicted_q  # an unchanged memory stays bitwise the same
+            f["path"][:] = memory.predicted_q  # unchanged numbers stay bitwise the same
         else:
             f["path"][1], f["path"][2 : N + 1] = q, memory.knots(q, v, N, T_s)
         for place, level in enumerate(self._form.levels if self._levels else ()):
@@ -230,7 +230,8 @@ class CompiledTick:
         self, unsolved: int, tau_0: Array, limits: LimitsInForce, iterations: int, started: int
     ) -> Plan:
         ticks = self._ticks
-        # Levels that are solved alone are only evidence. The last one is applied.
+        # Without priorities, the solution of the last level is applied, and the other levels are solved for
+        # the evidence only.
         alone = bool(self._levels) and self._levels[0].alone
         idle_us = float(self.arena.f["time_us"][:-1].sum()) if alone else 0.0
 

@@ -48,8 +48,8 @@ class ArmLimits:
     q_upper: Array
 
     def with_robot(self, robot: Robot) -> ArmLimits:
-        """Returns the limits that this arm and the description of a robot have in common. Raises InputError
-        if arm and description have different numbers of joints, or no common range of a joint."""
+        """Returns limits that satisfy both the limits of this arm and those of a robot's description. Raises
+        InputError if arm and description have different numbers of joints, or no common range of a joint."""
         if len(self.tau) != robot.n:
             raise InputError(
                 f"the arm has {len(self.tau)} joints and the scene's robot '{robot.name}' has {robot.n}: "

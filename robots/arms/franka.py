@@ -23,9 +23,9 @@ _V = (2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61)  # rad/s
 _Q_LOWER = (-2.7437, -1.7628, -2.8973, -3.0421, -2.8065, 0.5445, -2.8973)  # rad
 _Q_UPPER = (2.7437, 1.7628, 2.8973, -0.1518, 2.8065, 3.7525, 2.8973)  # rad
 _ASIDE, _FARTHEST = 0.01, 0.2
-"""Largest distance of the flange from the axis of the last joint, and largest distance along this axis, m, if
-the scene's robot is this arm. The flange is on the axis, at 0.107 m along it (given by Franka's
-documentation)."""
+"""m: the scene's robot is not this arm if the flange is farther than this from the axis of the last joint
+(first value), or farther along this axis (second value). On a Franka arm the flange is on the axis, at 0.107
+m along it (given by Franka's documentation)."""
 
 
 @final

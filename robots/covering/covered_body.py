@@ -73,8 +73,8 @@ class Body:
         return quick_fits(self.middles, self.swell, group == np.arange(group.max() + 1)[:, None])
 
     def excess(self, fits: Fit) -> float:
-        """Returns the distance by which capsules stand out, m: the root mean square over their outer
-        surface."""
+        """Returns the distance by which capsules stand out of the body, m. It is the root mean square over
+        the outer surface of the capsules."""
         gaps, areas = self.gaps(fits, _SURFACE)
         return float(np.sqrt(np.average(gaps**2, weights=areas)))
 

@@ -23,10 +23,11 @@ USELESS = 0.5
 """Two bodies are left out if their capsules touch in more than this share of the postures without contact."""
 
 _TAPER = 0.4
-"""Reduction of the weight of the base's capsules. The weights increase from 0.6 at the base to 1 at a last
-link."""
+"""The weight of the capsules of the base is 1 minus this value. The weights increase from 0.6 at the base to
+1 at a last link."""
 _CLOSE = 2.5
-"""Factor on the weight of bodies if their capsules are too near to each other and their solids are not."""
+"""Factor on the weight of two bodies if their capsules are too near to each other, but their solids are
+not."""
 
 
 @per_robot

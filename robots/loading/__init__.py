@@ -1,1 +1,1 @@
-"""Loading: a robot from the catalog or from a URDF, with the data that its description lacks."""
+"""Loads a robot from the catalog or from a URDF, and adds the data that its description lacks."""

@@ -14,9 +14,9 @@ from robots.settings import PlantSettings
 from robots.truth import inertial, joint_axis, pose, true_model
 from robots.world import Ball, Box, Floor, Post, Thing, World
 
-# MuJoCo models friction as a spring-damper. With the default parameters, a light joint that sticks slides at
-# tenths of rad/s. These are the stiffest parameters that RK4 integrates without oscillations; they reduce the
-# sliding by a factor of ten thousand.
+# MuJoCo models friction as a spring-damper. With the default parameters, a light joint that should stick
+# moves at tenths of rad/s. The parameters below are the stiffest ones that RK4 integrates without
+# oscillations. They reduce this motion by a factor of ten thousand.
 _STICTION_SOLREF = (0.002, 1.0)
 _STICTION_SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 CONTACT_SOLREF = (0.004, 1.0)
@@ -45,7 +45,7 @@ def compiled(
     Args:
         robot, settings, world: the modelled robot, plant settings and world; the world is used with contacts
             only.
-        also: pairs of bodies that do not touch, in addition to the robot's own list.
+        also: further pairs of bodies whose contact is left out, in addition to the robot's own list.
         margin: m, margin of each solid; two solids count as touching if they are nearer than the sum of their
             margins.
 
@@ -115,7 +115,8 @@ def _body(joint: int) -> str:
 
 
 def _stop(joint: mujoco.MjsJoint, lower: float, upper: float) -> None:
-    """Sets the limits of a joint that has one. In MuJoCo a joint has either two limits or no limits."""
+    """Sets the limits of a joint that has at least one limit. In MuJoCo a joint has either two limits or no
+    limits."""
     if np.isfinite(lower) or np.isfinite(upper):
         joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
         joint.range = (max(lower, -_FAR), min(upper, _FAR))

@@ -1,1 +1,1 @@
-"""The mesh files that a description names: finds them and reads their triangles."""
+"""Finds the mesh files that a description names, and reads their triangles."""

@@ -24,7 +24,8 @@ def simplify(vertices: np.ndarray, faces: np.ndarray, most: int) -> tuple[np.nda
         0.5
         * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
     )
-    # Two triangles per cell cover the surface; the search begins with half of that cell size.
+    # With about two triangles per cell, this cell size would result in `most` faces. The search begins with
+    # half of it.
     cell = max(0.5 * float(np.sqrt(2.0 * area / most)), 1e-6 * extent)
     result = vertices, faces
     while len(result[1]) > most and cell < extent:

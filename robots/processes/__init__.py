@@ -1,1 +1,1 @@
-"""Child processes: limits their time and memory, and ends them and their descendants."""
+"""Limits the time and memory of child processes, and ends them and their descendants."""

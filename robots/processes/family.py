@@ -1,4 +1,4 @@
-"""A process and its descendants: measures their total memory and computing time, and ends them together."""
+"""Measures the total memory and computing time of a process and its descendants, and ends them together."""
 
 from __future__ import annotations
 

@@ -189,7 +189,8 @@ def _let_go(out: int) -> None:
     nowhere = os.open(os.devnull, os.O_RDWR)
     for number in range(3):
         os.dup2(nowhere, number)
-    # Only open descriptors are closed: in containers the highest possible number may be a billion.
+    # Only open descriptors are closed. In containers there may be a billion possible descriptors, and a loop
+    # over all of them would take too long.
     for number in map(int, os.listdir("/proc/self/fd")):
         if number > 2 and number != out:
             with suppress(OSError):  # the descriptor of the listing itself is closed already
@@ -255,13 +256,13 @@ def _answer(request: bytes, within: Allowance) -> bytes:
     except RecursionError:
         fault = "it is nested too deeply; give a file with fewer nested elements"
     except Exception as error:
-        fault = f"the import failed on it ({type(error).__name__}: {shortened(str(error), 100)})"
+        fault = f"the import raised an error ({type(error).__name__}: {shortened(str(error), 100)})"
     return pickle.dumps((None, fault, None))
 
 
 def _restrict(within: Allowance, parent: int) -> None:
-    """Makes this process end with its parent, at the largest wall time and at the limit of memory, if the
-    system supports this."""
+    """Makes this process end when its parent ends, when the largest wall time has passed, and when the limit
+    of memory is reached, as far as the system supports this."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent notices this and ends the process
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
     signal.alarm(int(PATIENCE * within.seconds) + 1)

@@ -46,7 +46,7 @@ def repair_inertials(root: Element) -> Iterator[Finding]:
 
 def nearest_physical(inertia: np.ndarray) -> tuple[np.ndarray, float]:
     """Returns (I', violation): the nearest physically possible inertia about the centre of mass, kg·m², and
-    the violation of the condition by the given inertia.
+    by how much the given inertia violates the condition below.
 
     A body's inertia is I = tr(Σ)·1 − Σ with Σ = ∫ρ r rᵀ ⪰ 0, so Σ = ½ tr(I)·1 − I must be positive
     semidefinite. For the principal moments, this condition is A + B ≥ C; it implies I ⪰ 0 (Wensing, Kim,

@@ -15,7 +15,8 @@ from robots.urdf.read import end_of, label, named
 MAX_LINKS = 1_000
 MAX_SHAPES = 5_000
 MAX_DEPTH = 200
-"""Largest number of joints in a chain: readers of URDF call themselves once per joint of a chain."""
+"""Largest number of joints in a chain. Readers of URDF are recursive functions, with one call per joint of a
+chain."""
 MAX_NAME = 100
 MOVABLE = ("revolute", "continuous", "prismatic")
 _KNOWN = (*MOVABLE, "fixed", "floating", "planar")
@@ -24,8 +25,8 @@ _GUESSES = 5
 
 
 def check_structure(root: Element, source: str) -> Iterator[Finding]:
-    """Yields a `refused` finding for every fault of the description that makes it something else than one
-    tree of links."""
+    """Yields a `refused` finding for every fault that prevents the description from being a single tree of
+    links."""
     for checks in ((_sizes,), (_names,), (_joint_ends, _types), (_single_tree,)):
         faults = [fault for check in checks for fault in check(root, source)]
         yield from faults

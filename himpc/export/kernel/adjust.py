@@ -119,7 +119,7 @@ def write_rows(t: TickArrays, p: LoopArrays, first: int, last: int) -> None:
 
 @inline_kernel
 def fade(t: TickArrays, p: LoopArrays) -> None:
-    """Increases the weights of rows that fade in by the share of one period."""
+    """Increases the weights of the rows that fade in, by the amount for one period."""
     if p.state[FADING] == 0.0:
         return
     p.state[FADING] = 0.0

@@ -26,8 +26,8 @@ def clamp(x: float, low: float, high: float) -> float:
 @inline_kernel
 def braking(t: TickArrays, p: LoopArrays, U: Array) -> None:
     """Computes increments (N, n) that always satisfy the torque rows, and also the velocity rows if this is
-    possible. Of the position rows, only the next one is used. The bounds are `lower` and `upper` of the
-    tick."""
+    possible. Of the position rows, each knot uses only the next one. The bounds are `lower` and `upper` of
+    the tick."""
     N, n = U.shape
     T_s, kinds = t.scalars[T_S], len(t.L) // N
     for a in range(n):
@@ -62,8 +62,8 @@ def braking(t: TickArrays, p: LoopArrays, U: Array) -> None:
 
 @inline_kernel
 def missed(t: TickArrays, p: LoopArrays, U: Array) -> float:
-    """Writes the violation of each row by increments to `size`, (b, n) ≥ 0 N·m; returns the largest
-    violation. A violation that is only rounding counts as 0."""
+    """Computes by how much the increments U violate each row, and writes these violations to `size`, (b, n) ≥
+    0 N·m. Returns the largest violation. A violation that is only rounding counts as 0."""
     N, n = U.shape
     for j in range(N):
         for a in range(n):

@@ -50,7 +50,8 @@ def climb_down(
     """Finds increments of level i that satisfy all rows if the rows are feasible; returns the fallback that
     was used."""
     if i > 0 and not t.level[i, ALONE]:
-        # If U_{i−1} is almost the only feasible point, opposite bounds nearly coincide: widen them a little.
+        # If U_{i−1} is almost the only feasible point, opposite bounds nearly coincide. The bounds are then
+        # widened a little.
         if solve_level(data, where, whole, whole_where, i, TOLERANCE):
             return SOLVE
         copy_rows(t.U[i], p.wanted)
@@ -94,7 +95,7 @@ def kept_rows(t: TickArrays, p: LoopArrays, keep: bool) -> None:
 
 @inline_kernel
 def contain(t: TickArrays, U: Array) -> None:
-    """Widens the rows until U meets them: lower levels then start from a feasible point."""
+    """Widens the rows until U meets them. Lower levels then start from the feasible point U."""
     constraint_values(U, bounds_of(t, t.reached))
     for row in range(len(t.L)):
         for a in range(U.shape[1]):

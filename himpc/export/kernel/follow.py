@@ -14,7 +14,7 @@ from himpc.tick.kernel.target import following
 
 @inline_kernel
 def follow(t: TickArrays, p: LoopArrays, later: bool) -> None:
-    """Writes x_d and its motion over the horizon of all tasks with a draggable target.
+    """For all tasks with a draggable target, writes x_d and its motion over the horizon.
 
     later: whether a period has passed since the last call.
     """
@@ -63,7 +63,7 @@ def show(t: TickArrays, task: int, samples: Array, m: int, width: int, moving: b
 
 @inline_kernel
 def rest_at_targets(t: TickArrays, p: LoopArrays) -> None:
-    """Sets all targets to rest at their raw targets."""
+    """Sets all filtered targets to their raw targets, at rest."""
     for task in range(len(t.task)):
         width = int(p.target[task, WIDTH])
         copy(p.raw[task], p.samples[task, 0], width)

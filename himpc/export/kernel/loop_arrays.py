@@ -14,13 +14,14 @@ class LoopArrays(NamedTuple):
     contains the shape, the unit and a description.
 
     Sizes: as for `TickArrays`, where r counts all levels, also those that are off; D = 2ʳ choices of levels;
-    V numbers of a target's value, W of a sample, K of its caps, see `himpc.tick.kernel.target.roll`.
+    V numbers of a target's value, W numbers of a sample and K numbers of the caps, see
+    `himpc.tick.kernel.target.roll`.
     """
 
     setup: Annotated[Array, "8", "1", "constants of the export, see MOST and the names after it"]
     state: Annotated[Array, "4", "1", "the memory, see STARTED and the names after it"]
     goal: Annotated[Array, "8 n", "N·m, rad/s, rad, rad/s²", "the desired limits, rows as in `limits`"]
-    tau_limit: Annotated[Array, "n", "N·m", "largest torque of each joint; no reading is larger"]
+    tau_limit: Annotated[Array, "n", "N·m", "largest torque of each joint; a larger reading is reduced to it"]
     Q: Annotated[Array, "M", "s⁴/m²", "weight of each row's residual"]
     R: Annotated[Array, "r n", "1/(N·m)²", "weight of the increments of each level"]
     enabled: Annotated[Array, "r", "1", "1 for a level that is on"]
@@ -30,7 +31,7 @@ class LoopArrays(NamedTuple):
     place: Annotated[Array, "r", "1", "index of each level among the solved levels; -1 if it is off"]
     weight: Annotated[Array, "M", "1", "share of Q in force for a row that fades in, 0 … 1"]
     target: Annotated[
-        Array, "T 4", "1", "of each task: draggable, number of rows, of values, of known samples"
+        Array, "T 4", "1", "of each task: draggable, and the numbers of rows, values and known samples"
     ]
     raw: Annotated[Array, "T V", "m, rad, 1", "the raw target, which is not filtered"]
     caps: Annotated[Array, "T K", "m/s, m/s², m/s³", "speed, acceleration and jerk limits; then scratch"]
@@ -42,8 +43,8 @@ class LoopArrays(NamedTuple):
     wanted: Annotated[Array, "N n", "N·m", "the point that the solver reached"]
     trial: Annotated[Array, "N n", "N·m", "increments of a fallback"]
     w: Annotated[Array, "N n", "N·m", "values of velocity rows"]
-    low: Annotated[Array, "N n", "N·m", "least velocity rows from which later rows can be met"]
-    high: Annotated[Array, "N n", "N·m", "largest velocity rows from which later rows can be met"]
+    low: Annotated[Array, "N n", "N·m", "least values of velocity rows from which later rows can be met"]
+    high: Annotated[Array, "N n", "N·m", "largest values of velocity rows from which later rows can be met"]
     before: Annotated[Array, "r N n", "N·m", "increments of the previous iteration"]
     weights: Annotated[Array, "n", "1/(N·m)²", "R of one level"]
 
@@ -55,8 +56,8 @@ SHAPES: dict[str, str] = {
 
 MOST, TOLERANCE, ON_ACCELERATION, LEVELS, DAMPS, BUDGET, SIMPLE = range(7)
 """Indices of `setup`: largest number of iterations and their tolerance (N·m), see `NHIMPC`; whether R weighs
-M̄⁻¹Δτ; number of levels and whether the last one is the damping level; multiplications that a tick may use;
-whether levels form a strict hierarchy, and can be switched."""
+M̄⁻¹Δτ; number of levels and whether the last one is the damping level; largest number of multiplications in a
+tick; whether levels form a strict hierarchy, which is required to switch levels."""
 STARTED, TICKS, FADING = range(3)
 """Indices of `state`: whether the previous tick is stored, number of ticks since the reset, and whether rows
 fade in."""

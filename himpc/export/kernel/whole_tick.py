@@ -90,7 +90,7 @@ def whole_tick(
         data, where, whole, whole_where: the arena of a tick.
         q, v: measured state, (n,) rad and rad/s.
         tau_applied: the torque that acted during the last period, (n,) N·m.
-        measured: whether `tau_applied` is valid; otherwise the torque of the last call acted.
+        measured: whether `tau_applied` is valid; otherwise the torque that the last call computed is used.
         tau: the torque to apply from now on, (n,) N·m; finite and within the limits in force for every state.
 
     Returns:
@@ -125,7 +125,7 @@ def whole_tick(
 @inline_kernel
 def iterate(t: TickArrays, p: LoopArrays, data: Array, where: Whole, whole: Whole, whole_where: Whole) -> int:
     """Solves all levels once; for NHIMPC, it repeats this until no increment changes. Returns the last of the
-    fallbacks that acted, HOLD if there is no torque."""
+    fallbacks that acted, HOLD if no torque was computed."""
     t.budget[0] = p.setup[BUDGET]
     most, change, count, fallback = int(p.setup[MOST]), math.inf, 0, SOLVE
     while count == 0 or (change > p.setup[TOLERANCE] and count < most):
@@ -173,7 +173,7 @@ def hold(t: TickArrays, p: LoopArrays) -> None:
 
 @inline_kernel
 def forget(t: TickArrays, p: LoopArrays) -> int:
-    """Ends a period without a usable state: its torque acts from now on, and the memory is cleared."""
+    """Ends a period without a usable state: the held torque acts from now on, and the memory is cleared."""
     copy(t.tau, t.tau_0, t.q.size)
     p.state[STARTED] = 0.0
     return HOLD
@@ -200,7 +200,7 @@ def begin(t: TickArrays) -> None:
 
 @inline_kernel
 def restart(t: TickArrays, p: LoopArrays, tau: Array, known: int) -> int:
-    """Clears everything except the settings; targets are at rest at their raw targets.
+    """Clears everything except the settings, and sets the filtered targets to their raw targets, at rest.
 
     tau: the torque that acts now, (n,) N·m; if `known` is 0, the torque is zero.
     """

@@ -30,8 +30,8 @@ _STEPS = 600
 _ROUGH = 1e-8
 """At a point that was not refined, a smaller violation may be a rounding error."""
 _CLOSE = 0.05
-"""A row is checked first if its bound is near x = 0: nearer than this share of the row's range or of one
-unit."""
+"""Rows with a bound near x = 0 are checked first. A bound is near if its distance is less than this share of
+the row's range, or of one unit if the range is larger."""
 
 
 @inline_kernel

@@ -11,7 +11,8 @@ from himpc.tick.kernel.arrays import Array, Whole
 from himpc.tick.kernel.linear import backward, close_gap, copy, dot, forward, split, subtract
 
 _DEPENDENT = 1e-10
-"""A row is linearly dependent on the active rows if less than this share of it is orthogonal to them."""
+"""A row is linearly dependent on the active rows if its part orthogonal to the active rows is less than this
+share of the row."""
 
 
 class Quadratic(NamedTuple):
@@ -74,7 +75,7 @@ def scale(cost: Quadratic, normal: Array, scaled_normal: Array) -> None:
 def resolve(active: ActiveSet, index: int, D: int, budget: Array) -> float:
     """Splits row `index` into a combination of the rows before it and a new direction. Writes the
     coefficients to `cholesky_factor` and the direction, not yet of length one, to `orthonormal_basis`.
-    Returns the length of the new direction, 0 if the row depends on the others."""
+    Returns the length of the new direction, 0 if the row is linearly dependent on the rows before it."""
     budget[0] -= 4.0 * D * (index + 1.0)
     scaled_normal = active.scaled_normal[index]
     left = split(
@@ -86,7 +87,7 @@ def resolve(active: ActiveSet, index: int, D: int, budget: Array) -> float:
         active.orthonormal_basis[index],
     )
     length, whole = math.sqrt(left), math.sqrt(dot(scaled_normal, scaled_normal, D))
-    # D rows span the whole space: the rounding error of one more row must not count as a new direction.
+    # D rows span the whole space. The rounding error of one more row must not count as a new direction.
     return length if index < D and length > _DEPENDENT * whole and length > 1e-14 else 0.0
 
 

@@ -212,8 +212,8 @@ def _shapes(kind: Any) -> dict[str, str]:
 
 
 def _numbered(name: str, shapes: dict[str, str]) -> Any:
-    """Returns a module with the index of every array. The compiler treats a module's numbers as constants; it
-    would write out a whole tuple wherever one of its numbers is used."""
+    """Returns a module with the index of every array. The compiler treats a module's numbers as constants. If
+    the indices were in a tuple, it would write out the whole tuple wherever one index is used."""
     places = ModuleType(name)
     vars(places).update({each: place for place, each in enumerate(shapes)})
     return places

@@ -53,16 +53,16 @@ def take_directions(
     projected_jacobian: Array, first: int, last: int, count: int, reflector: Array, Q: Array
 ) -> int:
     """Performs a Householder QR of a level's rows at one knot, within the directions that the levels above
-    leave. Returns the number of directions taken by then; the other directions have no effect on the level
-    and are left to lower levels.
+    leave. Returns the number of directions that the levels above and this level use. The other directions
+    have no effect on the level and are left to lower levels.
 
-    The row with the largest remainder is taken next, so the remainder shows the rank: a direction whose
+    The row with the largest remainder is always used next, so the remainder shows the rank: a direction whose
     effect is less than RANK_TOLERANCE of the size of the rows is left to lower levels.
 
     Args:
         projected_jacobian: (m, n), the level's rows in the old coordinates; afterwards in the new ones.
         first, last: range of rows.
-        count: number of directions that the levels above have taken.
+        count: number of directions that the levels above use.
         reflector: (n, n), one reflection is added for each direction.
         Q: (n, n), its columns are the directions; the first `count` columns do not change.
     """
@@ -70,7 +70,7 @@ def take_directions(
     size = 0.0
     for i in range(first, last):
         size += dot(projected_jacobian[i], projected_jacobian[i], n)
-    # Each row is taken once: after its direction is taken, only rounding errors remain of the row.
+    # No row is chosen twice. After its direction is used, only rounding errors remain of the row.
     for _ in range(min(last - first, n - count)):
         best, most = first, -1.0
         for i in range(first, last):

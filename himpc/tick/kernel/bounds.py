@@ -71,7 +71,8 @@ def bounds(
         M_bar: diagonal of M̄, (n,).
         limits: (8, n), of which the first six rows are read: torques, velocity limit, positions (of the
             limits for PAPER, otherwise of the stops), and deceleration.
-        approach: share of the distance to a velocity bound that may be used up at knots 1 … N.
+        approach: largest share of the distance to a velocity bound by which a joint may approach the bound
+            until knots 1 … N.
         mode: VIABILITY, PAPER or OFF.
         reaction: s, see `viable_speed`.
         period, T_s: duration of the previous and of this period, s.
@@ -124,7 +125,8 @@ def constraint_values(U: Array, bounds: LevelBounds) -> None:
         for c in range(n):
             for j in range(N):
                 value[first + j, c] = dot(D[c], U[j], n)
-            # From the last knot to the first: each knot needs the increments of earlier knots.
+            # The values are replaced from the last knot to the first: each knot needs the earlier ones
+            # unreplaced.
             for j in range(N - 1, -1, -1):
                 total = 0.0
                 for s in range(j + 1):

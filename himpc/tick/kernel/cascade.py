@@ -10,10 +10,10 @@ from himpc.tick.kernel.level import LevelQP
 from himpc.tick.kernel.linear import copy_rows, dot
 
 FIRST, LAST, KNOTS, AFRESH, ALONE, OWN_FIRST, OWN_LAST, OWN_KNOTS = range(8)
-"""Columns of the table of levels: range of its rows; number of knots in its residual; whether its `metric`
-differs from that of the level above, so that directions must be computed again; whether (33) is not imposed
-on it; range of the rows and number of knots of its evidence, which belong to this level alone also without
-priorities."""
+"""Columns of the table of levels: range of the level's rows; number of knots in its residual; whether its
+`metric` differs from that of the level above, so that directions must be computed again; whether the level is
+exempt from (33); range of the rows and number of knots of its evidence. The evidence is that of this level
+alone, also without priorities."""
 SOFTENED = 1.0
 """The last of `FALLBACKS` that applies an optimum."""
 
@@ -106,8 +106,8 @@ def widen(
     U: Array,
     room: float,
 ) -> bool:
-    """Computes the bounds of Problem i and the part of its increments that (33) fixes. If (33) fixes all of
-    them, it writes the increments to U[i] and returns False.
+    """Computes the bounds of Problem i and the part of its increments that (33) fixes. If (33) fixes all
+    increments, the function writes them to U[i] and returns False.
 
     Args:
         index, levels: i and the table of levels.

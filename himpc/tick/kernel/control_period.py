@@ -71,7 +71,8 @@ def perform_parts(
         return i
     if parts & LEVELS:
         for place in range(i, t.sizes[4]):
-            # If the solver fails at once, the point of an earlier tick must not be used as a direction.
+            # The point of an earlier tick is made invalid: if the solver fails at once, no fallback may use
+            # it.
             t.U[place, 0, 0] = math.nan
             started = _clock(t.stamp)
             solved = solve_level(data, where, whole, whole_where, place, 0.0)

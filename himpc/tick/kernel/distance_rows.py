@@ -57,12 +57,12 @@ def approach(pair: int, other: int, normal: Array, velocity: Array) -> float:
 @inline_kernel
 def soonest(room: float, slope: Any, fastest: Array, moving: float) -> float:
     """Returns the shortest time, s, in which a pair can come to the smallest distance that it must keep. For
-    a pair that is nearer, it returns `room`, which is then negative.
+    a pair that is already nearer than this distance, it returns `room`, which is then negative.
 
     Args:
         room: the pair's distance minus the smallest distance that it must keep, m.
         slope: (n,) m/rad, gradient of the distance.
-        fastest: (n,) rad/s, how fast joints may be.
+        fastest: (n,) rad/s, the largest speeds of the joints.
         moving: speed at which the object's motion reduces the distance, m/s.
     """
     if room <= 0.0:
@@ -104,7 +104,7 @@ def nearest(
         count, distance, sphere, shape, normal, slopes: of all pairs, see `near`.
         shares: (B, S) share of d_safe and the margin that each pair keeps.
         velocity: (b, 3) m/s, velocities of the first b shapes, which are objects.
-        fastest: (n,) rad/s, how fast joints may be.
+        fastest: (n,) rad/s, the largest speeds of the joints.
         d_safe: m.
         time: scratch, one per pair.
         chosen: indices of the chosen pairs; the result.

@@ -19,7 +19,8 @@ TOLERANCE = 1e-9
 """A row with a smaller violation counts as satisfied. The unit of this constant and the next one is N·m in
 HIMPC, and the unit of the row in HTMPC."""
 ROUNDED = 1e-7
-"""A row that no free direction can change counts as satisfied if its violation is smaller: it is rounding."""
+"""If no free direction can change a row, a violation of the row that is smaller than this is a rounding
+error, and the row counts as satisfied."""
 _NOISE = 1e-12
 """A multiplier counts as constant if its change is below this share of the largest change of a multiplier."""
 _HARD = 0.5

@@ -1,5 +1,5 @@
-"""Compiled linear algebra of small dense matrices. At these sizes a call of a library costs more than the
-work.
+"""Compiled linear algebra of small dense matrices. At these sizes the call of a library would take more time
+than the computation.
 
 The active rows are stored as cholesky_factor · orthonormal_basis, a lower triangular matrix times orthonormal
 rows. Rows are added and removed one by one.
@@ -13,7 +13,7 @@ from himpc.compilation.compiled import inline_kernel
 from himpc.tick.kernel.arrays import Array
 
 _ENOUGH = 0.5
-"""`split` does a second round against rounding errors if at most this share of ‖row‖² is left."""
+"""If at most this share of ‖row‖² is left, `split` repeats its computation to remove rounding errors."""
 
 
 @inline_kernel

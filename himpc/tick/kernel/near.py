@@ -28,7 +28,8 @@ Vector3 = tuple[float, float, float]
 
 _GOLDEN = 0.6180339887498949
 _NARROWER = 40
-"""Number of steps of the golden-section search. They reduce the segment to a share of 4e-9."""
+"""Number of steps of the golden-section search. They reduce the searched part to a share of 4e-9 of the
+segment."""
 _PARALLEL = 1e-9
 """Square of the sine of the angle below which segments count as parallel."""
 
@@ -92,8 +93,8 @@ def _outside_box(x: float, y: float, h: float, rotation: Array, half: Array) -> 
 
 @inline_kernel
 def _along_box(p: Vector3, d: Vector3, rotation: Array, half: Array) -> float:
-    """Returns the share of the segment p … p + d at which it is nearest to a box. The search uses that the
-    signed distance from a convex set is convex along a line."""
+    """Returns the share of the segment p … p + d at which it is nearest to a box. The search requires that
+    the signed distance is convex along a line; this is true for convex shapes."""
     low, high = 0.0, 1.0
     left, right = 1.0 - _GOLDEN, _GOLDEN
     f_left = _outside_box(p[0] + left * d[0], p[1] + left * d[1], p[2] + left * d[2], rotation, half)
@@ -125,7 +126,7 @@ def _along_segment(p: Vector3, d: Vector3, e: Array) -> float:
     de = d[0] * e[0] + d[1] * e[1] + d[2] * e[2]
     square = dd * ee - de * de
     if square <= _PARALLEL * dd * ee:
-        # The shares of this segment that lie beside the ends of the other segment.
+        # The shares at which this segment is beside the start and beside the end of the other segment.
         at_start, at_end = _clipped(-dp / dd), _clipped((de - dp) / dd)
         return 0.5 * (at_start + at_end)
     t = _clipped((de * ep - ee * dp) / square)

@@ -28,17 +28,18 @@ _ROUNDS = 4
 """Largest number of steps of refinement. Refinement corrects rounding errors of the normal equations on long
 horizons."""
 _ROUNDING = 2e-14
-"""A gradient below this share of ‖G‖‖e‖ is rounding error: a better point cannot be distinguished."""
+"""A gradient below this share of ‖G‖‖e‖ is a rounding error, and the point counts as optimal."""
 _MET = 1e-11
-"""N·m: largest violation of the active rows."""
+"""N·m: largest accepted violation of an active row."""
 _WORTH = 1e-8
-"""Largest change of the cost by the violations of the active rows."""
+"""Largest accepted change of the cost by the violations of the active rows."""
 _ROUGH = 1e-6
 """N·m: a smaller violation at a point without refinement may be a rounding error. If such rows were added
 near a vertex of many rows, the same rows would be added and removed until the budget is used up."""
 _MANY = 12
-"""Number of added rows in one attempt after which the distance of each violated row is computed. Adding the
-farthest row needs fewer rows in total than adding the row with the largest violation in N·m."""
+"""If an attempt adds more rows than this, the next row is the one that is farthest from the point, instead of
+the one with the largest violation in N·m. The distances take time, but fewer rows are then needed in
+total."""
 
 FAILED = -1.0
 

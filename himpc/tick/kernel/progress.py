@@ -13,8 +13,8 @@ from himpc.tick.kernel.arrays_of import arrays_of
 
 @kernel(VECTOR, INDICES, INDICES, INDICES, INDICES, VECTOR)
 def progress(data: Any, where: Whole, whole: Whole, whole_where: Whole, ends: Whole, lengths: Array) -> float:
-    """Writes the length of the last error of each of the first tasks, m or rad, and returns the largest
-    velocity of a row of a reference, m/s or rad/s.
+    """Writes the length of the last error of each task that has an entry in `ends`, m or rad, and returns the
+    largest velocity of a row of a reference, m/s or rad/s.
 
     Args:
         data, where, whole, whole_where: the arena.

@@ -16,8 +16,8 @@ def bounded_pull(task: Whole, error: Array, pull: float, K_p: Array, m: int, fre
 
     Args:
         task: see `jacobian`. error: x̃_k, (M,). K_p: (M,).
-        pull: the largest error on which a position task acts, m; other tasks act on errors up to TURN_PULL
-            times as large.
+        pull: the largest error on which a position task acts, m; for other tasks the largest error is
+            TURN_PULL · pull, rad.
         m: number of rows of the solved tasks.
         free: (N, M), updated.
     """

@@ -58,13 +58,13 @@ def effects(B: Array, U: Array, first: int, last: int, pushed: Array) -> None:
 
 @inline_kernel
 def add_effects(C: Array, pushed: Array, first: int, last: int, row_knots: Whole, e: Array) -> None:
-    """Computes e_{k+1} += Σ_{j≤k} √Q c_{k−j} pushed_j over the knots that a row counts.
+    """Computes e_{k+1} += Σ_{j≤k} √Q c_{k−j} pushed_j over the knots of each row's horizon.
 
     Args:
         C: √Q c_l of `ResidualModel`, (m, N): the effect depends on the distance l of two knots only.
         pushed: (N, m).
         first, last: the rows.
-        row_knots: number of knots that a row counts (Remark 8).
+        row_knots: number of knots in the horizon of each row (Remark 8).
         e: (N, m), changed.
     """
     for i in range(first, last):

@@ -52,8 +52,8 @@ def solve_level(data: Any, where: Whole, whole: Whole, whole_where: Whole, i: in
     """Solves Problem i of the cascade after the problems above it; returns False if no optimum was found
     within the remaining budget of the tick.
 
-    room: N·m by which bounds are widened if the levels above leave no room. It is positive only for a second
-    attempt at a level, which uses the directions of the first attempt.
+    room: N·m by which bounds are widened if U_{i−1} is almost the only feasible point. It is positive only
+    for a second attempt at a level. The second attempt uses the directions of the first one.
     """
     t = arrays_of(data, where, whole, whole_where)
     levels = t.level

@@ -50,8 +50,9 @@ def jerked(
 ) -> None:
     """Computes the change of the acceleration in one period towards the desired acceleration, within the jerk
     cap. The speed must not exceed its cap: the acceleration along the motion stays below √(jerk · speed
-    left). A straight line would allow twice this acceleration, but in a curve the speed also grows by itself.
-    If the acceleration is above this limit, the jerk is first used to reduce it.
+    left). On a straight line twice this acceleration would be possible, but on a curve other components of
+    the acceleration increase the speed too. If the acceleration is above this limit, the jerk is first used
+    to reduce it.
     """
     budget = caps[2] * T_s
     if speed == 0.0:
