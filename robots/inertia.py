@@ -15,8 +15,8 @@ _WIDEST = 40.0  # widest sampled range, rad or m; further turns repeat the same 
 
 
 def finite_range(q_lower: np.ndarray, q_upper: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the limits between which configurations are sampled: ±π for an unbounded joint, and one turn
-    from the finite limit of a joint with only one limit."""
+    """Returns the ends of the ranges in which configurations are sampled: the limits of a joint with two
+    limits, ±π for an unbounded joint, and otherwise the only limit and the angle one turn away from it."""
     turn = 2.0 * np.pi
     from_above = np.where(np.isfinite(q_upper), q_upper - turn, -np.pi)
     from_below = np.where(np.isfinite(q_lower), q_lower + turn, np.pi)

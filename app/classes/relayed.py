@@ -157,7 +157,7 @@ def can_be_told(place: LessonPlace) -> bool:
 
 
 def class_now(state: Gathering) -> ClassNow:
-    """Returns the state of a class without its members."""
+    """Returns the state of a class of learners, without the list of its learners."""
     place, poll = state.place, state.poll
     rounds = [] if poll is None else [sorted(Counter(votes.values()).items()) for votes in poll.rounds]
     if poll is not None and poll.is_open:

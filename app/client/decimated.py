@@ -33,7 +33,8 @@ class History:
 
     If the controller is slower than the buckets, some buckets have no row; a row is then valid until the next
     row. Buckets are aligned to simulated time, so that curves scroll without shimmering, and two robots on
-    one clock have the same buckets. Each row is read once, for any window. A reset sets the time back and
+    one clock have the same buckets. Each row is read only once, whatever span of
+    time the plots show. A reset sets the time back and
     clears the curves, since a jump would look like a motion.
     """
 

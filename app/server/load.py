@@ -44,7 +44,7 @@ class Load:
         connections: number of open connections.
         refused: number of requests refused since the start.
         messages: number of messages from pages since the start.
-        stopping: whether the server is starting or stopping.
+        stopping: True while the server starts or stops.
     """
 
     sessions: int
@@ -57,8 +57,8 @@ class Load:
 
     @property
     def full(self) -> bool:
-        """Whether pages use all places. Places that are reserved for learners who may come back are not
-        counted."""
+        """Whether pages use as many simulations as the server may have. Simulations that wait for a browser
+        to come back do not count."""
         return 0 < self.maximum <= self.attached
 
     @property

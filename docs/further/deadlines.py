@@ -88,8 +88,8 @@ FURTHER = Further(
         ),
         Question(
             r"The torques act one tick late, but $\bar M$ is doubled. How long does the same mode take now "
-            r"until a hundredth (0.01) of an error is left? The largest $\mu$ of all modes of this arm is "
-            "0.8. Which disadvantage does the doubling have for this mode?",
+            r"until a hundredth (0.01) of an error is left? Another mode of this arm has the largest $\mu$, "
+            "0.8. Which disadvantage does the doubling have for that other mode?",
             "$(1 - 0.1 - 0.1)^k = 0.01$ at $k = ⟨k⟩$, so it takes ⟨ms⟩ ms: the doubling compensates for the "
             r"delay. The largest $\mu$ rises from 0.8 to $⟨mu⟩$. The error of this mode now changes its "
             r"sign at every correction, and $\mu$ is only $⟨room⟩$ below the stability limit 2.",

@@ -72,8 +72,8 @@ def check_dimensions(robot: Robot, levels: tuple[Level, ...]) -> None:
     if len(levels) > 1 and total >= robot.n:
         listed = " + ".join(f"{size} ('{name}')" for name, size in sizes.items())
         raise InputError(
-            f"the tasks need {listed} = {total} coordinates and '{robot.name}' has {robot.n} joints: "
-            "their sum must be smaller, so switch a level off or control fewer axes"
+            f"the tasks need {listed} = {total} coordinates. These must be fewer than the {robot.n} "
+            f"joints of '{robot.name}': switch a level off or control fewer axes"
         )
 
 

@@ -53,12 +53,13 @@ class GivenRows:
         return at_rest(preview, len(task.axes))
 
     def write(self, previews: Mapping[str, Preview]) -> None:
-        """Writes J at the knots of the last prediction (30), value, error and reference of each task. For
-        orientations on fewer than three axes with a rotating reference, also writes the motion of the
-        reference.
+        """For each task that is not built in, writes J at the knots of the last prediction (30), the value,
+        the error and the reference. For orientations on fewer than three axes with a rotating reference, also
+        writes the motion of the reference. The arena must already hold the measured state and the
+        controller's memory.
 
         Args:
-            previews: the previews of all tasks. The arena must hold the measured state and the memory.
+            previews: the previews of all tasks.
         """
         if not self._given and True not in self._turned.values():
             return

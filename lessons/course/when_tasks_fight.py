@@ -177,7 +177,7 @@ EQUALITY = Step(
             because="HQP has rows on torque only, none on speed",
         ),
         Claim(
-            "From 2.5 s on joint 3 swings: its speed varies by more than 150°/s.",
+            "After 2.5 s, joint 3 swings: its speed varies by more than 150°/s.",
             Measure(Signal("v", "deg/s", column=2), "range", after=2.5),
             "at least",
             150.0,

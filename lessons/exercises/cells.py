@@ -7,7 +7,7 @@ _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
 
 
 def cell(text: str) -> str:
-    """Returns the text as a cell that a spreadsheet shows as text."""
+    """Returns the content of a cell that shows this text, also if the text begins like a formula."""
     return f"'{text}" if text.startswith(_FORMULA) else text
 
 

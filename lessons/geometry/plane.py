@@ -2,7 +2,8 @@
 
 All other variables of a QP (the other joints, later knots) have the values of one level's solution. In this
 cut the cost of a level is (w − c)ᵀ P (w − c) + least, with w = (Δτ_a, Δτ_b) of knot 0 in N·m. The bounds are
-a box, since no row couples two joints; rows of constraints that couple joints are left out. The set that (33)
+a box, since rows of torque, velocity and position couple no joints. Rows of other constraints are left out if
+they couple joints. The set that (33)
 allows is the whole plane, a line, a point or empty.
 """
 

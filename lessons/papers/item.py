@@ -62,7 +62,8 @@ class Row:
 
     @property
     def verdict(self) -> Verdict:
-        """The verdict on our number against the paper's; "" if the paper neither prints nor says anything."""
+        """The verdict on our number against the paper's; "" if the paper neither prints the number nor
+        describes it in words."""
         if self.paper is None and self.says is None:
             return ""
         if not math.isfinite(self.ours):

@@ -29,7 +29,7 @@ VELOCITY_SCENES: dict[str, str] = {
     "ridgeback-ur10-delivery": "a delivery round to three people, four times (Fig. 9)",
     "ridgeback-ur10-handover": "the hand waits until the ball is taken; people move meanwhile",
     "ridgeback-ur10-cluttered": "the base drives past obstacles that it must avoid",
-    "ridgeback-ur10-perception": "a crate beside the robot's path is reported on the path for a while",
+    "ridgeback-ur10-perception": "for a while, a crate beside the path is wrongly reported on the path",
     "iiwa14-htmpc": "KUKA iiwa 14 under HTMPC: position, then orientation",
     "panda-htmpc": "Franka Panda under HTMPC: position, then orientation",
 }

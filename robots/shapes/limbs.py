@@ -75,8 +75,8 @@ def _farthest(model: pin.Model, joint: int) -> np.ndarray:
 
 
 def _foot(top: np.ndarray, radius: float) -> np.ndarray:
-    """Returns the end, (3,) m, of a column from the floor to the first joint. If this joint is on the floor,
-    returns the end of a flat foot below the joint."""
+    """Returns the position, (3,) m, of the upper end of a column from the floor to the first joint. If this
+    joint is on the floor, returns the lower end of a flat foot below the joint."""
     return top if float(np.linalg.norm(top)) > 0.5 * radius else np.array([0.0, 0.0, -0.5 * radius])
 
 

@@ -129,7 +129,6 @@ REFERENCE = (
     )),
     Exempt("software", HTMPC + "equations.py::test_too_many_coordinates_are_explained", (
         ("himpc/htmpc/tracking.py", "InputError: the sum is too large, so that no freedom is left"),
-        ("himpc/htmpc/tracking.py", "joints: their sum must be smaller"),
     )),
     Exempt("software", HIMPC + "limits.py::test_tightened_limits_close_in_and_arrive", (
         ("himpc/limits/ramp.py", "Then it moves to its goal with time constant RAMP_SECONDS"),

@@ -122,7 +122,7 @@ class TasksPanel:
         return not self._in_lesson and self._add.picking
 
     def choose(self, frame: str) -> None:
-        """Chooses the link of this frame after a click on the link."""
+        """Chooses the frame for the new task. Called when a link was clicked; `frame` is its frame."""
         self._add.choose(frame)
 
     def toggle(self, place: int) -> Set | None:

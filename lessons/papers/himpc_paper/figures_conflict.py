@@ -152,7 +152,7 @@ def _fig_14(results: Results, quick: bool) -> Section:
             span = slice(chosen[0], chosen[-1] + 1)
             x_d = run["x_d/position"][span]
             path = PlotCurve(x_d[:, 0], x_d[:, 1], label="reference", colour="reference", style="dashed")
-            # The last pose has no label: it is also a pose of the other panel.
+            # The last pose of a panel has no label; the second panel labels that of the first.
             notes = tuple(_time_beside(points[-1], x_d, float(run.t[place])) for place, points in chains[:-1])
             panels.append(Panel("y (m)", (*arms, path), "x (m)", equal=True, title=title, notes=notes))
     caption = f"HIMPC on RT3 in {POSES} poses; straight and singular in the 1st, 10th and 19th (thick)."

@@ -17,8 +17,8 @@ _ON = {
     "Δτ, as printed": (),
     "M̄⁻¹Δτ, with viability": ("R_on=acceleration", "limits.position=viability"),
 }
-"""The quantity that R weighs. With R on accelerations the controller reacts so slowly that it cannot keep the
-printed position rows: with them the error of x is 5 mm at N = 5."""
+"""The quantity that R weighs, and its settings. With R on accelerations the controller reacts so slowly that
+it cannot keep the position rows as printed: with these rows the error of x is 5 mm at N = 5."""
 
 
 _N = 5
@@ -64,7 +64,7 @@ def _table_6(results: Results, quick: bool) -> Section:
                         "1e-4 m",
                         printed_value,
                         1e4 * errors[N],
-                        trouble(run) or "as in Table V; compare the trend over N below",
+                        trouble(run) or "the difference is that of Table V; compare the trend over N below",
                         topic="rt4-errors",
                     )
                 )
