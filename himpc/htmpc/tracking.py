@@ -72,7 +72,7 @@ def check_dimensions(robot: Robot, levels: tuple[Level, ...]) -> None:
     if len(levels) > 1 and total >= robot.n:
         listed = " + ".join(f"{size} ('{name}')" for name, size in sizes.items())
         raise InputError(
-            f"the tasks need {listed} = {total} coordinates. These must be fewer than the {robot.n} "
+            f"the tasks need {listed} = {total} coordinates, and this must be less than the {robot.n} "
             f"joints of '{robot.name}': switch a level off or control fewer axes"
         )
 

@@ -402,7 +402,7 @@ def test_too_many_coordinates_are_explained(robot: Robot) -> None:
         Level((FramePosition(name="p"), FrameOrientation(name="o"))),
         Level((FramePosition(name="elbow", frame="link_4", axes="x"),)),
     )
-    with pytest.raises(InputError, match=r"6 .*\+ 1 .*= 7 coordinates .*7 joints"):
+    with pytest.raises(InputError, match=r"6 .*\+ 1 .*= 7 coordinates, .*7 joints"):
         HTMPC(arm, mobile_settings(stack=stack))
     assert HTMPC(arm, mobile_settings(stack=stack[:1])) is not None
 

@@ -130,7 +130,7 @@ FAULTS = {
     "memory at import": ("x = [0] * 10**12\n", "line 1: .*memory"),
     "no function": ("torque = 3\n", "torque must be a function"),
     "no method": ("class Controller:\n    pass\n", "a method torque"),
-    "a lesson instead": ("LESSON = 1\n", "is a lesson, and a controller is needed"),
+    "a lesson instead": ("LESSON = 1\n", "is a lesson, but a controller is needed"),
     "constructor": ("class Controller:\n    def __init__(self, x): ...\n    def torque(self, n): ...\n", "x"),
     "missing name in a tick": (HOLDS.replace("now.bias", "nowbias"), r"mine.py, line 2: NameError"),
     "arguments": ("def torque():\n    return 0\n", "TypeError"),
@@ -303,7 +303,7 @@ def test_own_scene_begins_with_any_there_is(file) -> None:
     [
         ("SCENE = 3\n", "its scene is a int"),
         ("def scene():\n    return 1 / 0\n", "line 2: ZeroDivisionError"),
-        (HOLDS, "is a controller, and a scene is needed"),
+        (HOLDS, "is a controller, but a scene is needed"),
         (text_of("task", None, "").replace("max(np.hypot(p[0], p[1]), 1e-6)", "2.0"), "is off by"),
         ("TASK = 3\n", "TASK is a int"),
         (text_of("task", None, "").replace("[:, None, :]", ""), "the Jacobian of task 'reach' has shape"),
