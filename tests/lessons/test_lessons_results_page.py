@@ -71,8 +71,8 @@ def expected() -> dict[str, str]:
         + " m",
         "RT1, level 1: OSF and HQP over HIMPC": f"{min(ratios):.0f} to {max(ratios):.0f} ×",
         "RT2 (`planar3-conflict`): HIMPC": f"{power(own)} m on level 1, inside all bounds, with "
-        f"`velocity_approach` 8, the scene's value; {approach('15, the default elsewhere')} with the default 15, "
-        f"{approach('0, as printed')} with 0, as printed",
+        f"`velocity_approach` 8, the scene's value; {approach('15, the default elsewhere')} with the default "
+        f"15, {approach('0, as printed')} with 0, as printed",
         "Level 1, RT2 over RT1: HIMPC, HQP": f"{of(fig_11, 'HIMPC: level-1 RMSE in RT2 over RT1'):.1f}, "
         f"{of(fig_11, 'HQP: level-1 RMSE in RT2 over RT1'):.1f}",
         "RT2: HQP": f"{power(hqp)} m at {speed:.1f} × the speed limit",
