@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.htmpc.kernel.kinds import COLLISION
+from himpc.htmpc.kernel.kinds import COLLISION, LEXICOGRAPHIC
 from himpc.htmpc.plan import Felt, LevelEvidence
 from himpc.htmpc.problem import Iterate
 from himpc.htmpc.rows import ConstraintRows
@@ -21,10 +21,19 @@ _FELT = 1e-6
 
 
 def evidence(
-    level: Tracking, solved: Solved, final: Iterate, named: Callable[[int], str] | None = None
+    level: Tracking,
+    solved: Solved,
+    final: Iterate,
+    guards: Sequence[str],
+    named: Callable[[int], str] | None = None,
 ) -> LevelEvidence:
-    """Builds the evidence of a level from the result of `solve_level`. `final` contains the inputs after all
-    levels, and `named` returns the names of a pair, see `CollisionModel.named`."""
+    """Builds the evidence of a level from the result of `solve_level`.
+
+    Args:
+        final: the inputs after all levels.
+        guards: the names of the rows of (12) or (11), in their order.
+        named: returns the names of a pair, see `CollisionModel.named`.
+    """
     best = solved.at.errors(level)
     return LevelEvidence(
         name=level.name,
@@ -38,16 +47,21 @@ def evidence(
         iterations=len(solved.steps),
         unsolved=solved.unsolved,
         time_us=solved.time_us,
-        felt=_felt(solved.rows, solved.multipliers, named),
+        felt=_felt(solved.rows, solved.multipliers, guards, named),
     )
 
 
-def _felt(rows: ConstraintRows, multipliers: Array, named: Callable[[int], str] | None) -> Felt:
+def _felt(
+    rows: ConstraintRows, multipliers: Array, guards: Sequence[str], named: Callable[[int], str] | None
+) -> Felt:
     """Returns the active rows. The bounds of the slacks, whose multipliers are the last ones, are left
     out."""
     multipliers = multipliers[: len(rows.kind)]
     some = np.flatnonzero(np.abs(multipliers) > _FELT)
     kind, part = rows.kind[some], rows.part[some]
-    of_pairs = zip((kind == COLLISION).tolist(), part.tolist(), strict=True)
-    pairs = tuple(named(each) if is_pair and named else "" for is_pair, each in of_pairs)
-    return Felt(kind, rows.knot[some], part, multipliers[some], pairs)
+    of_guards = dict(zip(np.flatnonzero(rows.kind == LEXICOGRAPHIC).tolist(), guards, strict=True))
+    names = tuple(
+        named(each) if is_pair and named else of_guards.get(row, "")
+        for row, is_pair, each in zip(some.tolist(), (kind == COLLISION).tolist(), part.tolist(), strict=True)
+    )
+    return Felt(kind, rows.knot[some], part, multipliers[some], names)

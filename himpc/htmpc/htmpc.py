@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping
+from itertools import accumulate
 from time import perf_counter_ns
 
 import numpy as np
@@ -78,6 +79,8 @@ class HTMPC:
         collision = CollisionModel(robot, settings.obstacles, settings.self_collision)
         self._hold = self._held(active, settings)
         self._levels = tuple(form for level, form in every if level in active)
+        guards = accumulate((form.guards(settings) for form in self._levels), initial=())
+        self._guards = [*guards][:-1]  # each level has the rows of all levels above it
         self._bounds = limits
         self._table = ConstraintTable(settings.horizon * robot.n)
         self._effort = Effort(weights, settings.horizon, settings.dt)
@@ -112,7 +115,8 @@ class HTMPC:
         at = solved[-1].at if solved else tick.iterate(tick.brake)
         named = None if self._avoidance is None else self._avoidance.model.named
         levels = tuple(
-            evidence(level, one, at, named) for level, one in zip(self._levels, solved, strict=True)
+            evidence(level, one, at, guards, named)
+            for level, one, guards in zip(self._levels, solved, self._guards, strict=True)
         )
         U = at.U if np.isfinite(at.U).all() else tick.brake
         U = permitted(tick.start, U, self._bounds, self._settings.period)

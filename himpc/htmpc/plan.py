@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.htmpc.kernel.kinds import KINDS, LEXICOGRAPHIC
+from himpc.htmpc.kernel.kinds import KINDS
 from himpc.htmpc.prediction import Motion
 from himpc.htmpc.settings import MotionBounds
 from himpc.plan import Binding
@@ -19,13 +19,14 @@ Whole = NDArray[np.int64]
 
 class Felt(NamedTuple):
     """Active constraint rows: kind, knot and part as in `ConstraintRows`, and the multipliers, all (r,).
-    `pairs` contains the names of the pair for each row of a distance, and "" for other rows."""
+    `name` is the pair of a row of a distance, the coordinate of a row of (12), the cost of a row of (11), and
+    "" for the rows of a joint."""
 
     kind: Whole
     knot: Whole
     part: Whole
     multiplier: Array
-    pair: tuple[str, ...]
+    name: tuple[str, ...]
 
 
 class LevelEvidence(NamedTuple):
@@ -64,10 +65,10 @@ class LevelEvidence(NamedTuple):
     def binding(self, joint_names: Sequence[str]) -> list[Binding]:
         """Returns the active constraints with the names of joints and kinds."""
         found: list[Binding] = []
-        kinds, knots, parts, values, pairs = self.felt
-        each = zip(kinds.tolist(), knots.tolist(), parts.tolist(), values.tolist(), pairs, strict=True)
-        for kind, knot, part, multiplier, pair in each:
-            joint = pair or (joint_names[int(part)] if kind < LEXICOGRAPHIC else f"{KINDS[kind]} {part}")
+        kinds, knots, parts, values, names = self.felt
+        each = zip(kinds.tolist(), knots.tolist(), parts.tolist(), values.tolist(), names, strict=True)
+        for kind, knot, part, multiplier, name in each:
+            joint = name or joint_names[int(part)]
             side = "upper" if multiplier > 0 else "lower"
             found.append(Binding(self.name, joint, KINDS[kind], side, knot, abs(multiplier), 0.0))
         return found

@@ -24,12 +24,14 @@ class Tracking:
     Attributes:
         name: name of the level.
         tasks: tasks of the level.
+        coordinates: (m,), the task and the axis of each coordinate.
         Q: (N, m) diagonal weights at knots 1 … N; the last row is P. Knot 0 has no weights: it is measured,
             and its cost is constant.
     """
 
     name: str
     tasks: tuple[Task, ...]
+    coordinates: tuple[str, ...]
     Q: Array
 
     def errors(self, knots: Knots, desired: dict[str, Desired]) -> Array:
@@ -46,10 +48,18 @@ class Tracking:
         """Returns J of (8) without its constant first term."""
         return 0.5 * float(np.vdot(self.Q * e, e))
 
+    def guards(self, settings: HTMPCSettings) -> tuple[str, ...]:
+        """Returns the names of the rows of (12) or (11) with which the levels below keep this level: the
+        coordinates at knots 1 … N, or the cost."""
+        if settings.lexicographic == "per_coordinate":
+            return self.coordinates * settings.horizon
+        return (f"cost of {self.name}",)
+
 
 def tracking(robot: Robot, level: Level, settings: HTMPCSettings) -> Tracking:
     """Builds a level with its weights at every knot. Raises InputError for weights of the wrong length."""
-    m = sum(len(task.coordinates(robot)) for task in level.tasks)
+    names = tuple(f"{task.name} {axis}" for task in level.tasks for axis in task.coordinates(robot))
+    m = len(names)
     weight = np.asarray(level.Q, float)
     if weight.ndim and weight.shape != (m,):
         raise InputError(
@@ -57,7 +67,7 @@ def tracking(robot: Robot, level: Level, settings: HTMPCSettings) -> Tracking:
         )
     Q = np.tile(np.broadcast_to(weight, (m,)), (settings.horizon, 1))
     Q[-1] *= settings.terminal
-    return Tracking(level.name, level.tasks, Q)
+    return Tracking(level.name, level.tasks, names, Q)
 
 
 def check_dimensions(robot: Robot, levels: tuple[Level, ...]) -> None:

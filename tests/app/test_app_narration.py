@@ -41,6 +41,7 @@ class Told:
         ({"levels": (("position", True), ("posture", False))}, "Level 2, posture, switched off."),
         ({"levels": (("posture", True), ("position", True))}, "The levels are now posture, position."),
         ({"limits": frozenset({("torque", "joint 2")})}, "Torque limit of joint 2 is met."),
+        ({"limits": frozenset({("lexicographic", "ee x")})}, ""),
     ],
 )
 def test_what_changes_is_said_once(change: dict[str, Any], words: str) -> None:

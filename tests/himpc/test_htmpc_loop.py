@@ -112,6 +112,10 @@ def test_bounds_evidence_and_accuracy_on_a_square_wave(robot: Robot, rate_hz: fl
         "jerk",
         "lexicographic",
     }
+    bindings = [each for plan in plans for each in plan.binding(robot.joint_names)]
+    bound = [each for each in bindings if each.kind == "lexicographic"]
+    assert {each.level for each in bound} == {"base"}
+    assert {each.joint for each in bound} == {"ee x", "ee y", "ee z"}
 
 
 def test_the_plan_says_what_will_happen(robot: Robot) -> None:

@@ -23,6 +23,8 @@ _SMALL = {"m": 1e-3, "rad": math.radians(0.5)}
 """Errors below this value count as equal."""
 _QUIET = 10.0
 """Time, s, during which the same active limit is not announced again."""
+_GUARD = "lexicographic"
+"""The kind of the rows of (11) and (12). One of them binds in almost every period; they are not announced."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +99,8 @@ class Narration:
     def _reached(self, now: Facts) -> list[str]:
         """Active limits that were not announced recently."""
         t = self._clock()
-        new = [each for each in sorted(now.limits) if t - self._limits.get(each, -math.inf) > _QUIET]
+        limits = sorted(each for each in now.limits if each[0] != _GUARD)
+        new = [each for each in limits if t - self._limits.get(each, -math.inf) > _QUIET]
         self._limits.update(dict.fromkeys(now.limits, t))
         return [f"{kind} limit of {joint} is met" for kind, joint in new]
 
