@@ -71,7 +71,7 @@ def test_a_vote_goes_from_open_to_decided() -> None:
     assert hall.going_to(CHOICE).opened().stage == "open"
 
 
-@pytest.mark.parametrize(("place", "says"), [(SKETCH, "curve"), (NOTHING, "nothing")])
+@pytest.mark.parametrize(("place", "says"), [(SKETCH, "curve"), (NOTHING, "no question")])
 def test_a_step_without_a_question_is_only_run(place: LessonPlace, says: str) -> None:
     with pytest.raises(InputError, match=says):
         of(place).opened()

@@ -66,7 +66,8 @@ def test_wrong_addresses_and_scenes_are_one_sentence() -> None:
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_one_line_and_a_clean_end(number: signal.Signals) -> None:
     code = (
-        "import sys; from app.server.server import FIRST, PageServer; from app.server.serving import serve; "
+        "import app.commands.early, sys; from app.server.server import FIRST, PageServer; "
+        "from app.server.serving import serve; "
         "sys.exit(serve(PageServer(FIRST, port=0), open_browser=False))"
     )
     process = subprocess.Popen(
