@@ -123,7 +123,7 @@ def _learn(
     print(f"killed: the learner of a protocol client continues after {time.monotonic() - began:.1f} s")
     check(time.monotonic() - began < MOVE, "the protocol client changes servers in time")
     in_browser = _until(lambda: [_sessions(each) for each in rest] == [2, 2], page)
-    shown = _until(lambda: page.get_by_text("You go on where you were").count() > 0, page)
+    shown = _until(lambda: page.get_by_text("You continue where you were").count() > 0, page)
     check(in_browser and shown, "the learner in the browser continues on another server")
     page.get_by_text("2 of").first.wait_for()
     print(f"killed: the page in the browser continues after {time.monotonic() - began:.1f} s")

@@ -202,7 +202,7 @@ def test_learners_go_on_without_the_class_and_nothing_is_lost_when_it_is_back() 
             assert eventually(lambda: learner.kept_at == STEP and learner.lecture is not None, LONG)
             port = int(lead.url.rpartition(":")[2])
             lead.close()
-            assert eventually(lambda: page.shows("is interrupted. Go on"), LONG)
+            assert eventually(lambda: page.shows("is interrupted. Continue"), LONG)
             assert learner.kept_at is None
             learner.send(Predict(0))
             learner.send(RunStep())
