@@ -45,7 +45,10 @@ _DARK = "himpc-lab-dark"
 _PROGRESS = "himpc-lab-lessons"
 _ELSEWHERE = 3.0  # s for which a full server's page waits before it connects again
 _PERIOD = 1.0  # s between two checks of the page's place
-_GOES_ON = ("You continue where you were", "The robot starts again, with the settings or the step that you had.")
+_GOES_ON = (
+    "You continue where you were",
+    "The robot starts again, with the settings or the step that you had.",
+)
 _LONGEST = 100_000  # largest number of characters of a stored value
 
 

@@ -16,7 +16,7 @@ SCENE, TASK, LESSON = (text_of(kind, None, "mine.py") for kind in ("scene", "tas
 FILE = {
     "empty": ("", "defines neither"),
     "two things": ("TASK = 1\nLESSON = 2\nSCENE = 3\n", "put each into a file of its own"),
-    "another kind": ("def torque(now):\n    return now.q\n", "is a controller, and a"),
+    "another kind": ("def torque(now):\n    return now.q\n", "is a controller, but a"),
     "syntax": ("SCENE = (\n", "mine.py, line 1: "),
     "indentation": ("def scene():\nreturn 1\n", "mine.py, line 2: "),
     "missing name": ("SCENE = TASK = LESSON = nothing\n", "mine.py, line 1: NameError"),
