@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
+from viser import ClientHandle
 from websockets.sync.connection import Connection
 
 from app.adapter import private
@@ -109,9 +110,17 @@ def test_a_slow_line_queues_one_scene_at_most(alone: PageServer) -> None:
         for scene in ("planar3-hold", "planar3-singular", "planar3-conflict"):
             learner.load(SceneChoice(RunSpec(scene)))
             assert wait_until(lambda scene=scene: simulates(learner, scene), LONG)
+            assert wait_until(lambda: is_steady(client), LONG)  # a scene may still be built
             queued.append(private.waiting(client))
         assert queued[-1] < queued[0] + 100
         hear_until(viewer, page, lambda: shown._built is learner.ready and private.waiting(client) == 0)
+
+
+def is_steady(client: ClientHandle) -> bool:
+    """Returns whether no messages of a scene are queued within half a second."""
+    before = private.waiting(client)
+    time.sleep(0.5)
+    return private.waiting(client) < before + 20
 
 
 def simulates(learner: SimulationClient, scene: str) -> bool:

@@ -19,7 +19,7 @@ from urllib.parse import urlsplit
 import msgspec
 import pytest
 import websockets.asyncio.server as web
-from viser import __version__, _messages
+from viser import ViserServer, __version__, _messages
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 from websockets.sync.connection import Connection
@@ -414,21 +414,28 @@ def test_a_page_that_says_nothing_leaves_no_noise_at_the_end(caplog: pytest.LogC
 def test_a_page_that_comes_while_the_server_closes_leaves_no_noise(
     caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The visit of a page ends before it has asked the page anything."""
-    came, left, arrive, leave = threading.Event(), threading.Event(), Visit.arrive, Visit.leave
+    """The visit of a page ends before it has asked the page anything. The server waits for no answer."""
+    came, left, ended = threading.Event(), threading.Event(), threading.Event()
+    arrive, leave, stop = Visit.arrive, Visit.leave, private.stop
 
     async def late(visit: Visit) -> None:
         came.set()
         while not left.is_set():
             await asyncio.sleep(0.01)
         await arrive(visit)
+        ended.set()
 
     def leaves(visit: Visit) -> None:
         leave(visit)
         left.set()
 
+    def stops(server: ViserServer) -> None:
+        assert ended.wait(LONG)  # without this, the loop may stop while `late` sleeps
+        stop(server)
+
     monkeypatch.setattr(Visit, "arrive", late)
     monkeypatch.setattr(Visit, "leave", leaves)
+    monkeypatch.setattr(private, "stop", stops)
     server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
     with dial(server) as page:
         page.send(pack(camera()))
