@@ -414,7 +414,7 @@ def test_a_page_that_says_nothing_leaves_no_noise_at_the_end(caplog: pytest.LogC
 def test_a_page_that_comes_while_the_server_closes_leaves_no_noise(
     caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The visit of a page ends before it has asked the page anything. The server waits for no answer."""
+    """The visit of a page ends before it has asked the page anything. It does not wait for an answer."""
     came, left, ended = threading.Event(), threading.Event(), threading.Event()
     arrive, leave, stop = Visit.arrive, Visit.leave, private.stop
 
@@ -433,6 +433,7 @@ def test_a_page_that_comes_while_the_server_closes_leaves_no_noise(
         assert ended.wait(LONG)  # without this, the loop may stop while `late` sleeps
         stop(server)
 
+    monkeypatch.setattr("app.server.visit.STORAGE", 10 * LONG)  # a question that is not withdrawn stays open
     monkeypatch.setattr(Visit, "arrive", late)
     monkeypatch.setattr(Visit, "leave", leaves)
     monkeypatch.setattr(private, "stop", stops)
