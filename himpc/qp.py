@@ -48,7 +48,7 @@ class QPSolution:
 
 
 def is_installed(solver: Solver) -> bool:
-    """Whether a solver is installed."""
+    """Returns whether a solver is installed."""
     return solver != "qpoases" or find_spec("casadi") is not None
 
 

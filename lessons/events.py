@@ -72,7 +72,7 @@ class InsertTask:
     hold: float | None = 0.0
 
     def task(self) -> MissionTask:
-        """The task. Raises InputError for invalid values."""
+        """Returns the task. Raises InputError for invalid values."""
         return MissionTask(self.name, self.role, Go(self.goal, self.cruise), self.tolerance, self.hold)
 
 
@@ -92,7 +92,7 @@ class Appear:
     radius: float
 
     def ball(self) -> Ball:
-        """The obstacle. Raises InputError for invalid numbers."""
+        """Returns the obstacle. Raises InputError for invalid numbers."""
         if len(self.centre) != 3:
             raise InputError(f"obstacle '{self.name}' needs a centre of three numbers")
         x, y, z = self.centre
@@ -107,12 +107,12 @@ _KINDS = {
 
 
 def as_data(event: Event) -> dict[str, Any]:
-    """An event as JSON-ready data."""
+    """Returns an event as JSON-ready data."""
     return {"event": type(event).__name__, **asdict(event)}
 
 
 def from_data(data: dict[str, Any]) -> Event:
-    """The inverse of `as_data`. Raises InputError for data that do not describe an event."""
+    """Returns the inverse of `as_data`. Raises InputError for data that do not describe an event."""
     fields = dict(data)
     kind = _KINDS.get(str(fields.pop("event", "")))
     if kind is None:

@@ -46,7 +46,7 @@ class Spread(Protocol):
 
 
 def cores() -> int:
-    """Number of cores that this process may use."""
+    """Returns the number of cores that this process may use."""
     affinity = getattr(os, "sched_getaffinity", None)
     return max(1, len(affinity(0)) if affinity else os.cpu_count() or 1)
 
@@ -107,7 +107,7 @@ def one_by_one(
 
 
 def guarded(function: Callable[[T], U], item: T) -> U | FailedJob:
-    """The result of the function, or a failure if the function raised an exception."""
+    """Returns the result of the function, or a failure if the function raised an exception."""
     try:
         return function(item)
     except Exception as error:
@@ -115,8 +115,8 @@ def guarded(function: Callable[[T], U], item: T) -> U | FailedJob:
 
 
 def sentence(error: BaseException) -> str:
-    """An error in one line, with the name of its class. The name is omitted for an InputError, which is a
-    sentence."""
+    """Returns an error in one line, with the name of its class. The name is omitted for an InputError, which
+    is a sentence."""
     text = " ".join(str(error).split()) or "no reason given"
     return text if isinstance(error, InputError) else f"{type(error).__name__}: {text}"
 

@@ -139,8 +139,8 @@ def surroundings(robot: Robot, obstacles: tuple[Obstacle, ...], self_collision: 
 
 
 def base_joint(robot: Robot) -> int:
-    """Index of the last joint of a mobile base, which unbounded joints move over the floor; 0 for a robot
-    without one. Bodies up to that joint stand on the floor."""
+    """Returns the index of the last joint of a mobile base, which unbounded joints move over the floor; 0 for
+    a robot without one. Bodies up to that joint stand on the floor."""
     free = np.isinf(robot.q_lower) & np.isinf(robot.q_upper)
     return max((j for j in range(robot.n + 1) if j > 2 and free[:j].all()), default=0)
 

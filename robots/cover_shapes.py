@@ -91,8 +91,8 @@ def _table(shape: WorldShape) -> tuple[int, float, Array, Array, float]:
 
 
 def _reaches(robot: Robot, capsules: Sequence[Capsule], height: float) -> NDArray[np.bool_]:
-    """Whether the height of each capsule above a floor depends on the posture and is positive at home,
-    (S,)."""
+    """Returns whether the height of each capsule above a floor depends on the posture and is positive at
+    home, (S,)."""
     rng = np.random.default_rng(0)
     low = np.where(np.isfinite(robot.q_lower), robot.q_lower, -np.pi)
     high = np.where(np.isfinite(robot.q_upper), robot.q_upper, np.pi)

@@ -192,15 +192,15 @@ class Plant:
             self._data.xfrc_applied[self.robot.moving_body(body)] = wrench
 
     def mass_matrix(self) -> np.ndarray:
-        """(n, n) kg·m², M(q) with payload and armature."""
+        """Returns M(q) with payload and armature, (n, n) kg·m²."""
         return self._inertia(self._look())[: self.n, : self.n].copy()
 
     def bias(self) -> np.ndarray:
-        """(n,) N·m, C(q, v)·v + g(q): M q̈ + bias = τ − friction + push."""
+        """Returns C(q, v)·v + g(q), (n,) N·m: M q̈ + bias = τ − friction + push."""
         return self._look().qfrc_bias[: self.n].copy()
 
     def holding_torque(self) -> np.ndarray:
-        """(n,) N·m, torque that holds the plant at q: inverse dynamics, v = q̈ = 0, no push or friction."""
+        """Returns the torque, (n,) N·m, that holds the plant at q without a push or friction (v = q̈ = 0)."""
         probe = self._probe
         probe.qpos[:], probe.qvel[:] = self._data.qpos, 0.0
         mujoco.mj_fwdPosition(self._model, probe)
@@ -209,31 +209,31 @@ class Plant:
         return probe.qfrc_bias[: self.n].copy()
 
     def jacobian(self, frame: str) -> np.ndarray:
-        """(6, n) Jacobian of a frame's origin, linear over angular, world axes; m/rad and rad/rad."""
+        """Returns the Jacobian of a frame's origin in world axes, (6, n): linear, then angular rows."""
         J = np.zeros((6, self._model.nv))
         mujoco.mj_jacSite(self._model, self._look(), J[:3], J[3:], self._site(frame))
         return J[:, : self.n].copy()
 
     def frame_pose(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
-        """Orientation R (3, 3) and position p (3,) m of a frame in the world."""
+        """Returns the orientation R, (3, 3), and the position p, (3,) m, of a frame in the world."""
         site, probe = self._site(frame), self._look()
         return probe.site_xmat[site].reshape(3, 3).copy(), probe.site_xpos[site].copy()
 
     def acceleration(self, tau: np.ndarray) -> np.ndarray:
-        """(n,) rad/s², the acceleration if the torque tau (N·m) acted on the joints now: with friction,
-        damping and push, without saturation, delay and lag."""
+        """Returns the acceleration, (n,) rad/s², if the torque tau (N·m) acted on the joints now: with
+        friction, damping and push, without saturation, delay and lag."""
         found = self._accelerate(self._data.qpos, self._data.qvel, as_vector("tau", tau, self.n))
         self._fresh = True
         return found[: self.n].copy()
 
     def objects(self) -> np.ndarray:
-        """(k, 7) m and quaternion (w, x, y, z), poses of the free objects of the world, in their order."""
+        """Returns the poses of the free objects of the world, (k, 7): m, and quaternion (w, x, y, z)."""
         if self.settings.contacts:
             return self._data.qpos[self.n :].reshape(-1, 7).copy()
         return np.array([thing.pose for thing in self.world if thing.free]).reshape(-1, 7)
 
     def object_velocities(self) -> np.ndarray:
-        """(k, 3) m/s, velocities of the middles of the free objects in world axes, in their order."""
+        """Returns the velocities of the middles of the free objects, (k, 3) m/s, in world axes."""
         return self._data.qvel[self.n :].reshape(-1, 6)[:, :3].copy()
 
     def carry(self, place: int, position: np.ndarray, velocity: np.ndarray) -> None:

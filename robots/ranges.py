@@ -28,7 +28,7 @@ class Range:
     above: bool = False
 
     def holds(self, value: float) -> bool:
-        """Whether a number is allowed."""
+        """Returns whether a number is allowed."""
         return (
             math.isfinite(value) and self.low <= value <= self.high and not (self.above and value == self.low)
         )

@@ -150,7 +150,7 @@ def _keep_awake(server: viser.ViserServer) -> None:
 
 
 def senders(server: viser.ViserServer) -> list[asyncio.Event]:
-    """The wake-up events of the sender for all clients, and then of each client's sender."""
+    """Returns the wake-up events of the sender for all clients, and then of each client's sender."""
     websockets = server._websock_server
     each = [one.message_buffer for one in list(websockets._client_state_from_id.values())]
     return [buffer.message_event for buffer in (websockets._broadcast_buffer, *each)]
@@ -160,7 +160,7 @@ def senders(server: viser.ViserServer) -> list[asyncio.Event]:
 
 
 def connection_of(server: viser.ViserServer, client: viser.ClientHandle) -> ServerConnection | None:
-    """The web socket of a client; None if the client has left."""
+    """Returns the web socket of a client; None if the client has left."""
     return server._websock_server._live_connections.get(client.client_id)
 
 
@@ -171,7 +171,7 @@ def give_workers(client: viser.ClientHandle, workers: ThreadPoolExecutor) -> Non
 
 
 def unfinished_uploads(client: viser.ClientHandle) -> int:
-    """Number of bytes received so far of files whose upload is not complete."""
+    """Returns the number of bytes received so far of files whose upload is not complete."""
     return sum(one["transferred_bytes"] for one in list(client.gui._current_file_upload_states.values()))
 
 
@@ -212,7 +212,7 @@ def run_script(client: viser.ClientHandle, source: str) -> None:
 
 
 def waiting(client: viser.ClientHandle) -> int:
-    """Number of messages that are queued for this client."""
+    """Returns the number of messages that are queued for this client."""
     return len(client._websock_connection.get_message_buffer().message_from_id)
 
 
@@ -249,8 +249,8 @@ Kind = Literal["write", "upload", "other"]
 
 
 def kind_of(message: Any) -> Kind:
-    """The kind of a message. A "write" changes a control (fields `uuid`, `updates`), an "upload" begins an
-    upload for the control `source_component_uuid`, and all other messages are "other"."""
+    """Returns the kind of a message. A "write" changes a control (fields `uuid`, `updates`), an "upload"
+    begins an upload for the control `source_component_uuid`, and all other messages are "other"."""
     match message:
         case _messages.GuiUpdateMessage():
             return "write"
@@ -264,13 +264,13 @@ def kind_of(message: Any) -> Kind:
 
 
 def control_of(client: viser.ClientHandle, uuid: object) -> viser.GuiInputHandle[Any] | None:
-    """The control with this identifier; None if the page does not have it any more."""
+    """Returns the control with this identifier; None if the page does not have it any more."""
     found = client.gui._gui_input_handle_from_uuid.get(uuid) if isinstance(uuid, str) else None
     return None if found is None or found._impl.removed else found  # pyright: ignore[reportReturnType]
 
 
 def dom_id(handle: viser.GuiInputHandle[Any] | viser.GuiUploadButtonHandle) -> str:
-    """A control's id in the browser's document."""
+    """Returns a control's id in the browser's document."""
     return handle._impl.uuid
 
 

@@ -13,7 +13,7 @@ from robots import InputError
 
 
 def answer(port: int) -> bytes:
-    """The first bytes of a server's response to an HTTP request from this machine."""
+    """Returns the first bytes of a server's response to an HTTP request from this machine."""
     with socket.create_connection(("127.0.0.1", port), timeout=10.0) as stranger:
         stranger.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
         return stranger.recv(100)
@@ -25,7 +25,7 @@ def refuse(connection: ServerConnection, _: Request) -> Response:
 
 
 def reaches(start: object, path: str) -> bool:
-    """Whether an object has the attribute, or a dataclass has the field, at a dotted path."""
+    """Returns whether an object has the attribute, or a dataclass has the field, at a dotted path."""
     for name in path.split("."):
         if name in getattr(start, "__dataclass_fields__", ()):
             return True

@@ -14,8 +14,8 @@ _LATE = " on a removed "
 
 
 def is_removed_handle_error(error: BaseException) -> bool:
-    """Whether an exception is viser's refusal to write to a removed control or node. Such an exception can be
-    ignored, as the page does not show that control or node any more."""
+    """Returns whether an exception is viser's refusal to write to a removed control or node. Such an
+    exception can be ignored, as the page does not show that control or node any more."""
     return isinstance(error, RuntimeError) and _LATE in str(error)
 
 

@@ -77,7 +77,7 @@ class Orders:
         return int(self._taken.sum())
 
     def news(self) -> list[Order]:
-        """The targets that were dragged since the last call; empty while the watcher is writing."""
+        """Returns the targets that were dragged since the last call; empty while the watcher is writing."""
         before = int(self._head[_WRITES])
         if before == self._seen or before % 2:
             return []

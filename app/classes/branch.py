@@ -122,7 +122,7 @@ class Branch(Room):
         )
 
     def code_of(self, who: str) -> str:
-        """The code of a learner's state; "" if there is none."""
+        """Returns the code of a learner's state; "" if there is none."""
         told = self._latest(who)
         try:
             return "" if told is None else code_of(told)

@@ -101,8 +101,8 @@ class Hall(Room):
             self._keep()
 
     def who(self, number: int) -> str:
-        """The identity of the member with this number. Raises InputError if the member has no robot or has
-        left."""
+        """Returns the identity of the member with this number. Raises InputError if the member has no robot
+        or has left."""
         found = ((one, each) for one, each in self.state.members.items() if each.number == number)
         who, member = next(found, ("", None))
         if member is None or member.kind != "robot" or not member.here:
@@ -110,11 +110,11 @@ class Hall(Room):
         return who
 
     def server_of(self, who: str) -> str | None:
-        """The other server on which a learner is; None if the learner is on this server."""
+        """Returns the other server on which a learner is; None if the learner is on this server."""
         return self._far.get(who)
 
     def code_of(self, who: str) -> str:
-        """The state code of a learner on this server. Raises InputError if there is no code."""
+        """Returns the state code of a learner on this server. Raises InputError if there is no code."""
         told = self._latest(who)
         if told is None:
             raise InputError("the robot of this learner does not answer")
@@ -157,7 +157,7 @@ class Hall(Room):
             self._state = self._state.voted(who, answer, time.monotonic())
 
     def mine(self, who: str) -> float | None:
-        """The vote of a member in the present round."""
+        """Returns the vote of a member in the present round."""
         poll = self.state.poll
         return None if poll is None else poll.latest.get(who)
 
@@ -206,24 +206,24 @@ class Hall(Room):
             self._far[told.who] = server
 
     def news(self) -> ClassNow:
-        """The state of the class for its other servers."""
+        """Returns the state of the class for its other servers."""
         return class_now(self.state)
 
     def _elsewhere(self) -> set[str]:
         return {who for who, server in self._far.items() if server in self._servers}
 
     def _lost(self) -> int:
-        """The number of other servers that have learners but no connection."""
+        """Returns the number of other servers that have learners but no connection."""
         return len(set(self._far.values()) - self._servers)
 
     # ---------------------------------------------------------------- looking
 
     def everybody(self) -> View:
-        """The data that all pages show."""
+        """Returns the data that all pages show."""
         return {**for_all(self.state), "robot": self._shape[1]}
 
     def teachers(self) -> View:
-        """The further data that only the teacher's page shows."""
+        """Returns the further data that only the teacher's page shows."""
         with self._lock:
             lecture = self._lecture_of(self.robot)
             over = lecture is not None and lecture.exercise == self._state.place and lecture.phase == "done"
@@ -237,7 +237,7 @@ class Hall(Room):
             }
 
     def pose(self) -> View | None:
-        """The pose of the teacher's robot at this instant; None while there is no robot."""
+        """Returns the pose of the teacher's robot at this instant; None while there is no robot."""
         ready = self.robot.ready
         moment = self.robot.read(lambda block, _: block.moment())
         if ready is None or moment is None or not np.isfinite(moment[1]).all():

@@ -34,7 +34,7 @@ class BuildQueue:
             self._waiting.remove(who)
 
     def has(self, who: str) -> bool:
-        """Whether a learner waits for a robot to be built or to become ready."""
+        """Returns whether a learner waits for a robot to be built or to become ready."""
         return who in self._building or who in self._waiting
 
     def next(self, ready: Collection[str], now: float) -> list[str]:

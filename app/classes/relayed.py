@@ -123,7 +123,8 @@ of_class = msgspec.json.Decoder(OfClass)
 
 
 def is_secret(text: str) -> bool:
-    """Whether a text can be the identity of a learner. It comes from a browser, which can store any text."""
+    """Returns whether a text can be the identity of a learner. It comes from a browser, which can store any
+    text."""
     return re.match(_SECRET, text) is not None
 
 
@@ -152,7 +153,7 @@ def read_done(told: Sequence[Ran], course: Sequence[View]) -> dict[LessonPlace, 
 
 
 def can_be_told(place: LessonPlace) -> bool:
-    """Whether a message can name a step. The path of a teacher's own lesson may be too long."""
+    """Returns whether a message can name a step. The path of a teacher's own lesson may be too long."""
     return len(place.lesson) <= LONGEST_NAME and place.lesson.isprintable()
 
 

@@ -96,7 +96,7 @@ class Room(ABC):
             self._state = self._state.called(who, name)
 
     def name_of(self, who: str) -> str:
-        """The name that a member typed; "" if there is none."""
+        """Returns the name that a member typed; "" if there is none."""
         member = self.state.members.get(who)
         return "" if member is None else member.name
 
@@ -209,14 +209,14 @@ class Room(ABC):
                 learner.announce(place)
 
     def _arrived(self, learner: SimulationClient) -> bool:
-        """Whether a robot that was brought to the class's step has loaded it, and has not run it."""
+        """Returns whether a robot that was brought to the class's step has loaded it, and has not run it."""
         lecture, led = learner.lecture, self._led.get(learner.token)
         if lecture is None or led is None or lecture is led[0]:
             return False
         return (lecture.exercise, lecture.attempt) == (self._state.place, 0)
 
     def _lecture_of(self, learner: SimulationClient) -> Lecture | None:
-        """The run of a learner's step; None while the step that the class chose is being loaded."""
+        """Returns the run of a learner's step; None while the step that the class chose is being loaded."""
         if self._builds.has(learner.token):
             return None
         led = self._led.get(learner.token)
@@ -227,12 +227,12 @@ class Room(ABC):
         return () if self._sessions is None else self._sessions.learners
 
     def _latest(self, who: str) -> Told | None:
-        """The last reported run of a learner of this server; None if there is none."""
+        """Returns the last reported run of a learner of this server; None if there is none."""
         learner = next((each for each in self._learners() if each.token == who), None)
         return None if learner is None else learner.latest()
 
     def _elsewhere(self) -> set[str]:
-        """The members whose page is open on another server."""
+        """Returns the members whose page is open on another server."""
         return set()
 
     @property

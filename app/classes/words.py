@@ -24,7 +24,7 @@ CLASS_KEY = "X-Himpc-Lab-Class-Key"
 
 
 def is_of_a_class(path: str) -> bool:
-    """Whether an address belongs to a class."""
+    """Returns whether an address belongs to a class."""
     plain = urlsplit(path).path
     return plain in (f"/{TEACHER}", TABLE, f"/{BRANCH}") or plain.startswith(PHONES)
 

@@ -56,5 +56,5 @@ class Coming:
         return replace(self, held=(), sent=True) if place == self.lecture.exercise else None
 
     def is_at(self, lecture: Lecture) -> bool:
-        """Whether a report comes from a robot that has loaded this step."""
+        """Returns whether a report comes from a robot that has loaded this step."""
         return self.sent and lecture.exercise == self.lecture.exercise

@@ -45,6 +45,6 @@ def decimate(curves: np.ndarray, tolerance: float, phase: int = 0) -> np.ndarray
 
 
 def _straight(curves: np.ndarray, tolerance: float) -> bool:
-    """Whether all curves are within the tolerance of their chords."""
+    """Returns whether all curves are within the tolerance of their chords."""
     first, share = curves[:, :1], np.arange(curves.shape[1]) / max(1, curves.shape[1] - 1)
     return bool((np.abs(curves - first - (curves[:, -1:] - first) * share) <= tolerance).all())

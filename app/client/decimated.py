@@ -198,5 +198,5 @@ class PlotWindow:
 
     @staticmethod
     def ages() -> np.ndarray:
-        """The times before the end of the window, (2 · BUCKETS,) s, ≤ 0."""
+        """Returns the times before the end of the window, (2 · BUCKETS,) s, ≤ 0."""
         return _AGES.copy()

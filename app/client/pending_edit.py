@@ -31,7 +31,7 @@ class PendingEdit(Generic[T]):
         return value
 
     def now(self, shown: T) -> T:
-        """The last edit if it is recent, otherwise the value that is shown."""
+        """Returns the last edit if it is recent, otherwise the value that is shown."""
         if self._asked is None or time.monotonic() - self._asked[0] > HOLD:
             return shown
         return self._asked[1]

@@ -75,10 +75,10 @@ class RowHistory:
         self._kept += 1
 
     def recent(self) -> np.ndarray:
-        """The rows of the last minute, (k, size)."""
+        """Returns the rows of the last minute, (k, size)."""
         end = self._kept
         return self._recent[np.arange(max(0, end - len(self._recent)), end) % len(self._recent)]
 
     def whole(self) -> np.ndarray:
-        """The rows since the last reset, (k, size)."""
+        """Returns the rows since the last reset, (k, size)."""
         return self._whole[: self._thinned].copy()

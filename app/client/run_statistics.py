@@ -83,7 +83,7 @@ class RunStatistics:
         return float(finite.max()) if finite.size else 0.0
 
     def result(self) -> RunFigures | None:
-        """The figures so far; None before the first row."""
+        """Returns the figures so far; None before the first row."""
         if not self._ticks:
             return None
         return RunFigures(

@@ -90,7 +90,7 @@ class Simulation(ABC):
         return time.monotonic() - self._process.heard_at
 
     def trouble(self) -> Trouble | None:
-        """The problem that the page should show; None if there is none."""
+        """Returns the problem that the page should show; None if there is none."""
         if self.failure is not None:
             return Trouble("STOPPED", self.failure)
         return trouble_of(self._process, self._loading, self.quiet, self.who)

@@ -78,7 +78,7 @@ class SimulationClient(Simulation):
         return self._arm or super()._source()
 
     def trouble(self) -> Trouble | None:
-        """The problem of the simulation or its ghost that the page should show; None if there is none."""
+        """Returns the problem of the simulation or its ghost that the page should show, or None."""
         ghost = self.ghost
         found = super().trouble() or (None if ghost is None else ghost.trouble())
         return found if found is None or self._arm is None else replace(found, offer=None)

@@ -97,7 +97,7 @@ def _code(found: Grade) -> int:
 
 
 def _is_own(first: Path, second: str) -> bool:
-    """Whether the first of two arguments is the file of an exercise and the second argument is the
+    """Returns whether the first of two arguments is the file of an exercise and the second argument is the
     solutions."""
     from lessons.exercises import EXERCISES
     from lessons.own.files import is_file

@@ -21,7 +21,7 @@ _CLOSED = ("math", "code", "pre", "abbr", "svg", "style")
 
 @cache
 def words() -> dict[str, str]:
-    """Every word of the glossary with its explanation."""
+    """Returns every word of the glossary with its explanation."""
     return {word: str(entry["means"]) for word, entry in _entries().items()}
 
 

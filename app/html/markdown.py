@@ -21,13 +21,13 @@ _PLACE = re.compile(r"\ue000(\d+)\ue001")
 
 @lru_cache(maxsize=256)
 def rendered(text: str) -> str:
-    """HTML of paragraphs. HTML tags in the text are shown as text."""
+    """Returns HTML of paragraphs. HTML tags in the text are shown as text."""
     return _html(text, _MARKDOWN.render)
 
 
 @lru_cache(maxsize=256)
 def rendered_line(text: str) -> str:
-    """HTML of a text that is part of a line."""
+    """Returns HTML of a text that is part of a line."""
     return _html(text, _MARKDOWN.renderInline)
 
 

@@ -39,15 +39,15 @@ def css(colour: RGB, alpha: float = 1.0) -> str:
 
 
 def level_colours(names: Sequence[str]) -> dict[str, RGB]:
-    """A colour per level name. A level keeps its colour when it moves up or down."""
+    """Returns a colour per level name. A level keeps its colour when it moves up or down."""
     colours = {name: LEVELS[k % len(LEVELS)] for k, name in enumerate(names)}
     colours["damping"] = DAMPING
     return colours
 
 
 def recoloured(names: Sequence[str], before: dict[str, RGB]) -> dict[str, RGB]:
-    """The colours of another stack. An existing level keeps its colour, and a new level takes the colour of a
-    level with which it shares a task. The other levels get unused colours."""
+    """Returns the colours of another stack. An existing level keeps its colour, and a new level takes the
+    colour of a level with which it shares a task. The other levels get unused colours."""
     found: dict[str, RGB] = {}
     for name in names:
         tasks = set(name.split("+"))
@@ -71,7 +71,7 @@ def joint_dash(index: int) -> tuple[float, ...]:
 
 
 def contrast(one: RGB, other: RGB) -> float:
-    """The contrast ratio of WCAG 2.1, 1 … 21."""
+    """Returns the contrast ratio of WCAG 2.1, 1 … 21."""
     low, high = sorted((_luminance(one), _luminance(other)))
     return (high + 0.05) / (low + 0.05)
 
@@ -82,19 +82,19 @@ def on(colour: RGB) -> RGB:
 
 
 def button(colour: RGB) -> RGB:
-    """The colour, darkened until white text on a button of this colour is readable."""
+    """Returns the colour, darkened until white text on a button of this colour is readable."""
     return next(found for found in _mixed(colour, BLACK) if contrast(found, WHITE) >= 4.6)
 
 
 def ink(colour: RGB) -> str:
-    """The CSS colour of text in this colour, darker on a light page and lighter on a dark page."""
+    """Returns the CSS colour of text in this colour, darker on a light page and lighter on a dark page."""
     light, dark = readable_on(colour, LIGHT_PAGE), readable_on(colour, DARK_PAGE)
     return f"light-dark({css(light)},{css(dark)})"
 
 
 def readable_on(colour: RGB, page: RGB) -> RGB:
-    """The colour, mixed with black or white until its contrast with the page is at least 7.5. On pale areas
-    and in paler paragraphs, the contrast is then at least 4.5."""
+    """Returns the colour, mixed with black or white until its contrast with the page is at least 7.5. On pale
+    areas and in paler paragraphs, the contrast is then at least 4.5."""
     return next(found for found in _mixed(colour, on(page)) if contrast(found, page) >= _TEXT)
 
 

@@ -17,7 +17,8 @@ esc = html.escape
 
 
 def quantity(value: float, unit: str) -> str:
-    """A length in m or an angle in rad, converted to a readable unit with a suitable number of digits."""
+    """Returns a length in m or an angle in rad, converted to a readable unit with a suitable number of
+    digits."""
     if not math.isfinite(value):
         return "–"
     if unit == "m":
@@ -38,7 +39,7 @@ def _digits(size: float) -> int:
 
 
 def swatch(colour: RGB) -> str:
-    """A small square in a level's colour."""
+    """Returns a small square in a level's colour."""
     return (
         '<span style="display:inline-block;width:0.75em;height:0.75em;border-radius:2px;'
         f'background:{css(colour)};margin-right:0.4em"></span>'
@@ -53,14 +54,14 @@ def badge(text: str, colour: RGB) -> str:
 
 
 def block(inner: str, style: str = "", lines: int = 0) -> str:
-    """A paragraph in the font size of the panel, with room for `lines` lines. The controls below the
+    """Returns a paragraph in the font size of the panel, with room for `lines` lines. The controls below the
     paragraph stay in place as long as its text fits into this room."""
     room = f"min-height:{1.45 * lines + 0.3:g}em;" if lines else ""
     return f'<div style="font-size:0.85em;line-height:1.45;padding:0.15em 0.75em;{room}{style}">{inner}</div>'
 
 
 def in_trouble(state: str, sentence: str) -> str:
-    """The text that a page shows for a simulation that ended unexpectedly, hangs or takes long."""
+    """Returns the text that a page shows for a simulation that ended unexpectedly, hangs or takes long."""
     colour = GOOD if state == "PREPARING" else BAD
     return block(
         f"{badge(state, colour)} {esc(sentence)}",
@@ -69,8 +70,8 @@ def in_trouble(state: str, sentence: str) -> str:
 
 
 def bar(share: float, colour: RGB, mark: float | None = None) -> str:
-    """A horizontal gauge that is filled up to `share` and has a line at `mark`. Both are shares of the
-    gauge's width."""
+    """Returns a horizontal gauge that is filled up to `share` and has a line at `mark`. Both are shares of
+    the gauge's width."""
     width = 100 * min(max(share, 0.0), 1.0)
     line = (
         ""
@@ -87,13 +88,13 @@ def bar(share: float, colour: RGB, mark: float | None = None) -> str:
 
 @lru_cache(maxsize=64)
 def formula(latex: str) -> str:
-    """A LaTeX formula as MathML that scrolls instead of being cut off."""
+    """Returns a LaTeX formula as MathML that scrolls instead of being cut off."""
     style = "overflow-x:auto;padding:0.3em 0.75em"
     return f'<div tabindex="0" style="{style}">{convert(latex, display="block")}</div>'
 
 
 def figure(value: float, unit: str = "") -> str:
-    """A number with three significant digits and its unit."""
+    """Returns a number with three significant digits and its unit."""
     if not math.isfinite(value):
         return "–"
     size = abs(value)
@@ -105,7 +106,7 @@ def figure(value: float, unit: str = "") -> str:
 
 
 def readable(words: str) -> str:
-    """A sentence with all numbers and units in the format of `figure`."""
+    """Returns a sentence with all numbers and units in the format of `figure`."""
     return _EXPONENT.sub(lambda found: figure(float(found[0])), _DEGREES.sub("°", words))
 
 
@@ -120,6 +121,6 @@ def _power(value: float) -> str:
 
 
 def free_name(wanted: str, taken: Sequence[str]) -> str:
-    """The requested name, with a number appended if this name is taken."""
+    """Returns the requested name, with a number appended if this name is taken."""
     numbered = (wanted if k == 1 else f"{wanted} {k}" for k in itertools.count(1))
     return next(name for name in numbered if name not in taken)

@@ -73,5 +73,5 @@ def surroundings(environment: Mapping[str, str]) -> Surroundings | None:
 
 
 def here() -> Surroundings | None:
-    """The Jupyter server of this process."""
+    """Returns the Jupyter server of this process."""
     return surroundings(os.environ)

@@ -42,7 +42,8 @@ class Forked:
         return self._doing()
 
     def fileno(self) -> int:
-        """A descriptor that is readable when there is news for `look`. It may change after each `look`."""
+        """Returns a descriptor that is readable when there is news for `look`. It may change after each
+        `look`."""
         return self._status.fileno() if self._alone is None else self._alone
 
     def look(self) -> bool:

@@ -79,7 +79,7 @@ class Block:
         self._head[1] += 1
 
     def poses(self) -> np.ndarray:
-        """A copy of the latest poses."""
+        """Returns a copy of the latest poses."""
         return self.moment()[1]
 
     def moment(self) -> tuple[float, np.ndarray]:

@@ -90,13 +90,13 @@ class Wire:
             self._end.sendall((head + parcel.content)[sent:])
 
     def poll(self, timeout: float | None = 0.0) -> bool:
-        """Whether a message, or the end of the connection, can be received within `timeout` seconds; None: no
-        limit."""
+        """Returns whether a message, or the end of the connection, can be received within `timeout` seconds;
+        None: no limit."""
         return bool(self._poll.poll(None if timeout is None else 1e3 * timeout))
 
     def takes(self) -> bool:
-        """Whether a message of up to 50 kB can be sent without waiting, as most of the socket's buffer is
-        free."""
+        """Returns whether a message of up to 50 kB can be sent without waiting, as most of the socket's
+        buffer is free."""
         return bool(self._room.poll(0))
 
     def recv(self) -> Any:

@@ -36,7 +36,7 @@ class Cadence:
         return 1 / CALM if self._calm(now) else 1 / (self._share * POSES)
 
     def plots_due(self, now: float) -> bool:
-        """Whether the plots should be drawn now."""
+        """Returns whether the plots should be drawn now."""
         if self._calm(now):
             return True
         if now < self._next_plots:
@@ -47,7 +47,8 @@ class Cadence:
         return True
 
     def texts_due(self, now: float) -> bool:
-        """Whether the texts should be written now. Slowed simulated time does not reduce their rate."""
+        """Returns whether the texts should be written now. Slowed simulated time does not reduce their
+        rate."""
         if now < self._next_texts and not self._calm(now):
             return False
         self._next_texts = now + 1 / TEXTS

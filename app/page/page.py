@@ -150,9 +150,9 @@ class Page:
                 raise
 
     def _delivered(self) -> bool:
-        """Whether the browser has received the scene that was built last. The next scene is built only after
-        that. Otherwise, on a slow connection, the messages of all scenes that a learner opens would
-        accumulate."""
+        """Returns whether the browser has received the scene that was built last. The next scene is built
+        only after that. Otherwise, on a slow connection, the messages of all scenes that a learner opens
+        would accumulate."""
         return self._stage is None or private.waiting(self._client) == 0
 
     def _show(self, ready: Ready, same: bool) -> None:

@@ -89,7 +89,7 @@ class Face(Protocol):
         ...
 
     def toggle(self, place: int) -> Event | None:
-        """The event that switches the level at an index (0-based) on or off; None if there is no such
+        """Returns the event that switches the level at an index (0-based) on or off; None if there is no such
         level."""
         ...
 

@@ -143,7 +143,7 @@ class TorqueFace:
         return self._context.poses_or_still()[-1]
 
     def _targets_now(self) -> dict[str, np.ndarray]:
-        """The present raw targets, also while a past instant is shown."""
+        """Returns the present raw targets, also while a past instant is shown."""
         ready, status = self._context.ready, self._context.learner.status
         targets = {task.name: task.raw for task in ready.tasks if task.raw is not None}
         return targets if status is None or status is self._stale else targets | status.targets

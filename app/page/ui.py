@@ -20,5 +20,5 @@ _FACES: dict[type[SceneSettings], Callable[[Context], Face]] = {
 
 
 def face_for(context: Context) -> Face:
-    """The user interface for the kind of scene that is loaded."""
+    """Returns the user interface for the kind of scene that is loaded."""
     return _FACES[type(context.ready.settings)](context)

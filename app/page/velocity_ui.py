@@ -204,7 +204,7 @@ class VelocityFace:
         self._carried.follow(tip[:3], carries)
 
     def _at(self, task: TaskView, poses: np.ndarray) -> np.ndarray:
-        """The position of a task's point, (3,) m: the tip, or the base on the floor."""
+        """Returns the position of a task's point, (3,) m: the tip, or the base on the floor."""
         if "z" in task.axes or not self._base:
             return poses[-1, :3]
         return np.array([*poses[len(self._base) - 1, :2], 0.01])

@@ -73,11 +73,11 @@ class Budget:
         return self._now() - self._calm > PATIENCE
 
     def controls(self) -> bool:
-        """Whether one more ping may be answered."""
+        """Returns whether one more ping may be answered."""
         return not self._control.take(1.0)
 
     def uploads(self, size: int, unfinished: Callable[[], int]) -> bool:
-        """Whether a part of `size` bytes may be accepted. unfinished: returns the number of bytes of
+        """Returns whether a part of `size` bytes may be accepted. unfinished: returns the number of bytes of
         incomplete files."""
         if self._held + size + _ENTRY > UPLOADS:
             self._held = unfinished()  # files that are complete now no longer count

@@ -54,7 +54,7 @@ class ClassDoor:
     key: str | None = field(default=None, repr=False)
 
     def is_for_servers(self, path: str) -> bool:
-        """Whether an address is only for other servers of the class, which have the class's key."""
+        """Returns whether an address is only for other servers of the class, which have the class's key."""
         return urlsplit(path).path == _SERVERS
 
     def answer(self, door: Door, request: Request, who: str) -> Answer | Served:

@@ -86,11 +86,11 @@ class Classroom:
         return (self._learner,)
 
     def guide(self) -> SimulationClient:
-        """The session itself, which the teacher controls."""
+        """Returns the session itself, which the teacher controls."""
         return self._learner
 
     def is_right(self, token: str) -> bool:
-        """Whether this is the instructor's token, compared in constant time."""
+        """Returns whether this is the instructor's token, compared in constant time."""
         return secrets.compare_digest(token.encode(errors="replace"), self.token.encode())
 
     def enter(self, tokens: Sequence[str], refuse: Refuse, account: str = "") -> SimulationClient:

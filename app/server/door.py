@@ -94,7 +94,7 @@ class Door:
         return None
 
     def is_owner(self, request: Request, who: str = "") -> bool:
-        """Whether the person who started the server sent this upgrade. The upgrade must have been
+        """Returns whether the person who started the server sent this upgrade. The upgrade must have been
         admitted."""
         return self.role(request, who) == "owner" and not came_through_a_proxy(request.headers)
 
@@ -223,7 +223,7 @@ def as_origin(text: str, option: str = "--trusted-origin") -> str:
 
 
 def is_upgrade(request: Request) -> bool:
-    """Whether a request opens a web socket. The test is the same as in viser."""
+    """Returns whether a request opens a web socket. The test is the same as in viser."""
     return request.headers.get_all("Upgrade") == ["websocket"]
 
 
@@ -233,14 +233,14 @@ def query_of(request: Request) -> dict[str, list[str]]:
 
 
 def _leads_away(request: Request) -> bool:
-    """Whether the address makes viser's page connect to another server or play a recording. Messages from
-    another server or a recording may contain scripts, which would run as a part of our page."""
+    """Returns whether the address makes viser's page connect to another server or play a recording. Messages
+    from another server or a recording may contain scripts, which would run as a part of our page."""
     return not ELSEWHERE.isdisjoint(query_of(request))
 
 
 def _is_embedded(headers: Headers, framed: bool) -> bool:
-    """Whether a page of another site loads a part of its content from this server. A link on such a page is
-    allowed. framed: frames are allowed; the browser then checks which page contains them."""
+    """Returns whether a page of another site loads a part of its content from this server. A link on such a
+    page is allowed. framed: frames are allowed; the browser then checks which page contains them."""
     site, mode, dest = (headers.get_all(f"Sec-Fetch-{name}") for name in ("Site", "Mode", "Dest"))
     if dest and set(dest) & {"iframe", "frame", "embed", "object"} and not (framed and dest == ["iframe"]):
         return True

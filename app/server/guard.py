@@ -152,7 +152,8 @@ class ConnectionGuard:
         return None
 
     def _is_owners(self, connection: ServerConnection, request: Request) -> bool:
-        """Whether this page was opened by the person who started the server, on the server's machine."""
+        """Returns whether this page was opened by the person who started the server, on the server's
+        machine."""
         ends = ends_of(connection.transport)
         return ends is not None and ends.near and self._door.is_owner(request, ends.user)
 

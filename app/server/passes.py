@@ -98,7 +98,8 @@ class Passes:
         return _first(any(_same(each, right) for each in given) for right in known)
 
     def in_header(self, headers: Headers) -> bool:
-        """Whether a proxy sent the token in its header. The owner's secret is not accepted in the header."""
+        """Returns whether a proxy sent the token in its header. The owner's secret is not accepted in the
+        header."""
         given = headers.get_all(HEADER)
         return len(given) == 1 and _same(given[0], self.token)
 

@@ -18,7 +18,7 @@ Address = ipaddress.IPv4Address | ipaddress.IPv6Address
 
 
 def came_through_a_proxy(headers: Headers) -> bool:
-    """Whether a proxy has forwarded the request for another client."""
+    """Returns whether a proxy has forwarded the request for another client."""
     names = [name.lower() for name, _ in headers.raw_items()]
     return any(name in _BY_PROXIES or name.startswith("x-forwarded-") for name in names)
 

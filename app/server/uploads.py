@@ -37,7 +37,7 @@ class Uploads:
         self._refused: deque[str] = deque(maxlen=_REMEMBERED)
 
     def takes(self, raw: bytes, budget: Budget) -> bool:
-        """Whether a message that begins or carries a file may be passed on."""
+        """Returns whether a message that begins or carries a file may be passed on."""
         try:
             part = msgspec.msgpack.decode(raw, type=_Transfer)
         except msgspec.DecodeError:

@@ -26,7 +26,8 @@ _SHEET = 0.6
 def fit(
     points: np.ndarray, direction: np.ndarray, fov: float, aspect: float, phone: bool
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(position, look_at) of a camera that shows all points in the middle of the free part of its picture.
+    """Returns (position, look_at) of a camera that shows all points in the middle of the free part of its
+    picture.
 
     Args:
         points: (k, 3) m.

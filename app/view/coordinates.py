@@ -15,7 +15,7 @@ def in_order(ready: Ready) -> list[TaskView]:
 
 
 def draggable(tasks: tuple[TaskView, ...]) -> tuple[TaskView | None, TaskView | None]:
-    """The first position target of the stack, and an orientation target of the same frame."""
+    """Returns the first position target of the stack, and an orientation target of the same frame."""
     position = next((t for t in tasks if t.kind == "position" and t.raw is not None), None)
     if position is None:
         return None, None
@@ -41,8 +41,8 @@ def full(task: TaskView, values: np.ndarray | None, else_: np.ndarray) -> np.nda
 
 
 def of_task(task: TaskView, targets: Mapping[str, np.ndarray]) -> np.ndarray | None:
-    """The position or rotation of a draggable task's target; None if there is no target. None also if the
-    target has other coordinates, after a change of the task's axes, its kind or the stack."""
+    """Returns the position or rotation of a draggable task's target; None if there is no target. None also if
+    the target has other coordinates, after a change of the task's axes, its kind or the stack."""
     found = targets.get(task.name)
     return None if found is None or found.shape != raw(task).shape else found
 

@@ -135,7 +135,7 @@ class Hand:
             self.verdict = verdict
 
     def movables(self) -> list[Movable]:
-        """The target, which can be moved without a mouse; [] if there is no target."""
+        """Returns the target, which can be moved without a mouse; [] if there is no target."""
         gizmo = self._gizmo
         if gizmo is None:
             return []

@@ -23,12 +23,12 @@ _THERE = 5e-3
 
 
 def point(values: Sequence[float] | np.ndarray) -> np.ndarray:
-    """A point in space from the coordinates of a hand (3) or of a base on the floor (2), m."""
+    """Returns a point in space from the coordinates of a hand (3) or of a base on the floor (2), m."""
     return np.array([*values, 0.0][:3], float)
 
 
 def open_row(rows: Sequence[MissionRow], role: str) -> MissionRow | None:
-    """The first task of a role that is not completed."""
+    """Returns the first task of a role that is not completed."""
     return next((row for row in rows if row.role == role and row.state != "done"), None)
 
 
@@ -121,7 +121,7 @@ class Goals:
             goal.follow(None if target is None else point(target), text)
 
     def movables(self) -> list[Movable]:
-        """The goals, which can be moved without a mouse: positions first, then orientations."""
+        """Returns the goals, which can be moved without a mouse: positions first, then orientations."""
         free = {name: task for name, task in self._roles.items() if task.raw is not None}
         return [
             *(Movable(name, goal.where, goal.put) for name, goal in self._goals.items() if name in free),

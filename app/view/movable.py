@@ -27,5 +27,6 @@ class Movable:
 
 
 def turned(rotation: np.ndarray, by: np.ndarray) -> np.ndarray:
-    """The rotation (3, 3) followed by a rotation about the world's axes, by the rotation vector (3,), rad."""
+    """Returns the rotation (3, 3) followed by a rotation about the world's axes, by the rotation vector (3,),
+    rad."""
     return vtf.SO3.exp(by).as_matrix() @ rotation

@@ -75,15 +75,15 @@ class ReportedObstacles:
 
 
 def _edges(box: Box) -> np.ndarray:
-    """The twelve edges of a box about its centre, (12, 2, 3) m."""
+    """Returns the twelve edges of a box about its centre, (12, 2, 3) m."""
     corners = 0.5 * np.array(box.size) * np.array(list(product((-1.0, 1.0), repeat=3)))
     pairs = [(a, b) for a in range(8) for b in range(a + 1, 8) if (a ^ b).bit_count() == 1]
     return corners[np.array(pairs)].astype(np.float32)
 
 
 def _end(obstacle: Ball | Box, side: int) -> tuple[float, float, float]:
-    """A point on the vertical line through the centre, m: the obstacle's lowest point (side −1), or a point
-    above its top (side 1)."""
+    """Returns a point on the vertical line through the centre, m: the obstacle's lowest point (side −1), or a
+    point above its top (side 1)."""
     x, y, z = obstacle.centre
     half = 0.5 * obstacle.size[2] if isinstance(obstacle, Box) else obstacle.radius
     return x, y, z + side * half + max(side, 0) * _ABOVE

@@ -72,14 +72,14 @@ class RobotView:
 
 
 def camera_for(robot: Robot) -> tuple[np.ndarray, np.ndarray, float]:
-    """(position, look_at) of a camera that shows the robot well, and the length of its arm, m."""
+    """Returns (position, look_at) of a camera that shows the robot well, and the length of its arm, m."""
     points, direction, reach = _home(robot)
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     return middle + reach * direction, middle, reach
 
 
 def gizmo_size(robot: Robot) -> float:
-    """The size of the arrows and rings at a robot's targets, m."""
+    """Returns the size of the arrows and rings at a robot's targets, m."""
     return _gizmo(_home(robot)[2])
 
 
@@ -129,6 +129,6 @@ def aim(
 
 
 def look_at(camera: viser.CameraHandle, robot: Robot, base: np.ndarray) -> None:
-    """Turns the camera to a robot whose base is at (3,), m."""
+    """Turns the camera to a robot. base: position of the robot's base, (3,) m."""
     eye, at, _ = camera_for(robot)
     turn(camera, eye + base, at + base)

@@ -52,7 +52,7 @@ class Targets:
             target.follow(poses, of_task(target.task, raw), live)
 
     def movables(self) -> list[Movable]:
-        """The targets, which can be moved without a mouse."""
+        """Returns the targets, which can be moved without a mouse."""
         return [target.movable() for target in self._targets]
 
     def remove(self) -> None:
@@ -116,7 +116,7 @@ class _Target:
         self._post(MoveTarget(self.name, self._value()))
 
     def movable(self) -> Movable:
-        """The target, which can be moved without a mouse."""
+        """Returns the target, which can be moved without a mouse."""
         if self.task.kind in _TURNING:
             return Movable(self.name, self._at, turn=self._turn_by)
         return Movable(self.name, self._at, move=self._put)
@@ -134,7 +134,7 @@ class _Target:
         self._moved()
 
     def _value(self) -> tuple[float, ...]:
-        """The task's target at the dragged position."""
+        """Returns the task's target at the dragged position."""
         task, at = self.task, np.array(self._control.position, float)
         if task.kind in _TURNING:
             return xyzw(vtf.SO3(np.array(self._control.wxyz, float)).as_matrix())
@@ -185,7 +185,7 @@ class _Target:
 
 
 def frame_pose(robot: Robot, poses: np.ndarray, frame: str) -> pin.SE3:
-    """The pose of a link in the world, from the poses (n + 1, 7) of the joints."""
+    """Returns the pose of a link in the world, from the poses (n + 1, 7) of the joints."""
     found = robot.model.frames[robot.frame_id(frame)]
     joint = found.parentJoint
     if joint == 0:
@@ -205,5 +205,5 @@ def _put(node: viser.SceneNodeHandle, position: np.ndarray, rotation: np.ndarray
 
 
 def _facing(normal: np.ndarray) -> np.ndarray:
-    """A rotation whose x axis is the given normal."""
+    """Returns a rotation whose x axis is the given normal."""
     return pin.Quaternion.FromTwoVectors(np.array([1.0, 0.0, 0.0]), normal).toRotationMatrix()

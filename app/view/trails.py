@@ -15,12 +15,12 @@ like a dot."""
 
 
 def segments(points: np.ndarray) -> np.ndarray:
-    """A curve (k, 3) as line segments (k − 1, 2, 3)."""
+    """Returns a curve (k, 3) as line segments (k − 1, 2, 3)."""
     return np.stack([points[:-1], points[1:]], axis=1).astype(np.float32)
 
 
 def trace(tips: np.ndarray) -> np.ndarray:
-    """The path (k, 3) of a hand, m, as segments, without the inner points of straight parts."""
+    """Returns the path (k, 3) of a hand, m, as segments, without the inner points of straight parts."""
     return segments(tips[decimate(tips.T, _FINE)]) if len(tips) > 1 else NOTHING
 
 

@@ -32,7 +32,7 @@ class Leader:
         self.on, self.until = False, math.inf
 
     def waits(self, t: float) -> bool:
-        """Whether a step to time t (s) would leave the ghost too far behind."""
+        """Returns whether a step to time t (s) would leave the ghost too far behind."""
         return t > self.until + 1e-9
 
     def script(self, session: Session) -> Script | None:

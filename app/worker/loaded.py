@@ -27,8 +27,8 @@ class Loaded:
     left_out: tuple[str, ...] = ()
 
     def looks_like(self, choice: SceneChoice, session: Session) -> bool:
-        """Whether this is a step of the running lesson and looks the same. The page need not be rebuilt
-        then."""
+        """Returns whether this is a step of the running lesson and looks the same. The page need not be
+        rebuilt then."""
         then, now = choice.exercise, self.choice.exercise
         if then is None or now is None or then.lesson != now.lesson:
             return False

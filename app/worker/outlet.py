@@ -30,7 +30,7 @@ class Outlet:
         self.late = fields["late"].start if "late" in fields else None
 
     def fits(self, session: Session) -> bool:
-        """Whether the session's rows still have this layout. Each stack has its own layout."""
+        """Returns whether the session's rows still have this layout. Each stack has its own layout."""
         if session.layout is not self.layout and session.layout == self.layout:
             self.layout = session.layout
         return session.layout is self.layout

@@ -45,7 +45,7 @@ class Pacer:
         self._capped_at = -float("inf")
 
     def capped(self, now: float) -> bool:
-        """Whether simulated time was slowed down within the last second."""
+        """Returns whether simulated time was slowed down within the last second."""
         return now - self._capped_at < _MEMORY
 
     def real_time_factor(self, now: float) -> float:

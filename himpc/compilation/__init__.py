@@ -19,5 +19,5 @@ interface only."""
 
 
 def public_only() -> bool:
-    """Whether the environment selects Numba's public interface alone."""
+    """Returns whether the environment selects Numba's public interface alone."""
     return os.environ.get(SWITCH) == "public"

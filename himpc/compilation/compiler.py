@@ -16,7 +16,7 @@ _COMPILES = "HIMPC_LAB_COMPILES"  # variable that is set in the environment of a
 
 
 def compiles_here() -> bool:
-    """Whether this process was started to compile."""
+    """Returns whether this process was started to compile."""
     return _COMPILES in os.environ
 
 

@@ -53,7 +53,7 @@ class Kept:
         return next((str(folder) for folder in self._folders(make=True)), None)
 
     def has_room(self) -> bool:
-        """Whether a folder has enough free disk space for the code."""
+        """Returns whether a folder has enough free disk space for the code."""
         return any(_written(folder / "room", bytes(_ROOM), keep=False) for folder in self._folders(make=True))
 
     def load_overload(self, signature: Any, context: Any) -> Any:
@@ -162,7 +162,7 @@ def _make(folder: Path, above: bool) -> None:
 
 
 def _ours(folder: Path) -> bool:
-    """Whether a folder exists, belongs to this user and cannot be written to by anybody else."""
+    """Returns whether a folder exists, belongs to this user and cannot be written to by anybody else."""
     try:
         found = folder.lstat()
     except OSError:

@@ -185,7 +185,7 @@ class HIMPC(TorqueController):
         return plan
 
     def _slowed(self, v: Array) -> LimitsInForce:
-        """The limits in force. If distances are kept, velocity limits may be lower, see `StallGuard`."""
+        """Returns the limits in force. `StallGuard` may lower velocity limits while distances are kept."""
         distances = self._distances if self.kernel is None else self.kernel.distances
         now = self._limits
         return now if distances is None else self._guard.limits(now, self._tau_0, v, distances)

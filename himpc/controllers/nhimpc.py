@@ -71,7 +71,7 @@ class NHIMPC(HIMPC):
 
 
 def _solved(found: PeriodResult) -> bool:
-    """Whether every level is at its optimum. If not, further iterations are useless."""
+    """Returns whether every level is at its optimum. If not, further iterations are useless."""
     return bool(found.solutions) and all(solution.fallback == "solve" for solution in found.solutions)
 
 

@@ -118,7 +118,7 @@ def _portable() -> str:
 
 
 def _own_digest() -> str:
-    """Returns a digest of the source files that turn Numba's text into code."""
+    """Returns a digest of the source files that turn the LLVM code of Numba into object files."""
     own = b"".join(Path(__file__).with_name(name).read_bytes() for name in ("objects.py", "entries.py"))
     return sha256(own).hexdigest()[:8]
 

@@ -268,8 +268,8 @@ def prepare(robot: Robot, settings: Settings) -> Prepared:
 
 
 def usable(x: Array) -> bool:
-    """Whether values are finite, and small enough that their squares and the differences of bounds are also
-    finite."""
+    """Returns whether values are finite, and small enough that their squares and the differences of bounds
+    are also finite."""
     return x.dot(x) < 1e18
 
 

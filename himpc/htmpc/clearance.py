@@ -67,7 +67,7 @@ class CollisionModel:
         return not self._around.names
 
     def named(self, pair: int) -> str:
-        """The names of a pair: its link, and the obstacle or the other link."""
+        """Returns the names of a pair: its link, and the obstacle or the other link."""
         shape, sphere = divmod(pair, len(self.links))
         return f"{self.links[sphere]} – {self._around.names[shape]}"
 

@@ -258,7 +258,8 @@ class Problem:
         return guarded + (0 if self.softened else len(self.tick.rows.A))
 
     def allowed(self, at: Iterate, share: float = 1.0) -> bool:
-        """(13): whether the error of every level above has grown by at most `share` times its tolerance."""
+        """Returns whether the error of every level above has grown by at most `share` times its tolerance, as
+        in (13)."""
         settings = self.tick.settings
         per_coordinate = settings.lexicographic == "per_coordinate"
         delta = share * settings.delta_m

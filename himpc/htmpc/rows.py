@@ -118,10 +118,10 @@ class ConstraintTable:
 def limit_rows(
     start: Start, N: int, dt: float, period: float, bounds: MotionBounds, table: ConstraintTable | None = None
 ) -> ConstraintRows:
-    """Writes the rows of this tick's bounds that can become active to the beginning of a table, and returns
-    them.
+    """Returns the rows of this tick's bounds. They are written to the beginning of a table.
 
-    A row is left out if no inputs inside the input bounds can reach its bound.
+    Only rows that can become active are included: a row is left out if no inputs inside the input bounds
+    can reach its bound.
     """
     n = len(start.v)
     table = ConstraintTable(N * n) if table is None else table

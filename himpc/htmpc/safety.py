@@ -21,8 +21,8 @@ _FARTHEST = 1e6
 
 
 def plausible(robot: Robot, q: Array, v: Array) -> bool:
-    """Whether a measured state is a valid start of a plan: finite, and near the ranges of positions and
-    velocities.
+    """Returns whether a measured state is a valid start of a plan: finite, and near the ranges of positions
+    and velocities.
 
     Args:
         robot: its limits define these ranges.

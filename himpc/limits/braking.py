@@ -55,8 +55,8 @@ def braking(rows: Rows) -> Array:
 
 
 def _own(rows: Rows) -> int:
-    """The number of constraints, from the first on, whose rows do not couple joints and can be handled
-    here."""
+    """Returns the number of constraints, from the first on, whose rows do not couple joints and can be
+    handled here."""
     known = list(map(is_, rows.constraints, (TORQUE, VELOCITY, POSITION)))
     return next((place for place, each in enumerate(known) if not each), len(known))
 
@@ -83,8 +83,8 @@ def missed(rows: Rows, U: Array) -> Array:
 
 
 def least_slack(rows: Rows) -> Array:
-    """The least slack of the rows of velocity and position so that some increments satisfy all rows; zero if
-    the rows are feasible.
+    """Returns the least slack of the rows of velocity and position so that some increments satisfy all rows;
+    zero if the rows are feasible.
 
     Returns:
         slack, (r, n) ≥ 0 N·m (in the rows' scaling), zero on torque rows.

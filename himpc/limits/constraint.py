@@ -93,5 +93,5 @@ class Constraint:
 
 
 def lags(N: int) -> Array:
-    """Number of knots j − s between increment s and row j, (N, N)."""
+    """Returns the number of knots j − s between increment s and row j, (N, N)."""
     return np.subtract.outer(np.arange(N), np.arange(N)).astype(float)

@@ -26,5 +26,5 @@ def imposed(limits: Limits) -> tuple[Constraint, ...]:
 
 
 def bit_of(constraint: Constraint) -> int:
-    """The bit of a constraint in `at_bound`; 0 if it is not among `CONSTRAINTS`."""
+    """Returns the bit of a constraint in `at_bound`; 0 if it is not among `CONSTRAINTS`."""
     return 1 << CONSTRAINTS.index(constraint) if constraint in CONSTRAINTS else 0

@@ -21,9 +21,9 @@ def row_count(n: int) -> int:
 
 
 def least_rates(near: Near, avoidance: Avoidance) -> Array:
-    """The least ∇d·q̇, (r,) m/s, from which d_safe can still be kept: −v_stop(d − d_safe), with the margin
-    added to d_safe. Within the margin, d must not decrease. Below d_safe, d must increase. The velocity of an
-    object is taken into account."""
+    """Returns the least ∇d·q̇, (r,) m/s, from which d_safe can still be kept: −v_stop(d − d_safe), with the
+    margin added to d_safe. Within the margin, d must not decrease. Below d_safe, d must increase. The
+    velocity of an object is taken into account."""
     t, a = avoidance.reaction, avoidance.deceleration
     d_safe = near.share * avoidance.d_safe
     room = near.distance - d_safe - near.share * avoidance.margin

@@ -82,7 +82,7 @@ class LimitsInForce:
         return LimitsInForce(self.tau_lower, self.tau_upper, v_limit, self.q_lower, self.q_upper, self.a_max)
 
     def differs_in_velocity_only(self, other: LimitsInForce) -> bool:
-        """Whether all arrays except `v_limit` are the same objects as in `other`."""
+        """Returns whether all arrays except `v_limit` are the same objects as in `other`."""
         return (
             self.tau_upper is other.tau_upper
             and self.tau_lower is other.tau_lower

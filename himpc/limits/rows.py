@@ -48,12 +48,12 @@ class Rows(NamedTuple):
     directions: tuple[Directions | None, ...] = ()
 
     def values(self, U: Array) -> Array:
-        """The bounded values L U Dᵀ, (r, n) N·m."""
+        """Returns the bounded values L U Dᵀ, (r, n) N·m."""
         return self._turned(self.L @ U, absolute=False)
 
     def sizes(self, U: Array) -> Array:
-        """The sums of the magnitudes of the terms of `values`, (r, n) N·m. The rounding error of `values` is
-        proportional to these sums."""
+        """Returns the sums of the magnitudes of the terms of `values`, (r, n) N·m. The rounding error of
+        `values` is proportional to these sums."""
         return self._turned(self.L @ np.abs(U), absolute=True)
 
     def _turned(self, value: Array, absolute: bool) -> Array:
@@ -76,27 +76,27 @@ class Rows(NamedTuple):
         return np.repeat([each.hard for each in self.constraints], self.L.shape[1])
 
     def directions_of(self, row: int) -> Directions | None:
-        """The directions of a row's columns; None if the columns are the joints."""
+        """Returns the directions of a row's columns; None if the columns are the joints."""
         return self.directions[row // self.L.shape[1]] if self.directions else None
 
     def joints_of(self, row: int, column: int) -> tuple[int, ...]:
-        """The joints that a row bounds, counted from 0."""
+        """Returns the joints that a row bounds, counted from 0."""
         directions = self.directions_of(row)
         return (column,) if directions is None else tuple(np.flatnonzero(directions.D[column]).tolist())
 
     def constraint(self, row: int, column: int, upper: bool) -> Constraint:
-        """The constraint that a row's upper or lower bound imposes."""
+        """Returns the constraint that a row's upper or lower bound imposes."""
         constraint = self.constraints[row // self.L.shape[1]]
         stops = constraint is VELOCITY and self.stopping is not None and self.stopping[int(upper), column]
         return POSITION if stops else constraint
 
     def knot(self, row: int) -> int:
-        """The knot whose value a row bounds: 1 … N, for torque 0 … N−1."""
+        """Returns the knot whose value a row bounds: 1 … N, for torque 0 … N−1."""
         N = self.L.shape[1]
         return row % N + self.constraints[row // N].first_knot
 
     def widened(self, slack: Array) -> Rows:
-        """The rows with both bounds moved outward by `slack`, (r, n) ≥ 0."""
+        """Returns the rows with both bounds moved outward by `slack`, (r, n) ≥ 0."""
         return self._replace(lower=self.lower - slack, upper=self.upper + slack)
 
 

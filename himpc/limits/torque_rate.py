@@ -8,7 +8,7 @@ from himpc.limits.constraint import Block, Constraint, Moment
 
 
 def _bounds(now: Moment) -> Block:
-    """The bounds |Δτ_j| ≤ rate · T_s at every knot."""
+    """Returns the bounds |Δτ_j| ≤ rate · T_s at every knot."""
     step = np.full((now.N, now.tau_0.size), now.limits.torque_rate * now.T_s)
     return Block(-step, step)
 

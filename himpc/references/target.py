@@ -92,7 +92,7 @@ class Target:
         return self._gathered(motion)
 
     def stays(self, t: float, seen: object) -> bool:
-        """Whether the target is at rest and its preview at t equals the previous preview `seen`."""
+        """Returns whether the target is at rest and its preview at t equals the previous preview `seen`."""
         if self._rest is None or self._rest[1] is not seen:
             return False
         self._time = t

@@ -13,7 +13,7 @@ NUDGE = 1e-4
 
 
 def rests(preview: Preview) -> bool:
-    """Whether the target is at rest over the horizon."""
+    """Returns whether the target is at rest over the horizon."""
     return not (preview.displacement.any() or preview.velocity.any() or preview.acceleration.any())
 
 

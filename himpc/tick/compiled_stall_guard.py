@@ -32,7 +32,7 @@ class CompiledStallGuard:
         self._limits: tuple[LimitsInForce, Array, Array] | None = None
 
     def limits(self, limits: LimitsInForce, tau: Array, v: Array, distances: Distances) -> LimitsInForce:
-        """The limits in force at this tick, see `StallGuard.limits`."""
+        """Returns the limits in force at this tick, see `StallGuard.limits`."""
         if self._joints is None:
             self._joints = np.array((np.zeros_like(v), v))
         if self._limits is None or self._limits[0] is not limits:

@@ -34,7 +34,7 @@ _BUILT_IN = (FramePosition, FrameOrientation, Joints, Posture, Damping)
 
 
 def is_built_in(task: Task) -> bool:
-    """Whether the kernel computes the task; otherwise its rows are computed in Python."""
+    """Returns whether the kernel computes the task; otherwise its rows are computed in Python."""
     return type(task) in _BUILT_IN
 
 

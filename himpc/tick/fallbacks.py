@@ -121,7 +121,8 @@ def _climb_down(arena: Arena, place: int, like: Rows, budget: FallbackBudget) ->
 
 
 def _contradict(rows: Rows, widened: Rows) -> bool:
-    """Whether rows have no solution: in `widened`, they were widened by more than solvers tolerate."""
+    """Returns whether rows have no solution: in `widened`, they were widened by more than solvers
+    tolerate."""
     return bool(
         (widened.lower < rows.lower - _TOLERATED).any() or (widened.upper > rows.upper + _TOLERATED).any()
     )

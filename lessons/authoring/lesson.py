@@ -17,13 +17,14 @@ from robots import InputError
 
 
 def lesson_named(name: str) -> Lesson:
-    """A lesson by its name or file. Raises InputError if there is none, or the file cannot be used."""
+    """Returns a lesson by its name or file. Raises InputError if there is none, or the file cannot be
+    used."""
     return _lesson_of(read(name)) if is_file(name) else load_lesson(name)
 
 
 @lru_cache(maxsize=64)
 def _lesson_of(source: Source) -> Lesson:
-    """The lesson of a file. A file is tested again only if its content has changed."""
+    """Returns the lesson of a file. A file is tested again only if its content has changed."""
     module = module_of(source)
     expected(module, "lesson")
     found = vars(module)["LESSON"]

@@ -32,7 +32,7 @@ pointing task."""
 
 
 def choices(kind: Kind) -> Sequence[str]:
-    """The templates of a kind of file."""
+    """Returns the templates of a kind of file."""
     controllers = (*EXAMPLES, *EXERCISES)
     return {
         "controller": controllers,
@@ -44,7 +44,7 @@ def choices(kind: Kind) -> Sequence[str]:
 
 
 def text_of(kind: Kind, start: str | None, file: str) -> str:
-    """The text of a new file. Raises InputError if there is no such template."""
+    """Returns the text of a new file. Raises InputError if there is no such template."""
     known = choices(kind)
     if kind == "controller" and start is not None and is_file(start):
         return exercise_in(start).start

@@ -46,8 +46,8 @@ class Diagnosis:
         self._laws, self._seen = [each.make() for each in self._left], 0
 
     def see(self, now: View, answer: Any) -> None:
-        """Compares the torque of a submission at a tick, for the first ticks of a run and then every tenth
-        tick."""
+        """Compares the torque of a submission with those of the mistakes. After the first ticks of a run,
+        only every tenth tick is compared."""
         self._seen += 1
         if self._seen > _FIRST and self._seen % _EVERY:
             return

@@ -36,7 +36,7 @@ class EigenvalueJob(Work):
     payload_later: float | None = None
 
     def do(self) -> JobResult:
-        """The run; see `Work.do`."""
+        """Returns the run; see `Work.do`."""
         scene = prepared(torque_scene(self.spec.scene), self.spec.controller, self.spec.set)
         later = self.payload_later
         events = () if later is None else ((2.0, Set("plant.payload_kg", later)),)
@@ -68,7 +68,7 @@ class EigenvalueJob(Work):
 
 
 def longest(flags: NDArray[np.bool_]) -> int:
-    """Length of the longest sequence of true values."""
+    """Returns the length of the longest sequence of true values."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], flags, [False])).astype(int)))
     return int((edges[1::2] - edges[::2]).max(initial=0))
 

@@ -47,7 +47,7 @@ class Work(ABC):
 
     @abstractmethod
     def do(self) -> JobResult:
-        """The run. Raises InputError for invalid input."""
+        """Returns the run. Raises InputError for invalid input."""
 
 
 @final
@@ -73,11 +73,11 @@ class JobResult:
     error: str | None = None
 
     def __getitem__(self, field: str) -> Array:
-        """A field over time, (ticks, width); no rows if the run failed."""
+        """Returns a field over time, (ticks, width); no rows if the run failed."""
         return self.arrays.get(field, np.empty((0, 1)))
 
     def column(self, field: str, k: int = 0) -> Array:
-        """One number of a field over time, (ticks,); no rows if the run failed."""
+        """Returns one number of a field over time, (ticks,); no rows if the run failed."""
         return self.arrays[field][:, k] if field in self.arrays else np.empty(0)
 
     @property
@@ -101,7 +101,8 @@ class JobResult:
         return self.error is None and not self.summary["diverged"]
 
     def figure(self, *path: str | int) -> float:
-        """A number of the summary, e.g. figure("limits", "torque", "max_ratio"); NaN where there is none."""
+        """Returns a number of the summary, e.g. figure("limits", "torque", "max_ratio"); NaN where there is
+        none."""
         found: Any = self.summary
         try:
             for key in path:
@@ -111,7 +112,8 @@ class JobResult:
         return float("nan") if found is None else float(found)
 
     def error_of(self, task: str, coordinate: int = 0, measure: str = "rmse_after_1s") -> float:
-        """An error figure of one coordinate of a task, m or deg; NaN if there is none or control was lost."""
+        """Returns an error figure of one coordinate of a task, m or deg; NaN if there is none or control was
+        lost."""
         if not self.completed:
             return float("nan")
         tasks = self.summary.get("tasks", ())

@@ -98,8 +98,8 @@ def tune(
 
 
 def chosen(steps: list[Trial]) -> Trial | None:
-    """The step with the least error among those that kept control without noise; None if there is no such
-    step."""
+    """Returns the step with the least error among those that kept control without noise; None if there is no
+    such step."""
     good = [step for step in steps if step.verdict in ("go on", "satisfactory")]
     return min(good, key=lambda step: step.error, default=None)
 

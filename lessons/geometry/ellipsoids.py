@@ -39,7 +39,7 @@ class Ellipsoid:
 
 
 def ellipsoids(configuration: Configuration, stack: Stack) -> list[Ellipsoid]:
-    """The ellipsoids of all frame tasks of the enabled levels, highest priority first.
+    """Returns the ellipsoids of all frame tasks of the enabled levels, highest priority first.
 
     An ellipsoid has only the axes that its task controls. If the task controls x alone, it is a line along x.
     """

@@ -39,7 +39,7 @@ class TickProblems:
 
 
 def tick_of(session: TorqueSession) -> TickProblems:
-    """The last tick.
+    """Returns the last tick.
 
     Raises:
         InputError: no tick has run yet, or the controller does not solve such QPs.
@@ -63,7 +63,7 @@ def tick_of(session: TorqueSession) -> TickProblems:
 
 
 def plane_of(session: TorqueSession, joints: tuple[int, int], through: str, shift: float = 0.0) -> Plane:
-    """The cut through the QPs of the last tick in the plane of the first increments of two joints.
+    """Returns the cut through the QPs of the last tick in the plane of the first increments of two joints.
 
     Args:
         session: the session.
@@ -92,7 +92,7 @@ def plane_of(session: TorqueSession, joints: tuple[int, int], through: str, shif
 
 
 def matrix_of(session: TorqueSession, level: str) -> Matrix:
-    """The QP of a level at the last tick; the QP of the first level if no level has this name.
+    """Returns the QP of a level at the last tick; the QP of the first level if no level has this name.
 
     Raises:
         InputError: there is no such tick, see `tick_of`.
@@ -104,14 +104,14 @@ def matrix_of(session: TorqueSession, level: str) -> Matrix:
 
 
 def _weighted(session: TorqueSession, tick: TickProblems) -> Array | None:
-    """The optimum of one weighted cost of all tasks under the same bounds, (N, n) N·m."""
+    """Returns the optimum of one weighted cost of all tasks under the same bounds, (N, n) N·m."""
     if isinstance(session.controller, Weighted):
         return tick.plan.levels[-1].U
     return compromise(tick.problems, tick.plan.rows)
 
 
 def _osf(session: TorqueSession, plan: Plan) -> Array | None:
-    """The change of torque that OSF would demand at the same state, (n,) N·m."""
+    """Returns the change of torque that OSF would demand at the same state, (n,) N·m."""
     given = session.given
     if given is None:
         return None

@@ -56,7 +56,7 @@ class Matrix:
 
 
 def matrix(problem: LevelProblem, rows: Rows, solution: LevelSolution) -> Matrix:
-    """The picture of one level."""
+    """Returns the picture of one level."""
     N, n = solution.U.shape
     H = quadratic(problem, n)[0]
     shown = max(1, min(N, LARGEST // n))

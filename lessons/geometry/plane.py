@@ -37,7 +37,7 @@ class TorqueBox:
     kinds: tuple[tuple[str | None, str | None], tuple[str | None, str | None]]
 
     def inside(self, w: Array, room: float = 0.0) -> bool:
-        """Whether w is in the box, or at most `room` outside it, N·m."""
+        """Returns whether w is in the box, or at most `room` outside it, N·m."""
         return bool((self.lower - room <= w).all() and (w <= self.upper + room).all())
 
 
@@ -55,8 +55,8 @@ class Allowed:
     span: Array
 
     def segment(self, box: TorqueBox) -> Array | None:
-        """The ends (2, 2) of the part of the line that is in the box, ±inf for an end without a bound. None
-        if there is no such part, or if the allowed points are not a line."""
+        """Returns the ends (2, 2) of the part of the line that is in the box, ±inf for an end without a
+        bound. None if there is no such part, or if the allowed points are not a line."""
         if self.at is None or self.span.shape[1] != 1:
             return None
         low, high = _stretch(self.at, self.span[:, 0], box)
@@ -94,13 +94,13 @@ class LevelCut:
     leaves: Allowed
 
     def cost(self, w: Array) -> float:
-        """The cost at a point of the plane."""
+        """Returns the cost at a point of the plane."""
         away = w - self.centre
         return float(away @ self.P @ away) + self.least
 
     def ellipse(self, through: Array) -> tuple[float, float, float]:
-        """The contour of the cost through a point: its semi-axes (N·m), the longer one first, and the angle
-        from the first joint's axis to the longer one, rad."""
+        """Returns the contour of the cost through a point: its semi-axes (N·m), the longer one first, and the
+        angle from the first joint's axis to the longer one, rad."""
         away = through - self.centre
         values, axes = np.linalg.eigh(self.P)
         radii = np.sqrt(float(away @ self.P @ away) / np.maximum(values, 1e-300))
@@ -146,7 +146,7 @@ def cut(
     joints: tuple[int, int],
     held: Array,
 ) -> Plane:
-    """The plane of two joints' first increments.
+    """Returns the plane of two joints' first increments.
 
     Args:
         problems: of all levels, highest priority first.
@@ -226,7 +226,7 @@ def _box(rows: Rows, pair: list[int], held: Array) -> TorqueBox:
 
 
 def _left(B: Array, wanted: Array, pair: list[int], held: Array) -> Allowed:
-    """The set {w: B u = wanted} of (33) at knot 0, with the values of the other joints fixed."""
+    """Returns the set {w: B u = wanted} of (33) at knot 0, with the values of the other joints fixed."""
     others = held.copy()
     others[pair] = 0.0
     A, b = B[:, pair], wanted - B @ others
@@ -240,7 +240,7 @@ def _left(B: Array, wanted: Array, pair: list[int], held: Array) -> Allowed:
 
 
 def best(P: Array, centre: Array, allowed: Allowed, box: TorqueBox) -> Array | None:
-    """The point of `allowed` in the box where (w − c)ᵀ P (w − c) is least; None if there is none."""
+    """Returns the point of `allowed` in the box where (w − c)ᵀ P (w − c) is least; None if there is none."""
     at, span = allowed.at, allowed.span
     if at is None or (box.lower > box.upper + _MET).any():
         return None
@@ -262,7 +262,7 @@ def best(P: Array, centre: Array, allowed: Allowed, box: TorqueBox) -> Array | N
 
 
 def _best_on(P: Array, centre: Array, at: Array, along: Array, box: TorqueBox) -> Array | None:
-    """The best point of a line in the box."""
+    """Returns the best point of a line in the box."""
     low, high = _stretch(at, along, box)
     if low > high + _MET:
         return None
@@ -271,8 +271,8 @@ def _best_on(P: Array, centre: Array, at: Array, along: Array, box: TorqueBox) -
 
 
 def _stretch(at: Array, along: Array, box: TorqueBox) -> tuple[float, float]:
-    """The interval of s in which at + s·along is in the box; if the interval is empty, its first bound
-    exceeds its second.
+    """Returns the interval of s in which at + s·along is in the box; if the interval is empty, its first
+    bound exceeds its second.
     """
     low, high = -np.inf, np.inf
     for axis in (0, 1):

@@ -20,7 +20,7 @@ LARGEST = 1_000_000  # bytes
 
 
 def is_file(name: str) -> bool:
-    """Whether a text given as a name is the path of a Python file."""
+    """Returns whether a text given as a name is the path of a Python file."""
     return name.endswith(SUFFIX)
 
 
@@ -69,7 +69,7 @@ def read(path: str) -> Source:
 
 
 def fingerprint(path: str) -> str:
-    """The name of a file and the first characters of its digest, e.g. "mine.py@3fa9c1d20b7e". Raises
+    """Returns the name of a file and the first characters of its digest, e.g. "mine.py@3fa9c1d20b7e". Raises
     InputError if it cannot be read."""
     return f"{Path(path).name}@{read(path).digest[:12]}"
 
@@ -100,7 +100,8 @@ def with_fingerprint(mark: str, files: Iterable[str], kind: str) -> str:
 
 
 def execute(source: Source) -> ModuleType:
-    """The module that the file defines. Raises InputError, with the line, if it cannot be executed."""
+    """Returns the module that the file defines. Raises InputError, with the line, if it cannot be
+    executed."""
     module = ModuleType(source.module)
     module.__file__ = source.path
     sys.modules[source.module] = module
@@ -125,7 +126,7 @@ def _beside(path: str) -> Iterator[None]:
 
 
 def sentence(path: str, error: BaseException) -> str:
-    """A sentence with the line of the file that raised an exception, and the exception's message."""
+    """Returns a sentence with the line of the file that raised an exception, and the exception's message."""
     if isinstance(error, SyntaxError) and error.filename == path:
         return f"{path}, line {error.lineno}: {error.msg}"
     steps = traceback.walk_tb(error.__traceback__)

@@ -28,15 +28,15 @@ class Folder:
         return cls(path)
 
     def holds(self, path: str) -> bool:
-        """Whether a path is below the folder after all links and dots are resolved."""
+        """Returns whether a path is below the folder after all links and dots are resolved."""
         try:
             return self.path in Path(os.path.realpath(path)).parents
         except ValueError:  # e.g. a zero byte
             return False
 
     def admits(self, name: str) -> str:
-        """The path of a file below the folder, after all links and dots of its name are resolved. The path is
-        relative if the file is below the folder in which the program was started.
+        """Returns the path of a file below the folder, after all links and dots of its name are resolved. The
+        path is relative if the file is below the folder in which the program was started.
 
         Raises:
             InputError: the path leads outside the folder. The message does not reveal whether there is such a

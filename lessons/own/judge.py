@@ -17,7 +17,8 @@ LOADING = Allowance(10.0, 2_000_000_000, "loading it", "ends the program", "leav
 
 @lru_cache(maxsize=64)
 def judged(source: Source) -> Kind:
-    """The kind of a file. Raises InputError, with one sentence, if it cannot be loaded within the limits."""
+    """Returns the kind of a file. Raises InputError, with one sentence, if it cannot be loaded within the
+    limits."""
     try:
         return isolated(_kind, source, within=LOADING, copied=True)
     except Fault as fault:

@@ -21,7 +21,7 @@ _DEFINES: dict[Kind, str] = {
 
 
 def kind_of(module: ModuleType) -> Kind:
-    """The kind of a file. Raises InputError if it defines none of the kinds, or several."""
+    """Returns the kind of a file. Raises InputError if it defines none of the kinds, or several."""
     path, names = module.__file__, vars(module)
     defined: dict[Kind, bool] = {
         "controller": "torque" in names or "Controller" in names,
@@ -54,7 +54,8 @@ def _a(kind: Kind) -> str:
 
 
 def law_of(module: ModuleType) -> Callable[[], Callable[[Any], Any]]:
-    """The function that creates the control law of a file. Raises InputError if the file defines none."""
+    """Returns the function that creates the control law of a file. Raises InputError if the file defines
+    none."""
     expected(module, "controller")
     names = vars(module)
     if "Controller" in names:
@@ -69,7 +70,7 @@ def law_of(module: ModuleType) -> Callable[[], Callable[[Any], Any]]:
 
 
 def line_of(module: ModuleType) -> int:
-    """The number of the first line of the function `torque` in a controller's file."""
+    """Returns the number of the first line of the function `torque` in a controller's file."""
     made = vars(module).get("Controller")
     law = vars(module).get("torque") if made is None else getattr(made, "torque", None)
     code = getattr(law, "__code__", None)

@@ -64,7 +64,7 @@ def _caller() -> str:
 
 
 def load(source: Source, seconds: float = LONGEST) -> ModuleType:
-    """The module that a file defines.
+    """Returns the module that a file defines.
 
     Raises:
         InputError: the file cannot be executed (the message names the line), computes or sleeps for more than
@@ -121,7 +121,7 @@ def _in_time(source: Source, seconds: float) -> ModuleType:
 
 
 def _shared() -> dict[str, dict[str, Any]]:
-    """The functions, classes and modules in the modules of the lab and of its libraries."""
+    """Returns the functions, classes and modules in the modules of the lab and of its libraries."""
     return {
         name: {key: value for key, value in vars(module).items() if _is_code(value)}
         for name, module in list(sys.modules.items())

@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 
 def curve(run: JobResult, field: str, k: int = 0, scale: float = 1.0, **how: object) -> PlotCurve:
-    """A field of a run over time; nothing is drawn for a run that failed."""
+    """Returns a field of a run over time; nothing is drawn for a run that failed."""
     return PlotCurve(run.t, scale * run.column(field, k), **how)  # pyright: ignore[reportArgumentType]
 
 
@@ -26,9 +26,9 @@ _BROAD = (2.4, 1.0)
 def by_controller(
     runs: Sequence[JobResult], field: str, k: int, scale: float = 1.0, weights: tuple[float, float] = _BROAD
 ) -> tuple[PlotCurve, ...]:
-    """A field of several controllers' runs, each in its colour. weights: line widths of the first curve and
-    of the others. The first of several curves is broad, so that it stays visible below curves that coincide
-    with it."""
+    """Returns a field of several controllers' runs, each in its colour. weights: line widths of the first
+    curve and of the others. The first of several curves is broad, so that it stays visible below curves that
+    coincide with it."""
     shown = [run for run in runs if len(run.t)]
     return tuple(
         curve(
@@ -63,7 +63,7 @@ def _band(curve: PlotCurve) -> PlotCurve:
 
 
 def excerpt(panel: Panel, start: float, end: float) -> Panel:
-    """The panel for a short interval of time, with values shown as steps."""
+    """Returns the panel for a short interval of time, with values shown as steps."""
     curves = []
     for each in panel.curves:
         inside = (each.x >= start) & (each.x <= end)
@@ -74,7 +74,7 @@ def excerpt(panel: Panel, start: float, end: float) -> Panel:
 def error_panels(
     runs: Sequence[JobResult], tasks: Sequence[tuple[str, int, str, float]]
 ) -> tuple[Panel, ...]:
-    """A panel per coordinate: (task, coordinate, label with unit, scale from m or rad)."""
+    """Returns a panel per coordinate: (task, coordinate, label with unit, scale from m or rad)."""
     return tuple(
         Panel(label, by_controller(runs, f"error/{task}", k, scale)) for task, k, label, scale in tasks
     )
@@ -87,9 +87,9 @@ FAINTEST = 1e-4
 def log_error_panels(
     runs: Sequence[JobResult], tasks: Sequence[tuple[str, int, str, float]]
 ) -> tuple[Panel, ...]:
-    """The panels of `error_panels`, with the largest size of the error in windows of BAND on logarithmic
-    axes, so that small errors are visible, too. The first half of the curves is broad, because others may
-    coincide with them."""
+    """Returns the panels of `error_panels`, with the largest size of the error in windows of BAND on
+    logarithmic axes, so that small errors are visible, too. The first half of the curves is broad, because
+    others may coincide with them."""
     panels = []
     for panel in error_panels(runs, tasks):
         curves = tuple(
@@ -107,7 +107,7 @@ def _largest(curve: PlotCurve) -> PlotCurve:
 
 
 def spans(t: Array, inside: NDArray[np.bool_]) -> tuple[tuple[float, float], ...]:
-    """The intervals of time in which `inside` is true; gaps of less than BAND are closed."""
+    """Returns the intervals of time in which `inside` is true; gaps of less than BAND are closed."""
     times = t[inside]
     if not times.size:
         return ()
@@ -133,8 +133,8 @@ def joint_panels(
     joints: int | None = None,
     weights: tuple[float, float] = _BROAD,
 ) -> tuple[Panel, ...]:
-    """One panel per joint of a field with one number per joint. The first run that did not fail gives the
-    bound, drawn on both sides of zero. weights: see `by_controller`."""
+    """Returns one panel per joint of a field with one number per joint. The first run that did not fail gives
+    the bound, drawn on both sides of zero. weights: see `by_controller`."""
     known = next((run for run in runs if run.error is None), None)
     if known is None:
         return (Panel(f"${symbol}$ ({unit})", ()),)

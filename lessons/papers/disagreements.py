@@ -34,7 +34,7 @@ _NO_TOPIC = Topic("", "Not explained yet", "none.", "not known.", "run the item.
 
 
 def page(found: Found) -> str:
-    """The page in Markdown.
+    """Returns the page in Markdown.
 
     Args:
         found: every row of the items.

@@ -84,7 +84,8 @@ class Row:
         return "agrees" if (self.ours < turn) == (self.says == "below") else "opposite"
 
     def _turned(self) -> bool:
-        """Whether our effect has the opposite direction; False if one of the two counts as no effect."""
+        """Returns whether our effect has the opposite direction; False if one of the two counts as no
+        effect."""
         if self.turns_at is None or self.paper is None:
             return False
         theirs, own = self.paper - self.turns_at, self.ours - self.turns_at
@@ -168,10 +169,10 @@ class Item:
 
 
 def at_most(text: str, value: float, limit: float, band: float | None = CLOSE) -> PaperCheck:
-    """The check that a value is at most a limit; it fails for NaN."""
+    """Returns the check that a value is at most a limit; it fails for NaN."""
     return PaperCheck(f"{text} ≤ {limit:g}", value, bool(value <= limit), band)
 
 
 def between(text: str, value: float, low: float, high: float, band: float | None = CLOSE) -> PaperCheck:
-    """The check that a value is within two limits; it fails for NaN."""
+    """Returns the check that a value is within two limits; it fails for NaN."""
     return PaperCheck(f"{text}, {low:g} to {high:g}", value, bool(low <= value <= high), band)

@@ -8,10 +8,10 @@ from typing import Any
 
 
 def printed(table: str) -> dict[str, Any]:
-    """The printed values of a table, e.g. printed("himpc_table_2")."""
+    """Returns the printed values of a table, e.g. printed("himpc_table_2")."""
     return read(table)
 
 
 def read(table: str) -> dict[str, Any]:
-    """The content of a file of values."""
+    """Returns the content of a file of values."""
     return tomllib.loads((Path(__file__).parent / "values" / f"{table}.toml").read_text(encoding="utf-8"))

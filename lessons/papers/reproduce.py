@@ -63,7 +63,8 @@ def reproduce(
 
 
 def recalled(items: Sequence[Item]) -> list[Report]:
-    """The reports without a run, from the stored numbers; items that were never stored are left out."""
+    """Returns the reports without a run, from the stored numbers; items that were never stored are left
+    out."""
     found = []
     for quick in (True, False):
         for name, memory in stored(quick).items():
@@ -135,7 +136,7 @@ def _page(reports: Sequence[Report]) -> str:
 
 
 def as_data(reports: Sequence[Report], quick: bool) -> dict[str, Any]:
-    """The reports as JSON-ready data; numbers that are not finite become None."""
+    """Returns the reports as JSON-ready data; numbers that are not finite become None."""
     return {"quick": quick, "items": [_item_data(report) for report in reports]}
 
 

@@ -36,7 +36,7 @@ class StoredItem:
 
 
 def stored(quick: bool) -> dict[str, StoredItem]:
-    """The stored numbers by item; items that were never stored are missing."""
+    """Returns the stored numbers by item; items that were never stored are missing."""
     data = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {}
     return {
         item: StoredItem(
@@ -80,7 +80,8 @@ def _short(value: float | None) -> float | None:
 
 
 def judged(section: Section, memory: StoredItem | None) -> tuple[PaperCheck, ...]:
-    """A check for every row and every check of a section: whether its numbers are equal to the stored ones.
+    """Returns a check for every row and every check of a section: whether its numbers are equal to the stored
+    ones.
 
     A row must have the stored verdict, and the stored ratio (or, if the paper prints no number, the stored
     value) within its band. A row that does not agree with the paper must have a topic that explains it. No
@@ -135,7 +136,8 @@ def _near(now: float, before: float, band: float) -> bool:
 
 
 def from_memory(item: Item, memory: StoredItem, quick: bool = False) -> Section:
-    """An item's section as if its runs had given the stored numbers; without pictures and further tables."""
+    """Returns an item's section as if its runs had given the stored numbers; without pictures and further
+    tables."""
     nothing = {job: JobResult(job, {}, {}, "not run") for job in item.jobs(quick)}
     section = item.report(nothing, quick)
     rows = tuple(

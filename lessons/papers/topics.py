@@ -38,7 +38,7 @@ class Quoted:
     form: str = ".2g"
 
     def words(self, measured: Measured) -> str:
-        """The number as the text contains it; "–" if it was not measured."""
+        """Returns the number as the text contains it; "–" if it was not measured."""
         ours, ratio = measured.get((self.item, self.row), (math.nan, None))
         value = ratio if self.ratio else ours
         if value is None or not math.isfinite(value):
@@ -73,7 +73,7 @@ class Topic:
     given: tuple[str, ...] = ()
 
     def told(self, measured: Measured) -> Topic:
-        """The topic with the measured numbers in its texts."""
+        """Returns the topic with the measured numbers in its texts."""
         words = {name: each.words(measured) for name, each in self.numbers.items()}
         return replace(self, evidence=self.evidence.format_map(words), cause=self.cause.format_map(words))
 
@@ -85,7 +85,7 @@ class Topic:
 
 @cache
 def topics() -> dict[str, Topic]:
-    """All topics by name, in the order of the file."""
+    """Returns all topics by name, in the order of the file."""
     text = Path(__file__).with_name("topics.toml").read_text(encoding="utf-8")
     return {name: _topic(name, each) for name, each in tomllib.loads(text).items()}
 

@@ -14,7 +14,7 @@ from lessons.scenes.catalog import load_scene
 
 
 def number(value: float | None) -> str:
-    """A number with three significant digits, "–" if there is none."""
+    """Returns a number with three significant digits, "–" if there is none."""
     return "–" if value is None or not math.isfinite(value) else f"{value:.3g}"
 
 
@@ -29,7 +29,7 @@ _VERDICTS: dict[Verdict, str] = {"agrees": "agree", "differs": "differ", "opposi
 
 
 def trouble(run: JobResult) -> str:
-    """A sentence about the cause if a run has no figures; "" if it has figures."""
+    """Returns a sentence about the cause if a run has no figures; "" if it has figures."""
     if run.error is not None:
         return f"could not be run: {run.error}"
     return "" if run.lost_at is None else f"lost control at {run.lost_at:.2f} s"

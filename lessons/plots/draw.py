@@ -55,7 +55,8 @@ def draw(picture: Picture, folder: Path) -> Path:
 
 
 def _height(picture: Picture, row: int) -> float:
-    """The height of a row in inches: panels with equal axes are square, those with time series are lower."""
+    """Returns the height of a row in inches: panels with equal axes are square, those with time series are
+    lower."""
     panels = picture.panels[row * picture.columns : (row + 1) * picture.columns]
     if any(isinstance(panel, Panel) and panel.equal for panel in panels):
         return min(4.6, 0.85 * WIDTH / picture.columns)
@@ -114,7 +115,7 @@ def _draw_lines(axes: Axes, panel: Panel) -> None:
 
 
 def _positive(values: Iterable[np.ndarray]) -> bool:
-    """Whether there is a positive value for a logarithmic axis."""
+    """Returns whether there is a positive value for a logarithmic axis."""
     return any(bool((each[np.isfinite(each)] > 0).any()) for each in values)
 
 

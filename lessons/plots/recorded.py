@@ -27,7 +27,7 @@ class Recorded:
 
 
 def run_picture(name: str, run: Recorded, ghost: Recorded | None, T_s: float) -> Picture:
-    """The plots of the page, over the whole recording.
+    """Returns the plots of the page, over the whole recording.
 
     Args:
         name: file name without ending.

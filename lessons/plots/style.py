@@ -59,7 +59,7 @@ RC: dict[Any, Any] = {
 
 
 def colour(key: str) -> str:
-    """The colour of a controller, "reference" or a place in the sequence."""
+    """Returns the colour of a controller, "reference" or a place in the sequence."""
     if key == "reference":
         return REFERENCE
     if key.isdigit():
@@ -68,5 +68,5 @@ def colour(key: str) -> str:
 
 
 def name(controller: str) -> str:
-    """A controller's name as the paper writes it."""
+    """Returns a controller's name as the paper writes it."""
     return NAMES.get(controller, controller)

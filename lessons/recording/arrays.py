@@ -29,7 +29,8 @@ _PER_TASK = ("x", "x_d", "v_d", "a_d", "error")
 
 
 def arrays(recording: Recording, how: dict[str, Any]) -> dict[str, Any]:
-    """The arrays of a recording, see `named`; `how`: scene, URDF, seed and settings as the user gave them."""
+    """Returns the arrays of a recording, see `named`; `how`: scene, URDF, seed and settings as the user gave
+    them."""
     session = recording.session
     events = [(t, event) for t, event in session.log]
     return named(session.robot, session.settings, recording.layout, recording.rows, how, events)

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 def task_figures(
     recording: Recording, task: TaskInfo, level: int, rows: NDArray[np.bool_] | None = None
 ) -> dict[str, Any]:
-    """The errors of a task: root mean squares and peaks per coordinate, m or degrees.
+    """Returns the errors of a task: root mean squares and peaks per coordinate, m or degrees.
 
     Args:
         recording: the run.
@@ -62,7 +62,7 @@ def qp_figures(recording: Recording, fallbacks: Sequence[str]) -> dict[str, Any]
 
 
 def position_share(recording: Recording) -> float | None:
-    """The largest distance of a joint from the middle of its range, divided by half its range."""
+    """Returns the largest distance of a joint from the middle of its range, divided by half its range."""
     with np.errstate(all="ignore"):
         middle = 0.5 * (recording["q_lower"] + recording["q_upper"])
         half = 0.5 * (recording["q_upper"] - recording["q_lower"])

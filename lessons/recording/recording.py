@@ -26,7 +26,7 @@ class Recording:
         self.wall_s = wall_s
 
     def __getitem__(self, field: str) -> Array:
-        """A field over time, (ticks, width)."""
+        """Returns a field over time, (ticks, width)."""
         return self.rows[:, self.layout.fields[field]]
 
     @property

@@ -21,7 +21,7 @@ _BLOCKS: Mapping[type[Session], Callable[[Recording], dict[str, Any]]] = {
 
 
 def summary(recording: Recording) -> dict[str, Any]:
-    """The run as one JSON-ready object; its keys are part of the interface of the command line.
+    """Returns the run as one JSON-ready object; its keys are part of the interface of the command line.
 
     Ratios are relative to the limit in force at that tick, before any tightening. Numbers that are not
     finite become None. Figures that differ between torque and velocity level are in a block of their own.

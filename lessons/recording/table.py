@@ -21,9 +21,9 @@ def as_npz(data: dict[str, Any]) -> bytes:
 
 
 def as_csv(layout: Layout, rows: Array) -> bytes:
-    """One line per row, one column per number. The heading is the field's name; if the field has several
-    numbers, the number's name follows in brackets. SI units; orientations are quaternions x y z w. An empty
-    cell stands for a number that is not defined."""
+    """Returns one line per row, one column per number. The heading is the field's name; if the field has
+    several numbers, the number's name follows in brackets. SI units; orientations are quaternions x y z w. An
+    empty cell stands for a number that is not defined."""
     heads: list[str] = []
     for name, where in layout.fields.items():
         width = where.stop - where.start
@@ -34,7 +34,7 @@ def as_csv(layout: Layout, rows: Array) -> bytes:
 
 
 def _words(layout: Layout, field: str, width: int) -> tuple[str, ...]:
-    """Names of a field's numbers."""
+    """Returns names of a field's numbers."""
     kind, _, name = field.partition("/")
     if not name:
         return layout.joints

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 
 def block(recording: Recording) -> dict[str, Any]:
-    """The part of `lessons.recording.summary.summary` for the torque level."""
+    """Returns the part of `lessons.recording.summary.summary` for the torque level."""
     settings, layout = recording.session.settings, recording.layout
     place = {level.name: index for index, level in enumerate(settings.levels, start=1)}
     tasks = sorted(layout.tasks, key=lambda task: place[task.level])
@@ -41,8 +41,8 @@ def block(recording: Recording) -> dict[str, Any]:
 
 
 def _contact(recording: Recording) -> dict[str, float]:
-    """The deepest penetration (m), the largest force (N) and the time in contact (s), with the robot's own
-    links and with the world; a contact counts for the whole tick in which it occurs."""
+    """Returns the deepest penetration (m), the largest force (N) and the time in contact (s), with the
+    robot's own links and with the world; a contact counts for the whole tick in which it occurs."""
     force, depth = recording["contact_force"], recording["contact_depth"]
     touching = (force > 0.0) | (depth > 0.0)
     return {
@@ -53,14 +53,14 @@ def _contact(recording: Recording) -> dict[str, float]:
 
 
 def _levels(recording: Recording) -> list[dict[str, Any]]:
-    """Per enabled level, the number of its rows, and the number of directions that the level can control at
-    the robot's final pose."""
+    """Returns, per enabled level, the number of its rows, and the number of directions that the level can
+    control at the robot's final pose."""
     found = recording.session.ranks()
     return [{"name": name, "rank": rank, "rows": rows} for name, (rank, rows) in found.items()]
 
 
 def _average_cost(recording: Recording, level: str) -> float:
-    """(41): the mean of ‖e(x(k))‖²_Q + ‖Δτ(k)‖²_R with e from measurements."""
+    """Returns the cost of (41): the mean of ‖e(x(k))‖²_Q + ‖Δτ(k)‖²_R with e from measurements."""
     session = recording.session
     found = next(each for each in session.settings.levels if each.name == level)
     T_s = session.settings.T_s
@@ -100,7 +100,7 @@ def _limits(recording: Recording) -> dict[str, dict[str, float | None]]:
 
 
 def _share(tau: Array, recording: Recording) -> Array:
-    """The ratio of a torque to the bound on its side."""
+    """Returns the ratio of a torque to the bound on its side."""
     return np.maximum(tau / _bounded(recording["tau_upper"]), tau / _bounded(recording["tau_lower"]))
 
 

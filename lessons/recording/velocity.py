@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 
 def block(recording: Recording) -> dict[str, Any]:
-    """The part of `lessons.recording.summary.summary` for the velocity level."""
+    """Returns the part of `lessons.recording.summary.summary` for the velocity level."""
     session, layout = recording.session, recording.layout
     options, progress = session.settings.options, session.progress
     steps = np.concatenate([recording[f"step/{name}"][:, 0] for name in layout.levels])
@@ -64,8 +64,8 @@ def _mean(values: Array) -> float | None:
 
 
 def _part(recording: Recording, name: str, start: float, end: float) -> dict[str, Any]:
-    """One part of a run; a normalised error is the base error divided by its value at the start of the
-    part."""
+    """Returns one part of a run; a normalised error is the base error divided by its value at the start of
+    the part."""
     t = recording["t"][:, 0]
     rows = (t >= start - 1e-9) & (t < end - 1e-9)
     base = np.linalg.norm(recording["error/base"][rows], axis=1)
@@ -82,8 +82,8 @@ def _part(recording: Recording, name: str, start: float, end: float) -> dict[str
 
 
 def _report(recording: Recording) -> dict[str, Any] | None:
-    """The largest error of each task before, while and after an obstacle is reported wrongly, m, and the
-    error at the end; None for runs without wrong reports."""
+    """Returns the largest error of each task before, while and after an obstacle is reported wrongly, m, and
+    the error at the end; None for runs without wrong reports."""
     wrong = recording.session.settings.options.misreported
     if wrong is None:
         return None
@@ -113,6 +113,6 @@ def _limits(recording: Recording) -> dict[str, dict[str, float | None]]:
 
 
 def _qp_method(settings: VelocitySettings) -> str:
-    """The method that solves the QPs. If the compiled method finds no solution, DAQP is tried."""
+    """Returns the method that solves the QPs. If the compiled method finds no solution, DAQP is tried."""
     solver = settings.htmpc.solver
     return OWN_METHOD if solver == "daqp" and settings.controller != "htidkc" else solver

@@ -44,35 +44,35 @@ class LearnerProgress:
     best: Mapping[str, float] = field(default_factory=dict)
 
     def with_step(self, lesson: str, place: int) -> LearnerProgress:
-        """The progress after the run of a step."""
+        """Returns the progress after the run of a step."""
         return replace(self, seen={**self.seen, lesson: self.seen.get(lesson, frozenset()) | {place}})
 
     def with_points(self, lesson: str, points: float) -> LearnerProgress:
-        """The progress after a challenge was passed; only the best attempt counts."""
+        """Returns the progress after a challenge was passed; only the best attempt counts."""
         return replace(self, best={**self.best, lesson: max(points, self.best.get(lesson, 0.0))})
 
     def next_place(self, lesson: str, steps: int) -> int:
-        """The first step that was not seen; 0 if all steps were seen."""
+        """Returns the first step that was not seen; 0 if all steps were seen."""
         seen = self.seen.get(lesson, frozenset())
         return next((place for place in range(steps) if place not in seen), 0)
 
     def dumped(self) -> str:
-        """The progress as text."""
+        """Returns the progress as text."""
         return json.dumps(
             {"seen": {name: sorted(places) for name, places in self.seen.items()}, "best": dict(self.best)}
         )
 
 
 def kept(progress: LearnerProgress, key: bytes | None, account: str = "") -> str:
-    """The progress in the form that the browser stores. account: the name with which the learner signed in; a
-    key signs this name, too."""
+    """Returns the progress in the form that the browser stores. account: the name with which the learner
+    signed in; a key signs this name, too."""
     text = progress.dumped()
     return text if key is None else _seal(_of(account, text), key) + text
 
 
 def load_progress(text: str | None, key: bytes | None, account: str = "") -> LearnerProgress:
-    """The progress that a browser stored. With a key, only progress that is signed with it for this account
-    counts."""
+    """Returns the progress that a browser stored. With a key, only progress that is signed with it for this
+    account counts."""
     if key is None or not text:
         return progress_from(text)
     seal, body = text[:64], text[64:]
@@ -135,7 +135,7 @@ class HandedIn:
 
 
 def written(handed: HandedIn, key: bytes | None) -> str:
-    """The text that a learner hands in; it has only letters, digits, "-" and "_"."""
+    """Returns the text that a learner hands in; it has only letters, digits, "-" and "_"."""
     given = {"n": handed.name[:LONGEST_NAME], "t": handed.at, "p": handed.progress.dumped(), "c": handed.code}
     given |= {"a": handed.account} if handed.account else {}
     body = base64.urlsafe_b64encode(zlib.compress(json.dumps(given, ensure_ascii=False).encode(), 9))

@@ -18,7 +18,7 @@ Log = Sequence[tuple[float, Event]]
 
 
 def script(run: RunSpec, log: Log, duration: float) -> str:
-    """A stand-alone script that repeats a run to the last bit on the same machine.
+    """Returns a stand-alone script that repeats a run to the last bit on the same machine.
 
     The script begins at the last reset, with the settings that were in force then. Earlier events are left
     out.
@@ -97,7 +97,7 @@ def _arguments(run: RunSpec) -> tuple[str | None, ...]:
 
 
 def _measures_time(settings: SceneSettings, events: Log) -> bool:
-    """Whether the run depended on measured times at any moment."""
+    """Returns whether the run depended on measured times at any moment."""
     for event in (None, *(event for _, event in events)):
         settings = settings if event is None else settings_after(settings, (event,))
         if settings.measures_time:
@@ -116,7 +116,7 @@ def _tuple(name: str, items: Iterable[str]) -> str:
 
 
 def _call(event: Event) -> str:
-    """The Python call that creates an event, without arguments that have their default value."""
+    """Returns the Python call that creates an event, without arguments that have their default value."""
     given = [
         f"{field.name}={_literal(value)}" if place > 1 else _literal(value)
         for place, field in enumerate(fields(event))
@@ -126,7 +126,7 @@ def _call(event: Event) -> str:
 
 
 def _literal(value: Any) -> str:
-    """A Python literal: NumPy's numbers and arrays become plain numbers and lists."""
+    """Returns a Python literal: NumPy's numbers and arrays become plain numbers and lists."""
     if isinstance(value, (np.ndarray, np.generic)):
         return _literal(value.tolist())
     if isinstance(value, (list, tuple)):

@@ -52,7 +52,7 @@ class State:
 def state_of(
     run: RunSpec, settings: SceneSettings, *, lesson: str | None = None, step: int | None = None
 ) -> State:
-    """The state of a scene whose settings have been changed.
+    """Returns the state of a scene whose settings have been changed.
 
     Args:
         run: scene, robot and seed.
@@ -71,7 +71,7 @@ def state_of(
 
 
 def encode(state: State) -> str:
-    """The state as a code that fits into a link: letters, digits, "-" and "_".
+    """Returns the state as a code that fits into a link: letters, digits, "-" and "_".
 
     Raises:
         InputError: the run needs the file of a robot or a scene, which a code cannot contain; or the code
@@ -96,7 +96,8 @@ def encode(state: State) -> str:
 
 
 def _carried(text: str) -> str:
-    """An assignment in the form that a code contains: a user's file is replaced by its fingerprint."""
+    """Returns an assignment in the form that a code contains: a user's file is replaced by its
+    fingerprint."""
     path, value = parse_assignment(text)
     if path == "controller" and is_file(value):
         return assignment(path, fingerprint(value))

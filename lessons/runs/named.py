@@ -30,7 +30,7 @@ TASK_SCENE = "iiwa14-hold"
 def scene_named(
     name: str, urdf: str | None = None, tip: str | None = None, urdf_text: str | None = None
 ) -> Scene:
-    """A scene by its name, or the scene or task of a file; the arguments are those of `load_scene`.
+    """Returns a scene by its name, or the scene or task of a file; the arguments are those of `load_scene`.
 
     Raises:
         InputError: see `load_scene`; or the file cannot be used, and the message names the line.
@@ -44,7 +44,7 @@ def scene_named(
 
 @lru_cache(maxsize=64)
 def _scene_of(source: Source) -> Scene:
-    """The scene of a file. A file is tested again only if its content has changed."""
+    """Returns the scene of a file. A file is tested again only if its content has changed."""
     module = module_of(source)
     if kind_of(module) == "task":
         return with_task(load_scene(TASK_SCENE), source.path)
@@ -61,7 +61,7 @@ def _scene_of(source: Source) -> Scene:
 
 
 def task_in(name: str) -> Task:
-    """The task of a file. Raises InputError if the file cannot be used."""
+    """Returns the task of a file. Raises InputError if the file cannot be used."""
     module = module_of(read(name))
     expected(module, "task")
     found = vars(module)["TASK"]
@@ -71,7 +71,7 @@ def task_in(name: str) -> Task:
 
 
 def with_task(scene: Scene, name: str) -> TorqueScene:
-    """A scene with the task of a file as a level of its own, below the first one.
+    """Returns a scene with the task of a file as a level of its own, below the first one.
 
     Raises:
         InputError: the file cannot be used, the scene takes velocities, or the task's Jacobian is wrong.
@@ -85,8 +85,8 @@ def with_task(scene: Scene, name: str) -> TorqueScene:
 
 
 def with_tasks(scene: Scene, files: Iterable[str]) -> Scene:
-    """The scene with the tasks of files added to the kinds that its stack may name. A scene at velocity level
-    is returned unchanged.
+    """Returns the scene with the tasks of files added to the kinds that its stack may name. A scene at
+    velocity level is returned unchanged.
 
     Raises:
         InputError: a file cannot be used, or the task's Jacobian is wrong.
@@ -95,8 +95,8 @@ def with_tasks(scene: Scene, files: Iterable[str]) -> Scene:
 
 
 def with_files(scene: Scene, controllers: Iterable[str], tasks: Iterable[str]) -> Scene:
-    """The scene with users' files attached: files of controllers that it may use, and files of tasks that its
-    stack may name. A scene at velocity level is returned unchanged.
+    """Returns the scene with users' files attached: files of controllers that it may use, and files of tasks
+    that its stack may name. A scene at velocity level is returned unchanged.
 
     Raises:
         InputError: the file of a task cannot be used, or the task's Jacobian is wrong.
@@ -105,7 +105,7 @@ def with_files(scene: Scene, controllers: Iterable[str], tasks: Iterable[str]) -
 
 
 def misfits(robot: Robot, files: Iterable[str]) -> dict[str, str]:
-    """The error messages of the files whose task cannot be used on a robot, by file."""
+    """Returns the error messages of the files whose task cannot be used on a robot, by file."""
     found = {}
     for name in files:
         try:
@@ -116,7 +116,7 @@ def misfits(robot: Robot, files: Iterable[str]) -> dict[str, str]:
 
 
 def _task_for(robot: Robot, name: str) -> Task:
-    """The task of a file. Raises InputError if it cannot be used at all or on this robot."""
+    """Returns the task of a file. Raises InputError if it cannot be used at all or on this robot."""
     task = task_in(name)
     called(read(name), partial(check_task, task, robot, name))
     return task
@@ -157,7 +157,7 @@ def check_task(task: Task, robot: Robot, name: str) -> None:
 
 
 def module_of(source: Source) -> ModuleType:
-    """The module of a file, loaded once per content. Raises InputError, with the line."""
+    """Returns the module of a file, loaded once per content. Raises InputError, with the line."""
     judged(source)
     return _module_of(source)
 

@@ -52,7 +52,8 @@ class Clearance:
         self.found, self._due = NOTHING, 0
 
     def measure(self, q: Array, avoidance: Avoidance) -> tuple[float, float]:
-        """The distance of the nearest pair and the distance that it must keep, m, measured every EVERY ticks.
+        """Returns the distance of the nearest pair and the distance that it must keep, m, measured every
+        EVERY ticks.
 
         q: (n,) true positions.
         """

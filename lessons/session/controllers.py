@@ -22,7 +22,7 @@ LONGEST_TICK = 0.5
 
 
 def controller_of(settings: TorqueSettings, robot: Robot) -> Controller:
-    """The controller that settings name.
+    """Returns the controller that settings name.
 
     Raises:
         InputError: unknown name, a file without a controller, or settings that do not fit the robot.

@@ -23,7 +23,7 @@ class DelayedTorque:
         self._waiting: Array | None = None
 
     def applied(self, tau: Array, late: bool, before: Array) -> Array:
-        """The torque that this tick applies, (n,) N·m.
+        """Returns the torque that this tick applies, (n,) N·m.
 
         Args:
             tau: the controller's torque for this tick, (n,) N·m.

@@ -19,7 +19,7 @@ _SAME = 1e-6
 
 
 def ghost_scene(scene: Scene, leader: SceneSettings, own: Sequence[str]) -> Scene:
-    """The scene that a ghost runs.
+    """Returns the scene that a ghost runs.
 
     Args:
         scene: the scene, as the leader loaded it.
@@ -100,7 +100,7 @@ class GhostDriver:
 
 
 def swapped(settings: SceneSettings, own: Sequence[str]) -> tuple[tuple[str, ...], tuple[Set, ...]]:
-    """The changes with which leader and ghost exchange the values of the ghost's assignments.
+    """Returns the changes with which leader and ghost exchange the values of the ghost's assignments.
 
     Args:
         settings: the leader's.

@@ -14,12 +14,13 @@ from robots.world import Post, Thing
 
 
 def observed(plant: Plant, avoidance: Avoidance) -> Observed:
-    """The objects of a plant's world at their present places, if distances are kept."""
+    """Returns the objects of a plant's world at their present places, if distances are kept."""
     return objects_of(plant) if avoidance.on else NOTHING
 
 
 def objects_of(plant: Plant) -> Observed:
-    """The objects of a plant's world at their present places. A free box or post counts as upright."""
+    """Returns the objects of a plant's world at their present places. A free box or post counts as
+    upright."""
     shapes, moving = [thing.shape for thing in plant.world], plant.object_velocities()
     if not len(moving):
         return Observed(tuple(shapes))

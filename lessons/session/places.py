@@ -25,7 +25,7 @@ class Places(NamedTuple):
 
     @classmethod
     def of(cls, layout: Layout) -> Places:
-        """The indices in a layout."""
+        """Returns the indices in a layout."""
         fields = layout.fields
         numbers = (fields[name].start for name in ("t", "late", "dynamic_leak", "contact_depth", "distance"))
         return cls(*numbers, *(fields[name] for name in cls._fields[5:]))

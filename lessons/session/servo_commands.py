@@ -39,7 +39,7 @@ class Commands:
         self.sharpest = np.zeros_like(before)
 
     def next(self) -> Array:
-        """The next command, (n,)."""
+        """Returns the next command, (n,)."""
         self._given += 1
         command = self.plan.motion.velocity(self._given * self.h)
         self.sharpest = np.maximum(self.sharpest, np.abs((command - self.last) / self.h))

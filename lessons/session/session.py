@@ -149,4 +149,4 @@ class Session(ABC):
 
     @abstractmethod
     def binding(self) -> list[Binding]:
-        """The active constraints of the last plan."""
+        """Returns the active constraints of the last plan."""

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 
 def target_at(task: Task, value: Array) -> Target:
-    """A draggable target of a task. It starts at `value`, a result of `Task.target`."""
+    """Returns a draggable target of a task. It starts at `value`, a result of `Task.target`."""
     if value.ndim == 2:
         return dragged_target(value, ROTATION_CAPS)
     in_space = task.unit == "m" or isinstance(task, Pointing)
@@ -29,8 +29,8 @@ def target_at(task: Task, value: Array) -> Target:
 
 
 def kept(task: Task, reference: Reference | None, value: Array) -> Reference:
-    """The reference of a task in a changed stack: the scene's reference if it has the task's coordinates,
-    else a draggable target at `value`.
+    """Returns the reference of a task in a changed stack: the scene's reference if it has the task's
+    coordinates, else a draggable target at `value`.
 
     Args:
         task: the task.

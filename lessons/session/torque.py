@@ -114,8 +114,8 @@ class TorqueSession(Session):
         }
 
     def _references_for(self, stack: Stack) -> dict[str, Reference]:
-        """The references under another stack. A task that remains or was only renamed keeps its reference;
-        new tasks, and tasks that control something else now, hold their present values."""
+        """Returns the references under another stack. A task that remains or was only renamed keeps its
+        reference; new tasks, and tasks that control something else now, hold their present values."""
         here = Configuration(self.robot, self._data, self.plant.q, self.plant.v)
         old = {task.name: task for task in _tasks(self.settings.levels)}
         new = {task.name for task in _tasks(stack)}
@@ -138,7 +138,7 @@ class TorqueSession(Session):
         return np.array(self.settings.M_bar) * self.settings.M_bar_scale if found is None else found
 
     def target(self, task: str) -> Target | None:
-        """The draggable target of a task, None if its reference is a fixed motion."""
+        """Returns the draggable target of a task, None if its reference is a fixed motion."""
         reference = self.references.get(task)
         return reference if isinstance(reference, Target) else None
 
@@ -195,8 +195,8 @@ class TorqueSession(Session):
         self.failure = None
 
     def advance(self) -> Array:
-        """One control tick and its row (a buffer: copy it to keep it): the true joint state, the references,
-        the controller's results, and the torque that is applied from this tick on."""
+        """Runs one control tick and returns its row: true joint state, references, results of the controller,
+        and the torque that is applied from this tick on. The row is a buffer: copy it to keep it."""
         if self._mailbox or self._script or self._push_until < math.inf:
             self.drain()
         settings, plant = self.settings, self.plant
@@ -230,7 +230,7 @@ class TorqueSession(Session):
         return row
 
     def _true(self, plan: Plan, q: Array, ahead: Mapping[str, Preview]) -> tuple[float, float, float]:
-        """The values that need the plant's M: the true leak and the gauge of M̄, held between updates."""
+        """Returns the true leak and the gauge of M̄, which need the plant's M, as of the last update."""
         if self._ticks % TRUTH_TICKS == 0 and math.isfinite(float(q.sum())):
             M = self.plant.mass_matrix()
             done = None
@@ -250,7 +250,7 @@ class TorqueSession(Session):
         return self.plant.broken or not slow or not math.isfinite(q.dot(q))
 
     def _is_far(self, row: Array) -> bool:
-        """Whether level 1 is lost."""
+        """Returns whether level 1 is lost."""
         for where in self._hands:
             error = row[where]
             if error.dot(error) > LOST_POSITION**2:
@@ -273,7 +273,7 @@ class TorqueSession(Session):
         )
 
     def reference_path(self, task: str, points: int = 200) -> Array | None:
-        """One period of a periodic position reference, (points, 3) m; None for every other reference."""
+        """Returns one period of a periodic position reference, (points, 3) m; None for other references."""
         reference = self.references.get(task)
         phase = getattr(reference, "phase", None)
         tasks = {each.name: each for each in _tasks(self.settings.levels)}
@@ -287,7 +287,7 @@ class TorqueSession(Session):
         return path
 
     def ranks(self) -> dict[str, tuple[int, int]]:
-        """Per enabled level, the number of directions that it can control now, and the number of its rows."""
+        """Returns, per enabled level, the number of directions that it can control now, and its rows."""
         q = np.asarray(self.plant.q)
         return ranks(self.settings.levels, Configuration(self.robot, self._data, q, q))
 

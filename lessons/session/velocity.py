@@ -120,7 +120,7 @@ class VelocitySession(Session):
         self._take_settings(settings)
 
     def _for_controller(self, settings: VelocitySettings) -> HTMPCSettings:
-        """The controller's settings for the levels of this tick."""
+        """Returns the controller's settings for the levels of this tick."""
         lag = 1e-3 * settings.felt(self._solve_ms).latency_ms if settings.compensate_delay else 0.0
         hold = settings.htmpc.hold
         if settings.options.decoupled and self.progress.window:
@@ -139,8 +139,8 @@ class VelocitySession(Session):
         self._distances = ObstacleDistances(self.robot, settings.htmpc)
 
     def predicted_path(self, role: str) -> Array:
-        """The positions of a role's point in the last plan, knots 0 … N, (N+1, m) m; empty before the first
-        tick."""
+        """Returns the positions of a role's point in the last plan, knots 0 … N, (N+1, m) m; empty before the
+        first tick."""
         if self.plan is None:
             return np.empty((0, 3))
         task = self.roles[role]
@@ -215,7 +215,7 @@ class VelocitySession(Session):
             self._lost(float(row[fields["t"]][0]))
 
     def _direct(self) -> tuple[VelocityController, dict[str, Reference]]:
-        """The controller, with the window as its stack, and the references of its tasks by name."""
+        """Returns the controller, with the window as its stack, and the references of its tasks by name."""
         stack: list[Level] = []
         references: dict[str, Reference] = {}
         for place, active in enumerate(self.progress.window, start=1):
@@ -239,12 +239,12 @@ class VelocitySession(Session):
         return next(level for level in self.settings.htmpc.stack if level.tasks[0].name == role)
 
     def _points(self, q: Array, v: Array) -> tuple[dict[str, Array], dict[str, float]]:
-        """The position of each role's point, and its speed (m/s or rad/s)."""
+        """Returns the position of each role's point, and its speed (m/s or rad/s)."""
         return where(Configuration(self.robot, self._data, q, v), self.roles)
 
     def _is_wild(self, row: Array) -> bool:
-        """Whether the state is not finite or far too fast. A large error does not count: missions have goals
-        metres away.
+        """Returns whether the state is not finite or far too fast. A large error does not count: missions
+        have goals metres away.
         """
         fields = self.layout.fields
         fastest = float((np.abs(row[fields["v"]]) / self.robot.v_limit).max())

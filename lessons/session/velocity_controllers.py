@@ -43,5 +43,5 @@ _MAKERS: dict[str, Callable[[Robot, HTMPCSettings], VelocityController]] = {
 
 
 def make_velocity_controller(name: str, robot: Robot, settings: HTMPCSettings) -> VelocityController:
-    """A controller by its name. Raises InputError for settings that do not fit the robot."""
+    """Returns a controller by its name. Raises InputError for settings that do not fit the robot."""
     return _MAKERS[name](robot, settings)

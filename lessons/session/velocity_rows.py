@@ -55,7 +55,7 @@ _PER_LEVEL = ("cost", "kkt", "rung", "time_us", "step", "active", "bound")
 
 
 def layout_of(robot: Robot, roles: Stack) -> Layout:
-    """The indices of the fields of a row.
+    """Returns the indices of the fields of a row.
 
     `place` is the number of completed tasks of the mission, `left` the number of the others. `clearance` is
     the least distance to an obstacle in the control period, m, and `clearance_reported` the least distance

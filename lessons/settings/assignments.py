@@ -43,7 +43,7 @@ def _refuse_constant(text: str) -> Callable[[str], Any]:
 
 
 def with_assignments(settings: S, assignments: Iterable[str]) -> S:
-    """The settings after every "PATH=VALUE", in order. Raises InputError like `changed`."""
+    """Returns the settings after every "PATH=VALUE", in order. Raises InputError like `changed`."""
     for text in assignments:
         settings = settings.changed(*parse_assignment(text))
     return settings
@@ -73,7 +73,7 @@ def _parsed(text: str) -> Any:
 
 
 def differences(own: SceneSettings, settings: SceneSettings) -> tuple[str, ...]:
-    """The assignments that turn a scene's own settings into other settings of the same scene.
+    """Returns the assignments that turn a scene's own settings into other settings of the same scene.
 
     The controller comes first, so that a setting that the controller determines (its rate) is listed only if
     it differs from that of the controller.

@@ -52,7 +52,8 @@ class Entry:
         return f"{self.label} [{unit}]" if unit else self.label
 
     def at(self, path: str) -> Entry | None:
-        """The entry of one setting, with names instead of "*"; None if the path belongs to another entry."""
+        """Returns the entry of one setting, with names instead of "*"; None if the path belongs to another
+        entry."""
         found = self.pattern.fullmatch(path)
         if found is None:
             return None
@@ -63,7 +64,8 @@ class Entry:
 
 
 def entry_at(entries: tuple[Entry, ...], path: str) -> Entry:
-    """The entry of a path; if the table has none, an entry whose label is the last name of the path."""
+    """Returns the entry of a path; if the table has none, an entry whose label is the last name of the
+    path."""
     for entry in entries:
         found = entry.at(path)
         if found is not None:

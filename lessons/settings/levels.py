@@ -10,7 +10,7 @@ from robots.errors import unknown_name
 
 
 def ordered(stack: Stack, names: Any) -> Stack:
-    """The levels in another order.
+    """Returns the levels in another order.
 
     Args:
         stack: the levels.
@@ -27,7 +27,7 @@ def ordered(stack: Stack, names: Any) -> Stack:
 
 
 def moved(stack: Stack, name: str, to: int) -> Stack:
-    """The levels with one of them at another place; place 0 has the highest priority.
+    """Returns the levels with one of them at another place; place 0 has the highest priority.
 
     Raises:
         InputError: no level of that name, or no such place.

@@ -32,8 +32,8 @@ class SettingLine:
 
 
 def lines(settings: SceneSettings) -> list[SettingLine]:
-    """Every setting of a scene in the order of the page. Levels are listed by their names only, although a
-    path may also contain a level's place."""
+    """Returns every setting of a scene in the order of the page. Levels are listed by their names only,
+    although a path may also contain a level's place."""
     paths = [path for path in settings.paths() if not _BY_PLACE.fullmatch(path)]
     order = [entry.path for entry in settings.entries]
     told = {path: _pattern(settings, path) for path in paths}
@@ -42,8 +42,8 @@ def lines(settings: SceneSettings) -> list[SettingLine]:
 
 
 def reference(scenes: Sequence[SceneSettings]) -> list[SettingLine]:
-    """Every setting of several scenes of a kind, with "*" for names; `now` is the value of the first scene
-    that has it."""
+    """Returns every setting of several scenes of a kind, with "*" for names; `now` is the value of the first
+    scene that has it."""
     found: dict[str, SettingLine] = {}
     for settings in scenes:
         for path in settings.paths():

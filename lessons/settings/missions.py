@@ -40,7 +40,7 @@ class MissionOptions(ABC):
 
     @abstractmethod
     def mission(self, home: Home) -> Mission:
-        """The tasks. Args: home: position of each role's point at the start, (m,) m."""
+        """Returns the tasks. Args: home: position of each role's point at the start, (m,) m."""
 
     @property
     def L(self) -> int:
@@ -54,7 +54,7 @@ class MissionOptions(ABC):
         return False
 
     def person(self, task: str) -> int | None:
-        """The number of the person that a task of the mission visits, from 0; None: nobody."""
+        """Returns the number of the person that a task of the mission visits, from 0; None: nobody."""
         return None
 
     @property
@@ -64,7 +64,7 @@ class MissionOptions(ABC):
         return None
 
     def reported(self, obstacles: tuple[Obstacle, ...], t: float) -> tuple[Obstacle, ...]:
-        """The obstacles as they are reported to the controller at time t, s."""
+        """Returns the obstacles as they are reported to the controller at time t, s."""
         del t
         return obstacles
 
@@ -99,7 +99,7 @@ class ArchitectureOptions(MissionOptions):
         return self.architecture == "decoupled"
 
     def drive(self, name: str, place: Go) -> MissionTask:
-        """A task of the base."""
+        """Returns a task of the base."""
         rest = REST if self.base_at_rest else math.inf
         return MissionTask(name, "base", place, self.base_tolerance, rest=rest)
 
@@ -115,7 +115,8 @@ class OrderOptions(MissionOptions):
     order: tuple[str, ...] = ()
 
     def in_order(self, tasks: Mission) -> Mission:
-        """The tasks by the priorities of their roles. Raises InputError if a role is missing or unknown."""
+        """Returns the tasks by the priorities of their roles. Raises InputError if a role is missing or
+        unknown."""
         if not self.order:
             return tasks
         by_role = {task.role: task for task in tasks}
@@ -275,5 +276,5 @@ class DeliveryOptions(ArchitectureOptions):
 
 
 def _visit(role: str, number: int) -> str:
-    """The name of the task of a role in one visit of a delivery."""
+    """Returns the name of the task of a role in one visit of a delivery."""
     return f"{role} {number}"

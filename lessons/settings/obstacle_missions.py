@@ -100,7 +100,7 @@ class PerceptionOptions(OrderOptions):
 
 
 def _along(point: np.ndarray, cruise: float) -> Follow:
-    """A straight path along x from a point (m,), m."""
+    """Returns a straight path along x from a point (m,), m."""
     ahead = np.zeros(len(point))
     ahead[0] = WAY
     return Follow(Path(np.array([point, point + ahead]), cruise, "quintic", 0.0))

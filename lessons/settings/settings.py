@@ -40,13 +40,13 @@ class Place:
     shorthand: bool = False
 
     def fit(self, settings: Any, path: str, value: Any) -> Any:
-        """The value in the form in which the settings store it. Raises InputError, which names the path and
-        the allowed values, for a value that is not allowed."""
+        """Returns the value in the form in which the settings store it. Raises InputError, which names the
+        path and the allowed values, for a value that is not allowed."""
         return self.form.fit(path, value) if self.own_fit is None else self.own_fit(settings, path, value)
 
     def element(self, at: int, count: int) -> Place:
-        """The place of one of the `count` numbers of a list. If the settings have fewer numbers, the list is
-        first filled up with its last number."""
+        """Returns the place of one of the `count` numbers of a list. If the settings have fewer numbers, the
+        list is first filled up with its last number."""
 
         def spread(settings: Any) -> list[Any]:
             now = self.read(settings)
@@ -92,17 +92,17 @@ class SceneSettings(ABC):
 
     @abstractmethod
     def places(self) -> Mapping[str, Place]:
-        """The place of every path. All settings whose levels, tasks and options have the same names share a
-        table."""
+        """Returns the place of every path. All settings whose levels, tasks and options have the same names
+        share a table."""
 
     def elements(self, path: str) -> int:
-        """The number of elements of a path that can be changed one by one, such as "M_bar.3"; 0: there are
-        none."""
+        """Returns the number of elements of a path that can be changed one by one, such as "M_bar.3"; 0:
+        there are none."""
         return 0
 
     def place(self, path: str) -> Place:
-        """The place of a path; the path may also be one element of a value, such as M_bar.3, which `places`
-        does not contain. Raises InputError, which names the nearest path, for an unknown path.
+        """Returns the place of a path; the path may also be one element of a value, such as M_bar.3, which
+        `places` does not contain. Raises InputError, which names the nearest path, for an unknown path.
         """
         places = self.places()
         if path in places:
@@ -116,7 +116,7 @@ class SceneSettings(ABC):
         return places[whole].element(int(at) - 1, count)
 
     def entry(self, path: str) -> Entry:
-        """The description of a path for users."""
+        """Returns the description of a path for users."""
         return entry_at(self.entries, path)
 
     def special_differences(self, wanted: Any) -> list[tuple[str, Any]]:
@@ -130,15 +130,16 @@ class SceneSettings(ABC):
         return []
 
     def takes(self, event: Event) -> bool:
-        """Whether an event changes settings and not only the robot's task."""
+        """Returns whether an event changes settings and not only the robot's task."""
         return isinstance(event, Set)
 
     def after(self, event: Event) -> Self:
-        """The settings that remain after an event when the run is reset. Raises InputError like `changed`."""
+        """Returns the settings that remain after an event when the run is reset. Raises InputError like
+        `changed`."""
         return self.changed(event.path, event.value) if isinstance(event, Set) else self
 
     def changed(self, path: str, value: Any) -> Self:
-        """The settings with the value at a path replaced.
+        """Returns the settings with the value at a path replaced.
 
         Raises:
             InputError: unknown path (naming the nearest), or a value of the wrong type or range.
@@ -147,17 +148,18 @@ class SceneSettings(ABC):
         return place.write(self, place.fit(self, path, value))
 
     def as_data(self) -> dict[str, Any]:
-        """All settings as JSON-ready data."""
+        """Returns all settings as JSON-ready data."""
         data = asdict(self)  # pyright: ignore[reportArgumentType]  # every subclass is a dataclass
         return json.loads(json.dumps(data, default=str))
 
     def paths(self) -> list[str]:
-        """Every path that `changed` accepts, except paths of single numbers in lists and of obstacles."""
+        """Returns every path that `changed` accepts, except paths of single numbers in lists and of
+        obstacles."""
         return list(self.places())
 
     def value_at(self, path: str) -> Any:
-        """The value at a path; for a path to several values, the first of them. Raises InputError like
-        `place`."""
+        """Returns the value at a path; for a path to several values, the first of them. Raises InputError
+        like `place`."""
         return self.place(path).read(self)
 
 
@@ -168,8 +170,8 @@ Whole = Callable[[S, Any], S]
 def field_places(
     owner: type[Any], read: Part[S], write: Whole[S], prefix: str = "", without: tuple[str, ...] = ()
 ) -> dict[str, Place]:
-    """A place for each field of a dataclass that is part of the settings; the annotation of the field gives
-    its form.
+    """Returns a place for each field of a dataclass that is part of the settings; the annotation of the field
+    gives its form.
 
     Args:
         owner: the dataclass.
@@ -203,7 +205,7 @@ class LevelKey:
 
 
 def level_key(name: str) -> LevelKey:
-    """The key of a field of Level."""
+    """Returns the key of a field of Level."""
     return LevelKey(
         lambda level: getattr(level, name),
         lambda level, value: replace(level, **{name: value}),
@@ -217,7 +219,8 @@ def level_places(
     read: Callable[[S], Stack],
     write: Callable[[S, Stack], S],
 ) -> dict[str, Place]:
-    """Places "levels.NAME.KEY" and, as shorthands, "levels.PLACE.KEY" with 1 for the highest priority."""
+    """Returns the places of the settings of levels by path: "levels.NAME.KEY" and the shorthand
+    "levels.NUMBER.KEY", in which 1 is the highest priority."""
 
     def place(find: Callable[[Stack], int], key: LevelKey, by_place: bool) -> Place:
         def put(settings: S, value: Any) -> S:
@@ -245,7 +248,7 @@ def level_places(
 
 
 def every_level(key: str, read: Callable[[S], Stack], write: Callable[[S, Stack], S]) -> Place:
-    """A weight of all levels at once: one number, or one per level."""
+    """Returns a weight of all levels at once: one number, or one per level."""
 
     form = form_of(field_types(Level)[key])
 
@@ -267,7 +270,8 @@ def every_level(key: str, read: Callable[[S], Stack], write: Callable[[S, Stack]
 
 
 def settings_after(settings: S, events: Iterable[Event]) -> S:
-    """The settings after some events, as they remain when the run is reset. Most events change only the run.
+    """Returns the settings after some events, as they remain when the run is reset. Most events change only
+    the run.
 
     Args:
         settings: the settings before the events.

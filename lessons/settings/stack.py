@@ -32,7 +32,7 @@ NONE: Own = MappingProxyType({})
 
 
 def read_stack(value: Any, before: Stack, own: Own = NONE) -> Stack:
-    """A stack from a list with one entry per level, highest priority first.
+    """Returns a stack from a list with one entry per level, highest priority first.
 
     An entry is a task, {"task": KIND, "name": …, …} with the fields of its kind, K_p and K_v; a list of tasks
     of equal priority; or {"tasks": […]}. An entry may also have Q, R, horizon and enabled. For a user's file
@@ -56,7 +56,7 @@ def read_stack(value: Any, before: Stack, own: Own = NONE) -> Stack:
 
 
 def told(stack: Stack, own: Own = NONE) -> list[dict[str, Any]]:
-    """A stack as data from which `read_stack` makes the same stack again.
+    """Returns a stack as data from which `read_stack` makes the same stack again.
 
     Raises:
         InputError: the kind of a task has no name.
@@ -65,7 +65,8 @@ def told(stack: Stack, own: Own = NONE) -> list[dict[str, Any]]:
 
 
 def same_tasks(one: Stack, other: Stack) -> bool:
-    """Whether two stacks have the same levels with the same tasks; order, gains and weights do not count."""
+    """Returns whether two stacks have the same levels with the same tasks; order, gains and weights do not
+    count."""
     return _tasks(one) == _tasks(other)
 
 
@@ -77,8 +78,8 @@ def _tasks(stack: Stack) -> dict[str, list[Task]]:
 
 
 def level_of(entry: Any, before: Stack, taken: list[str], own: Own) -> Level:
-    """A level from an entry; see `read_stack`. taken: names of tasks, to which the names of the new level's
-    tasks are added."""
+    """Returns a level from an entry; see `read_stack`. taken: names of tasks, to which the names of the new
+    level's tasks are added."""
     given = (
         {"tasks": list(entry)}
         if isinstance(entry, (list, tuple))
@@ -100,7 +101,7 @@ def level_of(entry: Any, before: Stack, taken: list[str], own: Own) -> Level:
 
 
 def _made(entry: Any, before: Stack, taken: list[str], own: Own) -> list[Task]:
-    """The task of an entry, or the two tasks of a pose."""
+    """Returns the task of an entry, or the two tasks of a pose."""
     given = entry_of(entry, "a task of the stack")
     word = given.pop("task", None)
     template = _of_file(word, own)
@@ -123,8 +124,8 @@ def _made(entry: Any, before: Stack, taken: list[str], own: Own) -> list[Task]:
 
 
 def _of_file(word: Any, own: Own) -> Task | None:
-    """The task of a user's file. The word is the path of the file, the file's fingerprint in a code, or the
-    name of the task's class. None for one of the lab's kinds."""
+    """Returns the task of a user's file. The word is the path of the file, the file's fingerprint in a code,
+    or the name of the task's class. None for one of the lab's kinds."""
     if not isinstance(word, str) or word in KINDS:
         return None
     if ".py@" in word:
@@ -147,7 +148,7 @@ def fields_of(of: type[Task], given: Mapping[str, Any], what: str) -> dict[str, 
 
 
 def _gains(of: type[Task], name: str, before: Stack) -> dict[str, Any]:
-    """The gains of the task of that name, else those of the first task, which suit the robot."""
+    """Returns the gains of the task of that name, else those of the first task, which suit the robot."""
     known = {task.name: task for level in before for task in level.tasks}
     like = known.get(name) or next(iter(known.values()), None)
     own = {each.name: each.default for each in fields(of)}
@@ -157,7 +158,7 @@ def _gains(of: type[Task], name: str, before: Stack) -> dict[str, Any]:
 
 
 def _free(word: str, suffixes: tuple[str, ...], taken: list[str]) -> str:
-    """The kind's name, followed by a number if that name is taken."""
+    """Returns the kind's name, followed by a number if that name is taken."""
     word = "rest" if word == DAMPING_LEVEL.name else word
     names = (word, *(f"{word}_{count}" for count in range(2, 2 * MOST_TASKS)))
     return next(name for name in names if not {name + suffix for suffix in suffixes} & set(taken))
@@ -201,7 +202,7 @@ def quoted(value: Any) -> str:
 
 
 def one(value: Any) -> Any:
-    """One value for all coordinates, for a task whose number of coordinates will change."""
+    """Returns one value for all coordinates, for a task whose number of coordinates will change."""
     return value[0] if isinstance(value, tuple) else value
 
 

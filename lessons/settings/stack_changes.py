@@ -36,7 +36,7 @@ def add(stack: Stack, value: Any, own: Own = NONE) -> Stack:
 
 
 def remove(stack: Stack, value: Any) -> Stack:
-    """The stack without the task of that name; a level that has no tasks left is removed, too."""
+    """Returns the stack without the task of that name; a level that has no tasks left is removed, too."""
     at, task = _find(stack, value)
     rest = tuple(each for each in stack[at].tasks if each is not task)
     kept = (replace(stack[at], tasks=rest, Q=one(stack[at].Q)),) if rest else ()
@@ -108,7 +108,7 @@ def _find(stack: Stack, name: Any) -> tuple[int, Task]:
 
 
 def _place_of(stack: Stack, name: Any) -> int:
-    """The index of the level of that name, or of the level with a task of that name."""
+    """Returns the index of the level of that name, or of the level with a task of that name."""
     for at, level in enumerate(stack):
         if name == level.name or any(task.name == name for task in level.tasks):
             return at

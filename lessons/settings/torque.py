@@ -49,7 +49,7 @@ class SceneOptions(ABC):
 
     @abstractmethod
     def references(self, robot: Robot, stack: Stack) -> Mapping[str, Reference]:
-        """A fresh reference per task name, like `TorqueScene.references`."""
+        """Returns a fresh reference per task name, like `TorqueScene.references`."""
 
 
 Milliseconds = Annotated[float, Range(0.0, 1e3)]
@@ -105,7 +105,7 @@ class TorqueSettings(SceneSettings):
         return CONTROLLERS | dict.fromkeys(self.files, "a controller of your own, in a file of this machine")
 
     def for_controller(self) -> ControllerSettings:
-        """The part of the settings for the controller. Raises InputError for invalid values."""
+        """Returns the part of the settings for the controller. Raises InputError for invalid values."""
         if self.controller not in self.controllers:
             raise unknown_name("controller", self.controller, by_name(self.controllers))
         check_fields(self)
@@ -124,7 +124,7 @@ class TorqueSettings(SceneSettings):
         )
 
     def is_late(self, measured_ms: float) -> bool:
-        """Whether a torque with this computing time misses its deadline."""
+        """Returns whether a torque with this computing time misses its deadline."""
         assumed = self.solve_ms_per_knot * self.horizon
         # N times a decimal fraction has a rounding error. A torque that exactly meets its deadline must
         # not count as late.
@@ -241,7 +241,7 @@ def _gain(name: str, key: str) -> Place:
 
 
 def _stack_place(change: Callable[[TorqueSettings, Any], Stack], read: Callable[..., Any] = _levels) -> Place:
-    """A place at which a written value changes the stack."""
+    """Returns a place at which a written value changes the stack."""
     return Place(
         read, _with("levels"), Form(None, WORD), lambda s, _, value: change(s, value), shorthand=True
     )

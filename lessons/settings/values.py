@@ -38,7 +38,7 @@ class Form:
     range: Range = ANY
 
     def __str__(self) -> str:
-        """Text for users: "a whole number from 1 to 60"; "viability, paper or off"."""
+        """Returns text for users: "a whole number from 1 to 60"; "viability, paper or off"."""
         found = [] if self.kind is None else [self._one(self.kind)]
         if self.elements is not None:
             found.append(
@@ -55,8 +55,8 @@ class Form:
         return f"a {kind} {self.range}".strip()
 
     def fit(self, path: str, value: Any) -> Any:
-        """The value in the form in which it is stored. Raises InputError, which names the path and the
-        allowed values, for a value that is not allowed."""
+        """Returns the value in the form in which it is stored. Raises InputError, which names the path and
+        the allowed values, for a value that is not allowed."""
         if value is None and self.null:
             return None
         if isinstance(value, (list, tuple, np.ndarray)) and self.elements is not None:
@@ -86,7 +86,8 @@ class Form:
 
 @cache
 def form_of(hint: Any) -> Form:
-    """The allowed values of a field of a declared type: a number, word or switch, a list of them, null."""
+    """Returns the allowed values of a field of a declared type: a number, word or switch, a list of them,
+    null."""
     inner, allowed = plain(hint)
     kind: str | None = None
     elements: str | None = None
@@ -116,7 +117,7 @@ def _quoted(value: Any) -> str:
 
 
 def peak(values: NDArray[np.float64]) -> float | None:
-    """The largest finite value, None if there is none."""
+    """Returns the largest finite value, None if there is none."""
     found = values[np.isfinite(values)]
     return float(found.max()) if found.size else None
 

@@ -64,7 +64,8 @@ class VelocitySettings(SceneSettings):
             raise unknown_name("velocity-level controller", self.controller, VELOCITY_CONTROLLERS)
 
     def felt(self, solve_ms: float) -> VelocityPlantSettings:
-        """The plant on which the commands of a plan act if the computation of the plan took this many ms."""
+        """Returns the plant on which the commands of a plan act if the computation of the plan took this many
+        ms."""
         if not self.delay_measured:
             return self.plant
         return replace(self.plant, delay_ms=min(self.plant.delay_ms + solve_ms, LONGEST_DELAY))
@@ -101,7 +102,7 @@ class VelocitySettings(SceneSettings):
         return self.with_obstacle(event.ball()) if isinstance(event, Appear) else super().after(event)
 
     def places(self) -> Mapping[str, Place]:
-        """A field of HTMPCSettings ("horizon", "delta_m", "formulation", …), "controller",
+        """Returns a field of HTMPCSettings ("horizon", "delta_m", "formulation", …), "controller",
         "compensate_delay", "delay_measured", the fields of the scene's options ("peak", "seats", …; "order"
         takes effect when a run starts), "limits.KEY", "plant.KEY", "Q" for all levels (a new formulation sets
         its own), "levels.NAME.Q|enabled" with the level's name or its place 1 … r."""
@@ -140,7 +141,7 @@ class VelocitySettings(SceneSettings):
         return told
 
     def with_obstacle(self, obstacle: Obstacle) -> VelocitySettings:
-        """The settings with an obstacle added, or with the obstacle of this name replaced."""
+        """Returns the settings with an obstacle added, or with the obstacle of this name replaced."""
         obstacles = (*_without(self.htmpc.obstacles, obstacle.name), obstacle)
         return _with_htmpc(self, replace(self.htmpc, obstacles=obstacles))
 

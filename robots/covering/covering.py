@@ -107,7 +107,8 @@ def _parts(surfaces: list[Patch]) -> list[Body]:
 
 
 def _inside(small: Capsule, large: Capsule) -> bool:
-    """Whether the first capsule is contained in the second one, which is larger and on the same body."""
+    """Returns whether the first capsule is contained in the second one, which is larger and on the same
+    body."""
     if small.joint != large.joint or small.radius >= large.radius:
         return False
     ends = np.array([small.start, small.end])

@@ -50,7 +50,7 @@ def localise(root: Element, folder: Path | None, within: Path | None = None) -> 
 
 
 def has_meshes(text: str) -> bool:
-    """Whether a canonical URDF names mesh files; it takes time to read them."""
+    """Returns whether a canonical URDF names mesh files; it takes time to read them."""
     return next(etree.fromstring(text.encode()).iterfind("link/*/geometry/mesh"), None) is not None
 
 

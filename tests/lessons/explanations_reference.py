@@ -16,7 +16,7 @@ REFERENCE = (
         ("himpc/controllers/nhimpc.py", "The problem is then nonlinear, because"),
         ("himpc/controllers/null_space_control.py", "There is no QP, so the KKT residual is NaN."),
         ("himpc/controllers/one_step.py", "accelerations: q̈_p (n,)"),
-        ("himpc/limits/braking.py", "The least slack of the rows of velocity"),
+        ("himpc/limits/braking.py", "Returns the least slack of the rows of velocity"),
         ("himpc/tasks/pointing.py", "s = Rᵀ(c − p) is the point in the frame's coordinates"),
         ("lessons/papers/reproduce.py", "*agrees*: the ratio is within 10 % of 1"),
         ("lessons/session/session.py", "seed: seed of the run; all randomness comes from it"),

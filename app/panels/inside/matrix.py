@@ -58,7 +58,7 @@ class MatrixPanel:
 
 
 def markup(matrix: Matrix, names: Sequence[str]) -> str:
-    """SVG of the heat map: cells coloured by sign and size, lines between knots, and a mark at every
+    """Returns SVG of the heat map: cells coloured by sign and size, lines between knots, and a mark at every
     increment with an active bound."""
     k = len(matrix.shade)
     cell = _SIDE / k

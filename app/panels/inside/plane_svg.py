@@ -43,7 +43,7 @@ def half_width(plane: Plane, before: float | None) -> float:
 
 
 def _round(size: float) -> float:
-    """The next larger round number."""
+    """Returns the next larger round number."""
     scale = 10.0 ** math.floor(math.log10(size))
     return next(
         scale * digit
@@ -73,8 +73,8 @@ def _bounded(value: float, half: float) -> float:
 
 
 def parts(plane: Plane, half: float, colours: Mapping[str, RGB], joints: Sequence[str]) -> list[str]:
-    """SVG layers that change at different times, from back to front. joints: names of the joint of the
-    horizontal axis and of the joint of the vertical axis."""
+    """Returns SVG layers that change at different times, from back to front. joints: names of the joint of
+    the horizontal axis and of the joint of the vertical axis."""
     paper = _Paper(half)
     clip = f'<clipPath id="plane"><rect x="{_LEFT}" y="{_TOP}" width="{_SIDE}" height="{_SIDE}"/></clipPath>'
     inner = [_box(plane, paper)]
@@ -137,7 +137,7 @@ def _box(plane: Plane, paper: _Paper) -> str:
 
 
 def _sides(plane: Plane, paper: _Paper) -> str:
-    """The names of the limits at the visible sides of the box."""
+    """Returns the names of the limits at the visible sides of the box."""
     left, top, right, bottom = _corners(plane, paper)
     (w, e), (s, n) = plane.box.kinds
     x = min(max(0.5 * (left + right), _LEFT + 30), _LEFT + _SIDE - 30)
@@ -185,7 +185,8 @@ def _contours(level: LevelCut, place: int, paper: _Paper, colours: Mapping[str, 
 
 
 def _left(level: LevelCut, plane: Plane, place: int, paper: _Paper, colours: Mapping[str, RGB]) -> str:
-    """The set that a level leaves to the levels below: a point, or a line that is thick within the box."""
+    """Returns the set that a level leaves to the levels below: a point, or a line that is thick within the
+    box."""
     left, colour = level.leaves, css(colours.get(level.name, BOUND))
     if left.at is None or left.span.shape[1] == 2:
         return ""
@@ -254,7 +255,7 @@ def _mark(
     shift: tuple[float, float],
     hollow: bool = False,
 ) -> str:
-    """A mark at a point; if the point is outside the picture, an arrow at the edge points to it."""
+    """Returns a mark at a point; if the point is outside the picture, an arrow at the edge points to it."""
     exact = ",".join(f"{value:.10g}" for value in w)
     if not np.isfinite(w).all():
         return ""

@@ -38,8 +38,8 @@ class SpectrumPicture:
 
 
 def markup(values: np.ndarray | Sequence[float]) -> str:
-    """SVG with a mark for each eigenvalue; all eigenvalues are real. Marks outside the picture are drawn at
-    its edge. The attribute data-at contains the value."""
+    """Returns SVG with a mark for each eigenvalue; all eigenvalues are real. Marks outside the picture are
+    drawn at its edge. The attribute data-at contains the value."""
     x0, y0 = _MIDDLE
     ring = f'<circle cx="{x0}" cy="{y0}" r="{_RADIUS}" fill="{css(GOOD, 0.08)}" stroke="{css(BOUND)}"/>'
     far, high = _EDGE * _RADIUS, _RADIUS + 8

@@ -79,7 +79,8 @@ def _button(
 
 
 def _offer(lesson: Lesson, progress: LearnerProgress) -> tuple[str, int]:
-    """The label of the button ("Start", "Continue" or "Again") and the index of the step that it opens."""
+    """Returns the label of the button ("Start", "Continue" or "Again") and the index of the step that it
+    opens."""
     seen = progress.seen.get(lesson.name, frozenset())
     parts = len(parts_of(lesson))
     place = progress.next_place(lesson.name, parts)
@@ -120,7 +121,7 @@ def _framed(picture: str, words: str) -> str:
 
 @cache
 def glyph(name: str) -> str:
-    """The icon of a lesson: SVG in the colour of the surrounding text."""
+    """Returns the icon of a lesson: SVG in the colour of the surrounding text."""
     folder = files("app.panels.lesson") / "glyphs"
     found = folder / f"{name}.svg"
     return (found if found.is_file() else folder / "lesson.svg").read_text(encoding="utf-8")

@@ -20,7 +20,7 @@ Part = Step | Challenge
 
 
 def heading(exercise: LessonPlace) -> str:
-    """The heading: the lesson, the number of the step and the number of steps."""
+    """Returns the heading: the lesson, the number of the step and the number of steps."""
     lesson = exercise.whole
     parts = parts_of(lesson)
     names = [part.title if isinstance(part, Step) else "Challenge" for part in parts]
@@ -39,7 +39,7 @@ def heading(exercise: LessonPlace) -> str:
 
 
 def idea(part: Part, opened: bool) -> str:
-    """The text of the idea; it is folded after the run, so that the results come first."""
+    """Returns the text of the idea; it is folded after the run, so that the results come first."""
     words = rendered(part.text)
     if isinstance(part, Step) and part.ghost is not None:
         words += f'<p style="opacity:0.8">Ghost, the dashed grey curve: <b>{esc(part.ghost.words)}</b>.</p>'
@@ -48,7 +48,7 @@ def idea(part: Part, opened: bool) -> str:
 
 
 def state(part: Part, lecture: Lecture, best: float | None) -> str:
-    """The progress of the run, the claims or goals, the curves, and a challenge's points."""
+    """Returns the progress of the run, the claims or goals, the curves, and a challenge's points."""
     challenge = isinstance(part, Challenge)
     claims = part.goals if isinstance(part, Challenge) else part.claims
     html = "" if lecture.phase == "waiting" and not challenge else _progress(lecture)
@@ -61,7 +61,7 @@ def state(part: Part, lecture: Lecture, best: float | None) -> str:
 
 
 def after(part: Part, lecture: Lecture) -> str:
-    """The explanation of the result, and what to do now."""
+    """Returns the explanation of the result, and what to do now."""
     if isinstance(part, Challenge):
         return ""
     return block(
@@ -149,7 +149,7 @@ def _points(challenge: Challenge, lecture: Lecture, best: float | None) -> str:
 
 
 def pictures(part: Part, lecture: Lecture) -> str:
-    """The signals of the step, plotted over the run."""
+    """Returns the signals of the step, plotted over the run."""
     if not lecture.curves:
         return block("The curves of the run appear here: run this step (key P) to see them.")
     claims = part.goals if isinstance(part, Challenge) else part.claims
@@ -179,7 +179,7 @@ def _unit(signal: Signal) -> str:
 
 
 def _bounds(claims: tuple[Claim, ...], signal: Signal) -> list[Bound]:
-    """The bounds in claims about the largest or the last value of the signal itself."""
+    """Returns the bounds in claims about the largest or the last value of the signal itself."""
     return [
         Bound(claim.bound, claim.text)
         for claim in claims

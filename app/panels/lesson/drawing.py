@@ -18,7 +18,7 @@ GUESS, TRUTH = LEVELS[0], LEVELS[1]
 
 
 def scale(low: float, high: float, guess: float | None, truth: float | None, factor: float, unit: str) -> str:
-    """A logarithmic scale with the guess, the measured value, and the range of right answers."""
+    """Returns a logarithmic scale with the guess, the measured value, and the range of right answers."""
 
     def x(value: float) -> float:
         share = math.log(max(value, 1e-300) / low) / math.log(high / low)
@@ -58,7 +58,7 @@ def chart(
     bounds: Sequence[Bound],
     until: float,
 ) -> str:
-    """A signal over the run, with the ghost's curve (dashed) and reference lines (dotted)."""
+    """Returns a signal over the run, with the ghost's curve (dashed) and reference lines (dotted)."""
     shown = [curve.values, *([ghost.values] if ghost is not None else [])]
     values = np.concatenate([each[np.isfinite(each)] for each in shown])
     if not values.size:
@@ -90,7 +90,7 @@ def sketch(
     truth: SignalCurve | None,
     unit: str,
 ) -> str:
-    """The curve that the learner draws, with the measured curve over it."""
+    """Returns the curve that the learner draws, with the measured curve over it."""
     frame = _Frame((low, high, False), until, height=130, top=16, left=40)
     times, values = (np.array(column, float) for column in zip(*points, strict=True))
     parts = [
@@ -133,7 +133,7 @@ class _Frame(NamedTuple):
         return self.height - 14 - (self.height - 14 - self.top) * min(max(share, 0.0), 1.0)
 
     def axes(self, low: str, high: str) -> list[str]:
-        """The axes, with the labels of their ends."""
+        """Returns the axes, with the labels of their ends."""
         corner = f"M{self.left} {self.top}V{self.height - 14}H{_W - 6}"
         return [
             f'<path d="{corner}" stroke="{css(BOUND)}" fill="none"/>',
@@ -143,7 +143,7 @@ class _Frame(NamedTuple):
         ]
 
     def line(self, curve: SignalCurve, colour: RGB, dashes: str = "none") -> str:
-        """A curve, with gaps where it is not finite."""
+        """Returns a curve, with gaps where it is not finite."""
         pieces, pen = [], "M"
         for t, value in zip(curve.t.tolist(), curve.values.tolist(), strict=True):
             if not math.isfinite(value):

@@ -13,7 +13,7 @@ from lessons.exercises.exercise import Exercise
 
 
 def exercise_cards() -> str:
-    """The cards of all exercises, in order."""
+    """Returns the cards of all exercises, in order."""
     said = (
         f"<b>{len(EXERCISES)} exercises</b>: write the missing lines of a controller in a file of your own. "
         "This page runs the file whenever you save it. The last command judges the robot's motion."
@@ -22,12 +22,12 @@ def exercise_cards() -> str:
 
 
 def belonging_to(lesson: str) -> str:
-    """The cards of the exercises that belong to a lesson; "" if there are none."""
+    """Returns the cards of the exercises that belong to a lesson; "" if there are none."""
     return "".join(block(f"<b>Write it yourself.</b> {card(each)}") for each in exercises_of(lesson))
 
 
 def card(exercise: Exercise) -> str:
-    """The card of one exercise."""
+    """Returns the card of one exercise."""
     lesson = load_lesson(exercise.lesson).card.title
     lines = "<br>".join(f"<code>{esc(each)}</code>" for each in exercise.commands())
     return block(
@@ -49,7 +49,7 @@ def _judged_by(exercise: Exercise) -> str:
 
 
 def _hints(hints: Sequence[str], number: int = 1) -> str:
-    """The first hint as a folded element, which contains the next hint."""
+    """Returns the first hint as a folded element, which contains the next hint."""
     if not hints:
         return ""
     first = rendered_line(hints[0])

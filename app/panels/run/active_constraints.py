@@ -58,7 +58,8 @@ class BindingPanel:
 
 
 def readable(pair: str) -> str:
-    """The names of a pair as words: "link 5 – table" for "link_5 – table". A joint's name is not changed."""
+    """Returns the names of a pair as words: "link 5 – table" for "link_5 – table". A joint's name is not
+    changed."""
     return pair.replace("_", " ") if " – " in pair else pair
 
 

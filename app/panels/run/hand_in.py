@@ -15,7 +15,8 @@ from robots import InputError
 
 
 def add_hand_in(gui: viser.GuiApi, learner: SimulationClient, notebook: Notebook) -> None:
-    """Adds a folder to the current container. The text is made on request, on viser's threads."""
+    """Adds the folder with which learners hand in their progress. The text to hand in is written when the
+    learner asks for it, on one of viser's threads."""
     with gui.add_folder("Hand in your progress", expand_by_default=False):
         told = f" The text names your account, <b>{escape(notebook.account)}</b>." if notebook.account else ""
         gui.add_html(block((_SIGNED if notebook.signs else _NOT_SIGNED) + told))

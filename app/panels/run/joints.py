@@ -96,7 +96,7 @@ class JointPlots:
     def _curves(
         self, at_bound: np.ndarray, kind: int, joint: int | None, own: _Quantity, other: _Quantity | None
     ) -> list[np.ndarray]:
-        """The curves of a chart: values, upper and lower bound, marks at the bottom, and the ghost's
+        """Returns the curves of a chart: values, upper and lower bound, marks at the bottom, and the ghost's
         values."""
         if joint is None:
             edge = np.where(np.isfinite(own.values[:, 0]), 100.0, np.nan)
@@ -201,7 +201,7 @@ class JointPlots:
 
 
 def _sheet(robot: Robot, driven: Input) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
-    """The bounds of the robot's data sheet; ± one turn for a joint without position bounds."""
+    """Returns the bounds of the robot's data sheet; ± one turn for a joint without position bounds."""
     own = robot.tau_limit if driven is TORQUE else robot.a_max
     u = np.where(np.isfinite(own), own, 1e3)
     v = np.where(np.isfinite(robot.v_limit), robot.v_limit, 1e2)

@@ -49,7 +49,7 @@ class Facts:
 
 
 def facts_of(now: SessionSnapshot[SceneSettings]) -> Facts:
-    """The facts of a snapshot."""
+    """Returns the facts of a snapshot."""
     status = now.status
     fields = now.ready.layout.fields
     return Facts(
@@ -97,7 +97,7 @@ class Narration:
         return said[0].upper() + said[1:] + "."
 
     def _reached(self, now: Facts) -> list[str]:
-        """Active limits that were not announced recently."""
+        """Returns active limits that were not announced recently."""
         t = self._clock()
         limits = sorted(each for each in now.limits if each[0] != _GUARD)
         new = [each for each in limits if t - self._limits.get(each, -math.inf) > _QUIET]

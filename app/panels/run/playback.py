@@ -139,7 +139,7 @@ class PlaybackPanel:
 
 
 def _of_arm(status: Status, arm: ArmView) -> str:
-    """The status line of an arm."""
+    """Returns the status line of an arm."""
     if not arm.begun:
         return f"{badge('ARM', LEVELS[1])} &nbsp;at rest: Run starts the control; the arm holds its position"
     state = badge("ARM STOPPED", BAD) if arm.ended else badge("ARM RUNNING", GOOD)

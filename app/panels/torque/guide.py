@@ -14,7 +14,7 @@ from himpc.stack import Level
 def guide(
     tasks: tuple[TaskView, ...], levels: Sequence[Level], colours: Mapping[str, RGB], dragged: bool
 ) -> str:
-    """HTML that suggests what to try next, with the present names and places of the levels.
+    """Returns HTML that suggests what to try next, with the present names and places of the levels.
 
     Args:
         tasks: the tasks of the stack.
@@ -84,7 +84,7 @@ def _listed(places: Mapping[str, int]) -> str:
 
 
 def spoken(level: str) -> str:
-    """The name of a level as words."""
+    """Returns the name of a level as words."""
     return level.replace("+", " and ").replace("_", " ")
 
 

@@ -94,5 +94,5 @@ def _add_slider(
 
 
 def _inside(low: float, factor: float, digits: int) -> float:
-    """The smallest number with `digits` decimals that is not below a limit."""
+    """Returns the smallest number with `digits` decimals that is not below a limit."""
     return float(np.ceil(low * factor * 10**digits - 1e-6) / 10**digits)

@@ -101,7 +101,7 @@ def _title(place: int, name: str) -> str:
 
 
 def _rank(found: tuple[int, int] | None) -> str:
-    """A sentence with the number of directions that the level gets, and the number of its rows."""
+    """Returns a sentence with the number of directions that the level gets, and the number of its rows."""
     if found is None:
         return ""
     rank, rows = found

@@ -47,7 +47,7 @@ class LevelPlots:
         self._build(self._shown[0])
 
     def _wanted(self, ghost: bool) -> tuple[bool, bool, bool]:
-        """Whether there is a ghost, whether contacts are marked, and whether distances are drawn."""
+        """Returns whether there is a ghost, whether contacts are marked, and whether distances are drawn."""
         kept = self._settings.limits.avoidance.on
         return ghost, self._settings.plant.contacts, kept or self._furnished
 
@@ -99,7 +99,7 @@ class LevelPlots:
             near.show(window, lambda: _distances(window, windows))
 
     def _only_simulated(self, ghost: bool) -> bool:
-        """Whether the chart shows only the leaks of the simulation. The leaks of a measured arm are
+        """Returns whether the chart shows only the leaks of the simulation. The leaks of a measured arm are
         unknown."""
         return self._measured and ghost
 
@@ -145,6 +145,7 @@ def _distances(window: PlotWindow, windows: list[PlotWindow]) -> list[np.ndarray
 
 
 def touching(window: PlotWindow) -> np.ndarray:
-    """The top of the axis of errors while the robot touches something, otherwise the bottom of the axis."""
+    """Returns the top of the axis of errors while the robot touches something, otherwise the bottom of the
+    axis."""
     force = window.columns(window.layout.fields["contact_force"])[:, 0]
     return np.where(np.nan_to_num(force) > 0.0, _ERROR[1], 0.0)

@@ -126,7 +126,7 @@ class TasksPanel:
         self._add.choose(frame)
 
     def toggle(self, place: int) -> Set | None:
-        """The event for the hotkey of an index (0-based); None if there is no such level."""
+        """Returns the event for the hotkey of an index (0-based); None if there is no such level."""
         levels = {level.name: level for level in self._current().levels}
         names = self._order.now(tuple(levels))
         if place >= len(names) or names[place] not in levels:

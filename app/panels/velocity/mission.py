@@ -142,12 +142,12 @@ def swap(rows: tuple[MissionRow, ...], post: Send) -> None:
 
 
 def _options(*names: str) -> tuple[str, ...]:
-    """The options of a menu, which must not be empty."""
+    """Returns the options of a menu, which must not be empty."""
     return names or (_NOTHING,)
 
 
 def _waiting(rows: tuple[MissionRow, ...]) -> MissionRow | None:
-    """The first open task, if it lasts until it is released; otherwise None."""
+    """Returns the first open task, if it lasts until it is released; otherwise None."""
     first = next((row for row in rows if row.state != "done"), None)
     return first if first is not None and first.hold is None else None
 

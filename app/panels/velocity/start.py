@@ -105,12 +105,12 @@ class BeginPanel:
 
 
 def last_ball(settings: VelocitySettings) -> Ball | None:
-    """The newest ball among the obstacles."""
+    """Returns the newest ball among the obstacles."""
     return next((each for each in reversed(settings.htmpc.obstacles) if isinstance(each, Ball)), None)
 
 
 def guide(scene: str, drives: bool, places: Mapping[str, float], dragged: bool) -> str:
-    """HTML that suggests what to try next.
+    """Returns HTML that suggests what to try next.
 
     Args:
         scene: the name of the scene.

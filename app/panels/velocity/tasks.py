@@ -43,7 +43,7 @@ class RolesPanel:
         ]
 
     def toggle(self, place: int) -> Set | None:
-        """The event for the hotkey of an index (0-based); None if there is no such level."""
+        """Returns the event for the hotkey of an index (0-based); None if there is no such level."""
         if place >= len(self._order):
             return None
         name = self._order[place]

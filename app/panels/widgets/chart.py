@@ -52,13 +52,13 @@ class ChartLine:
     dash: tuple[float, ...] = ()
 
     def of_ghost(self) -> ChartLine:
-        """The line of the ghost for the same quantity."""
+        """Returns the line of the ghost for the same quantity."""
         finer = tuple(0.5 * length for length in self.dash) or _GHOST_DASH
         return replace(self, label=f"{self.label}, ghost", width=1.3, dash=finer)
 
 
 def of_ghost(lines: Sequence[ChartLine], ghost: bool) -> list[ChartLine]:
-    """The lines of the ghost; empty if there is no ghost."""
+    """Returns the lines of the ghost; empty if there is no ghost."""
     return [line.of_ghost() for line in lines] if ghost else []
 
 
@@ -170,8 +170,8 @@ class Chart:
 
 
 def _axis(span: tuple[float, float], log: bool) -> uplot.Axis:
-    """An axis with about five ticks, at powers of ten or at round numbers. The `span` of a logarithmic axis
-    consists of exponents."""
+    """Returns an axis with about five ticks, at powers of ten or at round numbers. The `span` of a
+    logarithmic axis consists of exponents."""
     low, high = span
     every = max(1.0, round((high - low) / _TICKS)) if log else _round((high - low) / _TICKS)
     places = [every * k for k in range(math.ceil(low / every - 1e-9), math.floor(high / every + 1e-9) + 1)]
@@ -185,7 +185,7 @@ def _power(exponent: float) -> str:
 
 
 def _round(step: float) -> float:
-    """The next larger number of the form 1, 2 or 5 times a power of ten."""
+    """Returns the next larger number of the form 1, 2 or 5 times a power of ten."""
     scale = 10.0 ** math.floor(math.log10(step))
     return next(scale * digit for digit in (1.0, 2.0, 5.0, 10.0) if scale * digit >= step - 1e-12 * scale)
 

@@ -183,19 +183,20 @@ def _add_choices(
 
 
 def _words(value: Any) -> str:
-    """The label of an option in a menu."""
+    """Returns the label of an option in a menu."""
     if isinstance(value, (list, tuple)):
         return ", ".join(map(_words, value))
     return figure(value) if isinstance(value, float) else str(value)
 
 
 def _step(low: float, high: float) -> float:
-    """The step of a slider: 1 or 5 times a power of ten, at most a two-hundredth of the range."""
+    """Returns the step of a slider: 1 or 5 times a power of ten, at most a two-hundredth of the range."""
     rough = (high - low) / 200
     power = 10.0 ** math.floor(math.log10(rough))
     return float(f"{(5 if rough >= 5 * power else 1) * power:.3g}")
 
 
 def _tenth(value: float) -> float:
-    """The step of a number input: a tenth of the value's decade. One click visibly changes any value."""
+    """Returns the step of a number input: a tenth of the value's decade. One click visibly changes any
+    value."""
     return 10.0 ** (len(f"{1 / max(value, 1e-6):.0f}") * -1.0) if value < 1 else 0.1

@@ -60,7 +60,7 @@ look();
 
 
 def tells_what_is_seen(updates: object) -> bool:
-    """Whether a write to a control comes from this script, not from a user."""
+    """Returns whether a write to a control comes from this script, not from a user."""
     value = updates.get("value") if isinstance(updates, Mapping) else None
     return isinstance(value, str) and value.partition("\n")[0] in (AWAKE, ASLEEP)
 
@@ -92,5 +92,5 @@ class InView:
         return self._titles is not None
 
     def sees(self, title: str) -> bool:
-        """Whether a chart with this title is visible."""
+        """Returns whether a chart with this title is visible."""
         return self._titles is None or title in self._titles

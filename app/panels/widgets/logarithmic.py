@@ -15,17 +15,17 @@ STEPS = 200
 
 
 def place_of(value: float, low: float, high: float) -> int:
-    """The position 0 … STEPS of a value on a logarithmic slider."""
+    """Returns the position 0 … STEPS of a value on a logarithmic slider."""
     share = math.log(max(value, 1e-300) / low) / math.log(high / low)
     return round(STEPS * min(max(share, 0.0), 1.0))
 
 
 def value_at(place: float, low: float, high: float) -> float:
-    """The value at a position of a logarithmic slider, with three digits."""
+    """Returns the value at a position of a logarithmic slider, with three digits."""
     return float(f"{low * (high / low) ** (place / STEPS):.3g}")
 
 
 def only_track(slider: viser.GuiSliderHandle[Any]) -> str:
-    """A style that hides the number box of a slider whose number is only a position."""
+    """Returns a style that hides the number box of a slider whose number is only a position."""
     here = f'[id="{dom_id(slider)}"]'
     return f"<style>{here} + {NUMBER_BOX},{here} {SLIDER_LABEL}{{display:none}}</style>"

@@ -105,7 +105,7 @@ class Bindings(Generic[S]):
 
 
 def on_scale(handle: viser.GuiInputHandle[Any]) -> Any:
-    """The control's value. A slider's value is limited to its range, since its number box accepts any
+    """Returns the control's value. A slider's value is limited to its range, since its number box accepts any
     number."""
     value, low, high = handle.value, getattr(handle, "min", None), getattr(handle, "max", None)
     if not isinstance(handle, viser.GuiSliderHandle) or low is None or high is None:
@@ -115,7 +115,8 @@ def on_scale(handle: viser.GuiInputHandle[Any]) -> Any:
 
 
 def scalar(value: object) -> float:
-    """The number that a slider shows. If the setting has one value per coordinate, this is their mean."""
+    """Returns the number that a slider shows. If the setting has one value per coordinate, this is their
+    mean."""
     if isinstance(value, (tuple, list)):
         return float(sum(value) / len(value))
     return float(value)  # pyright: ignore[reportArgumentType]

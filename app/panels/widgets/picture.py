@@ -79,5 +79,5 @@ class SvgPicture:
 
 
 def _script(value: object) -> str:
-    """The update as JavaScript."""
+    """Returns the update as JavaScript."""
     return json.dumps(value, ensure_ascii=False, separators=(",", ":"))

@@ -25,14 +25,14 @@ class SessionSnapshot(Generic[S_co]):
     bound_seconds: np.ndarray
 
     def field(self, name: str) -> np.ndarray:
-        """A field of the last row."""
+        """Returns a field of the last row."""
         return self.latest[self.ready.layout.fields[name]]
 
     def number(self, name: str) -> float:
-        """A scalar field of the last row; NaN if the layout has no field of this name."""
+        """Returns a scalar field of the last row; NaN if the layout has no field of this name."""
         where = self.ready.layout.fields.get(name)
         return float("nan") if where is None else float(self.latest[where][0])
 
     def error(self, task: str) -> float:
-        """The error norm ‖x̃‖ of a task, m or rad."""
+        """Returns the error norm ‖x̃‖ of a task, m or rad."""
         return float(np.linalg.norm(self.field(f"error/{task}")))

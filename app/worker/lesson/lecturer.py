@@ -80,7 +80,7 @@ class Lecturer:
 
     @property
     def pace(self) -> float | None:
-        """Simulated seconds per second of the run; None: the speed that the learner set."""
+        """The speed of the simulation as a multiple of real time; None: the speed that the learner set."""
         return FAST if self.fast and self._phase == "running" else None
 
     @property

@@ -39,22 +39,22 @@ class SessionReport(ABC):
 
     @abstractmethod
     def tasks(self) -> tuple[TaskView, ...]:
-        """The data of the tasks that the page needs."""
+        """Returns the data of the tasks that the page needs."""
 
     @abstractmethod
     def targets(self) -> dict[str, np.ndarray]:
-        """The raw targets that can be dragged, by task."""
+        """Returns the raw targets that can be dragged, by task."""
 
     @abstractmethod
     def path(self) -> np.ndarray:
-        """The predicted path of the tip, (N + 1, 3) m; empty before the first tick."""
+        """Returns the predicted path of the tip, (N + 1, 3) m; empty before the first tick."""
 
     def room(self) -> np.ndarray:
         """Points (k, 3), m, that the camera should show besides the robot."""
         return np.zeros((0, 3))
 
     def binding(self) -> tuple[Binding, ...]:
-        """Active constraints of the last plan, at most LISTED."""
+        """Returns active constraints of the last plan, at most LISTED."""
         return tuple(self.session.binding()[:LISTED])
 
     def gauge(self) -> tuple[float, float] | None:
@@ -62,31 +62,33 @@ class SessionReport(ABC):
         return None
 
     def ranks(self) -> dict[str, tuple[int, int]]:
-        """Per level, the number of directions that are available at the present posture, and the number of
-        rows; empty without a stack."""
+        """Returns, per level, the number of directions that are available at the present posture, and the
+        number of rows; empty without a stack."""
         return {}
 
     def world(self) -> World:
-        """The objects around the robot."""
+        """Returns the objects around the robot."""
         return ()
 
     def contacts(self) -> tuple[ContactPoint, ...]:
-        """The points of contact after the last tick, at most TOUCHING."""
+        """Returns the points of contact after the last tick, at most TOUCHING."""
         return ()
 
     def objects(self) -> np.ndarray:
-        """The poses of the free objects of the world, (k, 7): position, m, and quaternion (w, x, y, z)."""
+        """Returns the poses of the free objects of the world, (k, 7): position, m, and quaternion (w, x, y,
+        z)."""
         return np.zeros((0, 7))
 
     def nearest(self) -> str:
-        """The names of the nearest pair of links, or of a link and an object; "" if no distance is
+        """Returns the names of the nearest pair of links, or of a link and an object; "" if no distance is
         measured."""
         return ""
 
     def mission(self) -> MissionView | None:
-        """The state of the mission, if there is one."""
+        """Returns the state of the mission, if there is one."""
         return None
 
     def inside(self) -> Inside | None:
-        """The data of the last tick that `watch` requests; None if nothing is requested or available."""
+        """Returns the data of the last tick that `watch` requests; None if nothing is requested or
+        available."""
         return None

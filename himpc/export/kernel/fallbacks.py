@@ -114,7 +114,7 @@ def shifted(U: Array, out: Array) -> None:
 
 @inline_kernel
 def settled(U: Array) -> bool:
-    """Whether all increments are finite."""
+    """Returns whether all increments are finite."""
     total = 0.0
     for j in range(len(U)):
         total += dot(U[j], U[j], U.shape[1])

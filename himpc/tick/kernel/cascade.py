@@ -152,5 +152,6 @@ def predict(
 
 @inline_kernel
 def finite(x: Array) -> bool:
-    """Whether all numbers are finite, and so small that their squares and differences cannot overflow."""
+    """Returns whether all numbers are finite, and so small that their squares and differences cannot
+    overflow."""
     return dot(x, x, x.size) < 1e18

@@ -29,7 +29,7 @@ class Cell:
         return self.summary is not None and bool(self.summary["diverged"])
 
     def value(self, metric: str) -> float:
-        """A metric of the run; NaN if it has none, failed or lost control."""
+        """Returns a metric of the run; NaN if it has none, failed or lost control."""
         if self.summary is None or self.diverged:
             return math.nan
         return dict(_numbers(self.summary)).get(metric, math.nan)
@@ -40,7 +40,7 @@ _NO_METRIC = ("seed", "duration_s", "level", "finite", "diverged")
 
 
 def metrics(sweep: Sweep) -> list[str]:
-    """The metrics of a cell, the default first; one tick of the base scene is run to find them."""
+    """Returns the metrics of a cell, the default first; one tick of the base scene is run to find them."""
     scene = sweep.base.prepared()
     recording = run(scene, scene.settings.T_s, sweep.base.seed)
     found = dict(_numbers(_without_timing(summary(recording))))
@@ -85,11 +85,11 @@ def _without_timing(data: dict[str, Any]) -> dict[str, Any]:
 
 
 def perform_cell(spec: RunSpec) -> dict[str, Any]:
-    """The summary of a run, without its timing. Raises InputError for an invalid run."""
+    """Returns the summary of a run, without its timing. Raises InputError for an invalid run."""
     return _without_timing(summary(run(spec.prepared(), None, spec.seed)))
 
 
 def best_cell(cells: Sequence[Cell], metric: str) -> Cell | None:
-    """The cell with the least value of a metric; None if no cell has a value."""
+    """Returns the cell with the least value of a metric; None if no cell has a value."""
     known = [cell for cell in cells if math.isfinite(cell.value(metric))]
     return min(known, key=lambda cell: cell.value(metric), default=None)

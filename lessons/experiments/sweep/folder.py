@@ -23,8 +23,8 @@ from robots import InputError
 
 
 def usual_folder(sweep: Sweep) -> Path:
-    """The default folder of a sweep. Different sweeps have different folders; a repeated sweep continues in
-    its folder."""
+    """Returns the default folder of a sweep. Different sweeps have different folders; a repeated sweep
+    continues in its folder."""
     wanted = json.dumps(sweep.as_data(), sort_keys=True)
     names = "-".join([Path(sweep.base.scene).stem, *(axis.path for axis in sweep.axes)])
     readable = re.sub(r"[^\w.-]+", "_", names, flags=re.ASCII)[:80]

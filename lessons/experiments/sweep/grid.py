@@ -45,12 +45,12 @@ class Sweep:
         return list(itertools.product(*(axis.values for axis in self.axes)))
 
     def run(self, cell: int) -> RunSpec:
-        """The run of a cell."""
+        """Returns the run of a cell."""
         at = zip(self.axes, self.points[cell], strict=True)
         return self.base.but(*(f"{axis.path}={value!r}" for axis, value in at))
 
     def as_data(self) -> dict[str, Any]:
-        """The sweep as JSON-ready data; two sweeps with equal data have equal cells."""
+        """Returns the sweep as JSON-ready data; two sweeps with equal data have equal cells."""
         base = self.base
         return {
             "scene": base.scene,
@@ -63,7 +63,7 @@ class Sweep:
         }
 
     def files(self) -> dict[str, list[str]]:
-        """The fingerprints of the user's files that the sweep uses; empty if there are none. Raises
+        """Returns the fingerprints of the user's files that the sweep uses; empty if there are none. Raises
         InputError if a file cannot be read."""
         base = self.base
         own = [each for each in (base.scene, base.controller or "", *base.tasks) if is_file(each)]
@@ -71,7 +71,7 @@ class Sweep:
 
 
 def make_sweep(base: RunSpec, over: Sequence[str]) -> Sweep:
-    """A sweep from "PATH=lo:hi:n" texts.
+    """Returns a sweep from "PATH=lo:hi:n" texts.
 
     Values have equal steps, or equal ratios if hi ≥ 10 lo > 0 and the setting may have fractions;
     "PATH=lo:hi:n:lin" and "…:log" choose explicitly. Settings of whole numbers get whole numbers.

@@ -24,7 +24,8 @@ _FAINTEST = 1e-3
 
 
 def _level_1(run: JobResult, scale: float = 1e3) -> float:
-    """The largest RMSE of level 1's coordinates after the first second, mm; NaN if control was lost."""
+    """Returns the largest RMSE of level 1's coordinates after the first second, mm; NaN if control was
+    lost."""
     if not run.completed:
         return math.nan
     return scale * max(value for value in run.summary["tasks"][0]["rmse_after_1s"])

@@ -54,7 +54,7 @@ class ModelErrors:
 
 
 def model_errors(run: JobResult) -> ModelErrors:
-    """The errors along a run, from their definitions.
+    """Returns the errors along a run, from their definitions.
 
     q̈_k is the mean acceleration of period k, from the plant's true velocities. γ_k = M_n⁻¹(τ_k − N_n) − q̈_k
     is expanded in (21). δ_k = q̈_k − q̈_{k−1} − M̄⁻¹(τ_k − τ_{k−1}), the M̄⁻¹ε_q of (16), is expanded in

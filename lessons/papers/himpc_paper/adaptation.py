@@ -70,7 +70,7 @@ FIGURES = {
 
 
 def quantity(case: Case, words: str, what: str) -> str:
-    """The name of a row. Args: words: "as set" or the setting; what: a name of FIGURES."""
+    """Returns the name of a row. Args: words: "as set" or the setting; what: a name of FIGURES."""
     return f"{case.words}, {words}: {what}"
 
 

@@ -42,7 +42,7 @@ class EffortJob(Work):
     hold_deg: tuple[float, ...] = ()
 
     def do(self) -> JobResult:
-        """The run; see `Work.do`."""
+        """Returns the run; see `Work.do`."""
         scene = prepared(torque_scene(self.spec.scene), self.spec.controller, self.spec.set)
         robot, T_s = scene.robot, scene.settings.T_s
         form = stack_form(robot, scene.settings.levels, replace(scene.settings.for_controller(), horizon=1))
@@ -97,7 +97,7 @@ def _residual(
 
 
 def _summary(form: StackForm, t: Array, errors: Array, lost: bool) -> dict[str, Any]:
-    """The part of a run's summary that `JobResult.error_of` needs."""
+    """Returns the part of a run's summary that `JobResult.error_of` needs."""
     late = errors[t >= 1.0]
     rmse = np.sqrt((late**2).mean(axis=0)) if len(late) and not lost else np.full(errors.shape[1], np.nan)
     ends = np.cumsum(form.sizes)

@@ -88,7 +88,8 @@ def _conflict(results: Results, quick: bool) -> Section:
 
 
 def _swing(run: JobResult, start: float, end: float) -> tuple[float, float]:
-    """The largest speed of joint 3, deg/s, and half the number of its changes of direction per second."""
+    """Returns the largest speed of joint 3, deg/s, and half the number of its changes of direction per
+    second."""
     v = DEG * run.column("v", 2)[(run.t >= start) & (run.t <= end)]
     if not len(v):
         return math.nan, math.nan
@@ -113,7 +114,7 @@ def weakest(scene: str) -> float:
 
 
 def _radius(scene: str) -> float:
-    """The spectral radius of I − M⁻¹M̄ of the plant at the start."""
+    """Returns the spectral radius of I − M⁻¹M̄ of the plant at the start."""
     ready = prepared(torque_scene(scene), "himpc", ())
     plant = Plant(ready.robot, ready.settings.plant)
     plant.reset(ready.q_0)

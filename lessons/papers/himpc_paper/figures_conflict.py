@@ -125,7 +125,7 @@ def skeleton(robot: Robot, q: Array) -> Array:
 
 
 def _time_beside(tip: Array, path: Array, t: float) -> tuple[float, float, str]:
-    """The position and text of a label with the time of a pose, outside the path."""
+    """Returns the position and text of a label with the time of a pose, outside the path."""
     outward = tip[:2] - path.mean(axis=0)
     x, y = tip[:2] + 0.045 * outward / (np.linalg.norm(outward) or 1.0) - (0.03, 0.015)
     return float(x), float(y), f"{t:.1f} s"

@@ -25,5 +25,5 @@ OPEN = (
 
 
 def rt4(controller: str = "himpc", *assignments: str, seconds: float | None = None) -> Job:
-    """The run of RT4 for 4 s, most likely with the settings of the paper."""
+    """Returns the run of RT4 for 4 s, most likely with the settings of the paper."""
     return Job(RunSpec(RT4, controller=controller, set=assignments, duration=seconds))

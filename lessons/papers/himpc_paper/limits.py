@@ -41,7 +41,7 @@ _KINDS = ("position", "velocity")
 
 
 def _over(run: JobResult, kind: str) -> float:
-    """The largest ratio of a |value| to its limit."""
+    """Returns the largest ratio of a |value| to its limit."""
     return run.figure("limits", kind, "max_ratio")
 
 

@@ -20,27 +20,27 @@ COORDINATES = (("x", "position", 0, "m"), ("y", "position", 1, "m"), ("q1", "q1"
 
 
 def rt1(controller: str, *assignments: str) -> Job:
-    """The run of RT1, 8 s."""
+    """Returns the run of RT1, 8 s."""
     return Job(RunSpec(RT1, controller=controller, set=assignments))
 
 
 def rt2(controller: str, *assignments: str) -> Job:
-    """The run of RT2, 8 s."""
+    """Returns the run of RT2, 8 s."""
     return Job(RunSpec(RT2, controller=controller, set=assignments))
 
 
 def rt3(controller: str) -> Job:
-    """The run of RT3, 16 s."""
+    """Returns the run of RT3, 16 s."""
     return Job(RunSpec(RT3, controller=controller))
 
 
 def level_1(run: JobResult) -> float:
-    """The larger RMSE of x and y after the first second, m; NaN if the run was too short for one."""
+    """Returns the larger RMSE of x and y after the first second, m; NaN if the run was too short for one."""
     return float(np.maximum(run.error_of("position", 0), run.error_of("position", 1)))
 
 
 def largest_error(run: JobResult) -> float:
-    """The largest distance of the EE from its reference, m; infinite if control was lost."""
+    """Returns the largest distance of the EE from its reference, m; infinite if control was lost."""
     if run.error is not None:
         return math.nan
     error = run["error/position"]
@@ -48,7 +48,7 @@ def largest_error(run: JobResult) -> float:
 
 
 def whole_run(run: JobResult) -> float:
-    """The larger RMSE of x and y over the whole run, m."""
+    """Returns the larger RMSE of x and y over the whole run, m."""
     return float(np.maximum(run.error_of("position", 0, "rmse"), run.error_of("position", 1, "rmse")))
 
 

@@ -96,7 +96,7 @@ _WITH_MODEL = ("osf", "hqp")
 
 
 def _over_himpc(results: Results, controller: str, label: str, task: str, k: int, unit: str) -> Row:
-    """The error of a controller over HIMPC's: this ratio can be compared between different arms."""
+    """Returns the error of a controller over HIMPC's: this ratio can be compared between different arms."""
     paper = printed("himpc_table_2")
     return Row(
         f"{name(controller)} over HIMPC, {label}",

@@ -52,7 +52,7 @@ class PropertyResult:
 
 
 def verdicts(results: Results, controller: str) -> dict[str, PropertyResult]:
-    """The verdict on each property."""
+    """Returns the verdict on each property."""
     circle, conflict, singular = (results[make(controller)] for make in (rt1, rt2, rt3))
     accuracy, speed = level_1(circle), conflict.figure("limits", "velocity", "max_ratio")
     rough = (conflict, singular)
@@ -83,7 +83,7 @@ def _jobs(quick: bool) -> tuple[Job, ...]:
 
 
 def _cell(results: Results, criterion: str, controller: str) -> Row:
-    """A row with the ✓ (1) or ✗ (0) of the paper's table beside ours."""
+    """Returns a row with the ✓ (1) or ✗ (0) of the paper's table beside ours."""
     found = verdicts(results, controller)[criterion]
     return Row(
         f"{criterion}: {name(controller)}",

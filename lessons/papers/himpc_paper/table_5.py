@@ -102,7 +102,7 @@ def _topic(task: str, reading: str) -> str:
 def _change_row(
     results: Results, reading: str, extra: tuple[str, ...], label: str, task: str, k: int, unit: str
 ) -> Row:
-    """A row with the ratio of the disturbed plant's error to the nominal plant's, the subject of the
+    """Returns a row with the ratio of the disturbed plant's error to the nominal plant's, the subject of the
     table."""
     paper = printed("himpc_table_5")
     nominal, disturbed = results[rt4()], results[rt4("himpc", *extra)]
@@ -142,7 +142,7 @@ def _share_rows(results: Results) -> list[Row]:
 
 
 def _others(results: Results) -> Table:
-    """A table of the errors with other plants and settings, as shares of the nominal ones."""
+    """Returns a table of the errors with other plants and settings, as shares of the nominal ones."""
     rows = []
     for words, extra in _OTHERS.items():
         shares = _shares(results, words).values()

@@ -26,13 +26,13 @@ _N = 5
 
 
 def horizon_job(controller: str, N: int, extra: tuple[str, ...] = (), quick: bool = False) -> Job:
-    """The run of RT4 with a horizon; the quick version is shorter."""
+    """Returns the run of RT4 with a horizon; the quick version is shorter."""
     own = () if N == _N else (f"horizon={N}",)
     return rt4(controller, *own, *extra, seconds=2.0 if quick else None)
 
 
 def horizons(controller: str, quick: bool) -> tuple[int, ...]:
-    """The horizons of the runs; the quick version leaves out the runs that take minutes."""
+    """Returns the horizons of the runs; the quick version leaves out the runs that take minutes."""
     if controller == "nhimpc":
         return (10,) if quick else (10, 20, 30)
     return (5, 10, 20) if quick else (5, 10, 20, 30)

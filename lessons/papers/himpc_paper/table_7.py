@@ -16,7 +16,7 @@ from lessons.scenes.run_spec import RunSpec
 
 
 def timed(controller: str, N: int, quick: bool) -> Job:
-    """The run of RT4 for step times: half a second, alone on the machine."""
+    """Returns the run of RT4 for step times: half a second, alone on the machine."""
     return Job(
         RunSpec(RT4, controller=controller, set=(f"horizon={N}",), duration=0.2 if quick else 0.5), timed=True
     )

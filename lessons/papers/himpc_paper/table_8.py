@@ -18,7 +18,7 @@ _FREE = ("limits.position=off",)
 
 
 def resolution_job(thousandths: float, quick: bool = False) -> Job:
-    """The run of RT4 with encoders of a resolution in 1e-3 deg; no state bound is active."""
+    """Returns the run of RT4 with encoders of a resolution in 1e-3 deg; no state bound is active."""
     extra = (*_FREE, f"plant.encoder_resolution_deg={thousandths * 1e-3:g}")
     return rt4("himpc", *extra, seconds=2.0 if quick else None)
 

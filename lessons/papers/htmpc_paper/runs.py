@@ -22,24 +22,25 @@ METHODS = {"htmpc": "HTMPC", "htmpc_wpt": "HTMPC_WPT", "htidkc": "HTIDKC"}
 
 
 def peaks(quick: bool) -> list[tuple[float, float]]:
-    """The peak targets of the random square waves, 25, or 4 in the quick version."""
+    """Returns the peak targets of the random square waves, 25, or 4 in the quick version."""
     return random_peaks(PEAKS_SEED, 4 if quick else 25, EE_HOME)
 
 
 def square(controller: str, peak: tuple[float, float], *assignments: str) -> Job:
-    """One square wave."""
+    """Returns one square wave."""
     return Job(
         RunSpec(SQUARE, controller=controller, set=(f"peak=[{peak[0]:.9f},{peak[1]:.9f}]", *assignments))
     )
 
 
 def example(controller: str, *assignments: str) -> Job:
-    """The square wave with the scene's own peak; the paper does not print the coordinates of its example."""
+    """Returns the square wave with the scene's own peak; the paper does not print the coordinates of its
+    example."""
     return Job(RunSpec(SQUARE, controller=controller, set=assignments))
 
 
 def part(runs: Sequence[JobResult], place: int, key: str = "normalised_base_error") -> Array:
-    """The number `key` of one part of each run; NaN for a run without this part."""
+    """Returns the number `key` of one part of each run; NaN for a run without this part."""
     return np.array([run.figure("parts", place, key) for run in runs])
 
 
@@ -52,7 +53,7 @@ def hand_mm(run: JobResult) -> tuple[float, float, float]:
 
 
 def normalised(run: JobResult) -> Array:
-    """The base error over time, divided by its value at the start of each part."""
+    """Returns the base error over time, divided by its value at the start of each part."""
     error = np.linalg.norm(run["error/base"], axis=1)
     half = len(error) // 2
     return np.concatenate([error[:half] / error[0], error[half:] / error[half]]) if half else error

@@ -195,7 +195,7 @@ def _line(words: str, runs: list[JobResult], errors: tuple[Array, Array], author
 
 
 def collinear(job: Work) -> bool:
-    """Whether peak, valley (the origin) and the EE's home lie on a line, as in the paper's Fig. 7."""
+    """Returns whether peak, valley (the origin) and the EE's home lie on a line, as in the paper's Fig. 7."""
     peak = np.array(job.spec.set[0].partition("=")[2].strip("[]").split(","), float)
     a, b = peak - EE_HOME, -EE_HOME
     sine = abs(a[0] * b[1] - a[1] * b[0]) / (np.linalg.norm(a) * np.linalg.norm(b))
@@ -214,7 +214,7 @@ def _strip(title: str, values: dict[str, Array]) -> Panel:
 
 
 def _violin(place: int, values: Array) -> PlotCurve:
-    """The outline of the fitted density, from the smallest to the largest value."""
+    """Returns the outline of the fitted density, from the smallest to the largest value."""
     from scipy.stats import gaussian_kde  # imported here, because its import takes long
 
     y = np.linspace(values.min(), values.max(), 60)

@@ -69,7 +69,7 @@ def _table(results: Results, quick: bool) -> Section:
 
 
 def _order(results: Results, f: str, d: str) -> Row:
-    """The row with the table's subject: the ratio of the hand's error with (12) to that with (11)."""
+    """Returns the row with the table's subject: the ratio of the hand's error with (12) to that with (11)."""
     paper = printed("htmpc_table_1")
     mean = {e: hand_mm(results[_job(f, e, d)])[0] for e in EQUATIONS}
     return Row(
