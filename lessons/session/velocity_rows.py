@@ -114,7 +114,8 @@ def write_truth(
 ) -> None:
     """Writes the true positions of the points, their present references, and the errors.
 
-    places: the places of the roles in the window, from 1; references: those of the same roles.
+    places: by role, the place of its task in the window, counted from 1.
+    references: by role, the reference of its task, as far as the task is in the window.
     """
     fields = layout.fields
     t = float(row[fields["t"]][0])

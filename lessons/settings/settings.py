@@ -174,9 +174,9 @@ def field_places(
     gives its form.
 
     Args:
-        owner: the dataclass.
-        read: returns the owner in some settings.
-        write: returns the settings with another owner.
+        owner: the class.
+        read: returns the instance of this class that is a part of the given settings.
+        write: returns the given settings with this instance replaced by the given one.
         prefix: prefix of the paths.
         without: fields that are not settings.
     """

@@ -18,11 +18,11 @@ class Arena:
     """The numbers of one controller.
 
     Attributes:
-        data, whole: all numbers, all whole numbers.
+        data, whole: all floating-point numbers; all integers.
         where, whole_where: index in `data` and `whole` at which each array begins, in the order of `AT` and
             `WHOLE_AT`.
         f, i: the arrays by name, views into `data` and `whole`.
-        arguments: the arguments of compiled functions that describe the arena.
+        arguments: the four arrays that compiled functions receive: data, where, whole and whole_where.
     """
 
     def __init__(self, **sizes: int) -> None:

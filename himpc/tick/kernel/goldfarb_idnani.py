@@ -91,7 +91,8 @@ def take(active: ActiveSet, k: int, excess: float, z: Array, D: int, budget: Arr
         excess -= step * length * length
         active.multiplier[first] = 0.0
         if length > 0.0:
-            # The rotations that close the gap are also applied to this row. `resolve` is not needed again.
+            # The rotations that remove row `first` also turn the row that is being
+            # added, so `resolve` need not be called again.
             without(active, first, k + 1, D, budget)
             k -= 1
             length = active.cholesky_factor[k, k]
