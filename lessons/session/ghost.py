@@ -45,7 +45,7 @@ class GhostDriver:
 
     def __init__(self, session: Session, leader: SceneSettings, own: Sequence[str]) -> None:
         """session: a new session of `ghost_scene`; leader: the leader's settings at the last reset, at which
-        both begin; own: assignments."""
+        both begin; own: the ghost's own assignments."""
         self.session = session
         self._scene = session.scene
         self._leader = leader

@@ -84,8 +84,8 @@ class LevelPlots:
             ]
 
     def draw(self, window: PlotWindow, ghost: PlotWindow | None, settings: TorqueSettings) -> None:
-        """ghost: the ghost's data over the same interval; settings: contain whether the plant has contacts,
-        which are marked in the plot of errors, and whether distances are kept."""
+        """Draws the plots of the window. ghost: the ghost's data over the same interval. If the plant has
+        contacts, the plot of errors marks them. If distances are kept, there is a plot of them."""
         self._settings = settings
         if self._wanted(ghost is not None) != self._shown:
             self._build(ghost is not None)

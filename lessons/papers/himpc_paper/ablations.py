@@ -224,7 +224,7 @@ def _section_4c(results: Results, quick: bool) -> Section:
                 len(usable["Δτ"]) > 0,
             ),
             PaperCheck(
-                "with ‖τ‖²: number of such R, smaller than with ‖Δτ‖²",
+                "with ‖τ‖²: number of the tried R that do the same, fewer than with ‖Δτ‖²",
                 float(len(usable["τ"])),
                 len(usable["τ"]) < len(usable["Δτ"]),
             ),

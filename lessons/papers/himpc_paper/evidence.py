@@ -65,7 +65,7 @@ def _conflict(results: Results, quick: bool) -> Section:
             "s",
             text[f"conflict_{word}"],
             float(large[place]),
-            f"the paper's swing of q₁ is not printed; large: above {_LARGE:g}°",
+            f"the paper does not print the size of this swing; here an error above {_LARGE:g}° is large",
             topic="conflict-reaches-level-1",
         )
         for word, place in (("from", 0), ("until", -1))
