@@ -104,7 +104,7 @@ def grade_only(path: Path, exercise: str | None = None, seed: int = 0) -> Grade:
     file cannot be read, the grade contains an error.
 
     Raises:
-        InputError: there is no such exercise, or its file cannot be used.
+        InputError: there is no such exercise, or the file of the exercise cannot be used.
     """
     model = Submission.to(exercise, Source(str(path), ""), seed)
     files = sorted(path.glob(f"*{SUFFIX}")) if path.is_dir() else [path]
