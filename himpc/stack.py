@@ -110,7 +110,7 @@ def ranks(stack: Stack, configuration: Configuration) -> dict[str, tuple[int, in
 
 
 _RANK = 1e-6
-"""Singular values of a stacked Jacobian below this count as zero."""
+"""Singular values of a stacked Jacobian that are below this value are treated as zero."""
 
 
 def freedom_left(robot: Robot, stack: Stack) -> int:

@@ -74,8 +74,8 @@ class Predict:
 
 @dataclass(frozen=True)
 class RunStep:
-    """Command: run a step's script from its start. own: use the lesson's settings (a challenge always uses
-    the learner's); fast: run as fast as possible."""
+    """Command: run a step's script from its start. own: use the lesson's settings instead of the learner's
+    (a challenge always uses the learner's); fast: run as fast as possible."""
 
     own: bool = True
     fast: bool = False

@@ -16,7 +16,7 @@ from app.link.wire import Wire
 _END = 1.0  # s within which a process must end by itself
 
 Start = Callable[[socket.socket], Child]
-"""A function that starts a child, to which it passes this end of a socket."""
+"""A function that starts a child. Its argument is the child's end of the connection, a socket."""
 
 
 class Process:

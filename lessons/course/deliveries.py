@@ -164,8 +164,8 @@ WAIT = Step(
     why=r"""
     The base goes as far as the arm allows and waits there, with the arm stretched. When the ball is taken
     the window moves to the next task, and the rest of the way is short: the robot needs three seconds to
-    the second person. The ghost, whose only task was the hand, needs nearly seven. The plan does not need
-    the duration of the wait, which is not part of the problem.
+    the second person. The ghost, whose only task was the hand, needs nearly seven. The duration of the
+    wait is not part of the problem, and the plan does not need it.
     """,
     prediction=Choice(
         "From 5 s until the ball is taken, how far does the base drive?",

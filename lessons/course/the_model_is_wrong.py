@@ -51,7 +51,7 @@ EXACTLY = Step(
     ),
     claims=(
         Claim(
-            "With the exact model the largest error is less than a tenth of HIMPC's.",
+            "With the exact model OSF's largest error is less than a tenth of HIMPC's.",
             Measure(HAND, over_ghost=True),
             "at most",
             0.1,

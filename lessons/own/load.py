@@ -43,7 +43,7 @@ def alone(path: str) -> Iterator[None]:
 
 @cache
 def _watched() -> None:
-    """Installs one audit hook, which cannot be removed; it does nothing while no code runs within `alone`."""
+    """Installs one audit hook, which cannot be removed; it acts only while code runs within `alone`."""
     sys.addaudithook(_hook)
 
 
