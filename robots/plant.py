@@ -209,7 +209,7 @@ class Plant:
         return probe.qfrc_bias[: self.n].copy()
 
     def jacobian(self, frame: str) -> np.ndarray:
-        """Returns the Jacobian of a frame's origin in world axes, (6, n): linear, then angular rows."""
+        """Returns the Jacobian of a frame's origin, (6, n), world axes: linear (m/rad), then angular rows."""
         J = np.zeros((6, self._model.nv))
         mujoco.mj_jacSite(self._model, self._look(), J[:3], J[3:], self._site(frame))
         return J[:, : self.n].copy()
@@ -227,13 +227,13 @@ class Plant:
         return found[: self.n].copy()
 
     def objects(self) -> np.ndarray:
-        """Returns the poses of the free objects of the world, (k, 7): m, and quaternion (w, x, y, z)."""
+        """Returns the poses of the free objects in order, (k, 7): position, m; quaternion (w, x, y, z)."""
         if self.settings.contacts:
             return self._data.qpos[self.n :].reshape(-1, 7).copy()
         return np.array([thing.pose for thing in self.world if thing.free]).reshape(-1, 7)
 
     def object_velocities(self) -> np.ndarray:
-        """Returns the velocities of the middles of the free objects, (k, 3) m/s, in world axes."""
+        """Returns the velocities of the middles of the free objects in order, (k, 3) m/s, world axes."""
         return self._data.qvel[self.n :].reshape(-1, 6)[:, :3].copy()
 
     def carry(self, place: int, position: np.ndarray, velocity: np.ndarray) -> None:

@@ -41,7 +41,7 @@ class Stall(NamedTuple):
 
 
 def going(tasks: int) -> Stall:
-    """Returns a robot that is not stalled."""
+    """Returns the state of a robot that is not stalled."""
     return Stall(1.0, np.full(tasks, np.inf), np.inf)
 
 

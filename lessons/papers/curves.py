@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 
 def curve(run: JobResult, field: str, k: int = 0, scale: float = 1.0, **how: object) -> PlotCurve:
-    """Returns a field of a run over time; nothing is drawn for a run that failed."""
+    """Returns the curve of a field of a run over time; nothing is drawn for a run that failed."""
     return PlotCurve(run.t, scale * run.column(field, k), **how)  # pyright: ignore[reportArgumentType]
 
 
@@ -26,9 +26,9 @@ _BROAD = (2.4, 1.0)
 def by_controller(
     runs: Sequence[JobResult], field: str, k: int, scale: float = 1.0, weights: tuple[float, float] = _BROAD
 ) -> tuple[PlotCurve, ...]:
-    """Returns a field of several controllers' runs, each in its colour. weights: line widths of the first
-    curve and of the others. The first of several curves is broad, so that it stays visible below curves that
-    coincide with it."""
+    """Returns the curves of a field, one per controller, each in its colour. weights: line widths of the
+    first curve and of the others. The first of several curves is broad, so that it stays visible below
+    curves that coincide with it."""
     shown = [run for run in runs if len(run.t)]
     return tuple(
         curve(

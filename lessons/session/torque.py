@@ -287,7 +287,7 @@ class TorqueSession(Session):
         return path
 
     def ranks(self) -> dict[str, tuple[int, int]]:
-        """Returns, per enabled level, the number of directions that it can control now, and its rows."""
+        """Returns the ranks of the enabled levels at the present posture, see `himpc.stack.ranks`."""
         q = np.asarray(self.plant.q)
         return ranks(self.settings.levels, Configuration(self.robot, self._data, q, q))
 

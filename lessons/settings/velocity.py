@@ -102,10 +102,11 @@ class VelocitySettings(SceneSettings):
         return self.with_obstacle(event.ball()) if isinstance(event, Appear) else super().after(event)
 
     def places(self) -> Mapping[str, Place]:
-        """Returns a field of HTMPCSettings ("horizon", "delta_m", "formulation", …), "controller",
-        "compensate_delay", "delay_measured", the fields of the scene's options ("peak", "seats", …; "order"
-        takes effect when a run starts), "limits.KEY", "plant.KEY", "Q" for all levels (a new formulation sets
-        its own), "levels.NAME.Q|enabled" with the level's name or its place 1 … r."""
+        """Returns the place of every path. The paths are those of HTMPCSettings ("horizon", "delta_m",
+        "formulation", …), "controller", "compensate_delay", "delay_measured", those of the scene's options
+        ("peak", "seats", …; "order" takes effect when a run starts), "limits.KEY", "plant.KEY", "Q" for all
+        levels (a new formulation sets its own), "levels.NAME.Q|enabled" with the level's name or its place
+        1 … r."""
         return _places(tuple(level.name for level in self.levels), type(self.options))
 
     def elements(self, path: str) -> int:

@@ -58,7 +58,8 @@ def chart(
     bounds: Sequence[Bound],
     until: float,
 ) -> str:
-    """Returns a signal over the run, with the ghost's curve (dashed) and reference lines (dotted)."""
+    """Returns the chart of a signal over the run, with the ghost's curve (dashed) and reference lines
+    (dotted)."""
     shown = [curve.values, *([ghost.values] if ghost is not None else [])]
     values = np.concatenate([each[np.isfinite(each)] for each in shown])
     if not values.size:
