@@ -25,8 +25,6 @@ def greeting(server: PageServer) -> Iterator[str]:
     if server.hall is not None:
         yield f"  {'teacher:':{_WIDTH}}{server.teachers_link}"
         yield f"  {'phones:':{_WIDTH}}{server.outside}/v/{server.hall.code}"
-    if server.follows:
-        yield f"  {'takes part in:':{_WIDTH}}{server.follows}"
     if server.passes.token is None:
         yield "  --no-token: " + (_ALL if server.public else _ALL_HERE)
     if shared and server.passes.owner is not None:

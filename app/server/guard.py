@@ -14,7 +14,7 @@ from websockets.exceptions import ConnectionClosedError
 from websockets.frames import CloseCode, Frame, Opcode
 from websockets.http11 import Request, Response
 
-from app.classes.words import is_of_a_class
+from app.classes.words import LONGEST, is_of_a_class
 from app.server import budget
 from app.server.answers import CROWDED, FULL, NO_CLASS, NOT_OPEN, as_response, plain
 from app.server.budget import Budget
@@ -127,9 +127,7 @@ class ConnectionGuard:
 
     def _to_class(self, of: ClassDoor, connection: ServerConnection, request: Request) -> Response | None:
         """Returns the response to a request for a page of the class; None for an upgrade that is admitted."""
-        # Another server of the class sends the key instead, and may use any name for this server.
-        refused = None if of.is_for_servers(request.path) else self._door.refuses(request)
-        answer = self._not_open(connection, request) or refused
+        answer = self._not_open(connection, request) or self._door.refuses(request)
         found = answer or of.answer(self._door, request, _user(connection))
         if isinstance(found, Answer):
             self.refused += found.status >= HTTPStatus.BAD_REQUEST
@@ -138,7 +136,7 @@ class ConnectionGuard:
             return plain(found.status, found.kind, found.text, found.headers)
         if isinstance(connection, GuardedConnection):
             connection.serves = found.serve
-            connection.accept_short(found.longest)
+            connection.accept_short()
             connection.expect_word(FIRST_WORD)
         return None
 
@@ -253,9 +251,9 @@ class GuardedConnection(ServerConnection):
             self._guard.taken += 1
             return raw
 
-    def accept_short(self, longest: int) -> None:
-        """Sets the largest size of a message, B. A longer message ends the connection, with a reason."""
-        self.protocol.max_message_size = longest
+    def accept_short(self) -> None:
+        """Accepts only short messages from now on. A longer message ends the connection, with a reason."""
+        self.protocol.max_message_size = LONGEST
 
     async def recv_short(self) -> str | bytes:
         """Returns the next message of a page of a class."""

@@ -29,8 +29,6 @@ from robots import InputError
 
 if TYPE_CHECKING:  # needed for a class only, and loaded late
     from app.classes.hall import Hall
-    from app.classes.link import Link
-    from app.classes.room import Room
     from app.classes.sockets import Sockets
 
 FIRST = SceneChoice(RunSpec("iiwa14-hold"))
@@ -59,8 +57,6 @@ class PageServer:
         embed_in: Sequence[str] = (),
         all_steer: bool = False,
         room: Classroom | None = None,
-        class_key: str | None = None,
-        class_of: str | None = None,
     ) -> None:
         """Starts the server.
 
@@ -82,8 +78,6 @@ class PageServer:
             embed_in: origins whose pages may show the page in a frame.
             all_steer: every page of a classroom controls the robot.
             room: all pages show the robot of this room.
-            class_key: the key that the servers of one class have in common.
-            class_of: address of the server in whose class this server takes part.
 
         Raises:
             InputError: a scene, robot, host, port or origin cannot be used, or the options contradict each
@@ -101,8 +95,6 @@ class PageServer:
         self.proxies = tuple(map(as_origin, trusted_origins))
         """The addresses of the trusted proxies."""
         framing = frozenset(each if each == SELF else as_origin(each, "--embed-in") for each in embed_in)
-        self.follows = "" if class_of is None else as_origin(class_of, "--class-of")
-        """The address of the server in whose class this server takes part; "" if there is none."""
         _check_choice(choice)
         check_address(host, port)
         few_arenas()
@@ -121,7 +113,6 @@ class PageServer:
         self._closed = False  # if True, no new visit begins
         self._lock = threading.Lock()
         self._sockets: Sockets | None = None
-        self._link: Link | None = None
         try:
             self._viser = private.open_server(host, port, self.guard)
         except BaseException:
@@ -138,9 +129,6 @@ class PageServer:
         self._viser.on_client_connect(self._connect)
         self._viser.on_client_disconnect(self._disconnect)
         self.hall = None if class_names is None else self._new_hall(class_names)
-        self._class_key, self._room = class_key, self.hall
-        if self.follows and class_key is not None and isinstance(self.sessions, Sessions):
-            self._room = self._follow(self.follows, class_key, self.sessions)
         owner = None if own_files is None and self.hall is None else new_token()
         if ask_token and token is not None:
             self.passes = shared(token, owner)
@@ -192,16 +180,6 @@ class PageServer:
         alone = isinstance(self.sessions, Classroom)
         return Hall(None if alone else self.sessions, self.sessions.guide(), named)
 
-    def _follow(self, address: str, key: str, sessions: Sessions) -> Room:
-        from app.classes.branch import Branch
-        from app.classes.link import Link
-
-        start = sessions.start.exercise
-        branch = Branch(sessions, None if start is None else start.lesson)
-        self._link = Link(branch, address, key)
-        self._link.start(self._viser.get_event_loop())
-        return branch
-
     def _open_class(self, door: Door, refers: bool, hall: Hall) -> None:
         from app.classes.sockets import Sockets
         from app.server.class_door import ClassDoor
@@ -209,7 +187,7 @@ class PageServer:
         self._sockets = Sockets(hall, lambda: self.outside)
         self._sockets.start(self._viser.get_event_loop())
         self.guard.crowd = ConnectionLimits(*OF_A_CLASS)
-        self.guard.open(door, self.sessions, refers, ClassDoor(hall, self._sockets, self._class_key))
+        self.guard.open(door, self.sessions, refers, ClassDoor(hall, self._sockets))
 
     # ---------------------------------------------------------------- clients, on viser's loop
 
@@ -223,7 +201,7 @@ class PageServer:
                 self.sessions,
                 self._own_files,
                 self._key,
-                room=self._room,
+                room=self.hall,
                 refers=self._refers,
             )
         await visit.arrive()
@@ -249,9 +227,8 @@ class PageServer:
     def close(self) -> None:
         """Closes the pages, ends the processes and stops the server."""
         self.guard.close()
-        for each in (self._sockets, self._link):
-            if each is not None:
-                each.close()
+        if self._sockets is not None:
+            self._sockets.close()
         with self._lock:
             self._closed = True
             visits, self._visits = list(self._visits.values()), {}

@@ -12,7 +12,6 @@ from websockets.http11 import Request
 
 from app.server.door import Answer, Door, as_origin
 from app.server.passes import (
-    CLASS_VARIABLE,
     HEADER,
     QUERY,
     USER_HEADER,
@@ -261,7 +260,7 @@ def test_a_door_for_one_proxy_takes_only_plain_addresses() -> None:
         for upgrade in ({}, {"Upgrade": "websocket"}):
             answer = judged(door, path, **by_proxy, **upgrade)
             assert answer is not None and "unusual" in answer.text, path
-    for path in ("/", "/page", "/page?fixedDpr=1&a=%2F..//", "/class.csv", "/class/servers", "/v/x", "/v/"):
+    for path in ("/", "/page", "/page?fixedDpr=1&a=%2F..//", "/class.csv", "/v/x", "/v/"):
         assert judged(door, path, **by_proxy) is None, path
     folder = Path(viser.__file__).parent / "client" / "build"
     files = [each.relative_to(folder).as_posix() for each in folder.rglob("*") if each.is_file()]
@@ -290,8 +289,6 @@ def test_a_token_of_ones_own_comes_from_a_file_or_the_environment(tmp_path: Path
     for wrong in ("short", "with spaces and so on", "ä" * 20):
         with pytest.raises(InputError, match="16 characters"):
             given_token(None, {VARIABLE: wrong})
-    with pytest.raises(InputError, match="a key has 16 characters"):
-        given_token(None, {CLASS_VARIABLE: "short"}, "--class-key", CLASS_VARIABLE)
     with pytest.raises(InputError, match="cannot be read"):
         given_token(str(tmp_path / "none"), {})
 

@@ -56,7 +56,7 @@ function write(told) {
   ID("run").disabled = !all.title || all.stage === "running";
   main({ waiting: all.asked ? "open" : all.title ? "run" : "go", open: "close", closed: "run", running: "", decided: "go" }[all.stage]);
   const robots = mine.rows.filter((row) => row.here).length;
-  ID("present").textContent = `${mine.phones} phone${mine.phones === 1 ? "" : "s"}, ${robots} with a robot${servers(mine)}`;
+  ID("present").textContent = `${mine.phones} phone${mine.phones === 1 ? "" : "s"}, ${robots} with a robot`;
   ID("everywhere").checked = mine.everywhere;
   ID("stays").checked = mine.stays;
   people(mine.rows, all.named);
@@ -98,12 +98,6 @@ function people(rows, named) {
     button.value = row.number;
     button.disabled = !row.here;
   });
-}
-
-function servers({ servers, lost }) {
-  const others = (count) => `${count} other server${count === 1 ? "" : "s"}`;
-  const away = lost ? `; ${others(lost)} cannot be reached: the learners there continue, and are counted again later` : "";
-  return `${servers ? `, ${others(servers)}` : ""}${away}`;
 }
 
 function ago(seconds) {
