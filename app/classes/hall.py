@@ -116,12 +116,16 @@ class Hall(Room):
 
     # ---------------------------------------------------------------- the members
 
+    def knows(self, seat: str) -> bool:
+        """Returns whether a phone has had this seat before."""
+        known = self.state.members.get(seat)
+        return known is not None and known.kind == "phone"
+
     def enter(self, seat: str) -> str:
         """Admits a phone. Returns its seat: the seat that it had, otherwise a new one. Raises InputError if
         the class is full."""
         with self._lock:
-            known = self._state.members.get(seat)
-            seat = seat if known is not None and known.kind == "phone" else secrets.token_urlsafe(12)
+            seat = seat if self.knows(seat) else secrets.token_urlsafe(12)
             self._state = self._state.entered(seat, "phone", time.monotonic())
         return seat
 

@@ -13,6 +13,7 @@ from websockets.asyncio.server import broadcast
 from websockets.exceptions import ConnectionClosed
 
 from app.classes.hall import Hall
+from app.classes.newcomers import Newcomers
 from app.classes.pages import qr
 from app.classes.views import View
 from app.classes.words import (
@@ -33,12 +34,17 @@ from robots import InputError
 PAUSE = 0.2
 """Shortest time, s, between two messages that are read from one page."""
 _UNSENT = 64_000  # B that may wait for a slow page before pictures are left out
+_WAIT = 20.0  # s after which a phone that was not admitted says hello again
+_CROWD = "Many phones of your network are joining: this page joins by itself in less than a minute."
 _COUNTED = "Your vote is counted. You can change it until the vote is closed."
 _NONSENSE = "this page sent something that the class does not understand: reload it"
 
 
 class Line(Protocol):
-    """A connection whose messages are limited in length and number."""
+    """A connection whose messages are limited in length and number. address: the address of the client; None
+    if it is unknown."""
+
+    address: str | None
 
     async def recv_short(self) -> str | bytes:
         """Returns the next message. Raises ConnectionClosed when the connection has ended."""
@@ -54,6 +60,7 @@ class Sockets:
         """address: the address of the server for other machines."""
         self._hall, self._address = hall, address
         self._phones: dict[Any, str] = {}  # seat by connection
+        self._newcomers = Newcomers()
         self._teachers: set[Any] = set()
         self._said: dict[str, str] = {}
         self._behind: set[Any] = set()
@@ -93,8 +100,10 @@ class Sockets:
         said = _understood(of_phone, raw)
         match said:
             case Hello():
-                seat = self._hall.enter(said.seat)
-                self._phones[line] = seat
+                if not seat:  # a connection has one seat, however often it says hello
+                    if not self._hall.knows(said.seat) and not self._newcomers.admit(line.address):
+                        return "", {"say": _CROWD, "wait": _WAIT}
+                    seat = self._phones[line] = self._hall.enter(said.seat)
                 news = {"all": self._hall.everybody(), "seat": seat, "mine": self._hall.mine(seat)}
                 return seat, {**news, "pose": self._hall.pose(), "name": self._hall.name_of(seat)}
             case _ if not seat:

@@ -136,6 +136,7 @@ class ConnectionGuard:
             return plain(found.status, found.kind, found.text, found.headers)
         if isinstance(connection, GuardedConnection):
             connection.serves = found.serve
+            connection.address = self.address(connection, request)
             connection.accept_short()
             connection.expect_word(FIRST_WORD)
         return None
@@ -176,6 +177,7 @@ class GuardedConnection(ServerConnection):
         teaches: whether the page was opened with the owner's secret, on any machine.
         account: the name with which the user signed in at the proxy.
         serves: the function that serves a page of a class, in place of viser.
+        address: the address of the client, for a page of a class; None if it is unknown.
     """
 
     def __init__(self, *of: Any, guard: ConnectionGuard, **more: Any) -> None:
@@ -186,6 +188,7 @@ class GuardedConnection(ServerConnection):
         self.teaches = False
         self.serves: Callable[[Any], Awaitable[None]] | None = None
         self.account = ""
+        self.address: str | None = None
         self._guard = guard
         self._budget = Budget(self.loop.time)
         self._waiting = 0

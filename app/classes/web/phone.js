@@ -20,6 +20,7 @@ function guess() {
 
 function write(told) {
   const all = news.all;
+  if ("wait" in told) setTimeout(hello, 1000 * told.wait);
   if (!all) return;
   if ("seat" in told) keep(told.seat);
   if ("mine" in told) mine = told.mine;
@@ -86,4 +87,8 @@ ID("who").addEventListener("submit", (event) => {
   send({ do: "name", name: ID("name").value });
   ID("name").blur();
 });
-connect(() => send({ do: "hello", seat: stored() }), write);
+function hello() {
+  send({ do: "hello", seat: stored() });
+}
+
+connect(hello, write);
