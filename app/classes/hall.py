@@ -10,6 +10,7 @@ import numpy as np
 
 from app.classes.picture import Shape, pose_of, shape_of
 from app.classes.room import Learners, Room, begin
+from app.classes.saved import SavedGathering, restored
 from app.classes.views import View, course, for_all, for_teacher
 from app.client.simulation_client import SimulationClient
 from app.client.state_code import code_of
@@ -25,11 +26,14 @@ _CODE = 6
 class Hall(Room):
     """The class and its teacher's robot."""
 
-    def __init__(self, sessions: Learners | None, robot: SimulationClient, named: bool = True) -> None:
+    def __init__(
+        self, sessions: Learners | None, robot: SimulationClient, named: bool = True, code: str | None = None
+    ) -> None:
         """sessions: the learners with robots of their own; None if all watch the teacher's robot. robot: the
-        teacher's robot. named: whether people are asked for names."""
+        teacher's robot. named: whether people are asked for names. code: the phones' code of a class that
+        continues."""
         self.robot = robot
-        self.code = "".join(secrets.choice(_LETTERS) for _ in range(_CODE))
+        self.code = code or "".join(secrets.choice(_LETTERS) for _ in range(_CODE))
         """A part of the phones' address. It gives the right to vote and to watch."""
         super().__init__(sessions, named, "" if sessions is not None else f"v/{self.code}")
         start = robot.choice.exercise
@@ -41,6 +45,15 @@ class Hall(Room):
     @property
     def guide(self) -> SimulationClient:
         return self.robot
+
+    def resume(self, kept: SavedGathering) -> None:
+        """Continues a class that was saved. The teacher's robot loads its step."""
+        with self._lock:
+            self._state = restored(kept, frozenset(each["name"] for each in self.course))
+            self._keep()
+            place = self._state.place
+        if place is not None:
+            self.robot.load(self.robot.choice.at(place))
 
     # ---------------------------------------------------------------- the teacher
 

@@ -56,9 +56,12 @@ class Line(Protocol):
 class Sockets:
     """The open pages of a class."""
 
-    def __init__(self, hall: Hall, address: Callable[[], str]) -> None:
-        """address: the address of the server for other machines."""
-        self._hall, self._address = hall, address
+    def __init__(
+        self, hall: Hall, address: Callable[[], str], keep: Callable[[], object] = lambda: None
+    ) -> None:
+        """address: the address of the server for other machines; keep: saves the class if it has changed,
+        called on the thread of the class."""
+        self._hall, self._address, self._keep = hall, address, keep
         self._phones: dict[Any, str] = {}  # seat by connection
         self._newcomers = Newcomers()
         self._teachers: set[Any] = set()
@@ -177,6 +180,7 @@ class Sockets:
 
     def _tell(self) -> None:
         """Called on the thread of the class after each check of the pages."""
+        self._keep()
         news = {name: json.dumps(each) for name, each in self._news().items() if each is not None}
         loop = self._loop
         if loop is not None and not loop.is_closed():

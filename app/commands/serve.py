@@ -111,6 +111,11 @@ def serve(
         choice = SceneChoice.of_state(found).admitting(own)
     else:
         choice = own
+    file = None
+    if class_ and not no_names and port:  # at port 0, no address is the same after a new start
+        from app.server.class_file import class_file
+
+        file = class_file(host, port, choice, classroom)
     server = PageServer(
         choice,
         host=host,
@@ -126,5 +131,6 @@ def serve(
         class_names=not no_names if class_ else None,
         proxy_only=proxy_only,
         embed_in=embed_in,
+        class_file=file,
     )
     return serve_page(server, open_browser=not no_browser, drain=drain)

@@ -35,6 +35,11 @@ def new_token() -> str:
     return secrets.token_urlsafe(16)
 
 
+def new_key() -> bytes:
+    """Returns a random key for cookies."""
+    return secrets.token_bytes(32)
+
+
 def given_token(file: str | None, environment: Mapping[str, str]) -> str | None:
     """Returns the user's own token, which several servers can have in common: the first line of a file, or
     the environment variable; None if neither exists. Raises InputError, which names the option or the
@@ -78,7 +83,7 @@ class Passes:
     token: str | None = field(default=None, repr=False)
     owner: str | None = field(default=None, repr=False)
     cookie: str = "himpc-lab"
-    key: bytes = field(default_factory=lambda: secrets.token_bytes(32), repr=False)
+    key: bytes = field(default_factory=new_key, repr=False)
 
     def link(self, address: str, role: Role, page: str = "") -> str:
         """Returns the address of a page for a visitor with this role. page: "" is the page of a robot."""

@@ -1,3 +1,4 @@
+const ANEW = "The class has started anew: scan the code again.";
 let mine = null, asked = "", moved = false;
 const SEAT = "himpc-lab-seat " + location.pathname;
 

@@ -1,3 +1,4 @@
+const ANEW = "The class has started anew: open the teacher's address that himpc-lab printed, and scan the code again.";
 let course = [], chosen = "";
 
 function fill(select, entries) {
