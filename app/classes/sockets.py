@@ -17,6 +17,7 @@ from app.classes.newcomers import Newcomers
 from app.classes.pages import qr
 from app.classes.views import View
 from app.classes.words import (
+    ONLY_HERE,
     CastVote,
     GoTo,
     Hello,
@@ -57,11 +58,15 @@ class Sockets:
     """The open pages of a class."""
 
     def __init__(
-        self, hall: Hall, address: Callable[[], str], keep: Callable[[], object] = lambda: None
+        self,
+        hall: Hall,
+        address: Callable[[], str],
+        only_here: bool = False,
+        keep: Callable[[], object] = lambda: None,
     ) -> None:
-        """address: the address of the server for other machines; keep: saves the class if it has changed,
-        called on the thread of the class."""
-        self._hall, self._address, self._keep = hall, address, keep
+        """address: the address of the server for other machines; only_here: whether only this machine can
+        reach that address; keep: saves the class if it has changed, called on the thread of the class."""
+        self._hall, self._address, self._only_here, self._keep = hall, address, only_here, keep
         self._phones: dict[Any, str] = {}  # seat by connection
         self._newcomers = Newcomers()
         self._teachers: set[Any] = set()
@@ -144,7 +149,7 @@ class Sockets:
 
     def _phones_at(self, address: str) -> View:
         whole = f"{(address or self._address()).rstrip('/')}/v/{self._hall.code}"
-        return {"text": whole, "qr": qr(whole)}
+        return {"text": whole, "qr": qr(whole), "note": ONLY_HERE if self._only_here and not address else ""}
 
     async def _of_teacher(self, said: OfTeacher) -> View:
         hall = self._hall

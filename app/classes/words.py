@@ -15,6 +15,10 @@ TEACHER = "class"
 
 PHONES = "/v/"
 """The beginning of the address at which phones vote; the code of the class follows."""
+ONLY_HERE = (
+    "Phones cannot reach this address, which only this computer can open: start himpc-lab again with "
+    "--host 0.0.0.0."
+)
 TABLE = f"/{TEACHER}.csv"
 """The address of the table."""
 

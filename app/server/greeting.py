@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from app.classes.words import ONLY_HERE
 from app.server.address import seen_from_outside
 from app.server.classroom import Classroom
 
@@ -25,6 +26,8 @@ def greeting(server: PageServer) -> Iterator[str]:
     if server.hall is not None:
         yield f"  {'teacher:':{_WIDTH}}{server.teachers_link}"
         yield f"  {'phones:':{_WIDTH}}{server.outside}/v/{server.hall.code}"
+        if not server.public:
+            yield f"  {'':{_WIDTH}}{ONLY_HERE}"
     if server.continued is not None:
         yield f"  {'continues:':{_WIDTH}}{_CONTINUES.format(len(server.continued.state.members))}"
     if server.passes.token is None:

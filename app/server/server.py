@@ -209,7 +209,7 @@ class PageServer:
         from app.classes.sockets import Sockets
         from app.server.class_door import ClassDoor
 
-        self._sockets = Sockets(hall, lambda: self.outside, self._keep_class)
+        self._sockets = Sockets(hall, lambda: self.outside, not self.public, self._keep_class)
         self._sockets.start(self._viser.get_event_loop())
         self.guard.crowd = ConnectionLimits(*OF_A_CLASS)
         self.guard.open(door, self.sessions, refers, ClassDoor(hall, self._sockets))

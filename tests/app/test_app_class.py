@@ -18,11 +18,12 @@ from websockets.sync.client import ClientConnection, connect
 
 from app.__main__ import main
 from app.classes.newcomers import PER_MINUTE, Newcomers
-from app.classes.words import LONGEST
+from app.classes.words import LONGEST, ONLY_HERE
 from app.client.refused import STAYING
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
+from app.server.greeting import greeting
 from app.server.passes import QUERY
 from app.server.server import PageServer
 from browsing.wire import Wire, eventually
@@ -346,6 +347,16 @@ def test_new_phones_are_counted_by_address_and_minute() -> None:
     assert newcomers.admit("b") and newcomers.admit(None)
     now[0] = 60.0
     assert newcomers.admit("a")
+
+
+def test_an_address_that_phones_cannot_reach_is_said(server: PageServer) -> None:
+    """This server listens on 127.0.0.1. Terminal and teacher's page say so next to the phones' address."""
+    assert any(ONLY_HERE in line for line in greeting(server))
+    with Line(server.teachers_link) as lead:
+        lead.hear("address")
+        assert "127.0.0.1" in lead.told["address"]["text"] and lead.told["address"]["note"] == ONLY_HERE
+        lead.send(do="here", address="http://lab.example:8080")
+        assert lead.hear("address")["address"]["note"] == ""
 
 
 def test_a_server_without_a_class_has_none_of_its_pages(one_fork_server: None) -> None:

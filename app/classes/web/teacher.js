@@ -26,6 +26,7 @@ function write(told) {
   }
   if (told.address) {
     put("qr", told.address.qr);
+    ID("note").textContent = told.address.note;
     const [place, code] = told.address.text.replace(/^https?:\/\//, "").split(/(?=\/v\/)/);
     const big = document.createElement("b");
     big.textContent = code;
