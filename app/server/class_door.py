@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import secrets
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from http import HTTPStatus
 from typing import Any
 from urllib.parse import urlsplit
@@ -20,6 +20,7 @@ from app.classes.words import PHONES, TEACHER
 from app.server.answers import NO_CLASS
 from app.server.door import Answer, Door, is_upgrade
 from app.server.passes import QUERY
+from app.server.wrong_codes import WrongCodes
 
 _TEACHER = f"/{TEACHER}"
 _NOT_KEPT = ("Cache-Control", "no-store")
@@ -47,17 +48,20 @@ class ClassDoor:
 
     hall: Hall
     sockets: Sockets
+    wrong_codes: WrongCodes = field(default_factory=WrongCodes)
 
-    def answer(self, door: Door, request: Request, who: str) -> Answer | Served:
+    def answer(self, door: Door, request: Request, who: str, address: str | None) -> Answer | Served:
         """Returns the response to a request. The request must name this server and come from one of its
-        pages. who: identifies the sender, see `app.server.peers`."""
+        pages. who: identifies the sender, see `app.server.peers`; address: the address of the client, None if
+        it is unknown."""
         plain, host = urlsplit(request.path).path, request.headers["Host"]
         past = door.not_by_the_proxy(request)
         if past is not None:
             return past
         if plain.startswith(PHONES):
-            given = plain.removeprefix(PHONES).encode(errors="replace")
-            if not secrets.compare_digest(given, self.hall.code.encode()):
+            given = plain.removeprefix(PHONES)
+            if not secrets.compare_digest(given.encode(errors="replace"), self.hall.code.encode()):
+                self.wrong_codes.note(address, given)
                 return NO_CLASS
             return _page("phone", host, self.sockets.phone)
         if QUERY in request.path and not is_upgrade(request):

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import asyncio
 import ipaddress
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from http import HTTPStatus
 from typing import TYPE_CHECKING, Any
 
 from websockets.asyncio.server import ServerConnection
 from websockets.http11 import Request, Response
 
-from app.classes.words import is_of_a_class
+from app.classes.words import PHONES, is_of_a_class
 from app.server import budget
-from app.server.answers import CROWDED, FULL, NO_CLASS, NOT_OPEN, as_response, plain
+from app.server.answers import CROWDED, FULL, GUESSED, NO_CLASS, NOT_OPEN, as_response, plain
 from app.server.connection import GuardedConnection
 from app.server.connection_limits import ConnectionLimits
 from app.server.door import Answer, Door, is_upgrade
@@ -21,9 +22,10 @@ from app.server.load import Load, Places, load_of, report
 from app.server.peers import ends_of
 from app.server.prefix import under_its_name
 from app.server.request_line import NOT_ALLOWED
+from app.server.wrong_codes import DELAY, WrongCodes
 
 if TYPE_CHECKING:  # loaded only for a class: the server listens before these modules are loaded
-    from app.server.class_door import ClassDoor
+    from app.server.class_door import ClassDoor, Served
 
 HANDSHAKE = 5.0
 """Time, s, within which a request must be complete."""
@@ -74,7 +76,9 @@ class ConnectionGuard:
         """Returns the changed keywords for websockets' `serve`."""
         files: Callable[[ServerConnection, Request], Response | None] = given["process_request"] or _nothing
 
-        def request(connection: ServerConnection, request: Request) -> Response | None:
+        def request(
+            connection: ServerConnection, request: Request
+        ) -> Response | Awaitable[Response | None] | None:
             told = None if is_upgrade(request) else report(request.path, self.load)
             if told is not None and (_is_a_monitors(connection, request) or not self._door.refuses(request)):
                 return plain(*told)
@@ -131,10 +135,29 @@ class ConnectionGuard:
         answer = self._not_open(connection, request) or self._door.judge(request, _user(connection))
         return FULL if answer is None and self._refers and self.load.full else answer
 
-    def _to_class(self, of: ClassDoor, connection: ServerConnection, request: Request) -> Response | None:
-        """Returns the response to a request for a page of the class; None for an upgrade that is admitted."""
-        answer = self._not_open(connection, request) or self._door.refuses(request)
-        found = answer or of.answer(self._door, request, _user(connection))
+    def _to_class(
+        self, of: ClassDoor, connection: ServerConnection, request: Request
+    ) -> Response | Awaitable[Response | None] | None:
+        """Returns the response to a request for a page of the class; None for an upgrade that is admitted.
+        The response is late if its address has sent many wrong codes."""
+        refused = self._not_open(connection, request) or self._door.refuses(request)
+        address = self.address(connection, request)
+        found = refused or of.answer(self._door, request, _user(connection), address)
+        if refused is None and request.path.startswith(PHONES) and of.wrong_codes.are_many(address):
+            return self._late(of.wrong_codes, connection, request, found)
+        return self._of_class(found, connection, request)
+
+    async def _late(
+        self, wrong: WrongCodes, connection: ServerConnection, request: Request, found: Answer | Served
+    ) -> Response | None:
+        with wrong.waits(self.address(connection, request)) as may_wait:
+            if may_wait:
+                await asyncio.sleep(DELAY)
+            return self._of_class(found if may_wait else GUESSED, connection, request)
+
+    def _of_class(
+        self, found: Answer | Served, connection: ServerConnection, request: Request
+    ) -> Response | None:
         if isinstance(found, Answer):
             self.refused += found.status >= HTTPStatus.BAD_REQUEST
             return as_response(found)

@@ -251,6 +251,17 @@ def test_a_door_for_one_proxy_lets_in_nobody_else() -> None:
     assert everybody.account(asked(**by_proxy, **account)) == ""
 
 
+def test_a_request_with_two_accounts_is_refused() -> None:
+    """A proxy that appends its header to the visitor's own does not decide which of the two is right."""
+    door = Door(passes=shared(TOKEN, OWNER), proxy_only=True)
+    named = USER_HEADER.replace("-", "_")
+    for given in (["zoe", "prof"], ["zoe", "zoe"], ["", "zoe"]):
+        for upgrade in ({}, {"Upgrade": "websocket"}):
+            answer = judged(door, **{HEADER.replace("-", "_"): TOKEN, named: given}, **upgrade)
+            assert answer is not None and "two accounts" in answer.text
+    assert judged(door, **{HEADER.replace("-", "_"): TOKEN, named: "zoe"}) is None
+
+
 def test_a_door_for_one_proxy_takes_only_plain_addresses() -> None:
     """nginx treats the first four addresses as /v/x, for which it may ask for no password, and passes them on
     unchanged."""
