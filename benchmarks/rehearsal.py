@@ -1,13 +1,11 @@
-"""Rehearses a class: learners with robots of their own on two servers, and phones, go through a lesson.
+"""Rehearses a class: learners with robots of their own, and phones, go through a lesson.
 
     python -m benchmarks.rehearsal [--learners 20] [--phones 200] [--lesson L] [--json -]
 
-The program starts two servers, each with half of the learners. The first server has the teacher's page and
-the phones, and the second server follows this class. The class goes to each step of the lesson, votes, votes
-again, and runs the step on all robots. Then every learner hands in, and all texts are graded. Learners and
-phones use the protocol of their pages and draw nothing. The exit code is 0 if no vote, step or text was lost.
-Waiting times and real-time factors depend on the cores and on their other load. They are printed, but they do
-not change the exit code.
+The class goes to each step of the lesson, votes, votes again, and runs the step on all robots. Then every
+learner hands in, and all texts are graded. Learners and phones use the protocol of their pages and draw
+nothing. The exit code is 0 if no vote, step or text was lost. Waiting times and real-time factors depend on
+the cores and on their other load. They are printed, but they do not change the exit code.
 """
 
 from __future__ import annotations
@@ -35,7 +33,6 @@ from benchmarks.rehearsal_host import KEY, Host
 from benchmarks.rehearsal_people import Learner, Teacher
 from lessons.teaching.prediction import Choice, Value
 
-SERVERS = 2
 Waits = dict[str, list[float]]
 
 
@@ -47,7 +44,7 @@ def main() -> int:
     parser.add_argument("--lesson", default="a-redundant-arm")
     parser.add_argument("--json", choices=["-"], default=None)
     options = parser.parse_args()
-    found = rehearsed(options.learners // SERVERS, options.phones, options.lesson)
+    found = rehearsed(options.learners, options.phones, options.lesson)
     print(json.dumps(found, indent=1) if options.json else table(found))
     return 1 if found["lost"] else 0
 
@@ -56,30 +53,26 @@ def main() -> int:
 
 
 def rehearsed(learners: int, phones: int, lesson: str) -> dict[str, Any]:
-    """Returns everything that was measured. learners: their number on each server."""
-    hosts = [Host(learners, lesson)]
+    """Returns everything that was measured."""
+    host = Host(learners, lesson)
     try:
-        hosts += [Host(learners, lesson, hosts[0].links["server"]) for _ in range(SERVERS - 1)]
-        with _people(hosts, learners, phones) as (pages, crowd, teacher):
-            return _lecture(hosts, pages, crowd, teacher, lesson, len(pages) + phones)
+        with _people(host, learners, phones) as (pages, crowd, teacher):
+            return _lecture(host, pages, crowd, teacher, lesson, len(pages) + phones)
     finally:
-        for host in hosts:
-            host.close()
+        host.close()
 
 
 @contextlib.contextmanager
-def _people(
-    hosts: Sequence[Host], learners: int, phones: int
-) -> Iterator[tuple[list[Learner], Crowd, Teacher]]:
+def _people(host: Host, learners: int, phones: int) -> Iterator[tuple[list[Learner], Crowd, Teacher]]:
     with contextlib.ExitStack() as all_leave:
-        teacher = Teacher(hosts[0].links["teacher"])
+        teacher = Teacher(host.links["teacher"])
         all_leave.callback(teacher.close)
-        pages = [Learner(host.links["learners"]) for host in hosts for _ in range(learners)]
+        pages = [Learner(host.links["learners"]) for _ in range(learners)]
         for page in pages:
             all_leave.enter_context(page)
         for page in pages:
             page.waits_for(lambda page=page: page.find("Your name"))
-        crowd = Crowd("--phones", str(phones), "--at", hosts[0].links["phones"])
+        crowd = Crowd("--phones", str(phones), "--at", host.links["phones"])
         all_leave.enter_context(crowd)
         crowd.hear()
         crowd.go_on()  # begins the counting of pictures
@@ -89,7 +82,7 @@ def _people(
 
 
 def _lecture(
-    hosts: Sequence[Host],
+    host: Host,
     pages: Sequence[Learner],
     crowd: Crowd,
     teacher: Teacher,
@@ -100,7 +93,7 @@ def _lecture(
     lost: list[str] = []
     for k, page in enumerate(pages):
         page.use("Your name", f"learner {k}")
-    began, before = time.monotonic(), [host.report() for host in hosts]
+    began, before = time.monotonic(), host.report()
     own = time.process_time()
     steps = LessonPlace(lesson).whole.steps
     for place, step in enumerate(steps):
@@ -132,13 +125,10 @@ def _lecture(
         for row in _rows(teacher, len(steps))
         if row["done"] != len(steps)
     ]
-    reports = [host.report() for host in hosts]
-    used, robots = (
-        [now[what] - then[what] for now, then in zip(reports, before, strict=True)]
-        for what in ("busy", "robots")
-    )
+    report = host.report()
+    used, robots = (report[what] - before[what] for what in ("busy", "robots"))
     clients = time.process_time() - own
-    factors = [factor for report in reports for factor in report["factors"]]
+    factors = report["factors"]
     lost += _handed_in(pages, waits, lesson, len(steps))
     return {
         "learners": len(pages),
@@ -146,8 +136,8 @@ def _lecture(
         "cores": psutil.cpu_count(),
         "load_average": round(psutil.getloadavg()[0], 1),
         "minutes": round(minutes, 2),
-        "server_shares": [round(one / 60 / minutes, 3) for one in used],
-        "robots_share": round(sum(robots) / 60 / minutes, 3),
+        "server_share": round(used / 60 / minutes, 3),
+        "robots_share": round(robots / 60 / minutes, 3),
         "clients_share": round(clients / 60 / minutes, 3),
         "real_time_factors": {"runs": len(factors), **_figures(factors)},
         "waits": {name: _figures(times) for name, times in waits.items()},
@@ -238,9 +228,9 @@ def table(found: dict[str, Any]) -> str:
     )
     factors = found["real_time_factors"]
     return (
-        f"{found['learners']} learners on {SERVERS} servers, {found['cores']} cores, load average "
+        f"{found['learners']} learners, {found['cores']} cores, load average "
         f"{found['load_average']}, {found['minutes']} minutes\n"
-        f"servers: {found['server_shares']} of a core; all robots: {found['robots_share']}; all clients: "
+        f"server: {found['server_share']} of a core; all robots: {found['robots_share']}; all clients: "
         f"{found['clients_share']}\n"
         f"simulated over real time in {factors['runs']} runs: least {factors['least']}, median "
         f"{factors['median']}\nwaiting times, s:\n{waits}\nlost: {found['lost'] or 'nothing'}"

@@ -19,11 +19,11 @@ from app.link.exercise import LessonPlace
 from app.server.server import PageServer
 from lessons.replay.progress import read_key
 
-KEY, CLASS_KEY = "a key of a rehearsal", "the-class-of-a-rehearsal"
+KEY = "a key of a rehearsal"
 
 
-def be_a_server(learners: int, lesson: str, follows: str | None) -> None:
-    """Serves a class, or follows the class at an address. The process prints its own addresses. For each line
+def be_a_server(learners: int, lesson: str) -> None:
+    """Serves a class. The process prints its own addresses. For each line
     on stdin it prints the real-time factor of each learner's run, and the processor time that the server and
     the robots have used so far, s."""
     with tempfile.TemporaryDirectory() as folder:
@@ -35,17 +35,13 @@ def be_a_server(learners: int, lesson: str, follows: str | None) -> None:
             port=0,
             max_sessions=learners,
             key=read_key(str(key)),
-            class_names=True if follows is None else None,
-            class_key=CLASS_KEY,
-            class_of=follows,
+            class_names=True,
             grace=60.0,
         )
         try:
-            links = {"learners": server.guest_link, "server": server.url}
-            if server.hall is not None:
-                links["teacher"] = server.teachers_link
-                links["phones"] = f"{server.url.replace('http', 'ws')}/v/{server.hall.code}"
-            _tell(links)
+            assert server.hall is not None
+            phones = f"{server.url.replace('http', 'ws')}/v/{server.hall.code}"
+            _tell({"learners": server.guest_link, "teacher": server.teachers_link, "phones": phones})
             runs: dict[tuple[str, LessonPlace], list[float]] = {}
             over = threading.Event()
             threading.Thread(target=_follow, args=(server, runs, over), daemon=True).start()
@@ -91,11 +87,9 @@ def _tell(found: dict[str, Any]) -> None:
 class Host:
     """One server in a process of its own."""
 
-    def __init__(self, learners: int, lesson: str, follows: str | None = None) -> None:
-        """follows: the address of the server whose class it follows; None if this server has the class."""
-        more = [] if follows is None else ["--class-of", follows]
+    def __init__(self, learners: int, lesson: str) -> None:
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "benchmarks.rehearsal_host", str(learners), lesson, *more],
+            [sys.executable, "-m", "benchmarks.rehearsal_host", str(learners), lesson],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
@@ -127,6 +121,5 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser()
     parser.add_argument("learners", type=int)
     parser.add_argument("lesson")
-    parser.add_argument("--class-of", default=None)
     given = parser.parse_args()
-    be_a_server(given.learners, given.lesson, given.class_of)
+    be_a_server(given.learners, given.lesson)

@@ -43,8 +43,6 @@ class Gathering:
         everywhere: whether the step runs on all pages; otherwise it runs on the teacher's robot only.
         members: the members by identity; only a member's page and the server know this identity.
         past: earlier votes.
-        visits: number of times that the class has gone to a step; runs: number of times that it has run the
-            present step since then.
     """
 
     named: bool = True
@@ -56,8 +54,6 @@ class Gathering:
     everywhere: bool = True
     members: Mapping[str, Member] = field(default_factory=dict)
     past: tuple[Held, ...] = ()
-    visits: int = 0
-    runs: int = 0
 
     @property
     def stage(self) -> Stage:
@@ -80,8 +76,7 @@ class Gathering:
 
     def going_to(self, place: LessonPlace) -> Gathering:
         """Returns the class at another step, or at the beginning of the same step."""
-        fresh = replace(self, place=place, poll=None, truth=math.nan, running=False, past=self.votes)
-        return replace(fresh, visits=self.visits + 1, runs=0)
+        return replace(self, place=place, poll=None, truth=math.nan, running=False, past=self.votes)
 
     def opened(self) -> Gathering:
         """Returns the class with an open vote, the first or the second one. Raises InputError if there is
@@ -103,7 +98,7 @@ class Gathering:
         if self.place is None:
             raise InputError("choose a step first")
         poll = None if self.poll is None else self.poll.closed()
-        return replace(self, running=True, truth=math.nan, poll=poll, runs=self.runs + 1)
+        return replace(self, running=True, truth=math.nan, poll=poll)
 
     def measured(self, truth: float) -> Gathering:
         """Returns the class after the run. truth: the measured number; NaN if the step measures none."""
@@ -193,35 +188,13 @@ class Gathering:
             return self
         member = known.seen(at, lecture, now)
         after = self if member is known else self._with(who, member)
-        return (
-            after
-            if lecture is None or lecture.exercise != self.place
-            else after._expecting(who, lecture.answer, now)
-        )
-
-    def told(
-        self,
-        who: str,
-        at: LessonPlace | None,
-        done: Mapping[LessonPlace, tuple[int, int]],
-        answer: object,
-        since: float,
-    ) -> Gathering:
-        """Returns the class after another server reported about a learner, see `seen`. answer: the learner's
-        prediction; since: the time of the learner's last action, s."""
-        known = self.members[who]
-        member = replace(known, at=at, done={**known.done, **done}, since=since)
-        return self._with(who, member)._expecting(who, answer, since)
-
-    def _expecting(self, who: str, answer: object, now: float) -> Gathering:
-        """Returns the class after a prediction was read. While a vote is open, the prediction counts as a
-        vote."""
+        answer = None if lecture is None or lecture.exercise != self.place else lecture.answer
         if answer is None or self.poll is None or not self.poll.is_open:
-            return self
+            return after
         try:
-            return self.voted(who, answer, now)
+            return after.voted(who, answer, now)
         except InputError:
-            return self  # there are too many voters; the learner's page does not show this
+            return after  # there are too many voters; the learner's page does not show this
 
     def _with(self, who: str, member: Member) -> Gathering:
         return replace(self, members={**self.members, who: member})

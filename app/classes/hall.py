@@ -1,18 +1,16 @@
-"""A running class: its step, its votes and its members, also those on other servers."""
+"""A running class: its step, its votes and its members."""
 
 from __future__ import annotations
 
 import secrets
 import time
-from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from app.classes.gathering import MEMBERS
 from app.classes.picture import Shape, pose_of, shape_of
-from app.classes.relayed import ClassNow, LearnerNow, class_now, known_place, read_done, read_place
 from app.classes.room import Learners, Room, begin
+from app.classes.saved import SavedGathering, restored
 from app.classes.views import View, course, for_all, for_teacher
 from app.client.simulation_client import SimulationClient
 from app.client.state_code import code_of
@@ -21,20 +19,21 @@ from app.link.exercise import LessonPlace
 from lessons.replay.state import decode
 from robots import InputError
 
-SERVERS = 20
-"""Largest number of other servers of a class."""
 _LETTERS = "abcdefghjkmnpqrstuvwxyz23456789"  # characters that cannot be confused with each other
 _CODE = 6
 
 
 class Hall(Room):
-    """The class on the server that has the teacher's page."""
+    """The class and its teacher's robot."""
 
-    def __init__(self, sessions: Learners | None, robot: SimulationClient, named: bool = True) -> None:
+    def __init__(
+        self, sessions: Learners | None, robot: SimulationClient, named: bool = True, code: str | None = None
+    ) -> None:
         """sessions: the learners with robots of their own; None if all watch the teacher's robot. robot: the
-        teacher's robot. named: whether people are asked for names."""
+        teacher's robot. named: whether people are asked for names. code: the phones' code of a class that
+        continues."""
         self.robot = robot
-        self.code = "".join(secrets.choice(_LETTERS) for _ in range(_CODE))
+        self.code = code or "".join(secrets.choice(_LETTERS) for _ in range(_CODE))
         """A part of the phones' address. It gives the right to vote and to watch."""
         super().__init__(sessions, named, "" if sessions is not None else f"v/{self.code}")
         start = robot.choice.exercise
@@ -42,13 +41,19 @@ class Hall(Room):
         """The lessons of the teacher's list."""
         self._runs = 0  # number of runs of the teacher's robot before the present one
         self._shape: tuple[object, Shape | None] = (None, None)
-        self._far: dict[str, str] = {}  # by learner: the server, if the learner is on another one
-        self._servers: set[str] = set()  # the other servers that are connected
-        self._replaced: dict[str, None] = {}  # old identities of learners who have a new one
 
     @property
     def guide(self) -> SimulationClient:
         return self.robot
+
+    def resume(self, kept: SavedGathering) -> None:
+        """Continues a class that was saved. The teacher's robot loads its step."""
+        with self._lock:
+            self._state = restored(kept, frozenset(each["name"] for each in self.course))
+            self._keep()
+            place = self._state.place
+        if place is not None:
+            self.robot.load(self.robot.choice.at(place))
 
     # ---------------------------------------------------------------- the teacher
 
@@ -63,7 +68,9 @@ class Hall(Room):
     def place(self, lesson: str, place: int) -> LessonPlace:
         """Returns a step of the course, or of the lesson with which the class was started. Raises InputError
         for any other step."""
-        return read_place((lesson, place), self.course)
+        if lesson not in (each["name"] for each in self.course):
+            raise InputError("there is no such lesson in this class")
+        return LessonPlace.at(lesson, place + 1)
 
     def show_step(self) -> None:
         """Brings the teacher's robot back to the step of the class. Raises InputError if no step is
@@ -109,12 +116,8 @@ class Hall(Room):
             raise InputError("this learner has left, and has no robot any more")
         return who
 
-    def server_of(self, who: str) -> str | None:
-        """Returns the other server on which a learner is; None if the learner is on this server."""
-        return self._far.get(who)
-
     def code_of(self, who: str) -> str:
-        """Returns the state code of a learner on this server. Raises InputError if there is no code."""
+        """Returns the state code of a learner. Raises InputError if there is no code."""
         told = self._latest(who)
         if told is None:
             raise InputError("the robot of this learner does not answer")
@@ -126,23 +129,16 @@ class Hall(Room):
 
     # ---------------------------------------------------------------- the members
 
-    def recognise(self, who: str, before: Sequence[str], account: str = "") -> None:
-        with self._lock:
-            known = self._state.members
-            super().recognise(who, before, account)
-            self._replace(known, self._state.members)
-
-    def _replace(self, known: Collection[str], now: Collection[str]) -> None:
-        gone = [who for who in known if who not in now]
-        if gone:
-            self._replaced = dict.fromkeys([*self._replaced, *gone][-4 * MEMBERS :])
+    def knows(self, seat: str) -> bool:
+        """Returns whether a phone has had this seat before."""
+        known = self.state.members.get(seat)
+        return known is not None and known.kind == "phone"
 
     def enter(self, seat: str) -> str:
         """Admits a phone. Returns its seat: the seat that it had, otherwise a new one. Raises InputError if
         the class is full."""
         with self._lock:
-            known = self._state.members.get(seat)
-            seat = seat if known is not None and known.kind == "phone" else secrets.token_urlsafe(12)
+            seat = seat if self.knows(seat) else secrets.token_urlsafe(12)
             self._state = self._state.entered(seat, "phone", time.monotonic())
         return seat
 
@@ -161,61 +157,6 @@ class Hall(Room):
         poll = self.state.poll
         return None if poll is None else poll.latest.get(who)
 
-    # ---------------------------------------------------------------- other servers
-
-    def link(self, server: str) -> None:
-        """Called when another server of the class has connected. Raises InputError if there are too many."""
-        with self._lock:
-            if len(self._servers - {server}) >= SERVERS:
-                raise InputError(f"a class has at most {SERVERS} other servers")
-            self._servers.add(server)
-
-    def unlink(self, server: str) -> None:
-        """Called when the connection to another server was lost. Votes and progress are kept."""
-        with self._lock:
-            self._servers.discard(server)
-            for who, at in self._far.items():
-                if at == server:
-                    self._state = self._state.left(who)
-
-    def hear(self, server: str, told: LearnerNow) -> None:
-        """Receives the report of another server about a learner. The report is ignored if the learner is on
-        this server, or on a third server that is connected. Steps that this class does not have are left
-        out."""
-        at, done = known_place(told.at, self.course), read_done(told.done, self.course)
-        now = time.monotonic()
-        with self._lock:
-            known, home = self._state.members.get(told.who), self._far.get(told.who)
-            taken = home is None or (home != server and home in self._servers)
-            if known is not None and taken:
-                return
-            if told.who in self._replaced and not told.here:
-                return  # a late report of the server that this learner has left
-            state = self._state.succeeded(told.who, told.before, told.account)
-            self._replace(self._state.members, state.members)
-            self._replaced.pop(told.who, None)
-            try:
-                state = state.entered(told.who, "robot", now, told.account)
-            except InputError:
-                return  # the class is full
-            if told.name is not None:
-                state = state.called(told.who, told.name)
-            answer = told.answer if told.visit == state.visits else None
-            state = state.told(told.who, at, done, answer, now - told.quiet)
-            self._state = state if told.here else state.left(told.who)
-            self._far[told.who] = server
-
-    def news(self) -> ClassNow:
-        """Returns the state of the class for its other servers."""
-        return class_now(self.state)
-
-    def _elsewhere(self) -> set[str]:
-        return {who for who, server in self._far.items() if server in self._servers}
-
-    def _lost(self) -> int:
-        """Returns the number of other servers that have learners but no connection."""
-        return len(set(self._far.values()) - self._servers)
-
     # ---------------------------------------------------------------- looking
 
     def everybody(self) -> View:
@@ -232,8 +173,6 @@ class Hall(Room):
                 **for_teacher(self._state, time.monotonic()),
                 "shown": [sum(each is True for each in held), len(held)],
                 "busy": self.robot.trouble() is not None,
-                "servers": len(self._servers),
-                "lost": self._lost(),
             }
 
     def pose(self) -> View | None:
@@ -250,7 +189,6 @@ class Hall(Room):
             self._shape = ready, shape_of(ready.robot)
         super()._look()
         with self._lock:
-            self._far = {who: server for who, server in self._far.items() if who in self._state.members}
             self._measure()
 
     def _measure(self) -> None:

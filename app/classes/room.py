@@ -1,4 +1,4 @@
-"""The learners with robots of their own on one server, who follow a class."""
+"""The learners with robots of their own, who follow a class."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Learners(Protocol):
 
 
 class Room(ABC):
-    """Leads the learners of this server through the class's steps. A separate thread checks the learners
+    """Leads the learners through the class's steps. A separate thread checks the learners
     `RATE` times a second. People's messages may arrive on any thread."""
 
     def __init__(self, sessions: Learners | None, named: bool, vote: str = "") -> None:
@@ -73,8 +73,8 @@ class Room(ABC):
 
     @property
     @abstractmethod
-    def guide(self) -> SimulationClient | None:
-        """The teacher's robot; None if another server has it."""
+    def guide(self) -> SimulationClient:
+        """The teacher's robot."""
 
     # ---------------------------------------------------------------- the learners
 
@@ -155,13 +155,13 @@ class Room(ABC):
         for learner in learners:
             self._look_at(learner, now)
         with self._lock:
-            here = {each.token for each in learners if each.attached} | self._elsewhere()
+            here = {each.token for each in learners if each.attached}
             for who, member in self._state.members.items():
                 if member.kind == "robot" and member.here and who not in here:
                     self._state = self._state.left(who)
             before = self._builds.before()
         self._build()
-        self.seats.show(self.state, before, self._cut_off)
+        self.seats.show(self.state, before)
 
     def _build(self) -> None:
         """Brings the next learners to the class's step."""
@@ -227,18 +227,9 @@ class Room(ABC):
         return () if self._sessions is None else self._sessions.learners
 
     def _latest(self, who: str) -> Told | None:
-        """Returns the last reported run of a learner of this server; None if there is none."""
+        """Returns the last reported run of a learner; None if there is none."""
         learner = next((each for each in self._learners() if each.token == who), None)
         return None if learner is None else learner.latest()
-
-    def _elsewhere(self) -> set[str]:
-        """Returns the members whose page is open on another server."""
-        return set()
-
-    @property
-    def _cut_off(self) -> bool:
-        """Whether the server of the class cannot be reached."""
-        return False
 
 
 def begin(learner: SimulationClient, lecture: Lecture | None, state: Gathering) -> None:

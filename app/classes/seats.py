@@ -29,17 +29,16 @@ class Seats:
         with self._lock:
             self._seats.pop(who, None)
 
-    def show(self, state: Gathering, before: Mapping[str, int], cut_off: bool) -> None:
+    def show(self, state: Gathering, before: Mapping[str, int]) -> None:
         """Updates all pages whose view has changed. before: for each learner who waits for a robot at the
-        class's step, the number of learners before them; cut_off: whether the class's server cannot be
-        reached."""
+        class's step, the number of learners before them."""
         with self._lock:
             seats = list(self._seats.items())
         everybody = for_all(state)
         for who, (show, shown) in seats:
             member = state.members.get(who)
             away = member is not None and state.place not in (None, member.at) and who not in before
-            more = {"vote": self._vote, "before": before.get(who), "cut_off": cut_off}
+            more = {"vote": self._vote, "before": before.get(who)}
             view = {**everybody, "voted": 0, "away": away, **more}
             if view == shown:
                 continue

@@ -6,19 +6,18 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import Callable
-from contextlib import suppress
 from typing import Any, Protocol
 
 import msgspec
 from websockets.asyncio.server import broadcast
 from websockets.exceptions import ConnectionClosed
-from websockets.frames import CloseCode
 
 from app.classes.hall import Hall
+from app.classes.newcomers import Newcomers
 from app.classes.pages import qr
-from app.classes.relayed import AskState, Join, LearnerNow, LearnersNow, OfServer, StateTold, of_server
 from app.classes.views import View
 from app.classes.words import (
+    ONLY_HERE,
     CastVote,
     GoTo,
     Hello,
@@ -36,13 +35,17 @@ from robots import InputError
 PAUSE = 0.2
 """Shortest time, s, between two messages that are read from one page."""
 _UNSENT = 64_000  # B that may wait for a slow page before pictures are left out
-_PATIENCE = 12.0  # s within which another server must send the state of a learner
+_WAIT = 20.0  # s after which a phone that was not admitted says hello again
+_CROWD = "Many phones of your network are joining: this page joins by itself in less than a minute."
 _COUNTED = "Your vote is counted. You can change it until the vote is closed."
 _NONSENSE = "this page sent something that the class does not understand: reload it"
 
 
 class Line(Protocol):
-    """A connection whose messages are limited in length and number."""
+    """A connection whose messages are limited in length and number. address: the address of the client; None
+    if it is unknown."""
+
+    address: str | None
 
     async def recv_short(self) -> str | bytes:
         """Returns the next message. Raises ConnectionClosed when the connection has ended."""
@@ -50,19 +53,23 @@ class Line(Protocol):
 
     async def send(self, message: str) -> None: ...
 
-    async def close(self, code: int = ..., reason: str = ...) -> None: ...
-
 
 class Sockets:
     """The open pages of a class."""
 
-    def __init__(self, hall: Hall, address: Callable[[], str]) -> None:
-        """address: the address of the server for other machines."""
-        self._hall, self._address = hall, address
+    def __init__(
+        self,
+        hall: Hall,
+        address: Callable[[], str],
+        only_here: bool = False,
+        keep: Callable[[], object] = lambda: None,
+    ) -> None:
+        """address: the address of the server for other machines; only_here: whether only this machine can
+        reach that address; keep: saves the class if it has changed, called on the thread of the class."""
+        self._hall, self._address, self._only_here, self._keep = hall, address, only_here, keep
         self._phones: dict[Any, str] = {}  # seat by connection
+        self._newcomers = Newcomers()
         self._teachers: set[Any] = set()
-        self._servers: dict[str, tuple[Any, str]] = {}  # each server's connection and last message
-        self._states: dict[str, asyncio.Future[str]] = {}  # by learner: requested from other servers
         self._said: dict[str, str] = {}
         self._behind: set[Any] = set()
         """Pages that were too slow for the last changes. They get all data next time instead of the
@@ -101,8 +108,10 @@ class Sockets:
         said = _understood(of_phone, raw)
         match said:
             case Hello():
-                seat = self._hall.enter(said.seat)
-                self._phones[line] = seat
+                if not seat:  # a connection has one seat, however often it says hello
+                    if not self._hall.knows(said.seat) and not self._newcomers.admit(line.address):
+                        return "", {"say": _CROWD, "wait": _WAIT}
+                    seat = self._phones[line] = self._hall.enter(said.seat)
                 news = {"all": self._hall.everybody(), "seat": seat, "mine": self._hall.mine(seat)}
                 return seat, {**news, "pose": self._hall.pose(), "name": self._hall.name_of(seat)}
             case _ if not seat:
@@ -140,7 +149,7 @@ class Sockets:
 
     def _phones_at(self, address: str) -> View:
         whole = f"{(address or self._address()).rstrip('/')}/v/{self._hall.code}"
-        return {"text": whole, "qr": qr(whole)}
+        return {"text": whole, "qr": qr(whole), "note": ONLY_HERE if self._only_here and not address else ""}
 
     async def _of_teacher(self, said: OfTeacher) -> View:
         hall = self._hall
@@ -168,88 +177,19 @@ class Sockets:
     async def _open(self, number: int) -> str:
         """Loads the state of a learner into the teacher's robot, and returns the state's code."""
         who = self._hall.who(number)
-        server = self._hall.server_of(who)
-        if server is None:
-            code = await asyncio.to_thread(self._hall.code_of, who)
-        else:
-            code = await self._ask(server, who)
+        code = await asyncio.to_thread(self._hall.code_of, who)
         await asyncio.to_thread(self._hall.show_state, code)
         return code
-
-    async def _ask(self, server: str, who: str) -> str:
-        """Returns the code of a learner's state on another server. Raises InputError if no code arrives."""
-        if server not in self._servers:
-            raise InputError("the server of this learner cannot be reached")
-        answer = self._states.setdefault(who, asyncio.get_running_loop().create_future())
-        try:
-            await self._servers[server][0].send(_packed(AskState(who)))
-            code = await asyncio.wait_for(asyncio.shield(answer), _PATIENCE)
-        except (TimeoutError, ConnectionClosed):
-            code = ""
-        finally:
-            self._states.pop(who, None)
-        if not code:
-            raise InputError("the robot of this learner does not answer, or its state has no code")
-        return code
-
-    # ---------------------------------------------------------------- another server
-
-    async def server(self, line: Line) -> None:
-        """Serves another server of the class until the connection ends. A message that is not valid ends the
-        connection, with one sentence as the reason."""
-        name = ""
-        try:
-            joined = _understood(of_server, await line.recv_short())
-            if not isinstance(joined, Join):
-                raise InputError(_NONSENSE)
-            self._hall.link(joined.server)
-            name = joined.server
-            before, self._servers[name] = self._servers.get(name), (line, "")
-            if before is not None:
-                before[0].transport.abort()  # the old connection, which this one replaces
-            while True:
-                await self._of_server(name, _understood(of_server, await line.recv_short()))
-                await asyncio.sleep(PAUSE)
-        except InputError as error:
-            with suppress(ConnectionClosed):
-                await line.close(CloseCode.POLICY_VIOLATION, _sentence(error)[:100])
-        except ConnectionClosed:
-            pass
-        finally:
-            if name and self._servers.get(name, (None,))[0] is line:
-                del self._servers[name]
-                self._hall.unlink(name)
-
-    async def _of_server(self, name: str, said: OfServer) -> None:
-        match said:
-            case LearnersNow(learners):
-                await asyncio.to_thread(self._hear, name, learners)
-            case StateTold(who, code):
-                asked = self._states.get(who)
-                if asked is not None and not asked.done() and self._hall.server_of(who) == name:
-                    asked.set_result(code)
-            case Join():
-                raise InputError(_NONSENSE)
-
-    def _hear(self, name: str, learners: list[LearnerNow]) -> None:
-        for each in learners:
-            self._hall.hear(name, each)
 
     # ---------------------------------------------------------------- all pages
 
     def _tell(self) -> None:
         """Called on the thread of the class after each check of the pages."""
+        self._keep()
         news = {name: json.dumps(each) for name, each in self._news().items() if each is not None}
-        loop, now = self._loop, _packed(self._hall.news())
+        loop = self._loop
         if loop is not None and not loop.is_closed():
             loop.call_soon_threadsafe(self._spread, news)
-            loop.call_soon_threadsafe(self._tell_servers, now)
-
-    def _tell_servers(self, now: str) -> None:
-        for name, (line, heard) in list(self._servers.items()):
-            if heard != now and line.transport.get_write_buffer_size() <= _UNSENT:
-                broadcast([line], now)
-                self._servers[name] = line, now
 
     def _spread(self, news: dict[str, str]) -> None:
         changed = {name: text for name, text in news.items() if self._said.get(name) != text}
@@ -268,10 +208,6 @@ class Sockets:
 def _sentence(error: InputError) -> str:
     text = str(error)
     return f"{text[:1].upper()}{text[1:]}."
-
-
-def _packed(message: msgspec.Struct) -> str:
-    return msgspec.json.encode(message).decode()
 
 
 def _understood(decoder: msgspec.json.Decoder[Any], raw: str | bytes) -> Any:

@@ -15,26 +15,22 @@ TEACHER = "class"
 
 PHONES = "/v/"
 """The beginning of the address at which phones vote; the code of the class follows."""
+ONLY_HERE = (
+    "Phones cannot reach this address, which only this computer can open: start himpc-lab again with "
+    "--host 0.0.0.0."
+)
 TABLE = f"/{TEACHER}.csv"
 """The address of the table."""
-BRANCH = f"{TEACHER}/servers"
-"""The address at which other servers of the class connect."""
-CLASS_KEY = "X-Himpc-Lab-Class-Key"
-"""The header in which other servers send the key of the class."""
 
 
 def is_of_a_class(path: str) -> bool:
     """Returns whether an address belongs to a class."""
     plain = urlsplit(path).path
-    return plain in (f"/{TEACHER}", TABLE, f"/{BRANCH}") or plain.startswith(PHONES)
+    return plain in (f"/{TEACHER}", TABLE) or plain.startswith(PHONES)
 
 
-LONGEST_NAME = 100
-"""Largest length of the name of a person or a lesson, characters."""
-Short = Annotated[str, Meta(max_length=LONGEST_NAME)]
-BOUND = 1e12
-"""Largest absolute value of a number."""
-Number = Annotated[float, Meta(ge=-BOUND, le=BOUND)]
+Short = Annotated[str, Meta(max_length=100)]
+Number = Annotated[float, Meta(ge=-1e12, le=1e12)]
 
 
 class Hello(msgspec.Struct, forbid_unknown_fields=True, tag_field="do", tag="hello"):

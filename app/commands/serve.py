@@ -22,8 +22,6 @@ def serve(
     max_sessions: int = 4,
     classroom: bool = False,
     class_: Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(name="class")] = False,
-    class_of: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS")] = None,
-    class_key: Annotated[str | None, tyro.conf.arg(metavar="FILE")] = None,
     no_names: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     host: str = "127.0.0.1",
     port: int = 8080,
@@ -57,10 +55,6 @@ def serve(
         classroom: one robot for all pages; only a page with the printed token can control it.
         class_: open a page from which a teacher leads a class through a lesson, and a page on which phones
             vote; docs/instructors.md describes a lecture. With --classroom, all watch the teacher's robot.
-        class_of: address of another server with --class, e.g. http://lab-1.example.org:8080. The learners of
-            this server take part in that server's class. Both servers need the same --class-key.
-        class_key: file with the key that the servers of one class have in common; the environment variable
-            HIMPC_LAB_CLASS_KEY may contain the key instead.
         no_names: do not ask people in a class for their names.
         host: address to listen on; only this machine can reach the default address. The page asks for a
             token, which is part of the printed address.
@@ -85,7 +79,7 @@ def serve(
         key: file with a key of 16 characters or more, which signs the progress that learners hand in.
     """
     from app.link.choice import SceneChoice
-    from app.server.passes import CLASS_VARIABLE, given_token
+    from app.server.passes import given_token
     from app.server.server import FIRST, PageServer
     from app.server.serving import serve as serve_page
     from lessons.own.folder import Folder
@@ -95,17 +89,6 @@ def serve(
         raise InputError("--own-files DIR and --no-own-files contradict each other: leave one out")
     if no_names and not class_:
         raise InputError("--no-names is for a class: add --class, or omit --no-names")
-    of_class = given_token(class_key, os.environ, "--class-key", CLASS_VARIABLE)
-    if class_of is not None and (class_ or classroom):
-        raise InputError(
-            "--class-of ADDRESS is for a server without a teacher's page: leave out --class and --classroom"
-        )
-    if class_of is not None and of_class is None:
-        raise InputError(
-            "--class-of ADDRESS needs the key of the class: add --class-key FILE, with the key of that server"
-        )
-    if class_key is not None and class_of is None and not class_:
-        raise InputError("--class-key is for a class: add --class or --class-of ADDRESS, or omit --class-key")
     if class_ and proxy_only and not trusted_origin:
         raise InputError(
             "--class with --proxy-only needs the address of the proxy, where teacher and phones open their "
@@ -128,6 +111,11 @@ def serve(
         choice = SceneChoice.of_state(found).admitting(own)
     else:
         choice = own
+    file = None
+    if class_ and not no_names and port:  # at port 0, no address is the same after a new start
+        from app.server.class_file import class_file
+
+        file = class_file(host, port, choice, classroom)
     server = PageServer(
         choice,
         host=host,
@@ -143,7 +131,6 @@ def serve(
         class_names=not no_names if class_ else None,
         proxy_only=proxy_only,
         embed_in=embed_in,
-        class_key=of_class,
-        class_of=class_of,
+        class_file=file,
     )
     return serve_page(server, open_browser=not no_browser, drain=drain)

@@ -31,6 +31,13 @@ NO_CLASS = Answer(
     (("Cache-Control", "no-store"),),
 )
 
+GUESSED = Answer(
+    HTTPStatus.TOO_MANY_REQUESTS,
+    "Too many wrong codes",
+    "<p>Many wrong codes came from your network. This page tries again by itself.</p>",
+    (("Retry-After", "5"), ("Refresh", "5"), ("Cache-Control", "no-store")),
+)
+
 
 def plain(status: HTTPStatus, kind: str, text: str, more: tuple[tuple[str, str], ...] = ()) -> Response:
     """Returns a response with a text, which browsers must not store. more: further headers."""

@@ -12,7 +12,7 @@ from urllib.parse import parse_qs, quote, urlencode, urlsplit
 from websockets.datastructures import Headers
 from websockets.http11 import Request
 
-from app.server.passes import QUERY, Passes, Role
+from app.server.passes import QUERY, USER_HEADER, Passes, Role
 from app.server.peers import came_through_a_proxy
 from robots import InputError
 
@@ -76,6 +76,10 @@ class Door:
         hosts, origins = headers.get_all("Host"), headers.get_all("Origin")
         if len(hosts) != 1 or len(origins) > 1:
             return _foreign("The request must name one host and at most one origin.")
+        if len(headers.get_all(USER_HEADER)) > 1:
+            return _foreign(
+                f"The request names two accounts: the proxy must replace the header {USER_HEADER} of its visitor."
+            )
         if not self._is_ours(hosts[0]):
             return _foreign(
                 "The request names a host that is not this server. If the name is right, start himpc-lab "

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from app.classes.words import ONLY_HERE
 from app.server.address import seen_from_outside
 from app.server.classroom import Classroom
 
@@ -25,8 +26,10 @@ def greeting(server: PageServer) -> Iterator[str]:
     if server.hall is not None:
         yield f"  {'teacher:':{_WIDTH}}{server.teachers_link}"
         yield f"  {'phones:':{_WIDTH}}{server.outside}/v/{server.hall.code}"
-    if server.follows:
-        yield f"  {'takes part in:':{_WIDTH}}{server.follows}"
+        if not server.public:
+            yield f"  {'':{_WIDTH}}{ONLY_HERE}"
+    if server.continued is not None:
+        yield f"  {'continues:':{_WIDTH}}{_CONTINUES.format(len(server.continued.state.members))}"
     if server.passes.token is None:
         yield "  --no-token: " + (_ALL if server.public else _ALL_HERE)
     if shared and server.passes.owner is not None:
@@ -47,6 +50,9 @@ def _for_others(server: PageServer) -> Iterator[str]:
         yield f"  {_INSTRUCTOR:{_WIDTH}}{server.sessions.token}"
 
 
+_CONTINUES = (
+    "the class of the last start, with {} people; Ctrl-C ends it, and the next start begins a new class"
+)
 _KEEP = "Keep the first address secret: its page can run your Python files (not with --no-own-files)."
 _ALL = "everybody who can reach this address can open the page, run simulations here and upload robots."
 _ALL_HERE = "every user of this machine can open the page, run simulations as you and upload robots."

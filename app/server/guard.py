@@ -7,34 +7,31 @@ import ipaddress
 import logging
 from collections.abc import Awaitable, Callable, Mapping
 from http import HTTPStatus
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
 from websockets.asyncio.server import ServerConnection
-from websockets.exceptions import ConnectionClosedError
-from websockets.frames import CloseCode, Frame, Opcode
 from websockets.http11 import Request, Response
 
-from app.classes.words import is_of_a_class
+from app.classes.words import PHONES, is_of_a_class
 from app.server import budget
-from app.server.answers import CROWDED, FULL, NO_CLASS, NOT_OPEN, as_response, plain
-from app.server.budget import Budget
+from app.server.answers import CROWDED, FULL, GUESSED, NO_CLASS, NOT_OPEN, as_response, plain
+from app.server.connection import GuardedConnection
 from app.server.connection_limits import ConnectionLimits
 from app.server.door import Answer, Door, is_upgrade
 from app.server.load import Load, Places, load_of, report
 from app.server.peers import ends_of
 from app.server.prefix import under_its_name
-from app.server.uploads import TRANSFER, Uploads
-from app.server.words import refusal
+from app.server.request_line import NOT_ALLOWED
+from app.server.wrong_codes import DELAY, WrongCodes
 
 if TYPE_CHECKING:  # loaded only for a class: the server listens before these modules are loaded
-    from app.server.class_door import ClassDoor
+    from app.server.class_door import ClassDoor, Served
 
 HANDSHAKE = 5.0
 """Time, s, within which a request must be complete."""
 FIRST_WORD = 45.0
 """Time, s, within which a page must send its first message. The first picture may take long without a
 graphics card."""
-_SLICE = 4096  # B that are parsed between two checks of the limits
 
 
 class ConnectionGuard:
@@ -79,10 +76,14 @@ class ConnectionGuard:
         """Returns the changed keywords for websockets' `serve`."""
         files: Callable[[ServerConnection, Request], Response | None] = given["process_request"] or _nothing
 
-        def request(connection: ServerConnection, request: Request) -> Response | None:
+        def request(
+            connection: ServerConnection, request: Request
+        ) -> Response | Awaitable[Response | None] | None:
             told = None if is_upgrade(request) else report(request.path, self.load)
-            if told is not None and self._door.refuses(request) is None:
+            if told is not None and (_is_a_monitors(connection, request) or not self._door.refuses(request)):
                 return plain(*told)
+            if is_upgrade(request) and _asks_for_the_head(connection):
+                return as_response(NOT_ALLOWED)
             of_a_class = is_of_a_class(request.path)
             if self._class is not None and of_a_class:
                 return self._to_class(self._class, connection, request)
@@ -106,8 +107,10 @@ class ConnectionGuard:
             own = connection.serves if isinstance(connection, GuardedConnection) else None
             await (own or given["handler"])(connection)
 
-        def secure(_: ServerConnection, __: Request, response: Response) -> None:
+        def secure(connection: ServerConnection, _: Request, response: Response) -> None:
             self._door.secure(response.headers)
+            if _asks_for_the_head(connection):
+                response.body = b""
 
         return {
             **given,
@@ -121,16 +124,40 @@ class ConnectionGuard:
             "logger": _log(),
         }
 
+    def refuse(self, connection: ServerConnection, answer: Answer) -> None:
+        """Answers a request that websockets cannot read. The client then closes the connection."""
+        self.refused += 1
+        response = as_response(answer)
+        self._door.secure(response.headers)
+        connection.transport.write(response.serialize())
+
     def _judge(self, connection: ServerConnection, request: Request) -> Answer | None:
         answer = self._not_open(connection, request) or self._door.judge(request, _user(connection))
         return FULL if answer is None and self._refers and self.load.full else answer
 
-    def _to_class(self, of: ClassDoor, connection: ServerConnection, request: Request) -> Response | None:
-        """Returns the response to a request for a page of the class; None for an upgrade that is admitted."""
-        # Another server of the class sends the key instead, and may use any name for this server.
-        refused = None if of.is_for_servers(request.path) else self._door.refuses(request)
-        answer = self._not_open(connection, request) or refused
-        found = answer or of.answer(self._door, request, _user(connection))
+    def _to_class(
+        self, of: ClassDoor, connection: ServerConnection, request: Request
+    ) -> Response | Awaitable[Response | None] | None:
+        """Returns the response to a request for a page of the class; None for an upgrade that is admitted.
+        The response is late if its address has sent many wrong codes."""
+        refused = self._not_open(connection, request) or self._door.refuses(request)
+        address = self.address(connection, request)
+        found = refused or of.answer(self._door, request, _user(connection), address)
+        if refused is None and request.path.startswith(PHONES) and of.wrong_codes.are_many(address):
+            return self._late(of.wrong_codes, connection, request, found)
+        return self._of_class(found, connection, request)
+
+    async def _late(
+        self, wrong: WrongCodes, connection: ServerConnection, request: Request, found: Answer | Served
+    ) -> Response | None:
+        with wrong.waits(self.address(connection, request)) as may_wait:
+            if may_wait:
+                await asyncio.sleep(DELAY)
+            return self._of_class(found if may_wait else GUESSED, connection, request)
+
+    def _of_class(
+        self, found: Answer | Served, connection: ServerConnection, request: Request
+    ) -> Response | None:
         if isinstance(found, Answer):
             self.refused += found.status >= HTTPStatus.BAD_REQUEST
             return as_response(found)
@@ -138,7 +165,8 @@ class ConnectionGuard:
             return plain(found.status, found.kind, found.text, found.headers)
         if isinstance(connection, GuardedConnection):
             connection.serves = found.serve
-            connection.accept_short(found.longest)
+            connection.address = self.address(connection, request)
+            connection.accept_short()
             connection.expect_word(FIRST_WORD)
         return None
 
@@ -167,119 +195,20 @@ class ConnectionGuard:
         return named[-1].rpartition(",")[2].strip()[:64] if named else None
 
 
-class GuardedConnection(ServerConnection):
-    """A connection that counts messages before it decodes them. It passes on only messages that a page may
-    send.
+def _asks_for_the_head(connection: ServerConnection) -> bool:
+    line = connection.line if isinstance(connection, GuardedConnection) else None
+    return line is not None and line.method == "HEAD"
 
-    Attributes:
-        uploads: the uploads of the page.
-        refuse: shows a refusal to the user.
-        is_owners: whether the person who started the server opened the page.
-        teaches: whether the page was opened with the owner's secret, on any machine.
-        account: the name with which the user signed in at the proxy.
-        serves: the function that serves a page of a class, in place of viser.
-    """
 
-    def __init__(self, *of: Any, guard: ConnectionGuard, **more: Any) -> None:
-        super().__init__(*of, **more)
-        self.uploads: Uploads | None = None
-        self.refuse: Callable[[str], object] = _nothing_said
-        self.is_owners = False
-        self.teaches = False
-        self.serves: Callable[[Any], Awaitable[None]] | None = None
-        self.account = ""
-        self._guard = guard
-        self._budget = Budget(self.loop.time)
-        self._waiting = 0
-        self._expecting: asyncio.TimerHandle | None = None
-
-    def expect_word(self, patience: float) -> None:
-        """Closes the connection if it has sent no valid message after `patience` seconds."""
-        self._expecting = self.loop.call_later(patience, self._end_if_silent)
-
-    def _end_if_silent(self) -> None:
-        if not self._guard.crowd.has_spoken(self):
-            self.transport.abort()
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        super().connection_made(transport)
-        if not self._guard.crowd.enter(self, self._guard.address(self, None), self.transport.abort):
-            self.transport.abort()
-
-    def connection_lost(self, exc: Exception | None) -> None:
-        if self._expecting is not None:
-            self._expecting.cancel()  # the timer would keep the closed page in memory
-        self._guard.crowd.leave(self)
-        super().connection_lost(exc)
-
-    def data_received(self, data: bytes) -> None:
-        for at in range(0, len(data), _SLICE):
-            if self.transport.is_closing():
-                return
-            super().data_received(data[at : at + _SLICE])
-
-    def process_event(self, event: Any) -> None:
-        if isinstance(event, Frame):
-            if event.opcode in (Opcode.PING, Opcode.PONG):
-                if not self._budget.controls():
-                    self.transport.abort()
-                    return
-            elif event.opcode is not Opcode.CLOSE:
-                self._waiting += 1
-                if self._waiting > budget.WAITING:
-                    self.transport.abort()
-                    return
-        super().process_event(event)
-
-    async def recv(self, decode: bool | None = None) -> Any:
-        """As websockets' `recv`, but a client that sends too much is read more slowly, and finally
-        disconnected."""
-        while True:
-            raw = await super().recv(decode)
-            self._waiting = len(self.recv_messages.frames)
-            if isinstance(raw, str):
-                await self._end(CloseCode.UNSUPPORTED_DATA, "This page accepts binary messages only.")
-            if waiting := self._budget.wait(len(raw)):
-                await asyncio.sleep(waiting)
-            if self._budget.spent:
-                await self._end(CloseCode.POLICY_VIOLATION, "Too many messages.")
-            if (why := refusal(raw)) is not None:
-                if why:
-                    self.refuse(why)
-                continue
-            if TRANSFER in raw and not await self._may_upload(raw):
-                continue
-            self._guard.crowd.spoke(self)
-            self._guard.taken += 1
-            return raw
-
-    def accept_short(self, longest: int) -> None:
-        """Sets the largest size of a message, B. A longer message ends the connection, with a reason."""
-        self.protocol.max_message_size = longest
-
-    async def recv_short(self) -> str | bytes:
-        """Returns the next message of a page of a class."""
-        raw = await super().recv()
-        self._waiting = len(self.recv_messages.frames)
-        self._guard.crowd.spoke(self)
-        return raw
-
-    async def _may_upload(self, raw: bytes) -> bool:
-        await asyncio.sleep(0)  # viser first processes the earlier messages
-        return self.uploads is not None and self.uploads.takes(raw, self._budget)
-
-    async def _end(self, code: CloseCode, reason: str) -> NoReturn:
-        await self.close(code, reason)
-        raise ConnectionClosedError(None, None)  # viser treats this exception as the end of the connection
+def _is_a_monitors(connection: ServerConnection, request: Request) -> bool:
+    """Returns whether this is a request in HTTP/1.0 that names no host, which no browser sends."""
+    line = connection.line if isinstance(connection, GuardedConnection) else None
+    return line is not None and line.is_old and "Host" not in request.headers
 
 
 def _user(connection: ServerConnection) -> str:
     ends = ends_of(connection.transport)
     return "" if ends is None else ends.user
-
-
-def _nothing_said(_: str) -> None:
-    """Does nothing; used while no page can show the sentence."""
 
 
 def _nothing(_: ServerConnection, __: Request) -> Response | None:

@@ -9,6 +9,8 @@ from http import HTTPStatus
 from typing import ClassVar, Protocol
 from urllib.parse import urlsplit
 
+PATHS = "/health", "/metrics"
+"""The addresses of the load."""
 _JSON, _PROMETHEUS = "application/json", "text/plain; version=0.0.4; charset=utf-8"
 
 

@@ -24,8 +24,6 @@ USER_HEADER = "X-Himpc-Lab-User"
 """The header in which a proxy that asks for passwords sends its visitor's name, percent-encoded UTF-8."""
 VARIABLE = "HIMPC_LAB_TOKEN"
 """The environment variable with the user's own token."""
-CLASS_VARIABLE = "HIMPC_LAB_CLASS_KEY"
-"""The environment variable with the key of a class."""
 LONGEST_ACCOUNT = 80  # largest number of characters
 SHORTEST = 16  # smallest number of characters of a user's own token
 Role = Literal["guest", "owner"]
@@ -37,25 +35,27 @@ def new_token() -> str:
     return secrets.token_urlsafe(16)
 
 
-def given_token(
-    file: str | None, environment: Mapping[str, str], option: str = "--token-file", variable: str = VARIABLE
-) -> str | None:
+def new_key() -> bytes:
+    """Returns a random key for cookies."""
+    return secrets.token_bytes(32)
+
+
+def given_token(file: str | None, environment: Mapping[str, str]) -> str | None:
     """Returns the user's own token, which several servers can have in common: the first line of a file, or
     the environment variable; None if neither exists. Raises InputError, which names the option or the
     variable, if the token is too short or has characters other than letters, digits, - and _."""
-    text, place = environment.get(variable), variable
-    kind = "key" if variable == CLASS_VARIABLE else "token"
+    text, place = environment.get(VARIABLE), VARIABLE
     if file is not None:
-        place = f"{option} {file}"
+        place = f"--token-file {file}"
         try:
             text = Path(file).read_text(encoding="utf-8").partition("\n")[0]
         except (OSError, UnicodeDecodeError):
-            raise InputError(f"{place}: cannot be read; give a text file with the {kind}") from None
+            raise InputError(f"{place}: cannot be read; give a text file with the token") from None
     if text is None:
         return None
     if not re.fullmatch(rf"[A-Za-z0-9_-]{{{SHORTEST},200}}", text.strip()):
         raise InputError(
-            f"{place}: a {kind} has {SHORTEST} characters or more (letters, digits, - and _): make one with "
+            f"{place}: a token has {SHORTEST} characters or more (letters, digits, - and _): make one with "
             "python -c 'import secrets; print(secrets.token_urlsafe())'"
         )
     return text.strip()
@@ -83,7 +83,7 @@ class Passes:
     token: str | None = field(default=None, repr=False)
     owner: str | None = field(default=None, repr=False)
     cookie: str = "himpc-lab"
-    key: bytes = field(default_factory=lambda: secrets.token_bytes(32), repr=False)
+    key: bytes = field(default_factory=new_key, repr=False)
 
     def link(self, address: str, role: Role, page: str = "") -> str:
         """Returns the address of a page for a visitor with this role. page: "" is the page of a robot."""

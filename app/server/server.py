@@ -20,7 +20,7 @@ from app.server.connection_limits import OF_A_CLASS, ConnectionLimits
 from app.server.door import SELF, Door, as_origin, names_of_this_machine
 from app.server.guard import ConnectionGuard
 from app.server.malloc_tuning import few_arenas, large_arrays_apart
-from app.server.passes import VARIABLE, Passes, new_token, shared
+from app.server.passes import VARIABLE, Passes, new_key, new_token, shared
 from app.server.sessions import GRACE, Sessions
 from app.server.visit import Visit
 from lessons.own.folder import Folder
@@ -29,9 +29,8 @@ from robots import InputError
 
 if TYPE_CHECKING:  # needed for a class only, and loaded late
     from app.classes.hall import Hall
-    from app.classes.link import Link
-    from app.classes.room import Room
     from app.classes.sockets import Sockets
+    from app.server.class_file import ClassFile
 
 FIRST = SceneChoice(RunSpec("iiwa14-hold"))
 """The scene that the page shows by default."""
@@ -59,8 +58,7 @@ class PageServer:
         embed_in: Sequence[str] = (),
         all_steer: bool = False,
         room: Classroom | None = None,
-        class_key: str | None = None,
-        class_of: str | None = None,
+        class_file: ClassFile | None = None,
     ) -> None:
         """Starts the server.
 
@@ -82,8 +80,7 @@ class PageServer:
             embed_in: origins whose pages may show the page in a frame.
             all_steer: every page of a classroom controls the robot.
             room: all pages show the robot of this room.
-            class_key: the key that the servers of one class have in common.
-            class_of: address of the server in whose class this server takes part.
+            class_file: the file with which the class continues after a new start.
 
         Raises:
             InputError: a scene, robot, host, port or origin cannot be used, or the options contradict each
@@ -101,8 +98,6 @@ class PageServer:
         self.proxies = tuple(map(as_origin, trusted_origins))
         """The addresses of the trusted proxies."""
         framing = frozenset(each if each == SELF else as_origin(each, "--embed-in") for each in embed_in)
-        self.follows = "" if class_of is None else as_origin(class_of, "--class-of")
-        """The address of the server in whose class this server takes part; "" if there is none."""
         _check_choice(choice)
         check_address(host, port)
         few_arenas()
@@ -121,7 +116,6 @@ class PageServer:
         self._closed = False  # if True, no new visit begins
         self._lock = threading.Lock()
         self._sockets: Sockets | None = None
-        self._link: Link | None = None
         try:
             self._viser = private.open_server(host, port, self.guard)
         except BaseException:
@@ -137,15 +131,20 @@ class PageServer:
         self._viser.gui.configure_theme(show_share_button=False, show_logo=False)
         self._viser.on_client_connect(self._connect)
         self._viser.on_client_disconnect(self._disconnect)
+        self._class_file = class_file
+        self.continued = None if class_file is None else class_file.read()
+        """The class that this server continues; None if there is none."""
+        before = self.continued
         self.hall = None if class_names is None else self._new_hall(class_names)
-        self._class_key, self._room = class_key, self.hall
-        if self.follows and class_key is not None and isinstance(self.sessions, Sessions):
-            self._room = self._follow(self.follows, class_key, self.sessions)
         owner = None if own_files is None and self.hall is None else new_token()
+        if before is not None:
+            owner = before.owner
         if ask_token and token is not None:
             self.passes = shared(token, owner)
         else:
-            self.passes = Passes(new_token() if ask_token else None, owner, f"himpc-lab-{found}")
+            token = (before and before.token) or new_token() if ask_token else None
+            key = new_key() if before is None else bytes.fromhex(before.key)
+            self.passes = Passes(token, owner, f"himpc-lab-{found}", key)
         door = Door(local, frozenset(self.proxies), self.passes, names_of_this_machine(), proxy_only, framing)
         if self.hall is None:
             self.guard.open(door, self.sessions, refers)
@@ -190,26 +189,30 @@ class PageServer:
         from app.classes.hall import Hall
 
         alone = isinstance(self.sessions, Classroom)
-        return Hall(None if alone else self.sessions, self.sessions.guide(), named)
+        before = self.continued
+        code = None if before is None else before.code
+        hall = Hall(None if alone else self.sessions, self.sessions.guide(), named, code)
+        if before is not None:
+            hall.resume(before.state)
+        return hall
 
-    def _follow(self, address: str, key: str, sessions: Sessions) -> Room:
-        from app.classes.branch import Branch
-        from app.classes.link import Link
+    def _keep_class(self, now: bool = False) -> None:
+        if self.hall is not None and self._class_file is not None:
+            self._class_file.keep(self.hall, self.passes, now)
 
-        start = sessions.start.exercise
-        branch = Branch(sessions, None if start is None else start.lesson)
-        self._link = Link(branch, address, key)
-        self._link.start(self._viser.get_event_loop())
-        return branch
+    def end_class(self) -> None:
+        """Ends the class for good: a new start begins another one."""
+        if self._class_file is not None:
+            self._class_file.forget()
 
     def _open_class(self, door: Door, refers: bool, hall: Hall) -> None:
         from app.classes.sockets import Sockets
         from app.server.class_door import ClassDoor
 
-        self._sockets = Sockets(hall, lambda: self.outside)
+        self._sockets = Sockets(hall, lambda: self.outside, not self.public, self._keep_class)
         self._sockets.start(self._viser.get_event_loop())
         self.guard.crowd = ConnectionLimits(*OF_A_CLASS)
-        self.guard.open(door, self.sessions, refers, ClassDoor(hall, self._sockets, self._class_key))
+        self.guard.open(door, self.sessions, refers, ClassDoor(hall, self._sockets))
 
     # ---------------------------------------------------------------- clients, on viser's loop
 
@@ -223,7 +226,7 @@ class PageServer:
                 self.sessions,
                 self._own_files,
                 self._key,
-                room=self._room,
+                room=self.hall,
                 refers=self._refers,
             )
         await visit.arrive()
@@ -249,9 +252,9 @@ class PageServer:
     def close(self) -> None:
         """Closes the pages, ends the processes and stops the server."""
         self.guard.close()
-        for each in (self._sockets, self._link):
-            if each is not None:
-                each.close()
+        if self._sockets is not None:
+            self._sockets.close()
+            self._keep_class(now=True)
         with self._lock:
             self._closed = True
             visits, self._visits = list(self._visits.values()), {}

@@ -30,9 +30,9 @@ def serve(
         drain: time, s, for which open pages continue after SIGTERM.
         over: called twice a second; True ends the server.
     """
-    stop, now = threading.Event(), threading.Event()
+    stop, now, by_hand = threading.Event(), threading.Event(), threading.Event()
     try:
-        with _ended_by_signals(stop, now), contextlib.ExitStack() as until_the_end:
+        with _ended_by_signals(stop, now, by_hand), contextlib.ExitStack() as until_the_end:
             for line in greeting(server):
                 print(line, flush=True)
             if open_browser:
@@ -40,6 +40,8 @@ def serve(
             while not stop.wait(0.5) and not over():
                 pass
             server.drain(drain, now)
+            if by_hand.is_set():
+                server.end_class()
     finally:
         server.close()
     if server.loading:
@@ -50,14 +52,18 @@ def serve(
 
 
 @contextlib.contextmanager
-def _ended_by_signals(stop: threading.Event, now: threading.Event) -> Iterator[None]:
-    """Within this context, Ctrl-C and SIGTERM set `stop`. Ctrl-C and every further signal also set `now`. The
-    previous signal handlers are restored afterwards."""
+def _ended_by_signals(
+    stop: threading.Event, now: threading.Event, by_hand: threading.Event
+) -> Iterator[None]:
+    """Within this context, Ctrl-C and SIGTERM set `stop`. Ctrl-C and every further signal also set `now`, and
+    Ctrl-C sets `by_hand`. The previous signal handlers are restored afterwards."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
 
     def end(number: int, _: object) -> None:
+        if number == signal.SIGINT:
+            by_hand.set()
         if number == signal.SIGINT or stop.is_set():
             now.set()
         stop.set()

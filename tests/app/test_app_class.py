@@ -7,6 +7,7 @@ import io
 import json
 import re
 from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -16,11 +17,13 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 from app.__main__ import main
-from app.classes.words import LONGEST
+from app.classes.newcomers import PER_MINUTE, Newcomers
+from app.classes.words import LONGEST, ONLY_HERE
 from app.client.refused import STAYING
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
+from app.server.greeting import greeting
 from app.server.passes import QUERY
 from app.server.server import PageServer
 from browsing.wire import Wire, eventually
@@ -285,8 +288,75 @@ def test_a_phone_that_comes_back_has_its_seat(server: PageServer) -> None:
         assert "does not understand" in again.hear("say")["say"], "it has not said hello"
         again.send(do="hello", seat=seat)
         assert again.hear("seat")["seat"] == seat
-        again.send(do="hello", seat="one that nobody has")
-        assert again.hear("seat")["seat"] not in ("one that nobody has", seat)
+    with Line(f"{server.url}/v/{server.hall.code}") as other:
+        other.send(do="hello", seat="one that nobody has")
+        assert other.hear("seat")["seat"] not in ("one that nobody has", seat)
+
+
+def test_a_connection_has_one_seat_and_one_vote(server: PageServer) -> None:
+    """A phone that says hello again keeps its seat, with any seat that it names; it counts once and votes
+    once, and nobody of it stays when it has gone."""
+    hall = server.hall
+    assert hall is not None
+    assert eventually(lambda: hall.teachers()["phones"] == 0, LONG)
+    hall.go(STEP)
+    hall.open_vote()
+    with phone(server) as one:
+        seat = one.told["seat"]
+        for named in ("", "one that nobody has", "", seat):
+            one.send(do="hello", seat=named)
+            assert one.hear("seat")["seat"] == seat
+            one.send(do="vote", answer=1)
+            assert one.hear("mine")["mine"] == 1
+        assert hall.teachers()["phones"] == 1
+        assert hall.everybody()["voted"] == 1
+    assert eventually(lambda: hall.teachers()["phones"] == 0, LONG)
+    hall.close_vote()
+
+
+def test_a_whole_lecture_hall_behind_one_address_joins_at_once(server: PageServer) -> None:
+    with ExitStack() as leaving:
+        for _ in range(200):
+            leaving.enter_context(phone(server))
+        assert server.hall is not None and server.hall.teachers()["phones"] == 200
+
+
+def test_a_flood_of_new_phones_from_one_address_waits(
+    server: PageServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It keeps out neither a phone that has a seat nor, in the next minute, a new one."""
+    assert server.hall is not None
+    with phone(server) as one:
+        seat = one.told["seat"]
+    monkeypatch.setattr("app.classes.newcomers.PER_MINUTE", 0)
+    with Line(f"{server.url}/v/{server.hall.code}") as new, Line(f"{server.url}/v/{server.hall.code}") as old:
+        new.send(do="hello")
+        told = new.hear("say")
+        assert "joins by itself" in told["say"] and told["wait"] > 0 and "seat" not in told
+        old.send(do="hello", seat=seat)
+        assert old.hear("seat")["seat"] == seat
+        monkeypatch.undo()
+        new.send(do="hello")
+        new.hear("seat")
+
+
+def test_new_phones_are_counted_by_address_and_minute() -> None:
+    now = [0.0]
+    newcomers = Newcomers(lambda: now[0])
+    assert [newcomers.admit("a") for _ in range(PER_MINUTE + 1)] == [True] * PER_MINUTE + [False]
+    assert newcomers.admit("b") and newcomers.admit(None)
+    now[0] = 60.0
+    assert newcomers.admit("a")
+
+
+def test_an_address_that_phones_cannot_reach_is_said(server: PageServer) -> None:
+    """This server listens on 127.0.0.1. Terminal and teacher's page say so next to the phones' address."""
+    assert any(ONLY_HERE in line for line in greeting(server))
+    with Line(server.teachers_link) as lead:
+        lead.hear("address")
+        assert "127.0.0.1" in lead.told["address"]["text"] and lead.told["address"]["note"] == ONLY_HERE
+        lead.send(do="here", address="http://lab.example:8080")
+        assert lead.hear("address")["address"]["note"] == ""
 
 
 def test_a_server_without_a_class_has_none_of_its_pages(one_fork_server: None) -> None:

@@ -7,10 +7,13 @@ import os
 import signal
 from collections.abc import Iterator
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from test_app_class import LONG
 
+from app.classes.hall import Hall
 from app.classes.queue import PATIENCE, BuildQueue
 from app.client import rest
 from app.client.priority import BEHIND
@@ -157,3 +160,43 @@ def test_robots_are_built_a_few_at_a_time() -> None:
     queue.clear()
     assert queue.before() == {"c": 0, "d": 1}, "their robots were on the way to another step"
     assert queue.next("", PATIENCE + 1.0) == ["c", "d"]
+
+
+def test_a_second_step_does_not_wait_until_the_first_is_built() -> None:
+    """The teacher opens other steps and returns at once. The robot loads each step, also the one that its
+    page still shows, and loads the step again when the learner asks for it."""
+    steps = [LessonPlace("a-redundant-arm", k) for k in range(3)]
+    loaded: list[LessonPlace] = []
+
+    def simulation(token: str) -> Any:
+        return SimpleNamespace(
+            token=token,
+            attached=True,
+            account="",
+            choice=SimpleNamespace(exercise=steps[0], at=lambda place: place),
+            lecture=None,
+            ready=None,
+            kept_at=None,
+            give_way=lambda: None,
+            announce=lambda place: None,
+            coming=None,
+            load=lambda choice: None,
+            load_for_class=loaded.append,
+            read=lambda reader: None,
+        )
+
+    class OneLearner:
+        learners = (simulation("one"),)
+
+    hall = Hall(OneLearner(), simulation("the teacher's"))
+    hall.start(lambda: None)
+    try:
+        wanted = list[LessonPlace]()
+        for place in (steps[1], steps[2], steps[0], steps[1]):
+            hall.go(place)
+            wanted.append(place)
+            assert eventually(lambda wanted=wanted: loaded == wanted, PATIENCE / 3)
+        hall.fetch("one")
+        assert eventually(lambda: loaded == [*wanted, steps[1]], PATIENCE / 3)
+    finally:
+        hall.close()

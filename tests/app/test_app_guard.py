@@ -474,3 +474,47 @@ def test_what_the_wire_says_is_what_viser_reads() -> None:
     message = _messages.Message.deserialize(pack(camera()))
     assert isinstance(message, _messages.ViewerCameraMessage)
     assert msgspec.msgpack.decode(pack(camera()))["type"] == "ViewerCameraMessage"
+
+
+def answer_to(server: PageServer, request: str) -> tuple[int, dict[str, str], bytes]:
+    """Returns status, headers and content of the answer to a request that is sent as it is."""
+    where = urlsplit(server.url)
+    with socket.create_connection((where.hostname, where.port), timeout=LONG) as line:
+        line.sendall(request.encode())
+        answer = http.client.HTTPResponse(line, method=request.partition(" ")[0])
+        answer.begin()
+        return answer.status, {name.lower(): value for name, value in answer.getheaders()}, answer.read()
+
+
+def test_a_head_request_is_answered_like_get_without_content(plain: PageServer) -> None:
+    host = f"Host: {urlsplit(plain.url).netloc}\r\n\r\n"
+    for path in ("/health", "/metrics", "/"):
+        found = {
+            method: answer_to(plain, f"{method} {path} HTTP/1.1\r\n{host}") for method in ("GET", "HEAD")
+        }
+        assert found["GET"][0] == found["HEAD"][0] and found["GET"][2]
+        assert int(found["HEAD"][1]["content-length"]) > 0
+    where = urlsplit(plain.url)
+    with socket.create_connection((where.hostname, where.port), timeout=LONG) as line:
+        line.sendall(f"HEAD /health HTTP/1.1\r\n{host}".encode())
+        assert b"".join(iter(lambda: line.recv(4096), b"")).endswith(b"\r\n\r\n"), "no content"
+    upgrade = "Connection: Upgrade\r\nUpgrade: websocket\r\n"
+    assert answer_to(plain, f"HEAD / HTTP/1.1\r\n{upgrade}{host}")[0] == 405
+
+
+def test_a_monitor_may_use_http_1_0(plain: PageServer) -> None:
+    """It need not name a host, but a host that it names must be this server."""
+    assert answer_to(plain, "GET /health HTTP/1.0\r\n\r\n")[0] == 200
+    assert answer_to(plain, "HEAD /metrics HTTP/1.0\r\n\r\n")[0] == 200
+    assert answer_to(plain, "GET /health HTTP/1.0\r\nHost: evil.example\r\n\r\n")[0] == 403
+    assert answer_to(plain, "GET / HTTP/1.0\r\n\r\n")[0] == 505
+    assert answer_to(plain, "GET /health HTTP/1.1\r\n\r\n")[0] == 403
+
+
+@pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "OPTIONS", "TRACE", "PATCH", "CONNECT"])
+def test_other_methods_get_405(plain: PageServer, method: str) -> None:
+    host = f"Host: {urlsplit(plain.url).netloc}\r\n"
+    for more in ("\r\n", "Content-Length: 4\r\n\r\nabcd"):
+        status, head, content = answer_to(plain, f"{method} / HTTP/1.1\r\n{host}{more}")
+        assert (status, head["allow"]) == (405, "GET, HEAD") and b"GET and HEAD only" in content
+        assert head["x-content-type-options"] == "nosniff"

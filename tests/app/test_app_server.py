@@ -17,6 +17,7 @@ from viser import _messages
 
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
+from app.server import server
 from app.server.server import FIRST, PageServer
 from browsing.wire import let_in
 from lessons.scenes.run_spec import RunSpec
@@ -61,6 +62,15 @@ def test_wrong_addresses_and_scenes_are_one_sentence() -> None:
         PageServer(SceneChoice(RunSpec("hold", "/nowhere.urdf")))
     with pytest.raises(InputError, match="1 or more"):
         PageServer(FIRST, max_sessions=0)
+
+
+def test_a_port_that_was_taken_meanwhile_gives_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        monkeypatch.setattr(server, "check_address", lambda *_: None)
+        with pytest.raises(InputError, match="is in use"):
+            PageServer(FIRST, port=taken.getsockname()[1], max_sessions=1)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

@@ -5,6 +5,15 @@ const DARK = window.matchMedia("(prefers-color-scheme: dark)");
 const news = { all: null, class: null, pose: null };
 let socket = null;
 
+// A web socket does not say why it was refused. A class that has started anew has another code and secret.
+async function isRefused() {
+  try {
+    return (await fetch(location.href.split(/[?#]/)[0], { method: "HEAD", cache: "no-store" })).status === 403;
+  } catch {
+    return false;
+  }
+}
+
 function send(message) {
   if (socket && socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message));
 }
@@ -19,9 +28,10 @@ function connect(opened, heard) {
     heard(told);
     if ("pose" in told || "all" in told) move();
   };
-  socket.onclose = () => {
+  socket.onclose = async () => {
     say("The connection is interrupted; trying again …");
-    setTimeout(() => connect(opened, heard), 1500 + 1500 * Math.random());
+    if (await isRefused()) say(ANEW);
+    else setTimeout(() => connect(opened, heard), 1500 + 1500 * Math.random());
   };
 }
 

@@ -1,3 +1,4 @@
+const ANEW = "The class has started anew: scan the code again.";
 let mine = null, asked = "", moved = false;
 const SEAT = "himpc-lab-seat " + location.pathname;
 
@@ -20,6 +21,7 @@ function guess() {
 
 function write(told) {
   const all = news.all;
+  if ("wait" in told) setTimeout(hello, 1000 * told.wait);
   if (!all) return;
   if ("seat" in told) keep(told.seat);
   if ("mine" in told) mine = told.mine;
@@ -86,4 +88,8 @@ ID("who").addEventListener("submit", (event) => {
   send({ do: "name", name: ID("name").value });
   ID("name").blur();
 });
-connect(() => send({ do: "hello", seat: stored() }), write);
+function hello() {
+  send({ do: "hello", seat: stored() });
+}
+
+connect(hello, write);

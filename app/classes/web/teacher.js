@@ -1,3 +1,4 @@
+const ANEW = "The class has started anew: open the teacher's address that himpc-lab printed, and scan the code again.";
 let course = [], chosen = "";
 
 function fill(select, entries) {
@@ -25,6 +26,7 @@ function write(told) {
   }
   if (told.address) {
     put("qr", told.address.qr);
+    ID("note").textContent = told.address.note;
     const [place, code] = told.address.text.replace(/^https?:\/\//, "").split(/(?=\/v\/)/);
     const big = document.createElement("b");
     big.textContent = code;
@@ -56,7 +58,7 @@ function write(told) {
   ID("run").disabled = !all.title || all.stage === "running";
   main({ waiting: all.asked ? "open" : all.title ? "run" : "go", open: "close", closed: "run", running: "", decided: "go" }[all.stage]);
   const robots = mine.rows.filter((row) => row.here).length;
-  ID("present").textContent = `${mine.phones} phone${mine.phones === 1 ? "" : "s"}, ${robots} with a robot${servers(mine)}`;
+  ID("present").textContent = `${mine.phones} phone${mine.phones === 1 ? "" : "s"}, ${robots} with a robot`;
   ID("everywhere").checked = mine.everywhere;
   ID("stays").checked = mine.stays;
   people(mine.rows, all.named);
@@ -98,12 +100,6 @@ function people(rows, named) {
     button.value = row.number;
     button.disabled = !row.here;
   });
-}
-
-function servers({ servers, lost }) {
-  const others = (count) => `${count} other server${count === 1 ? "" : "s"}`;
-  const away = lost ? `; ${others(lost)} cannot be reached: the learners there continue, and are counted again later` : "";
-  return `${servers ? `, ${others(servers)}` : ""}${away}`;
 }
 
 function ago(seconds) {

@@ -20,10 +20,6 @@ _SAYS = {
     "decided": "",
 }
 _NAME = "Your name"
-_CUT_OFF = (
-    "<b>Class.</b> The connection to your teacher's computer is interrupted. Continue: your teacher gets "
-    "your results when the connection is back."
-)
 
 
 class ClassCard:
@@ -49,9 +45,9 @@ class ClassCard:
     def show(self, view: Mapping[str, Any]) -> None:
         """Shows a view of the class: the result of `app.classes.views.for_all` with more fields. `away`:
         whether this page is at another step; `vote`: address of a page for voting, for pages without their
-        own robot; `before`: number of learners who get their robot earlier, None if this page has its robot;
-        `cut_off`: whether the server of the class cannot be reached."""
-        self._text.content = (block(_CUT_OFF) if view["cut_off"] else "") + _html(view)
+        own robot; `before`: number of learners who get their robot earlier, None if this page has its
+        robot."""
+        self._text.content = _html(view)
         if self._back.visible != view["away"]:
             self._back.visible = view["away"]
 

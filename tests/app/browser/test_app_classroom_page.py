@@ -108,3 +108,29 @@ def test_a_phone_votes_and_the_projector_shows_who_was_right(browser: Browser, c
     assert faults == []
     phone.context.close()
     lead.context.close()
+
+
+def test_pages_of_a_class_that_has_ended_say_so(browser: Browser) -> None:
+    """Phone and projector lose their connection. The next class at the same address has another code."""
+
+    def started(port: int) -> PageServer:
+        choice = SceneChoice(RunSpec("planar3-hold"))
+        return PageServer(choice, port=port, classroom=True, class_names=True)
+
+    first = started(0)
+    assert first.hall is not None
+    lead = page_of(browser, first.first_link, 1920, 1080, [])
+    phone = page_of(browser, f"{first.url}/v/{first.hall.code}", 390, 844, [])
+    expect(phone.locator("#question")).to_contain_text("Wait for your teacher")
+    expect(lead.get_by_text("Phones cannot reach this address")).to_be_visible()
+    first.close()
+    expect(phone.get_by_text("The connection is interrupted")).to_be_visible()
+    second = started(int(first.url.rpartition(":")[2]))
+    try:
+        says = "The class has started anew: scan the code again."
+        expect(phone.get_by_text(says)).to_be_visible(timeout=LONG)
+        expect(lead.get_by_text("The class has started anew")).to_be_visible(timeout=LONG)
+    finally:
+        second.close()
+        phone.context.close()
+        lead.context.close()
