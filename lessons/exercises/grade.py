@@ -14,7 +14,7 @@ import numpy as np
 from himpc.controllers.own import OwnController
 from himpc.controllers.view import View
 from lessons.exercises import EXERCISES, load_exercise
-from lessons.exercises.apart import Apart, Exhausted
+from lessons.exercises.apart import Apart, Exhausted, Refused
 from lessons.exercises.exercise import Exercise, GradeCheck
 from lessons.exercises.mistakes import Diagnosis
 from lessons.exercises.own import exercise_of
@@ -147,8 +147,13 @@ def graded(submission: Submission) -> Grade:
                 f'{source.path}: has no name of an exercise: write e.g. EXERCISE = "joint-pd" at its '
                 f"top, or name one of {', '.join(EXERCISES)}"
             )
+        exercise = own or load_exercise(name)
         try:
-            lines = judged_by(own or load_exercise(name), apart, submission.seed)
+            lines = judged_by(exercise, apart, submission.seed)
+            apart.close()
+        except Refused as refusal:
+            checks = exercise.checks(submission.seed)
+            lines = tuple(_result(check, math.nan, str(refusal)) for check in checks)
         except Exhausted as end:
             return Grade(
                 source.path, source.digest, name, (), str(end), apart.protection, submission.possible
@@ -170,24 +175,22 @@ def judged_by(exercise: Exercise, shown: Shown, seed: int) -> tuple[CheckResult,
             value, fault, begins = math.nan, "", f"{lost}: "
         except InputError as error:
             value, fault = math.nan, str(error)
-        held = check.holds(value)
-        lines.append(
-            CheckResult(
-                check.text,
-                value,
-                check.unit,
-                check.condition,
-                check.points if held else 0,
-                check.points,
-                "" if held else fault or begins + check.why,
-            )
-        )
-        if not held and not fault:
+        lines.append(_result(check, value, fault or begins + check.why))
+        if not check.holds(value) and not fault:
             general.append((len(lines) - 1, begins))
     if diagnosis.says:
         for place, begins in general:
             lines[place] = replace(lines[place], why=begins + diagnosis.says)
     return tuple(lines)
+
+
+def _result(check: GradeCheck, value: float, why: str) -> CheckResult:
+    """Returns the result of a check; why: the reason if the check fails."""
+    held = check.holds(value)
+    points = check.points if held else 0
+    return CheckResult(
+        check.text, value, check.unit, check.condition, points, check.points, "" if held else why
+    )
 
 
 class _Lost(Exception):
