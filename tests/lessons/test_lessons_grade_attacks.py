@@ -18,6 +18,7 @@ from himpc.controllers.answers import OwnFault
 from himpc.controllers.own import OwnController
 from himpc.controllers.view import Bounds, LevelView, NearView, View
 from lessons.exercises.apart import Apart, Exhausted, Refused
+from lessons.exercises.cells import cell, of_cell
 from lessons.exercises.folder import grade_folder
 from lessons.exercises.grade import Submission, grade_apart
 from lessons.exercises.inside import now as told
@@ -390,19 +391,29 @@ def test_a_grade_process_ends_with_the_lab(now: View) -> None:
         time.sleep(0.02)
 
 
+@pytest.mark.parametrize("separator", [",", ";", "\t", "|"])
+@pytest.mark.parametrize("text", ["a;=1+1;b", "＝1+1", "a;\t@x", "a|=1", "'=1", "a;'=1", "a\tb; -1", "a=b"])
+def test_a_cell_is_text_wherever_a_spreadsheet_splits_it(text: str, separator: str) -> None:
+    line = f'1,"{cell(text)}",x' if "," in text else f"1,{cell(text)},x"
+    for part in line.split(separator):
+        assert part.strip()[:1] not in ("=", "+", "-", "@", "＝", "＋", "－", "＠")
+    assert of_cell(cell(text)) == text
+
+
 def test_a_table_of_grades_is_no_program_of_a_spreadsheet(tmp_path: Path) -> None:
     """Cells of the table never begin with a character that starts a formula. A submission in another
     encoding, or with a file name that is not UTF-8, does not stop the grading of a folder."""
     folder, out = tmp_path / "all", tmp_path / "grades.csv"
     folder.mkdir()
-    for name in ("=1+cmd|calc", "+1", "-1", "@x"):
+    for name in ("=1+cmd|calc", "+1", "-1", "@x", "z;=1", "＝1"):
         (folder / f"{name}.py").write_text("x = (")
     (folder / "latin.py").write_bytes("# é\ndef torque(now): return now.q\n".encode("latin-1"))
     Path(os.fsdecode(os.fsencode(folder) + b"/n\xe9.py")).write_text("x = (")
     rows = grade_folder(folder, None, 0, out, one_by_one, lambda _: None)
     assert {row["points"] for row in rows} == {"0"}
     cells = [line.split(",")[0] for line in out.read_text().splitlines()[1:]]
-    assert sorted(cells)[:4] == ["'+1.py", "'-1.py", "'=1+cmd|calc.py", "'@x.py"]
+    assert sorted(cells)[:5] == ["'+1.py", "'-1.py", "'=1+cmd|calc.py", "'@x.py", "'＝1.py"]
+    assert "z;'=1.py" in cells
     assert any("is not text in UTF-8" in row["error"] for row in rows)
     before = out.read_text()
     grade_folder(folder, None, 0, out, one_by_one, lambda _: None)
