@@ -38,7 +38,8 @@ def grade(
     """Run a solution of an exercise and grade its behaviour; without a file, list the exercises.
 
     Give the name of an exercise instead of a file to show this exercise; --hints N also shows its first N
-    hints. For an exercise of your own: himpc-lab grade EXERCISE.py SUBMISSIONS.
+    hints. For an exercise of your own: himpc-lab grade SOLUTIONS EXERCISE.py. The exercise is always the
+    second argument: it is executed with your rights, and solutions are not.
 
     Every file runs in a separate process for at most a minute. A folder of submissions gives one table. If
     grading was stopped, the same command continues it. Exit code 0: all points; 1: some points are missing;
@@ -46,9 +47,9 @@ def grade(
 
     Args:
         file: one of these: a Python file with a solution; a folder of such files; the name of an exercise; a
-            learner's progress, as the page exported it; the file of an exercise of your own, followed by the
-            file or folder of solutions.
-        exercise: name of the exercise; by default the name that the file assigns to EXERCISE.
+            learner's progress, as the page exported it.
+        exercise: name of the exercise, or the file of an exercise of your own; by default the name that the
+            solution assigns to EXERCISE.
         hints: number of hints of the exercise to show.
         seed: seed of the disturbances.
         out: file for the table of a folder, grades.csv by default; an unfinished table is continued. With
@@ -72,8 +73,6 @@ def grade(
         return check_exercise(check, seed, hints, json)
     if autograder is not None:
         return write_autograder(autograder, Path("autograder") if out is None else out)
-    if file is not None and exercise is not None and _is_own(file, exercise):
-        file, exercise = Path(exercise), str(file)
     if file is None or (exercise is None and str(file) in EXERCISES and not file.exists()):
         return _list(None if file is None else str(file), hints, json)
     if not file.exists() and exercise is None and not file.suffix:
@@ -96,15 +95,6 @@ def _code(found: Grade) -> int:
     return 2 if found.error else 0 if found.passed else 1
 
 
-def _is_own(first: Path, second: str) -> bool:
-    """Returns whether the first of two arguments is the file of an exercise and the second argument is the
-    solutions."""
-    from lessons.exercises import EXERCISES
-    from lessons.own.files import is_file
-
-    return is_file(first.name) and second not in EXERCISES and Path(second).exists()
-
-
 def _formatted(
     file: Path,
     exercise: str | None,
@@ -118,8 +108,10 @@ def _formatted(
     from lessons.exercises.formats import formatted
     from lessons.exercises.grade import grade_only
 
-    found = grade_only(file, exercise, seed)
     target = json or "results.json"
+    if target != "-":
+        Path(target).unlink(missing_ok=True)  # a file that a student handed in must not pass for the result
+    found = grade_only(file, exercise, seed)
     write_json(formatted(found, form, visibility), target)
     if target != "-":
         print(f"{found.points} of {found.of} points: {target}")

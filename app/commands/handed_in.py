@@ -18,6 +18,8 @@ def handed_in(file: Path, key: str | None, json: str | None) -> int:
     from lessons.replay.progress import read_handed_in, read_key
 
     try:
+        if not file.is_file():  # reading a named pipe would wait for ever
+            raise OSError
         text = file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError):
         raise InputError(f"{file}: cannot be read as text; give the file that the page exported") from None

@@ -30,7 +30,7 @@ def new(
     write_new(kind, file, start)
     exercise = any_exercise(start) if start in EXERCISES or (start is not None and is_file(start)) else None
     if exercise is not None and start is not None and exercise.start:
-        lines = (f"himpc-lab grade {start} {file}",)
+        lines = (f"himpc-lab grade {file} {start}",)
     elif exercise is not None:
         settings = "".join(f" --set {each}" for each in exercise.live)
         run = f"himpc-lab run {exercise.scene} --controller {file}{settings}"
@@ -42,7 +42,7 @@ def new(
             "exercise": (
                 f"himpc-lab grade --check {file}",
                 f"himpc-lab new controller start.py --from {file}",
-                f"himpc-lab grade {file} start.py",
+                f"himpc-lab grade start.py {file}",
             ),
         }.get(kind, (f"himpc-lab run {own}", f"himpc-lab --scene {own}"))
     print("\n  ".join((f"{file} is written. Try it:", *lines)))

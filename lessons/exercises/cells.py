@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-_FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
-"""First characters of cells that a spreadsheet would interpret as a formula."""
+import re
+
+_RISKY = r"""[\s']*[=+\-@\t\r\n\uff1d\uff0b\uff0d\uff20]"""
+_BEGINS = re.compile(rf"(^|[;|\t\r\n])(?={_RISKY})")
+_MARKED = re.compile(rf"(^|[;|\t\r\n])'(?={_RISKY})")
+"""Beginnings that a spreadsheet would interpret as a formula, in half or full width; also after a separator
+at which the spreadsheets of some countries split a cell."""
 
 
 def cell(text: str) -> str:
-    """Returns the content of a cell that shows this text, also if the text begins like a formula."""
-    return f"'{text}" if text.startswith(_FORMULA) else text
+    """Returns the content of a cell that shows this text, with an apostrophe before each formula."""
+    return _BEGINS.sub(r"\1'", text)
 
 
 def of_cell(text: str) -> str:
     """Returns the text from which `cell` has made this cell."""
-    return text[1:] if text.startswith("'") and text[1:].startswith(_FORMULA) else text
+    return _MARKED.sub(r"\1", text)

@@ -14,10 +14,10 @@ import numpy as np
 from himpc.controllers.own import OwnController
 from himpc.controllers.view import View
 from lessons.exercises import EXERCISES, load_exercise
-from lessons.exercises.apart import Apart, Exhausted
+from lessons.exercises.apart import Apart, Exhausted, Refused
 from lessons.exercises.exercise import Exercise, GradeCheck
 from lessons.exercises.mistakes import Diagnosis
-from lessons.exercises.own import exercise_of
+from lessons.exercises.own import check_order, exercise_of
 from lessons.exercises.result import CheckResult, Grade
 from lessons.own.files import SUFFIX, Source, is_file, read
 from lessons.recording.recording import Recording
@@ -94,9 +94,12 @@ def grade(path: str, exercise: str | None = None, seed: int = 0) -> Grade:
     """Grades a file in a separate process. The arguments are those of `Submission`.
 
     Raises:
-        InputError: there is no such exercise or no such file, or the file of the exercise cannot be used.
+        InputError: there is no such exercise or no such file, the file of the exercise cannot be used, or the
+            files are in the wrong order.
     """
-    return grade_apart(Submission.to(exercise, read(path), seed))
+    source = read(path)
+    check_order(source, exercise)
+    return grade_apart(Submission.to(exercise, source, seed))
 
 
 def grade_only(path: Path, exercise: str | None = None, seed: int = 0) -> Grade:
@@ -106,15 +109,23 @@ def grade_only(path: Path, exercise: str | None = None, seed: int = 0) -> Grade:
     Raises:
         InputError: there is no such exercise, or the file of the exercise cannot be used.
     """
-    model = Submission.to(exercise, Source(str(path), ""), seed)
     files = sorted(path.glob(f"*{SUFFIX}")) if path.is_dir() else [path]
-    if len(files) != 1:
-        error = f"hand in one Python file: found {', '.join(each.name for each in files[:5]) or 'none'}"
-        return Grade(str(path), "", exercise or "", error=error, possible=model.possible)
+    source, error = Source(str(files[0] if len(files) == 1 else path), ""), ""
     try:
-        return grade_apart(replace(model, source=read(str(files[0]))))
-    except InputError as error:
-        return Grade(str(files[0]), "", exercise or "", error=str(error), possible=model.possible)
+        if len(files) != 1:
+            said = ", ".join(each.name for each in files[:5]) or "none"
+            raise InputError(f"hand in one Python file: found {said}")
+        source = read(str(files[0]))
+    except InputError as refusal:
+        error = str(refusal)
+    try:
+        check_order(source, exercise)
+    except InputError as refusal:
+        return Grade(source.path, source.digest, exercise or "", error=str(refusal))
+    model = Submission.to(exercise, source, seed)
+    if error:
+        return Grade(source.path, "", exercise or "", error=error, possible=model.possible)
+    return grade_apart(model)
 
 
 def grade_apart(submission: Submission) -> Grade:
@@ -147,8 +158,13 @@ def graded(submission: Submission) -> Grade:
                 f'{source.path}: has no name of an exercise: write e.g. EXERCISE = "joint-pd" at its '
                 f"top, or name one of {', '.join(EXERCISES)}"
             )
+        exercise = own or load_exercise(name)
         try:
-            lines = judged_by(own or load_exercise(name), apart, submission.seed)
+            lines = judged_by(exercise, apart, submission.seed)
+            apart.close()
+        except Refused as refusal:
+            checks = exercise.checks(submission.seed)
+            lines = tuple(_result(check, math.nan, str(refusal)) for check in checks)
         except Exhausted as end:
             return Grade(
                 source.path, source.digest, name, (), str(end), apart.protection, submission.possible
@@ -170,24 +186,22 @@ def judged_by(exercise: Exercise, shown: Shown, seed: int) -> tuple[CheckResult,
             value, fault, begins = math.nan, "", f"{lost}: "
         except InputError as error:
             value, fault = math.nan, str(error)
-        held = check.holds(value)
-        lines.append(
-            CheckResult(
-                check.text,
-                value,
-                check.unit,
-                check.condition,
-                check.points if held else 0,
-                check.points,
-                "" if held else fault or begins + check.why,
-            )
-        )
-        if not held and not fault:
+        lines.append(_result(check, value, fault or begins + check.why))
+        if not check.holds(value) and not fault:
             general.append((len(lines) - 1, begins))
     if diagnosis.says:
         for place, begins in general:
             lines[place] = replace(lines[place], why=begins + diagnosis.says)
     return tuple(lines)
+
+
+def _result(check: GradeCheck, value: float, why: str) -> CheckResult:
+    """Returns the result of a check; why: the reason if the check fails."""
+    held = check.holds(value)
+    points = check.points if held else 0
+    return CheckResult(
+        check.text, value, check.unit, check.condition, points, check.points, "" if held else why
+    )
 
 
 class _Lost(Exception):

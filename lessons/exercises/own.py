@@ -90,6 +90,16 @@ def _law(text: str) -> Law:
     return law_of(execute(Source("a known mistake", text)))()
 
 
+def check_order(source: Source, exercise: str | None) -> None:
+    """Raises InputError if a submission looks like the file of an exercise, and the exercise is another file:
+    a command that names the exercise first would execute the file of a student. Neither file is executed."""
+    if exercise is not None and is_file(exercise) and _makes_one(source):
+        raise InputError(
+            f"{source.path}: is the file of an exercise, which stands after the solutions: "
+            f"himpc-lab grade {exercise} {source.path}"
+        )
+
+
 def any_exercise(name: str) -> Exercise:
     """Returns the lab's exercise with this name, or the exercise of a teacher's file.
 
@@ -109,13 +119,13 @@ def exercise_of(source: Source) -> Exercise:
     """Executes a teacher's file in this process and returns its exercise.
 
     Raises:
-        InputError: the file cannot be loaded or used, or does not assign a call, such as `own_exercise(…)`,
-            to EXERCISE. A file without this assignment is not executed: it may be a student's.
+        InputError: the file cannot be loaded or used, or does not assign a call of `own_exercise` to
+            EXERCISE. A file without this assignment is not executed: it may be a student's.
     """
     if not _makes_one(source):
         raise InputError(
-            f"{source.path}: is not the file of an exercise: it must assign EXERCISE = own_exercise(…); "
-            "begin with himpc-lab new exercise FILE.py"
+            f"{source.path}: is not the file of an exercise: it must assign EXERCISE = own_exercise(…). The "
+            "exercise stands after the solutions: himpc-lab grade SOLUTIONS EXERCISE.py"
         )
     module = load(source)
     expected(module, "exercise")
@@ -134,6 +144,7 @@ def _makes_one(source: Source) -> bool:
     return any(
         isinstance(each, ast.Assign)
         and isinstance(each.value, ast.Call)
+        and ast.unparse(each.value.func).rpartition(".")[2] == "own_exercise"
         and any(isinstance(to, ast.Name) and to.id == "EXERCISE" for to in each.targets)
         for each in body
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import stat
 import sys
 import traceback
 from collections.abc import Iterable, Iterator
@@ -49,9 +50,11 @@ class Source:
 
 
 def read(path: str) -> Source:
-    """Reads a file. Raises InputError if it does not exist or is not text."""
+    """Reads a file. Raises InputError if it does not exist, is not a regular file, or is not text."""
     try:
-        with open(path, "rb") as file:
+        with open(path, "rb", opener=_at_once) as file:
+            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+                raise OSError(0, "not a regular file")
             data = file.read(LARGEST + 1)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else "no such path"
@@ -66,6 +69,11 @@ def read(path: str) -> Source:
     except UnicodeDecodeError as error:
         line = data[: error.start].count(b"\n") + 1
         raise InputError(f"{path}, line {line}: is not text in UTF-8; save it as UTF-8") from None
+
+
+def _at_once(path: str, flags: int) -> int:
+    """Opens a file without waiting: a named pipe would wait for somebody who writes into it."""
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 
 def fingerprint(path: str) -> str:

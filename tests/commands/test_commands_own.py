@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -111,6 +112,46 @@ def test_grade_has_exit_codes_of_its_own(capsys: pytest.CaptureFixture[str]) -> 
     assert "it ends its own process" in capsys.readouterr().out
     assert main(["grade", "mine.py", "joint-dp"]) == 2
     assert main(["grade", "nothing.py"]) == 2
+
+
+def test_grade_executes_only_the_second_file_with_the_rights_of_the_teacher(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """A solution is executed by the grader's sandbox alone, in whatever order the files are given, and a file
+    that it left behind is not taken for a result."""
+    assert main(["new", "exercise", "softer.py"]) == 0
+    leaves = "open('ran_here', 'w').write('x')\ndef torque(now):\n    return now.gravity\n"
+    for name in ("str", "own_exercise"):
+        Path("mine.py").write_text(f"EXERCISE = {name}('softer')\n{leaves}")
+        Path("result.json").write_text("{}")
+        assert main(["grade", "mine.py", "softer.py", "--format", "github", "--json", "result.json"]) == 2
+        assert json.loads(Path("result.json").read_text())["status"] == "error"
+        assert main(["grade", "mine.py", "softer.py"]) == 2
+    Path("mine.py").write_text(f"EXERCISE = own_exercise('softer')\n{leaves}")
+    for further in ([], ["--format", "github", "--json", "result.json"]):
+        assert main(["grade", "softer.py", "mine.py", *further]) == 2
+    assert "stands after the solutions" in capsys.readouterr().err
+    Path("mine.py").write_text(f"EXERCISE = str('softer')\n{leaves}")
+    for line in (["softer.py", "mine.py"], ["--check", "mine.py"], ["--autograder", "mine.py"]):
+        assert main(["grade", *line]) == 2
+    assert not Path("ran_here").exists()
+
+
+def test_only_regular_files_are_read(capsys: pytest.CaptureFixture[str]) -> None:
+    """Reading a named pipe would wait for ever."""
+    for name in ("fifo.py", "fifo.txt"):
+        os.mkfifo(name)
+    for line in (
+        "grade fifo.py",
+        "grade fifo.txt",
+        "grade fifo.py joint-pd --format github",
+        "run planar3-hold --controller fifo.py",
+        "run fifo.py",
+        "run planar3-hold --task fifo.py",
+        "new controller x.py --from fifo.py",
+    ):
+        assert main(line.split()) == 2, line
+    assert "fifo.py: cannot be read (not a regular file)" in capsys.readouterr().err
 
 
 def test_sweep_takes_files_of_ones_own(capsys: pytest.CaptureFixture[str]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 import signal
+import subprocess
 import sys
 import time
 from pathlib import Path
@@ -16,8 +17,10 @@ from right_laws import PD
 from himpc.controllers.answers import OwnFault
 from himpc.controllers.own import OwnController
 from himpc.controllers.view import Bounds, LevelView, NearView, View
-from lessons.exercises.apart import Apart, Exhausted
+from lessons.exercises.apart import Apart, Exhausted, Refused
+from lessons.exercises.cells import cell, of_cell
 from lessons.exercises.folder import grade_folder
+from lessons.exercises.grade import Submission, grade_apart
 from lessons.exercises.inside import now as told
 from lessons.exercises.inside.now import rebuilt, shape_of
 from lessons.own.files import Source
@@ -63,7 +66,7 @@ def said(text: str, now: View, kernel: bool = True, **limits) -> str:
     try:
         with apart(text, kernel, **limits) as one:
             one.fresh()(now)
-    except (InputError, OwnFault, Exhausted) as fault:
+    except (InputError, OwnFault, Exhausted, Refused) as fault:
         return str(fault)
     return ""
 
@@ -152,6 +155,139 @@ def test_a_grade_is_not_for_those_who_attack(attack: str, kernel: bool, now: Vie
     assert not (tmp_path / "hi").exists()
 
 
+HIDES = """
+import os, sys
+done = []
+def torque(now):
+    if not done:
+        done.append(True)
+        try:
+            {0}
+        except OSError:
+            pass
+        frame = sys._getframe()
+        while frame:
+            for held in list(frame.f_locals.values()):
+                if isinstance(held, list) and any(isinstance(each, str) for each in held):
+                    held.clear()
+            frame = frame.f_back
+    return right(now)
+"""
+
+
+@linux
+@pytest.mark.parametrize("kernel", [True, False])
+@pytest.mark.parametrize(
+    "call",
+    [
+        "open('/etc/passwd')",
+        "os.utime('/etc/passwd')",
+        "os.sched_setaffinity(os.getppid(), {min(os.sched_getaffinity(0))})",
+        "os.sched_setscheduler(os.getppid(), os.SCHED_BATCH, os.sched_param(0))",
+    ],
+)
+def test_a_grade_is_0_for_those_who_hide_a_refused_call(call: str, kernel: bool) -> None:
+    """The right law follows, and gets no points."""
+    if "sched" in call and not kernel:
+        pytest.skip("Python has no event for this call; see the next test")
+    text = PD.replace("def torque", "def right") + HIDES.format(call)
+    found = grade_apart(Submission(Source("mine.py", text), "joint-pd", kernel=kernel))
+    assert found.points == 0
+    assert found.lines
+    assert all("a submission may not do that" in line.why for line in found.lines)
+
+
+@linux
+def test_a_grade_is_0_for_those_who_slow_the_grader(now: View) -> None:
+    """The grader notices a change of its own scheduling, and undoes it."""
+    before = os.sched_getaffinity(0), os.sched_getscheduler(0), os.sched_getparam(0).sched_priority
+    call = f"os.sched_setscheduler({os.getpid()}, os.SCHED_BATCH, os.sched_param(0))"
+    one = apart(once(f"import os; {call}"), kernel=False)
+    one.fresh()(now)
+    assert os.sched_getscheduler(0) == os.SCHED_BATCH
+    with pytest.raises(Refused, match="changing the scheduling of the grader"):
+        one.close()
+    assert (os.sched_getaffinity(0), os.sched_getscheduler(0), os.sched_getparam(0).sched_priority) == before
+
+
+def test_a_grade_is_for_runs_without_memory_of_other_runs(now: View) -> None:
+    """What a submission changes in its process is gone in the next run of the robot."""
+    counts = "import builtins\nbuiltins.runs = getattr(builtins, 'runs', 0) + 1\n"
+    with apart(counts + "def torque(now):\n    return now.q * 0 + builtins.runs") as one:
+        assert [float(one.fresh()(now)[0]) for _ in range(3)] == [1.0, 1.0, 1.0]
+
+
+WALK = """
+import contextlib, ctypes, os, signal
+import pyseccomp
+from lessons.exercises.inside.confine import ALLOWED, UNANSWERED, _calls
+
+restrict, call = _calls(), ctypes.CDLL(None, use_errno=True).syscall
+quiet = {name: error for error, names in UNANSWERED.items() for name in names}
+names = {}
+for number in range(1024):
+    with contextlib.suppress(ValueError):
+        names[number] = pyseccomp.resolve_syscall(pyseccomp.Arch.NATIVE, number).decode()
+assert len(names) > 300
+for number, name in names.items():
+    if name in ALLOWED:
+        continue
+    child = os.fork()
+    if child == 0:
+        signal.alarm(10)
+        if restrict():
+            least = ctypes.c_long(-1)
+            call(ctypes.c_long(number), *(least,) * 6)
+            os._exit(min(ctypes.get_errno(), 250))
+        os._exit(251)
+    code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    if code != quiet.get(name, -signal.SIGSYS):
+        print(name, code)
+"""
+"""Makes every system call that libseccomp knows, in a restricted process of its own, with the arguments −1,
+and prints the calls that are neither on a list of `confine` nor end the process."""
+
+
+@linux
+def test_every_system_call_is_on_the_list_or_refused() -> None:
+    with apart(once("pass")) as one:
+        if "seccomp" not in one.protection:
+            pytest.skip("this system has no libseccomp")
+    done = subprocess.run([sys.executable, "-c", WALK], capture_output=True, text=True, timeout=300)
+    assert (done.returncode, done.stdout) == (0, ""), done.stderr
+
+
+@linux
+@pytest.mark.parametrize(
+    ("call", "allowed"),
+    [
+        ("os.open('/dev/null', os.O_RDONLY)", True),
+        ("os.open('/dev/null', os.O_WRONLY)", False),
+        ("os.open('/dev/null', os.O_RDONLY | os.O_CREAT)", False),
+        ("os.open('/dev/null', os.O_RDONLY | os.O_PATH)", False),
+        ("os.fork()", False),
+        ("os.kill(os.getpid(), 0)", False),
+        ("fcntl.fcntl(0, fcntl.F_GETFD)", True),
+        ("fcntl.fcntl(0, fcntl.F_SETOWN, os.getpid())", False),
+        ("resource.getrlimit(resource.RLIMIT_CPU)", True),
+        ("resource.setrlimit(resource.RLIMIT_CPU, (1, 1))", False),
+        ("resource.prlimit(os.getppid(), resource.RLIMIT_CPU)", False),
+        ("threading.Thread(target=int).start()", True),
+    ],
+)
+def test_some_system_calls_are_allowed_with_some_arguments_only(call: str, allowed: bool) -> None:
+    """The calls are made without Python's hook."""
+    text = (
+        "import fcntl, os, resource, threading\n"
+        "from lessons.exercises.inside.confine import _calls\n"
+        f"if _calls()():\n    {call}\n    os._exit(0)\nprint('no seccomp')\n"
+    )
+    done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, timeout=60)
+    if "no seccomp" in done.stdout:
+        pytest.skip("this system has no libseccomp")
+    assert done.returncode == (0 if allowed else -signal.SIGSYS), done.stderr
+
+
 SPAWN = """
 import _posixsubprocess, os
 def spawn():
@@ -170,7 +306,7 @@ def test_a_grade_is_not_for_those_who_go_below_python(now: View) -> None:
         if one.protection != ("Landlock", "seccomp"):
             pytest.skip("this system has not both")
     text = SPAWN.format("sleep 100") + once("spawn()")
-    assert "Operation not permitted" in said(text, now) or "PermissionError" in said(text, now)
+    assert "a submission may not do that" in said(text, now)
 
 
 @linux
@@ -255,19 +391,29 @@ def test_a_grade_process_ends_with_the_lab(now: View) -> None:
         time.sleep(0.02)
 
 
+@pytest.mark.parametrize("separator", [",", ";", "\t", "|"])
+@pytest.mark.parametrize("text", ["a;=1+1;b", "＝1+1", "a;\t@x", "a|=1", "'=1", "a;'=1", "a\tb; -1", "a=b"])
+def test_a_cell_is_text_wherever_a_spreadsheet_splits_it(text: str, separator: str) -> None:
+    line = f'1,"{cell(text)}",x' if "," in text else f"1,{cell(text)},x"
+    for part in line.split(separator):
+        assert part.strip()[:1] not in ("=", "+", "-", "@", "＝", "＋", "－", "＠")
+    assert of_cell(cell(text)) == text
+
+
 def test_a_table_of_grades_is_no_program_of_a_spreadsheet(tmp_path: Path) -> None:
     """Cells of the table never begin with a character that starts a formula. A submission in another
     encoding, or with a file name that is not UTF-8, does not stop the grading of a folder."""
     folder, out = tmp_path / "all", tmp_path / "grades.csv"
     folder.mkdir()
-    for name in ("=1+cmd|calc", "+1", "-1", "@x"):
+    for name in ("=1+cmd|calc", "+1", "-1", "@x", "z;=1", "＝1"):
         (folder / f"{name}.py").write_text("x = (")
     (folder / "latin.py").write_bytes("# é\ndef torque(now): return now.q\n".encode("latin-1"))
     Path(os.fsdecode(os.fsencode(folder) + b"/n\xe9.py")).write_text("x = (")
     rows = grade_folder(folder, None, 0, out, one_by_one, lambda _: None)
     assert {row["points"] for row in rows} == {"0"}
     cells = [line.split(",")[0] for line in out.read_text().splitlines()[1:]]
-    assert sorted(cells)[:4] == ["'+1.py", "'-1.py", "'=1+cmd|calc.py", "'@x.py"]
+    assert sorted(cells)[:5] == ["'+1.py", "'-1.py", "'=1+cmd|calc.py", "'@x.py", "'＝1.py"]
+    assert "z;'=1.py" in cells
     assert any("is not text in UTF-8" in row["error"] for row in rows)
     before = out.read_text()
     grade_folder(folder, None, 0, out, one_by_one, lambda _: None)

@@ -95,8 +95,9 @@ def test_a_submission_to_an_own_exercise_is_graded_in_a_process_that_cannot_read
     ("text", "words"),
     [
         ("EXERCISE = 'joint-pd'\nraise SystemExit\n", "is not the file of an exercise"),
-        ("def torque(now): return now.q\nEXERCISE = make()\n", "name 'make' is not defined"),
-        ("EXERCISE = dict()\n", "must be made with own_exercise"),
+        ("def torque(now): return now.q\nEXERCISE = own_exercise()\n", "NameError: name 'own_exercise'"),
+        ("EXERCISE = dict()\nraise SystemExit\n", "is not the file of an exercise"),
+        ("own_exercise = dict\nEXERCISE = own_exercise()\n", "must be made with own_exercise"),
         ("EXERCISE = (\n", "is not the file of an exercise"),
     ],
 )

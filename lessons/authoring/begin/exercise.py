@@ -10,7 +10,7 @@ You need: what a torque is
 #
 #     himpc-lab grade --check FILE.py              shows the card; tests the solution and every mistake
 #     himpc-lab new controller start.py --from FILE.py   writes the file with which students begin
-#     himpc-lab grade FILE.py submissions/               grades a folder, or one file
+#     himpc-lab grade submissions/ FILE.py               grades a folder, or one file
 
 from lessons.exercises.exercise import GradeCheck, pushed
 from lessons.exercises.own import own_exercise

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 LOAD = b"L"
-"""To the submission: execute the file again. The answer is READY or FAULT."""
+"""To the process that is copied: JSON with the path and the text of the submission. The answer is READY."""
 SHAPE = b"S"
 """To the submission: the description of the numbers of the next ticks, see `now.shape_of`. There is no
 answer."""
@@ -22,7 +22,8 @@ TICK = b"T"
 REPLY = b"R"
 """To the submission: the requested matrix."""
 READY = b"Y"
-"""From the submission: JSON with the data of the file, such as its exercise."""
+"""From the submission: JSON with the mechanisms that are in force, before the file is executed, and then with
+the data of the file, such as its exercise."""
 TORQUE = b"U"
 """From the submission: an array."""
 OTHER = b"O"
