@@ -1,10 +1,10 @@
 """Compares the results of all scenes under all controllers with those of another commit.
 
-python benchmarks/same_as.py COMMIT [--seconds S] runs every scene with every controller that fits, without a
-page, here and in a checkout of COMMIT. It compares the results of `himpc-lab run --json`, except the keys of
-`TIMING`. With --tolerance T, two numbers may differ by T times the larger of the two, or by 1e-9 if that is
-more, and the keys of `_HOW` (the route and its residuals) are not compared. The exit code is 1 if any result
-differs.
+python benchmarks/same_as.py COMMIT [--seconds S] [--scenes NAME ...] runs every scene with every controller
+that fits, without a page, here and in a checkout of COMMIT. It compares the results of `himpc-lab run
+--json`, except the keys of `TIMING`. With --tolerance T, two numbers may differ by T times the larger of the two, or
+by 1e-9 if that is more, and the keys of `_HOW` (the route and its residuals) are not compared. The exit code
+is 1 if any result differs.
 """
 
 from __future__ import annotations
@@ -46,8 +46,9 @@ def main() -> int:
     parser.add_argument("commit")
     parser.add_argument("--seconds", type=float, default=0.5)
     parser.add_argument("--tolerance", type=float, default=0.0)
+    parser.add_argument("--scenes", nargs="*")
     given = parser.parse_args()
-    names = _names()
+    names = [each for each in _names() if given.scenes is None or each.split("/")[0] in given.scenes]
     with tempfile.TemporaryDirectory() as folder:
         then, now, before = (Path(folder) / name for name in ("then", "now", "before"))
         then.mkdir()
