@@ -22,7 +22,8 @@ from app.arm.orders import Orders
 from app.arm.prepared import maker, prepared
 from app.link.ring import Block
 from himpc.export.native import build
-from lessons.scenes.catalog import torque_scene
+from lessons.scenes.catalog import as_torque_scene
+from lessons.scenes.run_spec import RunSpec
 from robots import Plant
 from robots.arms.arm import Reading
 from robots.arms.simulated_arm import SimulatedArm
@@ -48,7 +49,7 @@ def main() -> None:
 
 def measure(priority: str, library: Path, seconds: float) -> None:
     """Runs the loop, and prints the number of missed periods and the times of the controller."""
-    scene = torque_scene("panda-hold")
+    scene = as_torque_scene(RunSpec("panda-hold").for_export().prepared(), "an arm")
     arm = SimulatedArm(Plant(scene.robot))
     ready = prepared(scene, scene.q_0, arm.limits, ())
     controller, orders = maker(library, ready.image)(), Orders(len(ready.image.manifest["tasks"]))

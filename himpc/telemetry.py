@@ -60,6 +60,7 @@ _PER_JOINT = (
     "tau_0",
     "q_measured",
     "v_measured",
+    "v_limit_lowered",
 )
 PER_LEVEL = ("cost", "kkt", "rung", "time_us", "leak", "active")
 """The fields of each level, one number each, in this order."""
@@ -80,7 +81,9 @@ class Layout:
     """The position of each field in a row.
 
     `q` and `v` are the plant's state, `q_measured` and `v_measured` the values that the controller received;
-    `tau_0` is the torque that acted until this tick. `contact_depth` (m) and `contact_force` (N) are the
+    `tau_0` is the torque that acted until this tick. `v_limit` is the user's velocity limit, and
+    `v_limit_lowered` the limit that the controller imposed: a guard lowers it, for example while the robot
+    comes to rest before an obstacle. `contact_depth` (m) and `contact_force` (N) are the
     deepest penetration and the largest force of the tick that begins with the row; both are 0 without a
     contact. `distance` (m) is that of the nearest pair of two links, or of a link and an object; NaN if no
     distance is measured. `distance_kept` (m) is the distance to keep, d_safe with its margin; NaN if no

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
+from app.commands.export import WITHOUT
 from robots import InputError
 
 if TYPE_CHECKING:
@@ -91,9 +92,10 @@ def arm(
         raise InputError(f"--missed is {missed}: give a number of periods, 0 or more")
     if not 0.0 <= missed_share <= 1.0:
         raise InputError(f"--missed-share is {missed_share}: give a share from 0 to 1")
-    plain = RunSpec(scene, urdf, tip, controller=controller)
+    plain = RunSpec(scene, urdf, tip, controller=controller).for_export()
     spec = plain.but(*set)
     loaded = as_torque_scene(spec.prepared(), "an arm")
+    print(WITHOUT, flush=True)
     limits, start = _found(loaded, robot, real_time)
     beside = nominal(loaded, as_torque_scene(plain.prepared(), "an arm"))
     ready = prepared(beside, start, limits, drag)

@@ -64,7 +64,9 @@ def export(
             )
     assignments = (*([f"stack={stack}"] if stack is not None else ()), *set)
     spec = RunSpec(scene, urdf, tip, controller=controller, seed=seed).but(*assignments)
-    loaded = as_torque_scene(spec.prepared(), "export's")
+    loaded = as_torque_scene(spec.for_export().prepared(), "export's")
+    if loaded.settings.limits != as_torque_scene(spec.prepared(), "export's").settings.limits:
+        print(WITHOUT, flush=True)
     session = TorqueSession(replace(loaded, events=()), seed)
     image = image_of(session.controller, loaded.robot, session.references)
     force = in_force(loaded.robot, loaded.settings.for_controller().limits)
@@ -82,6 +84,12 @@ def export(
         print(f"{len(content):9,} bytes  {folder / name}")
     print(f"build and replay: see {folder / 'README.md'}")
     return 0
+
+
+WITHOUT = (
+    "note: distances and the guard of a blocked robot are not exported; this controller does not avoid "
+    "objects, and presses against them with up to all the torque of its motors"
+)
 
 
 def recorded(scene: TorqueScene, ticks: int, seed: int) -> Recorded:

@@ -23,6 +23,7 @@ from himpc.export.link import check_linker, linked
 from himpc.export.objects import object_code, target_named
 from lessons.course import COURSE, load_lesson
 from lessons.scenes.catalog import as_torque_scene, load_scene
+from lessons.scenes.run_spec import RunSpec
 from robots import InputError
 
 ROOT = Path(__file__).parents[2]
@@ -70,7 +71,7 @@ def write(site: Path) -> None:
     (out / "kernel.js").write_text(wrapped("kernel", linked(object_code(target_named("wasm32")))))
     robots: dict[str, Any] = {}
     for name in TRIED:
-        scene = as_torque_scene(load_scene(name), "a live page's")
+        scene = as_torque_scene(RunSpec(name).for_export().prepared(), "a live page's")
         pack = Pack()
         told = {"scene": scene_data(scene, pack, HORIZONS, wide=True)}
         (out / f"{name}.js").write_text(pack.script(f"scene/{name}", told))

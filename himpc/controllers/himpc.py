@@ -14,7 +14,7 @@ from himpc.cascade.level import NO_ROWS, LevelProblem, LevelSolution
 from himpc.controllers.adaptation import Adaptation, LoadModel, adapted
 from himpc.controllers.base import TorqueController
 from himpc.controllers.period import PeriodResult, PeriodState
-from himpc.controllers.stall_guard import stall_guard
+from himpc.controllers.stall_guard import guard_of
 from himpc.formulation.forms import LevelForm, StackForm, measure, prepare, usable
 from himpc.formulation.memory import Memory
 from himpc.formulation.settings import Settings, check_solver
@@ -57,7 +57,7 @@ class HIMPC(TorqueController):
         """Clears plan and memory; τ₀ (n,) N·m is the torque acting now, and q̈ and ẍ start at zero."""
         super().reset(tau_0)
         self._memory: Memory | None = None
-        self._guard = stall_guard(self._settings, len(self._form.tasks))
+        self._guard = guard_of(self._settings, len(self._form.tasks), self.robot.tau_limit)
         self._asked: list[LevelProblem] = []
         if self.kernel is not None:
             self.kernel.forget()
@@ -85,18 +85,15 @@ class HIMPC(TorqueController):
     def _apply(self, settings: Settings) -> None:
         check_solver(settings, settings.route == "explicit")
         self._form, self._idle, self._off = prepare(self.robot, settings)
-        self._M_bar_set = np.array(settings.M_bar)
-        self._M_bar = self._M_bar_set
+        self._M_bar = self._M_bar_set = np.array(settings.M_bar)
         self._still = np.zeros((settings.horizon, self.robot.n))
         self._goal = in_force(self.robot, settings.limits)
-        # A joint's torque cannot exceed its limit. A larger reading is wrong, and bounds must not start from
-        # it.
+        # A joint's torque cannot exceed its limit: bounds must not start from a larger, wrong reading.
         self._reach = np.maximum(self.robot.tau_limit, self._goal.tau_upper)
         self._settings = settings
-        self._guard = stall_guard(self._settings, len(self._form.tasks))
+        self._guard = guard_of(self._settings, len(self._form.tasks), self.robot.tau_limit)
         self._load = LoadModel(self.robot, settings.nominal) if settings.M_bar_adapt else None
-        avoidance = settings.limits.avoidance
-        explicit = settings.route == "explicit"
+        avoidance, explicit = settings.limits.avoidance, settings.route == "explicit"
         self._distances = Distances(self.robot, avoidance) if explicit and avoidance.on else None
         self.kernel = self._compile() if settings.route == "compiled" else None
 
@@ -146,7 +143,7 @@ class HIMPC(TorqueController):
             return self._hold(q, started)
         solutions, predicted_q = found.solutions, found.predicted_q
         first = solutions[-1].U[0] if solutions else 0.0
-        if self._distances is not None:
+        if self._guard is not None:
             self._guard.errors, self._guard.fastest = self._form.lengths(errors), self._form.fastest(previews)
         tau = np.minimum(np.maximum(self._tau_0 + first, limits.tau_lower), limits.tau_upper)
         if not usable(tau):
@@ -175,20 +172,23 @@ class HIMPC(TorqueController):
         if self._weight:
             for place, level in enumerate(self._form.levels):
                 tick.fade(place, self._faded(level))
-
         plan = tick.step(q, v, previews, self._tau_0, self._slowed(v), started)
         if plan is None:
             return self._hold(q, started)
-        if self._settings.limits.avoidance.on:
+        if self._guard is not None:
             self._guard.errors, self._guard.fastest = tick.progress()
         self._tau_0 = plan.tau
         return plan
 
     def _slowed(self, v: Array) -> LimitsInForce:
-        """Returns the limits in force. `StallGuard` may lower velocity limits while distances are kept."""
+        """Returns the limits in force, in which a guard may lower the velocity limits."""
+        if self._guard is None:
+            return self._limits
         distances = self._distances if self.kernel is None else self.kernel.distances
-        now = self._limits
-        return now if distances is None else self._guard.limits(now, self._tau_0, v, distances)
+        limits = self._guard.limits(self._limits, self._tau_0, v, distances)
+        if self.kernel is not None:
+            self.kernel.pull(self._guard.largest_error)
+        return limits
 
     def _adapt(self, q: Array) -> None:
         """Adapts M̄ to the torque that acted."""
@@ -248,7 +248,7 @@ class HIMPC(TorqueController):
             before = form.jacobian(past)[0] @ memory.v
         error = measure(form.tasks, configuration, previews, values, errors)
         asked = form.asked(configuration, previews)
-        pull = self._settings.limits.avoidance.largest_error
+        pull = (self._guard or self._settings.limits.avoidance).largest_error
         error = form.pulling(error, pull) if math.isfinite(pull) else error
         free = form.free(error, x_dot, (x_dot - before) / memory.period, asked, configuration.horizon)
         if not math.isfinite(float(free.sum())):

@@ -41,7 +41,8 @@ class FilteredHIMPC(HIMPC):
     def _apply(self, settings: Settings) -> None:
         limits = settings.limits
         avoidance = replace(limits.avoidance, on=False)
-        super()._apply(replace(settings, limits=replace(limits, avoidance=avoidance)))
+        guard = limits.stall_guard and not limits.avoidance.on
+        super()._apply(replace(settings, limits=replace(limits, avoidance=avoidance, stall_guard=guard)))
         self._filter = DistanceFilter(self.robot, settings) if limits.avoidance.on else None
 
     def step(

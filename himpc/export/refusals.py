@@ -27,6 +27,8 @@ def check(controller: Controller, settings: Settings) -> None:
         raise InputError(
             "M_bar_adapt needs the robot's dynamic model, which is not exported: set it to false"
         )
+    if settings.limits.stall_guard:
+        raise InputError("the guard of a blocked robot is not exported: set limits.stall_guard to false")
     given = given_of(imposed(settings.limits))
     if given:
         raise InputError(

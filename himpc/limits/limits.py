@@ -33,6 +33,8 @@ class Limits:
             iiwa's circle by 17 % with rate 0, which is (32e) as printed, and by 0.2 % with 15 (`himpc-lab
             reproduce himpc-limits`).
         torque_rate: N·m/s; largest change of each joint's torque per second; 0: not imposed.
+        stall_guard: whether a robot that presses without progress comes to rest, also if no distances are
+            kept. Without this guard, as printed, time-delay estimation increases the torque without end.
         avoidance: the distances that are kept.
     """
 
@@ -43,6 +45,7 @@ class Limits:
     velocity_scale: Annotated[float, Range(0.0, above=True)] = 1.0
     velocity_approach: Annotated[float, Range(0.0, 1e4)] = 15.0
     torque_rate: Annotated[float, Range(0.0, 1e5)] = 0.0
+    stall_guard: bool = False
     avoidance: Avoidance = field(default_factory=Avoidance)
 
     def __post_init__(self) -> None:
@@ -68,6 +71,7 @@ class LimitsInForce:
         v_limit: (n,) rad/s.
         q_lower, q_upper: (n,) rad.
         a_max: (n,) rad/s², the deceleration that the viability bound assumes.
+        v_before: (n,) rad/s, the velocity limits before a guard lowered them; None if no guard did.
     """
 
     tau_lower: Array
@@ -76,10 +80,17 @@ class LimitsInForce:
     q_lower: Array
     q_upper: Array
     a_max: Array
+    v_before: Array | None = None
+
+    @property
+    def user_v_limit(self) -> Array:
+        """The velocity limits that the user has set, (n,) rad/s: those that no guard has lowered."""
+        return self.v_limit if self.v_before is None else self.v_before
 
     def with_velocities(self, v_limit: Array) -> LimitsInForce:
-        """Returns the same bounds with other velocity limits, (n,) rad/s."""
-        return LimitsInForce(self.tau_lower, self.tau_upper, v_limit, self.q_lower, self.q_upper, self.a_max)
+        """Returns the same bounds with lower velocity limits, (n,) rad/s."""
+        bounds = self.tau_lower, self.tau_upper, v_limit, self.q_lower, self.q_upper, self.a_max
+        return LimitsInForce(*bounds, self.user_v_limit)
 
     def differs_in_velocity_only(self, other: LimitsInForce) -> bool:
         """Returns whether all arrays except `v_limit` are the same objects as in `other`."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import final
 
 import numpy as np
@@ -23,16 +24,19 @@ class CompiledStallGuard:
     """Contains the degree to which the robot of a controller is stalled. Its attributes are those of
     `StallGuard`."""
 
-    def __init__(self, tasks: int, T_s: float) -> None:
-        self._T_s = T_s
+    def __init__(self, tasks: int, T_s: float, largest_error: float = math.inf) -> None:
+        self._T_s, self.largest_error = T_s, largest_error
         self.errors: Array | None = None
         self.fastest = 0.0
         self._due, self._stall = np.full(tasks, np.inf), np.array((1.0, np.inf))
         self._joints: Array | None = None
         self._limits: tuple[LimitsInForce, Array, Array] | None = None
 
-    def limits(self, limits: LimitsInForce, tau: Array, v: Array, distances: Distances) -> LimitsInForce:
+    def limits(
+        self, limits: LimitsInForce, tau: Array, v: Array, distances: Distances | None
+    ) -> LimitsInForce:
         """Returns the limits in force at this tick, see `StallGuard.limits`."""
+        assert distances is not None
         if self._joints is None:
             self._joints = np.array((np.zeros_like(v), v))
         if self._limits is None or self._limits[0] is not limits:

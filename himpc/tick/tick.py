@@ -26,7 +26,7 @@ from himpc.tick.gather import gathered
 from himpc.tick.given import GivenRows
 from himpc.tick.given_bounds import GivenBounds
 from himpc.tick.kernel.arena import Snapshot
-from himpc.tick.kernel.arrays import Array
+from himpc.tick.kernel.arrays import PULL, Array
 from himpc.tick.kernel.control_period import (
     ALL_PARTS,
     FINISH,
@@ -136,6 +136,10 @@ class CompiledTick:
         row of a reference, m/s or rad/s."""
         lengths = np.empty(len(self._ends))
         return lengths, progress(*self.arena.arguments, self._ends, lengths)
+
+    def pull(self, largest_error: float) -> None:
+        """Sets the largest error on which tasks act, m or rad."""
+        self.arena.f["scalars"][PULL] = largest_error
 
     def fade(self, place: int, share: float | Array) -> None:
         """Multiplies a level's √Q by `share`, one number or one per row."""

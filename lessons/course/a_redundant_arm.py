@@ -197,6 +197,7 @@ LESSON = Lesson(
     name="a-redundant-arm",
     card=card_of(__doc__),
     scene="iiwa14-hold",
+    set=("avoidance.on=false",),
     steps=(FOLLOW, ELBOW, COUNT),
     challenge=CHALLENGE,
 )

@@ -254,5 +254,6 @@ LESSON = Lesson(
     name="keeping-clear",
     card=card_of(__doc__),
     scene="iiwa14-table",
+    set=("avoidance.on=false",),
     steps=(BELOW, FIRST_TASK, INSIDE, BEHIND),
 )

@@ -153,5 +153,6 @@ LESSON = Lesson(
     name="swap-the-priorities",
     card=card_of(__doc__),
     scene="iiwa14-hold",
+    set=("avoidance.on=false",),
     steps=(LAST, FIRST, BACK),
 )

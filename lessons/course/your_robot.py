@@ -186,6 +186,7 @@ LESSON = Lesson(
     card=card_of(__doc__),
     scene="hold",
     urdf=LAMP,
+    set=("avoidance.on=false",),
     steps=(LOAD, WRONG, TUNE),
     challenge=CHALLENGE,
 )

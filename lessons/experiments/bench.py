@@ -11,7 +11,8 @@ import numpy as np
 from himpc.catalog import Route
 from himpc.qp import Solver, is_installed
 from lessons.events import MoveTarget
-from lessons.scenes.catalog import torque_scene
+from lessons.scenes.catalog import as_torque_scene
+from lessons.scenes.run_spec import RunSpec
 from lessons.session.torque import TorqueSession
 
 HORIZONS = (5, 10, 20, 30)
@@ -63,7 +64,7 @@ def bench(
         ticks: timed ticks per contender.
         progress: called with the completed share.
     """
-    loaded = torque_scene(scene)
+    loaded = as_torque_scene(RunSpec(scene).for_export().prepared(), "bench's")
     timings = []
     for place, N in enumerate(horizons):
         sessions = {}

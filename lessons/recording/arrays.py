@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 _PER_JOINT = (
     *("q", "v", "q_measured", "v_measured", "tau_0", "tau", "tau_demand"),
-    *("tau_lower", "tau_upper", "v_limit", "q_lower", "q_upper"),
+    *("tau_lower", "tau_upper", "v_limit", "v_limit_lowered", "q_lower", "q_upper"),
 )
 _PER_TASK = ("x", "x_d", "v_d", "a_d", "error")
 

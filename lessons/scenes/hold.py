@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from himpc.limits import Limits
+from himpc.limits.avoidance import Avoidance
 from himpc.stack import Level, freedom_left
 from himpc.tasks import FrameOrientation, FramePosition, Posture
 from lessons.scenes.torque_scene import TorqueScene
@@ -16,6 +18,9 @@ from robots.floor import standing_floor
 
 TOUCHING = PlantSettings(contacts=True, joint_stops=True)
 """The plant of scenes with dragged targets: objects and the ends of the joints' ranges stop the robot."""
+DRAGGED = Limits(stall_guard=True, avoidance=Avoidance(on=True))
+"""The limits of scenes with dragged targets: a target may be in an object, in the robot or out of reach. The
+scenes of the papers have the printed rows alone."""
 PLANAR3_PLANT = replace(TOUCHING, armature=(0.05, 0.05, 0.03))
 """The paper's M̄ = 0.033 requires geared motors: without armature the loop would be unstable."""
 
@@ -60,7 +65,7 @@ def _hold(robot: Robot, plant: PlantSettings) -> TorqueScene:
         name="hold",
         title=f"{robot.name}: drag the target; position, then orientation, then posture",
         robot=robot,
-        settings=TorqueSettings(levels=tuple(levels), M_bar=tuple(robot.M_bar), plant=plant),
+        settings=TorqueSettings(levels=tuple(levels), M_bar=tuple(robot.M_bar), limits=DRAGGED, plant=plant),
         references=lambda robot, stack: {},
         q_0=robot.home,
         v_0=np.zeros(robot.n),

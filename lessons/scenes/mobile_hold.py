@@ -6,7 +6,7 @@ import numpy as np
 
 from himpc.stack import Level
 from himpc.tasks import FramePosition
-from lessons.scenes.hold import TOUCHING
+from lessons.scenes.hold import DRAGGED, TOUCHING
 from lessons.scenes.torque_scene import TorqueScene
 from lessons.settings.torque import TorqueSettings
 from robots import load_robot
@@ -28,7 +28,9 @@ def ridgeback_hold() -> TorqueScene:
         name="ridgeback-ur10-hold",
         title="Ridgeback and UR10 under HIMPC: drag the targets of hand and base; the hand comes first",
         robot=robot,
-        settings=TorqueSettings(levels=levels, M_bar=tuple(robot.M_bar), R_on="acceleration", plant=TOUCHING),
+        settings=TorqueSettings(
+            levels=levels, M_bar=tuple(robot.M_bar), R_on="acceleration", limits=DRAGGED, plant=TOUCHING
+        ),
         references=lambda robot, stack: {},
         q_0=robot.home,
         v_0=np.zeros(robot.n),

@@ -8,9 +8,14 @@ import shlex
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, final
 
+from lessons.scenes.names import VELOCITY_SCENES
+
 if TYPE_CHECKING:
     from lessons.events import Event
     from lessons.scenes.scene import Scene
+
+NOT_EXPORTED = ("avoidance.on=false", "limits.stall_guard=false")
+"""The assignments that switch off what scenes have by default and exported controllers lack."""
 
 _TASK_FILE = re.compile(r'"task"\s*:\s*("(?:[^"\\]|\\.)*\.py")')
 """Pattern for a task in a stack, as JSON, that is named by the path of its file."""
@@ -72,6 +77,11 @@ class RunSpec:
     def but(self, *assignments: str) -> RunSpec:
         """Returns the same run with further assignments."""
         return replace(self, set=(*self.set, *assignments))
+
+    def for_export(self) -> RunSpec:
+        """Returns the run as an exported controller can repeat it: without distances and without the guard
+        of a blocked robot, which are not exported. Assignments of the run itself remain in force."""
+        return self if self.scene in VELOCITY_SCENES else replace(self, set=(*NOT_EXPORTED, *self.set))
 
     def admitting(self, *assignments: str) -> RunSpec:
         """Returns the same run with further assignments by the person who started the program: the Python

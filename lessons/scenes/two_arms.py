@@ -13,7 +13,7 @@ from himpc.references import Waypoints
 from himpc.stack import Level
 from himpc.tasks import FrameOrientation, FramePosition, Posture, RelativeOrientation, RelativePosition
 from lessons.events import Event, MoveTarget
-from lessons.scenes.hold import TOUCHING, gains
+from lessons.scenes.hold import DRAGGED, TOUCHING, gains
 from lessons.scenes.torque_scene import TorqueScene
 from lessons.settings.torque import TorqueSettings
 from robots import NominalSettings, Robot, load_robot
@@ -138,7 +138,9 @@ def _scene(
         name=name,
         title=title,
         robot=robot,
-        settings=TorqueSettings(levels=levels, M_bar=tuple(robot.M_bar), nominal=NOMINAL, plant=PLANT),
+        settings=TorqueSettings(
+            levels=levels, M_bar=tuple(robot.M_bar), limits=DRAGGED, nominal=NOMINAL, plant=PLANT
+        ),
         references=lambda robot, stack: {},
         q_0=robot.home,
         v_0=np.zeros(robot.n),

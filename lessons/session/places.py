@@ -22,6 +22,8 @@ class Places(NamedTuple):
     tau: slice
     q_measured: slice
     v_measured: slice
+    v_limit: slice
+    v_limit_lowered: slice
 
     @classmethod
     def of(cls, layout: Layout) -> Places:

@@ -92,10 +92,9 @@ class Session(ABC):
         self.diverged_at = self.failure = None
         self._script = deque(self.scene.events)
 
-    def _lost(self, t: float, notice: bool = True) -> None:
+    def _lost(self, t: float) -> None:
         """Called when control was lost, at time t, s."""
-        if notice:
-            self.notices.append(f"The robot is out of control since t = {t:.2f} s: press Reset.")
+        self.notices.append(f"The robot is out of control since t = {t:.2f} s: press Reset.")
         self.diverged_at = t
 
     # ---------------------------------------------------------------- events

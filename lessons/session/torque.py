@@ -38,9 +38,6 @@ Array = NDArray[np.float64]
 TRUTH_TICKS = 20
 """Ticks between two updates of the values that need the plant's M (gauge of M̄, true leak)."""
 
-LOST_POSITION = 0.5
-"""m: a level-1 position error above this counts as divergence."""
-
 
 @final
 class TorqueSession(Session):
@@ -101,7 +98,6 @@ class TorqueSession(Session):
         self._push_until = math.inf
         self._ticks = 0
         self._outbox = DelayedTorque()
-        self._hands = self._first_hands()
         self._truth = (math.nan, math.nan, math.nan)
 
     def _fresh_references(self) -> dict[str, Reference]:
@@ -182,7 +178,6 @@ class TorqueSession(Session):
             self.layout, self.references, self.plan, self.given = layout, references, None, None
             self._row, self._at = np.full(layout.size, np.nan), Places.of(layout)
         self.settings = settings
-        self._hands = self._first_hands()
 
     def _hand_over(self, taking: Controller) -> None:
         taking.reset(self.plant.tau)
@@ -212,6 +207,7 @@ class TorqueSession(Session):
         row[at.t] = t
         row[at.q], row[at.v] = q, v
         row[at.q_measured], row[at.v_measured] = state.q, state.v
+        row[at.v_limit], row[at.v_limit_lowered] = plan.limits.user_v_limit, plan.limits.v_limit
         self.plan, self.given = plan, Given(state.q, state.v, ahead)
         row[at.truth], row[at.truth + 1], row[at.truth + 2] = self._true(plan, q, ahead)
         if plan.notice is not None:
@@ -222,11 +218,8 @@ class TorqueSession(Session):
         row[at.touch], row[at.touch + 1] = plant.touch
         row[at.near], row[at.near + 1] = self.clearance.measure(q, settings.limits.avoidance)
         self._ticks += 1
-        if self.diverged_at is None:
-            wild = self._is_wild(q, v)
-            if wild or self._is_far(row):
-                # No notice if only the error is large: a target may have been dragged out of reach.
-                self._lost(t, notice=wild)
+        if self.diverged_at is None and self._is_wild(q, v):
+            self._lost(t)
         return row
 
     def _true(self, plan: Plan, q: Array, ahead: Mapping[str, Preview]) -> tuple[float, float, float]:
@@ -244,25 +237,12 @@ class TorqueSession(Session):
         return self._truth
 
     def _is_wild(self, q: Array, v: Array) -> bool:
+        """Returns whether control is lost. A large error alone is not a loss: a target may be out of reach,
+        or limits or distances may hold the robot."""
         share = v / self.robot.v_limit
         # A comparison with NaN is false, so "not within" is also true for values that are not finite.
         slow = share.dot(share) <= LOST_SPEED**2 or float(np.abs(share).max()) <= LOST_SPEED
         return self.plant.broken or not slow or not math.isfinite(q.dot(q))
-
-    def _is_far(self, row: Array) -> bool:
-        """Returns whether level 1 is lost."""
-        for where in self._hands:
-            error = row[where]
-            if error.dot(error) > LOST_POSITION**2:
-                return True
-        return False
-
-    def _first_hands(self) -> tuple[slice, ...]:
-        """Columns with the errors of the position tasks of the first enabled level."""
-        first = next((level.tasks for level in self.settings.levels if level.enabled), ())
-        return tuple(
-            self.layout.fields[f"error/{task.name}"] for task in first if isinstance(task, FramePosition)
-        )
 
     def predicted_path(self, frame: str = "") -> Array:
         """Predicted positions of a frame at knots 0 … N of the last plan, (N+1, 3) m."""

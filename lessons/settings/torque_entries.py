@@ -46,6 +46,12 @@ TORQUE_ENTRIES = (
           "Largest change of each joint's torque per second; in himpc, hiqp, nhimpc and weighted this "
               "limit ranks above all levels. 0: not imposed",
           "N·m/s", 0.0, 2000.0, 10.0, name="torque rate limit"),
+    Entry("limits.stall_guard", "Rest when blocked",
+          "A robot whose torque rises without progress of its tasks comes to rest, also if no distances are "
+              "kept. Without this guard, as printed, time-delay estimation increases the torque until it is "
+              "at its limit. himpc, hiqp, nhimpc and weighted have the guard, and always while they keep "
+              "distances",
+          tries=("false", "true"), name="guard of a blocked robot"),
     Entry("avoidance.on", "Keep distances",
           "Keep distances between links, and between links and objects. himpc, hiqp, nhimpc and weighted "
               "do this by bounds above all levels, himpc_filtered by a filter behind its levels",

@@ -16,7 +16,7 @@ from lessons.settings.torque import TorqueSettings
 from robots import Robot
 
 _DISTANCES = ("on", "d_safe", "margin", "reaction", "deceleration", "pull", "velocity_margin")
-_LIMITS = ("torque", "velocity", "position", "torque_scale", "velocity_scale", "torque_rate")
+_LIMITS = ("torque", "velocity", "position", "torque_scale", "velocity_scale", "torque_rate", "stall_guard")
 
 
 class ControllerPanel:

@@ -47,7 +47,10 @@ CASES = (
         Case(f"2 kg, encoders of {deg}°", set=(*_payload(2.0), f"plant.encoder_resolution_deg={deg}"))
         for deg in ("0.00001", "0.0001", "0.001")
     ),
-    *(Case(f"{_HOLD}, {kg:g} kg", scene=_HOLD, set=_payload(kg)) for kg in (0.0, 2.0, 4.0)),
+    *(
+        Case(f"{_HOLD}, {kg:g} kg", scene=_HOLD, set=("avoidance.on=false", *_payload(kg)))
+        for kg in (0.0, 2.0, 4.0)
+    ),
     Case("hiqp, 4 kg", "hiqp", set=_payload(4.0)),
     Case("weighted, 2 kg", "weighted", set=_payload(2.0)),
 )

@@ -1,0 +1,72 @@
+"""Brings a robot to rest whose torque rises although its joints do not move: it presses against something."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from himpc.constants import CREEP, FORGETS, PRESSING, RELEASE, STOPPING, TREND_SECONDS, WEAK_PULL
+from himpc.limits.limits import LimitsInForce
+
+Array = NDArray[np.float64]
+
+
+class Windup(NamedTuple):
+    """The degree to which time-delay estimation has wound up the torque.
+
+    Attributes:
+        tau: (n,) N·m, the torque that acted one period ago.
+        wound: (n,) change of the torque while the joints were still, as a share of the torque limits.
+        trend: mean of the rate at which ½‖wound‖² grows, per period.
+        share: 1 if the robot is free, 0 if it is stopped.
+    """
+
+    tau: Array
+    wound: Array
+    trend: float
+    share: float
+
+
+def free(tau: Array) -> Windup:
+    """Returns the state of a robot that does not press. tau: (n,) N·m, the torque that acts."""
+    return Windup(tau, np.zeros_like(tau), 0.0, 1.0)
+
+
+def wound_up(before: Windup, tau: Array, v: Array, largest_torque: Array, moves: bool, T_s: float) -> Windup:
+    """Returns the wind-up one period later.
+
+    Time-delay estimation counts the force of a contact as a disturbance, and presses harder in every period.
+    Its torque then rises although no joint moves. A torque that changes because the robot moves (gravity in
+    another posture) is forgotten at the rate max|q̇| / FORGETS. If the remaining change exceeds PRESSING, the
+    robot is stopped while the change grows, and until a reference moves.
+
+    Args:
+        before: the wind-up one period ago.
+        tau: torque that acts, (n,) N·m.
+        v: measured, (n,) rad/s.
+        largest_torque: (n,) N·m.
+        moves: whether a reference moves.
+        T_s: control period, s.
+    """
+    change = (tau - before.tau) / largest_torque
+    wound = (before.wound + change) * math.exp(-float(np.abs(v).max()) * T_s / FORGETS)
+    trend = before.trend + min(1.0, T_s / TREND_SECONDS) * (float(change @ wound) - before.trend)
+    presses = float(np.abs(wound).max()) >= PRESSING and (trend > 0.0 or not moves)
+    goal, seconds = (0.0, STOPPING) if presses else (1.0, RELEASE)
+    return Windup(tau, wound, trend, before.share + min(1.0, T_s / seconds) * (goal - before.share))
+
+
+def stopped(limits: LimitsInForce, windup: Windup) -> LimitsInForce:
+    """Returns the limits in force, with the lower velocity limits of a robot that presses."""
+    if windup.share > 1.0 - 1e-6:
+        return limits
+    creep = np.minimum(limits.v_limit, CREEP)
+    return limits.with_velocities(creep + windup.share * (np.minimum(limits.v_limit, 1e3) - creep))
+
+
+def largest_error(windup: Windup) -> float:
+    """Returns the largest error on which tasks act, m or rad, see `Avoidance.pull`."""
+    return math.inf if windup.share > 1.0 - 1e-6 else WEAK_PULL * windup.share + 1e-9
