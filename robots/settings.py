@@ -84,7 +84,7 @@ class PlantSettings:
 
 
 def per_joint(name: str, value: PerJoint, n: int) -> np.ndarray:
-    """Returns values (n,); a single number is repeated. Raises InputError with the name for a wrong length."""
+    """Returns values (n,); a single number is repeated. Raises InputError with the name for a wrong size."""
     if not isinstance(value, tuple):
         return np.full(n, float(value))
     if len(value) != n:

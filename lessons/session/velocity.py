@@ -112,13 +112,11 @@ class VelocitySession(Session):
 
     def adopt(self, settings: SceneSettings) -> None:
         assert isinstance(settings, VelocitySettings)
-        # Controller, distances and plant may refuse the settings; until all have accepted them nothing changes.
-        # The next tick sets the order of the window.
+        # Nothing changes before controller and plant have accepted the settings. The next tick sets the order
+        # of the window.
         fitted = make_velocity_controller(settings.controller, self.robot, settings.htmpc)
-        distances, limits = (
-            ObstacleDistances(self.robot, settings.htmpc),
-            bounds(self.robot, settings.htmpc.limits),
-        )
+        distances = ObstacleDistances(self.robot, settings.htmpc)
+        limits = bounds(self.robot, settings.htmpc.limits)
         if settings.plant != self.settings.plant:
             self.plant.configure(settings.plant)
         if settings.controller != self.settings.controller:

@@ -176,8 +176,9 @@ def test_a_change_that_is_refused_at_its_last_part_changes_nothing(iiwa: Robot, 
     good = iiwa_settings(iiwa, M_bar_adapt=True)
     one, other = (make_controller(name, iiwa, good) for _ in range(2))
     previews = holds(iiwa, 20)
-    both = [[c.step(iiwa.home, np.full(7, 0.01 * k), previews).tau for k in range(3)] for c in (one, other)]
-    np.testing.assert_array_equal(*both)
+    for k in range(3):
+        for each in (one, other):
+            each.step(iiwa.home, np.full(7, 0.01 * k), previews)
     before = one.settings
     limits = replace(good.limits, torque_scale=0.5, avoidance=Avoidance(on=True))
     wrong = replace(good, horizon=20, limits=limits, nominal=NominalSettings(armature=(0.1, 0.2)))
@@ -188,7 +189,8 @@ def test_a_change_that_is_refused_at_its_last_part_changes_nothing(iiwa: Robot, 
     assert one.settings == before
     for k in range(5):
         at = iiwa.home + 0.01, np.full(7, 0.02 * k)
-        np.testing.assert_array_equal(*[c.step(*at, previews).tau for c in (one, other)])
+        now, then = (each.step(*at, previews) for each in (one, other))
+        np.testing.assert_array_equal(now.tau, then.tau)
 
 
 def test_a_message_about_the_nominal_model_names_it(iiwa: Robot) -> None:
