@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from robots.inertia import mass_matrix
 from robots.ranges import Range, check_fields
 from robots.robot import Robot
-from robots.settings import PerJoint, PlantSettings
+from robots.settings import PerJoint, PlantSettings, per_joint
 from robots.truth import true_model
 
 Array = NDArray[np.float64]
@@ -58,10 +58,11 @@ class NominalModel:
     """
 
     def __init__(self, robot: Robot, settings: NominalSettings) -> None:
-        plant = settings.as_plant()
-        self._model = true_model(robot, plant)
+        for name in ("armature", "mass_scale", "inertia_scale"):
+            per_joint(f"nominal.{name}", getattr(settings, name), robot.n)
+        self._damping = per_joint("nominal.damping", settings.damping, robot.n)
+        self._model = true_model(robot, settings.as_plant())
         self._data = self._model.createData()
-        self._damping = plant.per_joint("damping", robot.n)
 
     def mass_matrix(self, q: Array) -> Array:
         """Returns M(q) with armature, (n, n) symmetric, kg·m²."""

@@ -49,22 +49,20 @@ class Plant:
         check_world(world)
         self.timestep = timestep
         self.world = world
-        self._push: tuple[str | None, np.ndarray] = (None, np.zeros(6))
         self._build(PlantSettings() if settings is None else settings)
         self.reset(robot.home)
 
-    def _build(self, settings: PlantSettings) -> None:
+    def _build(self, settings: PlantSettings, model: mujoco.MjModel | None = None) -> None:
         robot = self.robot
-        self._model = compiled(robot, settings, self.world)
+        self._model = compiled(robot, settings, self.world) if model is None else model
         self.settings = settings
         self._data, self._probe = mujoco.MjData(self._model), mujoco.MjData(self._model)
         self._q, self._v = self._data.qpos[: robot.n], self._data.qvel[: robot.n]
         self._fresh = False
         self._armature = self._model.dof_armature[: robot.n].copy()
         self._diagonal = settings.per_joint("diagonal_scale", robot.n)
-        self._altered = bool((self._diagonal != 1.0).any())
         self._resolution = encoder_resolution(robot, settings)
-        self._rounds = bool(self._resolution.any())
+        self._altered, self._rounds = bool((self._diagonal != 1.0).any()), bool(self._resolution.any())
         limit = robot.tau_limit if settings.saturate else np.full(robot.n, np.inf)
         self._tau_lower, self._tau_upper = -limit, limit
         self._lag, self._delay = 1e-3 * settings.torque_lag_ms, 1e-3 * settings.delay_ms
@@ -119,7 +117,8 @@ class Plant:
         torque = None if tau is None else as_vector("tau", tau, self.n)
         mujoco.mj_resetData(self._model, self._data)
         self._q[:], self._v[:] = position, velocity
-        self._push, self._fresh, self.broken = (None, np.zeros(6)), False, False
+        self._push: tuple[str | None, np.ndarray] = (None, np.zeros(6))
+        self._fresh = self.broken = False
         self._touch = Touch()
         torque = self.holding_torque() if torque is None else torque
         self._motors = Motors(np.clip(torque, self._tau_lower, self._tau_upper), 0.0)
@@ -176,10 +175,11 @@ class Plant:
             self._push = (body, wrench)
         self._fresh = False
 
-    def configure(self, settings: PlantSettings) -> None:
-        """Changes the plant while it runs. t, q, v, push and the states of motors and encoders are kept."""
+    def configure(self, settings: PlantSettings, model: mujoco.MjModel | None = None) -> None:
+        """Changes the plant while it runs. t, q, v, push and the states of motors and encoders are kept.
+        Without `model` (`compiled`), raises InputError, and changes nothing, if the settings do not fit."""
         old, (body, wrench) = self._data, self._push
-        self._build(settings)
+        self._build(settings, model)
         self._motors.limit(self._tau_lower, self._tau_upper)
         self._data.time = old.time
         for name in ("qpos", "qvel", "qacc_warmstart"):

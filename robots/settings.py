@@ -80,11 +80,13 @@ class PlantSettings:
     def per_joint(self, name: str, n: int) -> np.ndarray:
         """Returns the values (n,) of a per-joint field. A single number is repeated. Raises InputError for a
         wrong length."""
-        value = getattr(self, name)
-        if isinstance(value, tuple):
-            if len(value) != n:
-                raise InputError(
-                    f"plant.{name} has {len(value)} values; give one number or one per joint, {n}."
-                )
-            return np.array(value, dtype=float)
+        return per_joint(f"plant.{name}", getattr(self, name), n)
+
+
+def per_joint(name: str, value: PerJoint, n: int) -> np.ndarray:
+    """Returns values (n,); a single number is repeated. Raises InputError with the name for a wrong size."""
+    if not isinstance(value, tuple):
         return np.full(n, float(value))
+    if len(value) != n:
+        raise InputError(f"{name} has {len(value)} values; give one number or one per joint, {n}.")
+    return np.array(value, dtype=float)

@@ -15,7 +15,7 @@ from himpc.controllers.adaptation import Adaptation, LoadModel, adapted
 from himpc.controllers.base import TorqueController
 from himpc.controllers.period import PeriodResult, PeriodState
 from himpc.controllers.stall_guard import guard_of
-from himpc.formulation.forms import LevelForm, StackForm, measure, prepare, usable
+from himpc.formulation.forms import LevelForm, Prepared, StackForm, measure, prepare, usable
 from himpc.formulation.memory import Memory
 from himpc.formulation.settings import Settings, check_solver
 from himpc.kinematics.configuration import Configuration
@@ -70,10 +70,9 @@ class HIMPC(TorqueController):
         before = [about(task) for task in self._form.tasks]
         same = settings.M_bar == self._settings.M_bar and settings.T_s == self._settings.T_s
         measured_so_far = self._adaptation if same and settings.M_bar_adapt else None
-        if self.kernel is not None:
-            self._memory = self.kernel.memory
+        memory = self._memory if self.kernel is None else self.kernel.memory
         self._apply(settings)
-        self._adaptation = measured_so_far
+        self._memory, self._adaptation = memory, measured_so_far
         if self.kernel is not None and self._memory is not None:
             self.kernel.recall(self._memory, self._memory.q, self._memory.v)
         self._weight = {name: weight for name, weight in self._weight.items() if weight < 1.0}
@@ -83,24 +82,28 @@ class HIMPC(TorqueController):
                     self._weight[task.name] = 0.0
 
     def _apply(self, settings: Settings) -> None:
-        check_solver(settings, settings.route == "explicit")
-        self._form, self._idle, self._off = prepare(self.robot, settings)
+        explicit, avoidance = settings.route == "explicit", settings.limits.avoidance
+        check_solver(settings, explicit)
+        prepared = prepare(self.robot, settings)
+        goal = in_force(self.robot, settings.limits)
+        guard = guard_of(settings, len(prepared.form.tasks), self.robot.tau_limit)
+        load = LoadModel(self.robot, settings.nominal) if settings.M_bar_adapt else None
+        distances = Distances(self.robot, avoidance) if explicit and avoidance.on else None
+        kernel = None if explicit else self._compile(settings, prepared)
+        # Everything that may raise is above.
+        self._form, self._idle, self._off = prepared
+        self._settings, self._goal, self._guard, self._load = settings, goal, guard, load
+        self._distances, self.kernel = distances, kernel
         self._M_bar = self._M_bar_set = np.array(settings.M_bar)
         self._still = np.zeros((settings.horizon, self.robot.n))
-        self._goal = in_force(self.robot, settings.limits)
-        # A joint's torque cannot exceed its limit: bounds must not start from a larger, wrong reading.
-        self._reach = np.maximum(self.robot.tau_limit, self._goal.tau_upper)
-        self._settings = settings
-        self._guard = guard_of(self._settings, len(self._form.tasks), self.robot.tau_limit)
-        self._load = LoadModel(self.robot, settings.nominal) if settings.M_bar_adapt else None
-        avoidance, explicit = settings.limits.avoidance, settings.route == "explicit"
-        self._distances = Distances(self.robot, avoidance) if explicit and avoidance.on else None
-        self.kernel = self._compile() if settings.route == "compiled" else None
+        # A joint's torque cannot exceed its limit. A larger reading is wrong, and bounds must not start from
+        # it.
+        self._reach = np.maximum(self.robot.tau_limit, goal.tau_upper)
 
-    def _compile(self) -> CompiledTick:
-        """Creates the compiled tick for the settings in use."""
-        levels = [] if self._idle else [LevelTable.of(level) for level in self._form.levels]
-        return CompiledTick(self.robot, self._settings, self._form, self._off, levels)
+    def _compile(self, settings: Settings, prepared: Prepared) -> CompiledTick:
+        """Creates the compiled tick."""
+        levels = [] if prepared.idle else [LevelTable.of(level) for level in prepared.form.levels]
+        return CompiledTick(self.robot, settings, prepared.form, prepared.off, levels)
 
     def step(
         self, q: Array, v: Array, previews: Mapping[str, Preview], tau_applied: Array | None = None

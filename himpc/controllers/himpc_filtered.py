@@ -38,12 +38,18 @@ class FilteredHIMPC(HIMPC):
         if self._filter is not None:
             self._filter.forget()
 
+    @property
+    def settings(self) -> Settings:
+        """The settings that were given. The levels have the same settings, but with `avoidance.on` false."""
+        return self._given
+
     def _apply(self, settings: Settings) -> None:
         limits = settings.limits
+        distance_filter = DistanceFilter(self.robot, settings) if limits.avoidance.on else None
         avoidance = replace(limits.avoidance, on=False)
         guard = limits.stall_guard and not limits.avoidance.on
         super()._apply(replace(settings, limits=replace(limits, avoidance=avoidance, stall_guard=guard)))
-        self._filter = DistanceFilter(self.robot, settings) if limits.avoidance.on else None
+        self._given, self._filter = settings, distance_filter
 
     def step(
         self, q: Array, v: Array, previews: Mapping[str, Preview], tau_applied: Array | None = None

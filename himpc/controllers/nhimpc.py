@@ -7,6 +7,7 @@ import numpy as np
 from himpc.cascade.level import LevelSolution
 from himpc.controllers.himpc import HIMPC
 from himpc.controllers.period import PeriodResult, PeriodState
+from himpc.formulation.forms import Prepared
 from himpc.formulation.settings import Settings
 from himpc.tick.tables import LevelTable
 from himpc.tick.tick import CompiledTick
@@ -48,10 +49,11 @@ class NHIMPC(HIMPC):
         self.max_iterations = max_iterations
         super().__init__(robot, settings)
 
-    def _compile(self) -> CompiledTick:
-        levels = [] if self._idle else [LevelTable.of(level) for level in self._form.levels]
+    def _compile(self, settings: Settings, prepared: Prepared) -> CompiledTick:
+        form, idle, off = prepared
+        levels = [] if idle else [LevelTable.of(level) for level in form.levels]
         most = self.max_iterations if levels else 1
-        return CompiledTick(self.robot, self._settings, self._form, self._off, levels, self.tolerance, most)
+        return CompiledTick(self.robot, settings, form, off, levels, self.tolerance, most)
 
     def _search(self, tick: PeriodState) -> PeriodResult | None:
         fading = dict(self._weight)

@@ -97,14 +97,16 @@ class OneStepController(TorqueController):
     def _apply(self, settings: Settings) -> None:
         check_solver(settings, self.solves)
         prepared = prepare(self.robot, settings)
+        goal = in_force(self.robot, settings.limits)
+        known = all(is_built_in(task) for task in (*prepared.form.tasks, *prepared.off))
+        kinematics = Kinematics(self.robot, prepared.form, prepared.off) if known else None
         self._adopt(settings)
+        # Everything that may raise is above.
         self._form, self._idle, self._off = prepared
-        self._goal = in_force(self.robot, settings.limits)
+        self._goal, self._kinematics = goal, kinematics
         most = np.maximum(self.robot.tau_limit, self._goal.tau_upper)
         self._reach = most if self.clips else np.full(self.robot.n, np.inf)
         self._boundless = no_rows(self.robot.n)
-        known = all(is_built_in(task) for task in (*self._form.tasks, *self._off))
-        self._kinematics = Kinematics(self.robot, self._form, self._off) if known else None
         orientations = [task for task in self._form.tasks if isinstance(task, OrientationTask)]
         self._about_one_axis = [task.name for task in orientations if len(task.axes) == 1]
         self._settings = settings

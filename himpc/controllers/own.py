@@ -90,13 +90,13 @@ class OwnController(TorqueController):
     def _apply(self, settings: Settings) -> None:
         check_solver(settings, False)
         prepared = prepare(self.robot, settings)
-        self._nominal = NominalModel(self.robot, settings.nominal)
-        self._form, self._idle, self._off = prepared
-        self._goal = in_force(self.robot, settings.limits)
-        self._M_bar = read_only(np.array(settings.M_bar))
+        nominal, goal = NominalModel(self.robot, settings.nominal), in_force(self.robot, settings.limits)
         avoidance = settings.limits.avoidance
-        self._distances = Distances(self.robot, avoidance) if avoidance.on else None
-        self._settings = settings
+        distances = Distances(self.robot, avoidance) if avoidance.on else None
+        # Everything that may raise is above.
+        self._form, self._idle, self._off = prepared
+        self._settings, self._nominal, self._goal, self._distances = settings, nominal, goal, distances
+        self._M_bar = read_only(np.array(settings.M_bar))
 
     def step(
         self, q: Array, v: Array, previews: Mapping[str, Preview], tau_applied: Array | None = None

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from himpc.cascade.level import LevelProblem, LevelSolution
 from himpc.controllers.himpc import HIMPC
 from himpc.controllers.period import PeriodState
-from himpc.formulation.forms import LevelForm
+from himpc.formulation.forms import LevelForm, Prepared
+from himpc.formulation.settings import Settings
 from himpc.limits import Rows
 from himpc.plan import Plan
 from himpc.references import Preview
@@ -52,10 +53,11 @@ class Weighted(HIMPC):
         plan = super().step(q, v, previews, tau_applied)
         return replace(plan, step_us=plan.step_us - self._evidence_us) if self._evidence_us else plan
 
-    def _compile(self) -> CompiledTick:
-        levels = [] if self._idle else list(accumulated(self._form.levels))
-        tick = CompiledTick(self.robot, self._settings, self._form, self._off, levels)
-        for place, level in enumerate(self._form.levels):
+    def _compile(self, settings: Settings, prepared: Prepared) -> CompiledTick:
+        form, idle, off = prepared
+        levels = [] if idle else list(accumulated(form.levels))
+        tick = CompiledTick(self.robot, settings, form, off, levels)
+        for place, level in enumerate(form.levels):
             if level.name == DAMPING_LEVEL.name:
                 tick.fade(place, math.sqrt(DAMPING_SHARE))
         return tick

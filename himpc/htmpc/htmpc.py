@@ -77,14 +77,15 @@ class HTMPC:
         check_dimensions(robot, active)
         weights, limits = efforts(robot, settings), bounds(robot, settings.limits)
         collision = CollisionModel(robot, settings.obstacles, settings.self_collision)
-        self._hold = self._held(active, settings)
-        self._levels = tuple(form for level, form in every if level in active)
-        guards = accumulate((form.guards(settings) for form in self._levels), initial=())
-        self._guards = [*guards][:-1]  # each level has the rows of all levels above it
-        self._bounds = limits
+        hold, levels = self._held(active, settings), tuple(form for level, form in every if level in active)
+        guards = [*accumulate((form.guards(settings) for form in levels), initial=())]
+        effort = Effort(weights, settings.horizon, settings.dt)
+        avoidance = None if collision.empty else Avoidance(collision, settings.margin_m)
+        # Everything that may raise is above.
+        self._hold, self._levels = hold, levels
+        self._guards = guards[:-1]  # each level has the rows of all levels above it
+        self._bounds, self._effort, self._avoidance = limits, effort, avoidance
         self._table = ConstraintTable(settings.horizon * robot.n)
-        self._effort = Effort(weights, settings.horizon, settings.dt)
-        self._avoidance = None if collision.empty else Avoidance(collision, settings.margin_m)
         self._tasks = tasks
         self._settings = settings
 

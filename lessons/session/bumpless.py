@@ -8,9 +8,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.controllers import Controller, Settings
+from himpc.controllers import HIMPC, Controller, Settings
+from himpc.controllers.distance_filter import DistanceFilter
+from himpc.formulation.forms import usable
 from himpc.plan import Plan
 from himpc.references import Preview
+from himpc.references.outlook import observed_by
 from robots import InputError
 
 Array = NDArray[np.float64]
@@ -23,8 +26,9 @@ class Handover:
 
     s = 3x² − 2x³ rises from 0 to 1 in HANDOVER_SECONDS. The torques of two controllers differ, for example by
     the error of a model; the blend spreads this step over time. Both controllers get the measured state and
-    the torque that acted. Therefore the blend lies within the torque bounds if both torques do. Evidence and
-    prediction are those of the new controller.
+    the torque that acted. Therefore the blend lies within the torque bounds if both torques do. If the new
+    controller keeps distances, a `DistanceFilter` changes the blend, since the old torque may lead to a
+    collision. Evidence and prediction are those of the new controller.
     """
 
     def __init__(self, old: Controller, new: Controller) -> None:
@@ -32,6 +36,7 @@ class Handover:
         self._old: Controller | None = old
         self.new = new
         self._elapsed = 0.0
+        self._filter = _filter_of(new)
 
     @property
     def settings(self) -> Settings:
@@ -52,6 +57,7 @@ class Handover:
         """Gives the settings to both controllers. Raises InputError, without any change, if they do not fit
         the new controller."""
         self.new.configure(settings)
+        self._filter = _filter_of(self.new)
         if self._old is not None:
             try:
                 self._old.configure(settings)
@@ -72,7 +78,18 @@ class Handover:
             self._old = None
             return plan
         share = x * x * (3.0 - 2.0 * x)
-        return replace(plan, tau=(1.0 - share) * leaving + share * plan.tau, fill=None)
+        tau = (1.0 - share) * leaving + share * plan.tau
+        if self._filter is None or not (usable(q) and usable(v) and usable(tau)):
+            return replace(plan, tau=tau, fill=None)
+        M_bar = np.array(self.settings.M_bar) if plan.M_bar is None else plan.M_bar
+        found = self._filter(q, v, plan.tau_0, tau, M_bar, plan.limits, observed_by(previews))
+        return replace(plan, tau=found.tau, unsolved=plan.unsolved + (not found.met), fill=None)
+
+
+def _filter_of(controller: Controller) -> DistanceFilter | None:
+    """Returns a filter for the settings of a controller that keeps distances, otherwise None."""
+    keeps = isinstance(controller, HIMPC) and controller.settings.limits.avoidance.on
+    return DistanceFilter(controller.robot, controller.settings) if keeps else None
 
 
 def settled(controller: Controller) -> Controller:

@@ -32,6 +32,7 @@ from lessons.settings.settings import SceneSettings
 from lessons.settings.stack import same_tasks
 from lessons.settings.torque import TorqueSettings
 from robots import InputError, Plant, Robot, convergence_gauge
+from robots.mechanics.model import compiled
 
 Array = NDArray[np.float64]
 
@@ -95,8 +96,7 @@ class TorqueSession(Session):
         self.references = self._fresh_references()
         self.plan: Plan | None = None
         self.given: Given | None = None
-        self._push_until = math.inf
-        self._ticks = 0
+        self._push_until, self._ticks = math.inf, 0
         self._outbox = DelayedTorque()
         self._truth = (math.nan, math.nan, math.nan)
 
@@ -168,12 +168,15 @@ class TorqueSession(Session):
         recomposed = not same_tasks(settings.levels, self.settings.levels)
         if recomposed:
             layout, references = layout_of(self.robot, settings.levels), self._references_for(settings.levels)
-        if settings.plant != self.settings.plant:
-            self.plant.configure(settings.plant)
+        # Plant and controller may both refuse the settings. The plant changes after both have accepted them.
+        changed, world = settings.plant != self.settings.plant, self.plant.world
+        model = compiled(self.robot, settings.plant, world) if changed else None
         if settings.controller == self.settings.controller:
             self.controller.configure(settings.for_controller())
         else:
             self._hand_over(self._controller_of(settings, self.robot))
+        if model is not None:
+            self.plant.configure(settings.plant, model)
         if recomposed:
             self.layout, self.references, self.plan, self.given = layout, references, None, None
             self._row, self._at = np.full(layout.size, np.nan), Places.of(layout)
@@ -204,16 +207,14 @@ class TorqueSession(Session):
         plan = self.controller.step(state.q, state.v, ahead, tau)
         row, at = self._row, self._at
         write_plan(row, self.layout, plan, ahead)
-        row[at.t] = t
-        row[at.q], row[at.v] = q, v
+        row[at.t], row[at.q], row[at.v] = t, q, v
         row[at.q_measured], row[at.v_measured] = state.q, state.v
         row[at.v_limit], row[at.v_limit_lowered] = plan.limits.user_v_limit, plan.limits.v_limit
         self.plan, self.given = plan, Given(state.q, state.v, ahead)
         row[at.truth], row[at.truth + 1], row[at.truth + 2] = self._true(plan, q, ahead)
         if plan.notice is not None:
             self.failure = plan.notice
-        late = settings.is_late(1e-3 * plan.step_us)
-        row[at.late] = late
+        late = row[at.late] = settings.is_late(1e-3 * plan.step_us)
         row[at.tau] = plant.step(self._outbox.applied(plan.tau, late, tau), T_s)
         row[at.touch], row[at.touch + 1] = plant.touch
         row[at.near], row[at.near + 1] = self.clearance.measure(q, settings.limits.avoidance)

@@ -50,7 +50,8 @@ class VelocitySession(Session):
     def __init__(self, scene: VelocityScene, seed: int = 0) -> None:
         """Raises InputError if the scene's settings do not fit its robot."""
         super().__init__(scene, seed, VelocityPlant(scene.robot, scene.settings.plant, seed))
-        self._take_settings(scene.settings)
+        self.bounds = bounds(scene.robot, scene.settings.htmpc.limits)
+        self._distances = ObstacleDistances(scene.robot, scene.settings.htmpc)
         self._data = scene.robot.model.createData()
         self.roles = {task.name: task for level in scene.settings.htmpc.stack for task in level.tasks}
         self.layout = layout_of(scene.robot, scene.settings.htmpc.stack)
@@ -111,13 +112,16 @@ class VelocitySession(Session):
 
     def adopt(self, settings: SceneSettings) -> None:
         assert isinstance(settings, VelocitySettings)
-        # If the controller refuses the settings, nothing changes. The next tick sets the order of the window.
+        # Nothing changes before controller and plant have accepted the settings. The next tick sets the order
+        # of the window.
         fitted = make_velocity_controller(settings.controller, self.robot, settings.htmpc)
-        if settings.controller != self.settings.controller:
-            self.controller = fitted if self.controller is not None else None
+        distances = ObstacleDistances(self.robot, settings.htmpc)
+        limits = bounds(self.robot, settings.htmpc.limits)
         if settings.plant != self.settings.plant:
             self.plant.configure(settings.plant)
-        self._take_settings(settings)
+        if settings.controller != self.settings.controller:
+            self.controller = fitted if self.controller is not None else None
+        self.settings, self.bounds, self._distances = settings, limits, distances
 
     def _for_controller(self, settings: VelocitySettings) -> HTMPCSettings:
         """Returns the controller's settings for the levels of this tick."""
@@ -132,11 +136,6 @@ class VelocitySession(Session):
             hold = (*hold, *(self.robot.joint_names[joint] for joint in sorted(still)))
         told = settings.options.reported(settings.htmpc.obstacles, self.t)
         return replace(settings.htmpc, stack=self._stack, delay_s=lag, hold=hold, obstacles=told)
-
-    def _take_settings(self, settings: VelocitySettings) -> None:
-        self.settings = settings
-        self.bounds = bounds(self.robot, settings.htmpc.limits)
-        self._distances = ObstacleDistances(self.robot, settings.htmpc)
 
     def predicted_path(self, role: str) -> Array:
         """Returns the positions of a role's point in the last plan, knots 0 … N, (N+1, m) m; empty before the

@@ -13,8 +13,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from himpc import HIMPC, FramePosition, Joints, Level, Limits
-from robots import InputError, Robot
+from himpc import CONTROLLERS, HIMPC, FramePosition, Joints, Level, Limits
+from himpc.controllers import make_controller
+from himpc.limits.avoidance import Avoidance
+from robots import InputError, NominalSettings, Robot
 
 Array = NDArray[np.float64]
 
@@ -165,6 +167,35 @@ def test_wrong_settings_change_nothing(iiwa: Robot) -> None:
     assert one.settings == good
     now, then = (c.step(iiwa.home + 0.01, np.zeros(7), previews) for c in (one, other))
     np.testing.assert_array_equal(now.tau, then.tau)
+
+
+@pytest.mark.parametrize("name", CONTROLLERS)
+def test_a_change_that_is_refused_at_its_last_part_changes_nothing(iiwa: Robot, name: str) -> None:
+    """Horizon, limits and levels of the refused settings are right, and only the nominal model, which is
+    prepared after them, does not fit. Settings and torques are those of a controller that was not asked."""
+    good = iiwa_settings(iiwa, M_bar_adapt=True)
+    one, other = (make_controller(name, iiwa, good) for _ in range(2))
+    previews = holds(iiwa, 20)
+    for k in range(3):
+        for each in (one, other):
+            each.step(iiwa.home, np.full(7, 0.01 * k), previews)
+    before = one.settings
+    limits = replace(good.limits, torque_scale=0.5, avoidance=Avoidance(on=True))
+    wrong = replace(good, horizon=20, limits=limits, nominal=NominalSettings(armature=(0.1, 0.2)))
+    if name.startswith("tdeosf"):
+        wrong = replace(wrong, M_bar=good.M_bar[:-1])  # it has no nominal model
+    with pytest.raises(InputError):
+        one.configure(wrong)
+    assert one.settings == before
+    for k in range(5):
+        at = iiwa.home + 0.01, np.full(7, 0.02 * k)
+        now, then = (each.step(*at, previews) for each in (one, other))
+        np.testing.assert_array_equal(now.tau, then.tau)
+
+
+def test_a_message_about_the_nominal_model_names_it(iiwa: Robot) -> None:
+    with pytest.raises(InputError, match=r"^nominal\.damping has 2 values"):
+        make_controller("osf", iiwa, iiwa_settings(iiwa, nominal=NominalSettings(damping=(0.1, 0.2))))
 
 
 # ------------------------------------------------------------------ evidence

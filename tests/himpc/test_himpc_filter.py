@@ -3,6 +3,8 @@ the filter reports when its rows cannot be satisfied."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -112,6 +114,21 @@ def test_rows_that_cannot_be_met_give_way_by_least_squares_and_say_so() -> None:
     for _ in range(300):
         near = np.clip(found.tau + 0.3 * rng.normal(size=robot.n), force.tau_lower, force.tau_upper)
         assert missed(near) >= least - 1e-6 * least
+
+
+@pytest.mark.parametrize("wanted", [keeping(), replace(keeping(), horizon=6)])
+def test_settings_that_are_given_back_keep_the_filter(wanted: Settings) -> None:
+    """`settings` returns what was given. A change of another setting therefore leaves the filter on."""
+    robot = load_robot("iiwa14")
+    controller = make_controller("himpc_filtered", robot, wanted)
+    assert controller.settings == wanted
+    controller.configure(replace(controller.settings, horizon=7))
+    references = {"position": Hold(np.array([0.5, 0.2, 0.4])), "posture": Hold(robot.home)}
+    ahead = Outlook(references, 0.0, T_S, 7, AROUND)
+    assert controller.step(robot.home, np.zeros(robot.n), ahead, np.zeros(robot.n)).behind is not None
+    off = Limits(avoidance=Avoidance(on=False))
+    controller.configure(replace(controller.settings, limits=off))
+    assert controller.step(robot.home, np.zeros(robot.n), ahead, np.zeros(robot.n)).behind is None
 
 
 def test_without_distances_it_is_himpc_and_a_state_that_is_not_finite_holds_the_torque() -> None:

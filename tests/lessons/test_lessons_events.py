@@ -14,7 +14,7 @@ from lessons.events import Event, MoveLevel, MoveTarget, Push, Reset, Set, as_da
 from lessons.scenes.catalog import torque_scene
 from lessons.scenes.torque_scene import TorqueScene
 from lessons.session.torque import TorqueSession
-from robots import InputError
+from robots import InputError, NominalSettings
 
 EVENTS: list[Event] = [
     Set("horizon", 8),
@@ -102,6 +102,32 @@ def test_a_refused_event_leaves_a_notice_and_changes_nothing(scene: TorqueScene,
     assert session.settings == quiet.settings
     assert session.plant.settings == quiet.plant.settings
     np.testing.assert_array_equal(value(session, rows[-1], "tau"), value(quiet, others[-1], "tau"))
+
+
+NOMINAL = NominalSettings(armature=(0.1, 0.2))
+"""It does not fit the robot. M_bar_adapt uses it."""
+
+
+@pytest.mark.parametrize("controller", ["himpc", "hqp"])
+def test_settings_of_which_one_is_refused_change_neither_controller_nor_plant(
+    scene: TorqueScene, controller: str
+) -> None:
+    """`adopt` gets several changes at once: the controller refuses one of them, then the plant. In both cases
+    controller and plant keep the settings of the session."""
+    session, quiet = TorqueSession(scene), TorqueSession(scene)
+    now, plant = session.settings, session.settings.plant
+    heavy = replace(now, controller=controller, M_bar_adapt=True, horizon=9)
+    for wrong in (
+        replace(heavy, nominal=NOMINAL, plant=replace(plant, payload_kg=5.0)),
+        replace(heavy, plant=replace(plant, payload_kg=5.0, friction=(0.1, 0.2))),
+    ):
+        with pytest.raises(InputError):
+            session.adopt(wrong)
+        assert session.settings == now
+        assert session.plant.settings == plant
+        assert session.controller.settings == now.for_controller()
+    rows, others = (np.array([each.tick().copy() for _ in range(5)]) for each in (session, quiet))
+    np.testing.assert_array_equal(value(session, rows, "tau"), value(quiet, others, "tau"))
 
 
 def test_a_fixed_motion_cannot_be_dragged() -> None:

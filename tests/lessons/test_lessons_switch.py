@@ -7,6 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from himpc import CONTROLLERS
+from himpc.controllers.distance_filter import DistanceFilter
+from himpc.references.outlook import observed_by
 from lessons.events import MoveTarget, Reset, Set
 from lessons.scenes.catalog import torque_scene
 from lessons.scenes.torque_scene import TorqueScene
@@ -141,6 +143,38 @@ def test_settings_reach_both_controllers_during_a_hand_over() -> None:
     assert not session.notices
     assert session.controller.settings.T_s == 0.001
     assert np.linalg.norm(tip(session) - start) < 1e-3
+
+
+@pytest.mark.parametrize("new", ["himpc", "himpc_filtered"])
+def test_a_controller_that_keeps_distances_keeps_them_during_the_hand_over(new: str) -> None:
+    """OSF drives the hand at the table, and the switch happens just in time. Without a filter on the blended
+    torque the hand would strike the table with more than 70 N. Another filter that sees the blended torques
+    changes none of them."""
+    session = TorqueSession(torque_scene("iiwa14-table"))
+    session.post(Set("avoidance.on", True))
+    session.post(Set("controller", "osf"))
+    for _ in range(TICKS + 50):
+        session.tick()
+    session.post(MoveTarget("position", (0.556, 0.0, 0.10)))
+    for _ in range(250):
+        session.tick()
+    session.post(Set("controller", new))
+    session.drain()
+    safe = DistanceFilter(session.robot, session.settings.for_controller())
+    force = session.layout.fields["contact_force"]
+    for _ in range(TICKS - 1):
+        row = session.tick()
+        assert isinstance(session.controller, Handover)
+        plan, given = session.plan, session.given
+        assert plan is not None
+        assert given is not None
+        M_bar, near = np.array(session.settings.M_bar), observed_by(given.previews)
+        again = safe(given.q, given.v, plan.tau_0, plan.tau, M_bar, plan.limits, near)
+        np.testing.assert_allclose(again.tau, plan.tau, atol=1e-6)
+        assert row[force] == 0.0
+    for _ in range(700):
+        assert session.tick()[force] == 0.0
+    assert session.diverged_at is None
 
 
 def test_changes_of_mind_and_a_reset() -> None:

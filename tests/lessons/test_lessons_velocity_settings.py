@@ -3,6 +3,8 @@ are tested."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from velocity_runs import HOME, scene
@@ -99,6 +101,18 @@ def test_what_is_wrong_with_an_event_is_a_notice_and_the_run_goes_on() -> None:
     session.post(Reset())
     session.tick()
     assert session.t == pytest.approx(0.1)
+
+
+def test_settings_of_which_the_plant_refuses_one_do_not_change_the_controller() -> None:
+    session = VelocitySession(scene("ridgeback-ur10-drag"))
+    session.tick()
+    now, controller, plant = session.settings, session.controller, session.plant.settings
+    wrong = replace(now.plant, payload_kg=5.0, friction=(0.1, 0.2))
+    with pytest.raises(InputError, match="friction has 2 values"):
+        session.adopt(replace(now, controller="htidkc", plant=wrong))
+    assert session.controller is controller
+    assert session.settings == now
+    assert session.plant.settings == plant
 
 
 @pytest.mark.parametrize(
