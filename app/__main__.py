@@ -8,9 +8,11 @@ if __name__ == "__main__":
 import os
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from importlib import import_module
 
 from app.commands.interrupts import interruptible
+from app.commands.output import machine_failure
 
 COMMANDS: dict[str, str] = {
     "serve": "open the page (the default if no command is given)",
@@ -35,15 +37,35 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code: 0 success, 1 a claim failed, 2 wrong input."""
     with interruptible() as interrupted:
         try:
-            return _run(list(sys.argv[1:] if argv is None else argv))
+            return _flushed(list(sys.argv[1:] if argv is None else argv))
         except BrokenPipeError:
             # The reader of our output has closed the pipe (e.g. `| head`), so no message can be shown.
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            _drop_output()
             return 0
-        except BaseException:
+        except BaseException as error:
             if interrupted.is_set():
                 return 130
-            raise
+            reason = machine_failure(error)
+            if reason is None:
+                raise
+            _drop_output()
+            with suppress(OSError):
+                print(f"himpc-lab: {reason}", file=sys.stderr)
+            return 2
+
+
+def _flushed(arguments: list[str]) -> int:
+    """Runs a command and writes its output out, so that an error of writing is noticed here."""
+    try:
+        return _run(arguments)
+    finally:
+        if sys.stdout is not None:  # it is None if the program was started without standard output
+            sys.stdout.flush()
+
+
+def _drop_output() -> None:
+    """Discards what is still to be written to standard output: Python writes it when the program ends."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _run(arguments: list[str]) -> int:

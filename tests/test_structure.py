@@ -169,8 +169,9 @@ def test_page_and_simulation_meet_in_link_only(folder: str) -> None:
 LESSONS = {
     "events": (),
     "own": (),
+    "outputs": (),
     "examples": (),
-    "plots": (),
+    "plots": ("outputs",),
     "parallel": (),
     "cluster": ("parallel",),
     "settings": ("events", "own"),
@@ -183,18 +184,19 @@ LESSONS = {
     "teaching": ("recording", "scenes/run_spec", "scenes", "settings", "events", "parallel"),
     "experiments": (
         *("recording", "scenes/run_spec", "session", "scenes", "settings", "events", "own", "parallel"),
-        "plots",
+        *("plots", "outputs"),
     ),
     "course": ("teaching", "events"),
     "exercises": (
         *("teaching", "recording", "scenes/run_spec", "session", "scenes", "settings", "events", "own"),
-        "parallel",
+        *("parallel", "outputs"),
     ),
     "authoring": (
         *("course", "exercises", "teaching", "scenes/run_spec", "runs", "scenes", "events", "own"),
+        "outputs",
     ),
     "replay": ("course", "scenes/run_spec", "scenes", "settings", "events", "own"),
-    "papers": ("replay", "experiments", "scenes/run_spec", "scenes", "settings", "plots"),
+    "papers": ("replay", "experiments", "scenes/run_spec", "scenes", "settings", "plots", "outputs"),
 }
 """The parts that each part of lessons/ may import beside itself. A run names its scene, which may be that of
 a file, and only a trial in a session shows whether such a file can be used; therefore runs are above

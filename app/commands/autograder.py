@@ -57,18 +57,19 @@ def write_autograder(exercise: str, folder: Path) -> int:
     own = is_file(exercise)
     try:
         folder.mkdir(parents=True)
+        for name, text in (("setup.sh", _SETUP), ("run_autograder", _RUN)):
+            (folder / name).write_text(text.replace("EXERCISE", _OWN if own else exercise), encoding="utf-8")
+            (folder / name).chmod(0o755)
+        if own:
+            shutil.copy(exercise, folder / _OWN)
+        (folder / "requirements.txt").write_text("\n".join(requirements()) + "\n", encoding="utf-8")
+        for name in PACKAGES:
+            shutil.copytree(_ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
     except OSError as error:
+        reason = error.strerror or "some files could not be copied"
         raise InputError(
-            f"--out {folder}: cannot be created ({error.strerror}); give a folder that does not exist yet"
+            f"--out {folder}: cannot be written ({reason}); give a folder that does not exist yet"
         ) from None
-    for name, text in (("setup.sh", _SETUP), ("run_autograder", _RUN)):
-        (folder / name).write_text(text.replace("EXERCISE", _OWN if own else exercise), encoding="utf-8")
-        (folder / name).chmod(0o755)
-    if own:
-        shutil.copy(exercise, folder / _OWN)
-    (folder / "requirements.txt").write_text("\n".join(requirements()) + "\n", encoding="utf-8")
-    for name in PACKAGES:
-        shutil.copytree(_ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
     print(
         f"{folder} is written. Zip its content, not the folder itself, and upload the file to Gradescope:\n"
         f"  cd {folder} && zip -r ../autograder.zip ."

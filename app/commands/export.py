@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -39,7 +40,7 @@ def export(
         stack: the levels as JSON, as --set stack=… of himpc-lab run takes them.
         set: change a setting, e.g. --set horizon=10 --set levels.2.enabled=false.
         ticks: length of the recorded run, in periods.
-        seed: seed of the recorded run.
+        seed: seed of the recorded run, from 0 to 2⁶³ − 1.
     """
     from himpc.export.folder import files_of
     from himpc.export.image import image_of
@@ -78,8 +79,7 @@ def export(
     settings = loaded.settings
     plant = saved(loaded.robot, settings.plant, loaded.world, settings.T_s)
     files = files_of(image, wanted, torques, recorded(loaded, ticks, seed), target, plant)
-    for name, content in files.items():
-        _write(folder / name, content)
+    _write(folder, files)
     for name, content in files.items():
         print(f"{len(content):9,} bytes  {folder / name}")
     print(f"build and replay: see {folder / 'README.md'}")
@@ -143,8 +143,12 @@ def _made(out: str) -> Path:
     return folder
 
 
-def _write(path: Path, content: bytes) -> None:
+def _write(folder: Path, files: Mapping[str, bytes]) -> None:
+    from lessons.outputs import write_files
+
     try:
-        path.write_bytes(content)
+        write_files({folder / name: content for name, content in files.items()})
     except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror}); give another --out") from None
+        raise InputError(
+            f"--out {folder}: cannot be written ({error.strerror}); give another folder"
+        ) from None

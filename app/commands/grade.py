@@ -51,7 +51,7 @@ def grade(
         exercise: name of the exercise, or the file of an exercise of your own; by default the name that the
             solution assigns to EXERCISE.
         hints: number of hints of the exercise to show.
-        seed: seed of the disturbances.
+        seed: seed of the disturbances, from 0 to 2⁶³ − 1.
         out: file for the table of a folder, grades.csv by default; an unfinished table is continued. With
             --autograder: the new folder, autograder by default.
         scheduler: address of a Dask scheduler, e.g. tcp://10.0.0.1:8786, which grades a folder instead of
@@ -68,7 +68,9 @@ def grade(
     from lessons.exercises import EXERCISES
     from lessons.exercises.grade import grade as grade_file
     from lessons.exercises.result import as_data
+    from lessons.scenes.run_spec import check_seed
 
+    check_seed(seed)
     if check is not None:
         return check_exercise(check, seed, hints, json)
     if autograder is not None:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import json
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 from robots import InputError
@@ -17,11 +18,33 @@ def write_json(data: Any, target: str) -> None:
     if target == "-":
         print(text)
         return
+    write_file("--json", target, text + "\n")
+
+
+def write_file(option: str, target: str, content: bytes | str) -> None:
+    """Writes the file that an option names, see `write_files`. Raises InputError if it cannot be written."""
+    from lessons.outputs import write_files
+
+    with _reported(option, target):
+        write_files({target: content})
+
+
+def check_file(option: str, target: str | None) -> None:
+    """Raises InputError if the file that an option names can certainly not be written; "-" is no file."""
+    from lessons.outputs import check_target
+
+    if target not in (None, "-"):
+        with _reported(option, target):
+            check_target(target)
+
+
+@contextmanager
+def _reported(option: str, target: str) -> Iterator[None]:
     try:
-        Path(target).write_text(text + "\n")
+        yield
     except OSError as error:
         raise InputError(
-            f"--json {target}: cannot be written ({error.strerror}); give another file"
+            f"{option} {target}: cannot be written ({error.strerror}); give another file"
         ) from None
 
 
@@ -47,3 +70,26 @@ def print_list(title: str, column: str, lines: Mapping[str, str], json_target: s
     else:
         print_table(title, (column, "what it is"), list(lines.items()))
     return 0
+
+
+_FULL = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
+_MEMORY = ("failed to map segment", "allocate memory")
+
+
+def machine_failure(error: BaseException) -> str | None:
+    """Returns one sentence if the machine is the cause of an error: a full disk, an encoding that lacks a
+    character, or too little memory. Returns None for any other error."""
+    if isinstance(error, UnicodeEncodeError):
+        return (
+            f"the output cannot be written: the encoding {error.encoding} lacks the character "
+            f"{error.object[error.start]!a}; set PYTHONIOENCODING=utf-8:replace"
+        )
+    if isinstance(error, OSError) and error.errno in _FULL:
+        what = error.filename or "the output"
+        return f"{what} cannot be written ({error.strerror}): free some space, or write to another place"
+    each: BaseException | None = error
+    while each is not None:  # a library may raise another exception while it reports the first one
+        if isinstance(each, MemoryError) or any(words in str(each) for words in _MEMORY):
+            return "there is too little memory: end other programs, or raise the limit (ulimit -v)"
+        each = each.__cause__ or each.__context__
+    return None

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from app.commands.output import print_table, write_json
+from app.commands.output import check_file, print_table, write_file, write_json
 from app.commands.progress import progress_bar
 from robots import InputError
 
@@ -42,16 +42,17 @@ def run(
         task: Python file with a task of your own, for a --state whose stack contains this task. With
             --set stack=… this option is not needed.
         duration: simulated seconds; the scene's own by default.
-        seed: seed of the run; 0, or the state's, by default.
+        seed: seed of the run, from 0 to 2⁶³ − 1; 0, or the state's, by default.
         state: a state code, as the page shows it; the run gets its scene, robot, settings and seed.
         settings: list the settings that --set can change in this scene; run nothing.
         set: change a setting, e.g. --set horizon=10 --set plant.payload_kg=2 --set levels.2.enabled=false.
         json: write the result as JSON to this file, or to standard output for "-".
-        npz: write one row per control tick to this file.
+        npz: write one row per control tick to this file, with exactly this name.
     """
     from lessons.recording.arrays import arrays
     from lessons.recording.run import run
     from lessons.recording.summary import summary
+    from lessons.recording.table import as_npz
 
     spec = _given(scene, urdf, tip, state)
     if controller is not None:  # if given, it replaces the seed of the state code
@@ -62,6 +63,8 @@ def run(
     loaded = spec.prepared()
     if settings:
         return _list(loaded, json)
+    check_file("--json", json)
+    check_file("--npz", npz)
     with progress_bar(f"{spec.scene} …", json is None) as progress:
         recording = run(loaded, None, spec.seed, progress)
     result = summary(recording)
@@ -75,7 +78,7 @@ def run(
             "duration": recording.duration,
             "set": list(spec.set),
         }
-        _save(npz, arrays(recording, how))
+        write_file("--npz", npz, as_npz(arrays(recording, how)))
     if json is not None:
         write_json(result, json)
     else:
@@ -107,15 +110,6 @@ def _list(scene: Scene, json: str | None) -> int:
     rows = [[line.path, line.now, line.allowed, line.unit, line.help] for line in found]
     print_table(f"Settings of {scene.name} for --set", ("path", "now", "allowed", "unit", "what it is"), rows)
     return 0
-
-
-def _save(path: str, data: dict[str, Any]) -> None:
-    import numpy as np
-
-    try:
-        np.savez_compressed(path, **data)
-    except OSError as error:
-        raise InputError(f"--npz {path}: cannot be written ({error.strerror}); give another file") from None
 
 
 def _show(result: dict[str, Any]) -> None:

@@ -42,7 +42,7 @@ def sweep(
             own by default.
         set: change a setting in all runs, e.g. --set plant.payload_kg=2.
         duration: simulated seconds per run; the scene's own by default.
-        seed: seed of the runs.
+        seed: seed of the runs, from 0 to 2⁶³ − 1.
         metric: quantity that the map shows; the RMSE of level 1 after the first second by default.
         scheduler: address of a Dask scheduler, e.g. tcp://10.0.0.1:8786, instead of this machine's cores.
     """

@@ -33,15 +33,17 @@ def tune(
         noise: step of the torque from tick to tick (RMS), as a share of its limit, above which the torque is
             noisy.
         duration: simulated seconds per step; the scene's own by default.
-        seed: seed of the runs.
+        seed: seed of the runs, from 0 to 2⁶³ − 1.
         set: change a setting in all runs, e.g. --set plant.encoder_resolution_deg=0.001.
         json: write the steps as JSON to this file, or to standard output for "-".
     """
     from lessons.experiments.tune import chosen
     from lessons.experiments.tune import tune as tune_scene
     from lessons.scenes.catalog import torque_scene
+    from lessons.scenes.run_spec import check_seed
     from lessons.settings.assignments import with_assignments
 
+    check_seed(seed)
     loaded = torque_scene(scene)
     loaded = replace(loaded, settings=with_assignments(loaded.settings, set))
     seconds = loaded.duration if duration is None else duration

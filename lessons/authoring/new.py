@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
@@ -10,6 +11,7 @@ from himpc.tasks import KINDS
 from lessons.course import COURSE
 from lessons.exercises import EXERCISES, start_of
 from lessons.exercises.own import exercise_in
+from lessons.outputs import write_files
 from lessons.own.files import is_file
 from lessons.own.kinds import Kind
 from lessons.scenes.names import ALL_SCENES
@@ -72,11 +74,10 @@ def write_new(kind: Kind, path: str, start: str | None = None) -> None:
     if not is_file(path):
         raise InputError(f"{path}: give a name that ends with .py, e.g. my_{kind}.py")
     text = text_of(kind, start, path)
+    if os.path.lexists(path):
+        raise InputError(f"{path} exists already: give another name, or remove it first")
     try:
-        with open(path, "x", encoding="utf-8") as file:
-            file.write(text)
-    except FileExistsError:
-        raise InputError(f"{path} exists already: give another name, or remove it first") from None
+        write_files({path: text})
     except OSError as error:
         raise InputError(f"{path} cannot be written ({error.strerror}): give another path") from None
 

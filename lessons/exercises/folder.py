@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-import os
+import io
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import replace
@@ -12,6 +12,7 @@ from pathlib import Path
 from lessons.exercises.cells import cell, of_cell
 from lessons.exercises.grade import WITHIN, Submission, grade_apart
 from lessons.exercises.result import Grade
+from lessons.outputs import write_files
 from lessons.own.files import SUFFIX, Source, fingerprint, is_file, read
 from lessons.parallel import FailedJob, Spread
 from robots import InputError
@@ -126,12 +127,11 @@ def _rows(out: Path) -> Iterator[Row]:
 
 def _write(out: Path, rows: list[Row]) -> None:
     """Writes the whole table. If writing is interrupted, the old file is unchanged."""
-    beside = out.with_name(out.name + ".part")
+    table = io.StringIO()
+    writer = csv.DictWriter(table, COLUMNS)
+    writer.writeheader()
+    writer.writerows({name: cell(value) for name, value in row.items()} for row in rows)
     try:
-        with beside.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, COLUMNS)
-            writer.writeheader()
-            writer.writerows({name: cell(value) for name, value in row.items()} for row in rows)
-        os.replace(beside, out)
+        write_files({out: table.getvalue()})
     except OSError as error:
         raise InputError(f"{out}: cannot be written ({error.strerror}); give another file") from None

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from lessons.experiments.jobs import Results, perform_all
+from lessons.outputs import write_files
 from lessons.papers.disagreements import page
 from lessons.papers.item import Item, PaperCheck, Row, Section, Table
 from lessons.papers.stored import from_memory, judged, store, stored
@@ -95,9 +96,12 @@ def write(reports: Sequence[Report], folder: Path, quick: bool) -> None:
         for report in reports:
             for picture in report.section.pictures:
                 draw(picture, folder)
-        (folder / "results.json").write_text(json.dumps(as_data(reports, quick), indent=1) + "\n")
-        (folder / "report.md").write_text(_markdown(reports, quick), encoding="utf-8")
-        (folder / PAGE).write_text(_page(reports), encoding="utf-8")
+        texts = {
+            "results.json": json.dumps(as_data(reports, quick), indent=1) + "\n",
+            "report.md": _markdown(reports, quick),
+            PAGE: _page(reports),
+        }
+        write_files({folder / name: text for name, text in texts.items()})
     except OSError as error:
         raise _unwritable(folder, error) from None
 
@@ -109,7 +113,7 @@ def write_page(reports: Sequence[Report], folder: Path) -> None:
     """Writes only disagreements.md. Raises InputError if it cannot be written."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / PAGE).write_text(_page(reports), encoding="utf-8")
+        write_files({folder / PAGE: _page(reports)})
     except OSError as error:
         raise _unwritable(folder, error) from None
 

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from lessons.experiments.jobs import JobResult
+from lessons.outputs import write_files
 from lessons.papers.item import Item, PaperCheck, Row, Section
 from lessons.papers.topics import topics
 
@@ -69,7 +70,7 @@ def store(sections: Mapping[str, Section], quick: bool) -> None:
         }
         if not (section.rows or section.checks):
             del kept[item]
-    FILE.write_text(json.dumps(data, indent=1, ensure_ascii=False, sort_keys=True) + "\n", encoding="utf-8")
+    write_files({FILE: json.dumps(data, indent=1, ensure_ascii=False, sort_keys=True) + "\n"})
 
 
 def _short(value: float | None) -> float | None:

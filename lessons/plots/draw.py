@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import textwrap
 from collections.abc import Iterable
 from pathlib import Path
@@ -12,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from lessons.outputs import write_files
 from lessons.plots.panels import Bars, Panel, Picture, PlotCurve
 from lessons.plots.style import BOUND, RC, REFERENCE, colour
 from lessons.plots.ticks import label_values
@@ -50,8 +52,15 @@ def draw(picture: Picture, folder: Path) -> Path:
         figure.align_ylabels(grid)
         _legend(figure, grid)
         path = folder / f"{picture.name}.png"
-        figure.savefig(path)
+        write_files({path: png(figure)})
     return path
+
+
+def png(figure: Figure) -> bytes:
+    """Returns a figure as the content of a PNG file."""
+    memory = io.BytesIO()
+    figure.savefig(memory, format="png")
+    return memory.getvalue()
 
 
 def _height(picture: Picture, row: int) -> float:

@@ -14,6 +14,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
+from lessons.outputs import write_files
+from lessons.plots.draw import png
 from lessons.plots.style import RC
 from lessons.plots.ticks import label_values
 
@@ -61,7 +63,7 @@ def draw_map(
         ]
         if handles:
             figure.legend(handles=handles, loc="outside lower center", ncols=2)
-        figure.savefig(path)
+        write_files({path: png(figure)})
 
 
 def _norm(z: Array) -> Normalize:

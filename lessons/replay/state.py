@@ -14,7 +14,7 @@ from typing import Any
 from lessons.course import COURSE
 from lessons.own.files import fingerprint, is_file
 from lessons.scenes.names import SCENES, VELOCITY_SCENES
-from lessons.scenes.run_spec import RunSpec
+from lessons.scenes.run_spec import MAX_SEED, RunSpec
 from lessons.settings.assignments import assignment, differences, parse_assignment
 from lessons.settings.settings import SceneSettings
 from robots import CATALOG, InputError
@@ -28,7 +28,6 @@ MAX_CODE = 12_000
 _MAX_TEXT = 60_000
 _MAX_ASSIGNMENTS = 500
 _MAX_ASSIGNMENT = 2_000
-_MAX_SEED = 2**63 - 1
 _PREFIX = re.compile(r"hl(\d{1,6})-")
 _KEYS = {"scene": "s", "urdf": "r", "tip": "t", "set": "a", "seed": "n", "lesson": "l", "step": "p"}
 
@@ -183,7 +182,7 @@ def _checked(given: Any) -> State:
         urdf,
         _text(given, "t", "tip"),
         set=tuple(assignments),
-        seed=_whole(given, "n", "seed", _MAX_SEED) or 0,
+        seed=_whole(given, "n", "seed", MAX_SEED) or 0,
     )
     return State(run, lesson, _whole(given, "p", "step", 100))
 

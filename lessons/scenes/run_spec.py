@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, final
 
 from lessons.scenes.names import VELOCITY_SCENES
+from robots.errors import InputError
 
 if TYPE_CHECKING:
     from lessons.events import Event
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 NOT_EXPORTED = ("avoidance.on=false", "limits.stall_guard=false")
 """The assignments that switch off what scenes have by default and exported controllers lack."""
 
+MAX_SEED = 2**63 - 1
 _TASK_FILE = re.compile(r'"task"\s*:\s*("(?:[^"\\]|\\.)*\.py")')
 """Pattern for a task in a stack, as JSON, that is named by the path of its file."""
 
@@ -35,7 +37,7 @@ class RunSpec:
         set: assignments "PATH=VALUE" as of `himpc-lab run --set`, in order.
         events: (time in s, event) in order; None: the scene's own.
         duration: simulated seconds; None: the scene's own.
-        seed: seed of the run.
+        seed: seed of the run, from 0 to MAX_SEED.
         files: Python files that can be selected as the controller, named by the person who started the
             program.
         tasks: Python files whose tasks the stack can name; the same person has named these files.
@@ -51,6 +53,9 @@ class RunSpec:
     seed: int = 0
     files: tuple[str, ...] = ()
     tasks: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        check_seed(self.seed)
 
     def loaded(self, bare: Scene | None = None) -> Scene:
         """Returns the scene with the run's files attached, without controller and assignments. Raises
@@ -100,11 +105,19 @@ class RunSpec:
             words += [f"--{name}", value] if value is not None else []
         for each in self.tasks:
             words += ["--task", each]
-        words += ["--duration", f"{self.duration:g}"] if self.duration is not None else []
+        words += (
+            ["--duration", repr(float(self.duration)).removesuffix(".0")] if self.duration is not None else []
+        )
         words += ["--seed", str(self.seed)] if self.seed else []
         for each in assignments:
             words += ["--set", each]
         return shlex.join(words)
+
+
+def check_seed(seed: int) -> None:
+    """Raises InputError if a seed is outside the range of seeds."""
+    if not 0 <= seed <= MAX_SEED:
+        raise InputError(f"seed is {seed}: give a whole number from 0 to {MAX_SEED}")
 
 
 def _unquoted(word: str) -> str:

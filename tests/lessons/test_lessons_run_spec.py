@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 
 import pytest
 
 from app.link.choice import SceneChoice
 from lessons.events import Push
-from lessons.scenes.run_spec import RunSpec
+from lessons.scenes.run_spec import MAX_SEED, RunSpec
 from robots import InputError
 
 
@@ -31,6 +32,21 @@ def test_the_command_line_says_all_but_the_script() -> None:
         "--duration", "2.5", "--seed", "4", "--set", "Q=[1,2]",
     ]  # fmt: skip
     assert RunSpec("planar3-hold", set=("controller=osf",)).command_line().endswith("--controller osf")
+
+
+@pytest.mark.parametrize("duration", [1234.5678, 0.1 + 0.2, 1e-7, 4.0, 3])
+def test_the_command_line_has_every_digit_of_the_duration(duration: float) -> None:
+    words = shlex.split(RunSpec("iiwa14-hold", duration=duration).command_line())
+    assert float(words[-1]) == duration and not words[-1].endswith(".0")
+
+
+def test_a_command_line_with_a_seed_repeats_the_run() -> None:
+    for seed in (0, 7, MAX_SEED):
+        (found,) = re.findall(r"--seed (\d+)", RunSpec("planar3-hold", seed=seed).command_line()) or ["0"]
+        assert int(found) == seed
+    for seed in (-1, MAX_SEED + 1):
+        with pytest.raises(InputError, match=f"seed is {seed}: give a whole number from 0"):
+            RunSpec("planar3-hold", seed=seed)
 
 
 def test_what_cannot_be_run_is_one_sentence() -> None:

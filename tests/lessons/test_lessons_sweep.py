@@ -71,6 +71,7 @@ def test_a_range_becomes_values(over: str, values: tuple[float, ...], log: bool)
         (("horizon=1:99:3",), "horizon"),
         (("horizon=1:3:3", "horizon=1:2:2"), "twice"),
         (("M_bar_scale=1:2:1000", "R=1:2:1000"), "cells"),
+        (("M_bar_scale=1:2:1000000000000000",), "at most 100000"),
     ],
 )
 def test_a_wrong_range_is_one_sentence(over: tuple[str, ...], says: str) -> None:

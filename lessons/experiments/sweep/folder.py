@@ -9,8 +9,8 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Callable
-from contextlib import closing
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
 from dataclasses import asdict
 from hashlib import sha256
 from pathlib import Path
@@ -18,6 +18,7 @@ from typing import Any
 
 from lessons.experiments.sweep.cells import Cell, perform_cell
 from lessons.experiments.sweep.grid import Sweep
+from lessons.outputs import write_files
 from lessons.parallel import FailedJob, Spread
 from robots import InputError
 
@@ -43,7 +44,7 @@ def finished_cells(sweep: Sweep, folder: Path) -> dict[int, Cell]:
         definition, file = folder / "sweep.json", folder / "cells.jsonl"
         if not definition.exists():
             file.write_text("")
-            definition.write_text(json.dumps(wanted, indent=2) + "\n")
+            write_files({definition: json.dumps(wanted, indent=2) + "\n"})
         held = json.loads(definition.read_text())
         if held != wanted:
             different = ", ".join(key for key in wanted if held.get(key) != wanted[key])
@@ -79,7 +80,8 @@ def carry_on(
         all cells in the order of the grid. After an interruption, the folder contains all finished cells.
 
     Raises:
-        InputError: see `finished_cells`; or a user's file that the sweep uses was changed during the sweep.
+        InputError: see `finished_cells`; or the folder cannot be written any more; or a user's file that the
+            sweep uses was changed during the sweep.
     """
     cells = finished_cells(sweep, folder)
     total, files = len(sweep.points), sweep.files()
@@ -87,7 +89,7 @@ def carry_on(
     if progress is not None:
         progress(len(cells), total)
     work = spread(perform_cell, [sweep.run(index) for index in missing])
-    with (folder / "cells.jsonl").open("a") as file, closing(work) as outcomes:
+    with _written(folder), (folder / "cells.jsonl").open("a") as file, closing(work) as outcomes:
         for place, outcome in outcomes:
             if sweep.files() != files:
                 raise InputError(
@@ -105,8 +107,21 @@ def carry_on(
                 progress(len(cells), total)
     ordered = [cells[index] for index in range(total)]
     data = {**sweep.as_data(), "cells": [_as_data(sweep, cell) for cell in ordered]}
-    (folder / "results.json").write_text(json.dumps(data, indent=1, allow_nan=False) + "\n")
+    with _written(folder):
+        write_files({folder / "results.json": json.dumps(data, indent=1, allow_nan=False) + "\n"})
     return ordered
+
+
+@contextmanager
+def _written(folder: Path) -> Iterator[None]:
+    """Raises InputError if a file of the folder cannot be written."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(
+            f"--out {folder}: cannot be written ({error.strerror}); free some space, and the same command "
+            "continues"
+        ) from None
 
 
 def _as_data(sweep: Sweep, cell: Cell) -> dict[str, Any]:

@@ -82,17 +82,29 @@ def make_sweep(base: RunSpec, over: Sequence[str]) -> Sweep:
     if not over:
         raise InputError("--over is missing: give at least one, e.g. --over M_bar_scale=0.2:4:20")
     settings = base.prepared().settings
-    axes = tuple(_axis(text, settings) for text in over)
-    paths = [axis.path for axis in axes]
+    spans = tuple(map(_span, over))
+    paths = [span.path for span in spans]
     if len(set(paths)) < len(paths):
         raise InputError(f"--over names {max(paths, key=paths.count)} twice: give each path once")
-    cells = math.prod(len(axis.values) for axis in axes)
+    cells = math.prod(span.count for span in spans)
     if cells > MAX_CELLS:
         raise InputError(f"--over gives {cells} cells: at most {MAX_CELLS} are possible; give fewer values")
-    return Sweep(base, axes)
+    return Sweep(base, tuple(_axis(span, settings) for span in spans))
 
 
-def _axis(text: str, settings: SceneSettings) -> Axis:
+@dataclass(frozen=True)
+class _Span:
+    """The parts of "PATH=lo:hi:n:kind"; kind: "lin", "log", or "" if it was not given."""
+
+    text: str
+    path: str
+    low: float
+    high: float
+    count: int
+    kind: str
+
+
+def _span(text: str) -> _Span:
     path, equals, span = text.partition("=")
     parts = span.split(":")
     try:
@@ -108,8 +120,13 @@ def _axis(text: str, settings: SceneSettings) -> Axis:
         ) from None
     if count < 1 or (count > 1 and not low < high):
         raise InputError(f"--over {text}: needs lo < hi and n of 1 or more")
+    return _Span(text, path, low, high, count, "".join(parts[3:]))
+
+
+def _axis(span: _Span, settings: SceneSettings) -> Axis:
+    text, path, low, high, count = span.text, span.path, span.low, span.high, span.count
     whole = settings.place(path).form.kind == WHOLE
-    log = parts[3] == "log" if parts[3:] else low > 0 and high >= _DECADE * low and not whole
+    log = span.kind == "log" if span.kind else low > 0 and high >= _DECADE * low and not whole
     if log and low <= 0:
         raise InputError(f"--over {text}: equal ratios need lo above 0; use …:lin for equal steps")
     spaced = np.geomspace(low, high, count) if log else np.linspace(low, high, count)
