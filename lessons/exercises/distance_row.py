@@ -8,6 +8,7 @@ You need: exercise "two-levels"; lesson "keeping-clear"
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -15,7 +16,7 @@ import numpy as np
 
 from himpc.controllers.view import View
 from lessons.events import MoveTarget
-from lessons.exercises.exercise import Exercise, GradeCheck, pushed
+from lessons.exercises.exercise import Exercise, GradeCheck, pushed, with_gains
 from lessons.exercises.laws import Array
 from lessons.exercises.mistakes import Mistake, wrong
 from lessons.exercises.starts.distance_row import cascade
@@ -36,6 +37,8 @@ BACK = MoveTarget("position", (0.5, 0.0, 0.5))
 _run = partial(RunSpec, "iiwa14-table", set=SETTINGS)
 INTO = _run(events=((0.0, DOWN), (0.9, UP)), duration=1.4)
 PAST = _run(events=((0.0, PAST_THE_POST), (0.45, BACK)), duration=0.7)
+# `now.near.d_safe` contains the margin. The nearest pair begins within the margin, where d must not decrease.
+WITHIN = replace(PAST, set=(*SETTINGS, "avoidance.d_safe=0.08", "avoidance.margin=0.03"), duration=0.1)
 
 
 def checks(seed: int) -> tuple[GradeCheck, ...]:
@@ -55,7 +58,7 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
             INTO,
             25.0,
             measure=Measure(NEAREST, "last", until=0.9),
-            points=2,
+            points=1,
         ),
         GradeCheck(
             "Then the hand reaches a target in free space, 6 cm above the table.",
@@ -72,6 +75,14 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
             1e-6,
             beside="hiqp",
             points=3,
+        ),
+        GradeCheck(
+            "If a pair begins below d_safe, the torque is the optimum, too.",
+            "the bound below d_safe is wrong: there v_stop is that of the distance 0",
+            with_gains(WITHIN, seed + 1, "position", "posture", K_p=60.0),
+            1e-6,
+            beside="hiqp",
+            points=1,
         ),
     )
 
@@ -93,7 +104,8 @@ def _rows(
     """Returns D and the lower bounds. The arguments are factors on terms, or switch terms off."""
     near, T = now.near, now.T_s
     slopes = gradient * near.gradient
-    room = np.maximum(near.d - d_safe * near.d_safe, 0.0)
+    free = near.d - d_safe * near.d_safe
+    room = np.maximum(free, 0.0)
     t, a = near.reaction, near.deceleration
     stop = {
         "viable": a * (np.sqrt(t**2 + 2.0 * room / a) - t),
@@ -101,6 +113,7 @@ def _rows(
         "upwards": -a * (np.sqrt(t**2 + 2.0 * room / a) - t),
         "none": 0.0 * room,
         "linear": room / t,
+        "signed": a * (np.sqrt(np.maximum(t**2 + 2.0 * free / a, 0.0)) - t),
     }[v_stop]
     share = 1.0 if at_once else min(1.0, now.bounds.approach * T or 1.0)
     lower = share * (-stop - speed * slopes @ now.q_dot) - q_ddot * T * slopes @ now.q_ddot
@@ -128,6 +141,7 @@ MISTAKES: tuple[Mistake, ...] = (
     wrong("v_stop has the wrong sign: a bound of −v_stop lets d shrink to d_safe", _law, v_stop="upwards"),
     wrong("the bound is constant: d can never shrink, not even far from d_safe", _law, v_stop="none"),
     wrong("the bound is linear in d − d_safe: v_stop contains a square root", _law, v_stop="linear"),
+    wrong("d − d_safe is negative below d_safe: s = max(d − d_safe, 0)", _law, v_stop="signed"),
     wrong("the reaction time t is missing in v_stop", _law, v_stop="no reaction"),
     wrong("∇dᵀq̇ is missing: Δτ changes the present velocity", _law, speed=0.0),
     wrong("q̈₀ is missing: with Δτ = 0 the robot continues to accelerate", _law, q_ddot=0.0),

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lessons.events import Push
-from lessons.exercises.mistakes import Mistake
+from lessons.exercises.mistakes import Law, Mistake
 from lessons.scenes.run_spec import RunSpec
 from lessons.settings.entry import entry_at
 from lessons.settings.torque_entries import TORQUE_ENTRIES
@@ -31,8 +31,8 @@ class GradeCheck:
         relation, bound: the condition: the value is "at most" or "at least" the bound.
         measure: the quantity that is measured in the submission's own run. None: the difference in torque
             from the controller `beside` is measured.
-        beside: the lab's controller that moves the robot while the submission receives the same states. The
-            value is the largest difference in torque, N·m.
+        beside: the lab's controller, or a control law, that moves the robot while the submission receives
+            the same states. The value is the largest difference in torque, N·m.
         points: number of points if the statement holds.
     """
 
@@ -42,7 +42,7 @@ class GradeCheck:
     bound: float
     relation: Relation = "at most"
     measure: Measure | None = None
-    beside: str = ""
+    beside: str | Law = ""
     points: int = 1
 
     def holds(self, value: float) -> bool:
@@ -129,3 +129,15 @@ def pushed(
     x, y, z = (newtons * direction / np.linalg.norm(direction)).tolist()
     events: Script = (*(run.events or ()), (at, Push(body, (x, y, z), seconds=0.1)))
     return replace(run, events=events)
+
+
+def with_gains(run: RunSpec, seed: int, *levels: str, K_p: float = 100.0) -> RunSpec:
+    """Returns the run with gains of these levels that depend on the seed: K_p, 1/s², is up to twice or half
+    as large as given, and K_v, 1/s, is 0.7 to 1.3 times the critical damping 2 √K_p. A law with the gains of
+    another run then returns other torques."""
+    rng, gains = np.random.default_rng([seed, 1]), []
+    for level in levels:
+        drawn = K_p * 2.0 ** rng.uniform(-1.0, 1.0)
+        K_v = 2.0 * drawn**0.5 * rng.uniform(0.7, 1.3)
+        gains += [f"levels.{level}.K_p={drawn:.4g}", f"levels.{level}.K_v={K_v:.4g}"]
+    return run.but(*gains)

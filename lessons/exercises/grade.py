@@ -16,7 +16,7 @@ from himpc.controllers.view import View
 from lessons.exercises import EXERCISES, load_exercise
 from lessons.exercises.apart import Apart, Exhausted, Refused
 from lessons.exercises.exercise import Exercise, GradeCheck
-from lessons.exercises.mistakes import Diagnosis
+from lessons.exercises.mistakes import Diagnosis, Law
 from lessons.exercises.own import check_order, exercise_of
 from lessons.exercises.result import CheckResult, Grade
 from lessons.own.files import SUFFIX, Source, is_file, read
@@ -212,7 +212,7 @@ def _measured(
     check: GradeCheck, shown: Shown, diagnosis: Diagnosis, recordings: dict[RunSpec, Recording | str]
 ) -> float:
     if check.measure is None:
-        return beside(_scene(check.run, check.beside), shown, diagnosis, check.run.duration or 1.0)
+        return beside(check.run, check.beside, shown, diagnosis)
     if check.run not in recordings:
         scene = _scene(check.run)
         session = TorqueSession(scene, controllers=partial(_own, shown, diagnosis))
@@ -245,11 +245,27 @@ def _own(shown: Shown, diagnosis: Diagnosis, settings: TorqueSettings, robot: Ro
     return OwnController(robot, settings.for_controller(), shown.fresh, call, shown.where)
 
 
-def beside(scene: TorqueScene, shown: Shown, diagnosis: Diagnosis, duration: float) -> float:
-    """Returns the largest difference, N·m, between the torque of the scene's controller and the torque of a
-    submission for the same states. The scene's controller moves the robot. Raises InputError if the
-    submission fails."""
-    session = TorqueSession(scene)
+@dataclass(frozen=True)
+class _Given:
+    """A control law of the lab, as a submission."""
+
+    law: Law
+    where: str = "the law of the exercise"
+
+    def fresh(self) -> Law:
+        return self.law
+
+
+def beside(run: RunSpec, controller: str | Law, shown: Shown, diagnosis: Diagnosis) -> float:
+    """Returns the largest difference, N·m, between the torque of a controller, which moves the robot, and the
+    torque of a submission for the same states. Raises InputError if the submission fails."""
+    if isinstance(controller, str):
+        scene = _scene(run, controller)
+        session = TorqueSession(scene)
+    else:
+        scene = _scene(run)
+        session = TorqueSession(scene, controllers=partial(_own, _Given(controller), Diagnosis(())))
+    duration = run.duration or 1.0
     other = _own(shown, diagnosis, scene.settings, session.robot)
     other.reset(session.plant.tau)
     worst = 0.0

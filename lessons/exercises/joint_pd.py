@@ -14,7 +14,7 @@ from typing import Any
 
 from himpc.controllers.view import View
 from lessons.events import MoveTarget
-from lessons.exercises.exercise import Exercise, GradeCheck, pushed
+from lessons.exercises.exercise import Exercise, GradeCheck, pushed, with_gains
 from lessons.exercises.laws import held, wanted
 from lessons.exercises.mistakes import Law, Mistake, wrong
 from lessons.scenes.run_spec import RunSpec
@@ -23,7 +23,7 @@ from lessons.teaching.measure import Measure, Signal
 
 ERROR = Signal("error/posture", "deg")
 ALONE = ("levels.position.enabled=false", "levels.orientation.enabled=false")
-IIWA = RunSpec("iiwa14-hold", set=(*ALONE, "levels.posture.K_p=100", "levels.posture.K_v=20"), duration=0.3)
+IIWA = RunSpec("iiwa14-hold", set=ALONE, duration=0.3)
 QUICK = ("levels.posture.K_p=2000", "levels.posture.K_v=400")
 STIFF = ("levels.posture.K_p=1000", "levels.posture.K_v=180")
 PLANAR = RunSpec("planar3-hold", set=(*ALONE, *QUICK), duration=1.2)
@@ -35,12 +35,12 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
     sent = replace(IIWA, set=(*ALONE, *STIFF), events=((0.02, MoveTarget("posture", moved)),), duration=1.0)
     return (
         GradeCheck(
-            "The iiwa stays where it is.",
-            "gravity, the spring or M̄ differs from the equation",
-            IIWA,
-            0.2,
-            measure=Measure(ERROR),
-            points=2,
+            "With other gains and a push, the torque of the iiwa is that of the equation.",
+            "one of these terms is wrong: g(q), M̄, K_p x̃ or K_v ẋ̃, with the gains of the level",
+            pushed(with_gains(IIWA, seed, "posture"), seed, "link_5", 20.0, at=0.02),
+            1e-6,
+            beside=_law,
+            points=4,
         ),
         GradeCheck(
             "The planar arm comes back after a push.",
@@ -48,7 +48,7 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
             pushed(PLANAR, seed, "link_3", 10.0, plane=True),
             0.5,
             measure=Measure(ERROR, "last"),
-            points=3,
+            points=2,
         ),
         GradeCheck(
             "The arm is at rest afterwards.",
@@ -64,7 +64,7 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
             sent,
             2.0,
             measure=Measure(ERROR, "last"),
-            points=3,
+            points=2,
         ),
     )
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from lessons.exercises.exercise import Exercise, GradeCheck, pushed
+from lessons.exercises.exercise import Exercise, GradeCheck, pushed, with_gains
 from lessons.exercises.laws import osf
 from lessons.exercises.mistakes import Mistake, wrong
 from lessons.scenes.run_spec import RunSpec
@@ -41,7 +41,7 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
     return (
         GradeCheck(
             "The hand follows its circle although the second task holds the posture: the first has priority.",
-            "the first level does not satisfy (4), or does not have priority",
+            "the first level does not satisfy (4), or has no priority. Both levels cannot be met here",
             HOLD,
             2.5,
             measure=Measure(Signal("error/position", "mm"), "rms", after=0.6),
@@ -61,15 +61,15 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
             CIRCLE,
             1e-6,
             measure=Measure(Signal("dynamic_leak", "m/s²")),
-            points=3,
+            points=2,
         ),
         GradeCheck(
             "With a model that is a little wrong and a push, the torque is that of OSF.",
             "one of these terms is wrong: J̇q̇, Λ, N, or the effect of the levels above on this level",
-            pushed(ROUGH, seed, "link_3", 3.0, plane=True),
+            pushed(with_gains(ROUGH, seed, "position", "posture"), seed, "link_3", 3.0, plane=True),
             1e-6,
             beside="osf",
-            points=3,
+            points=4,
         ),
     )
 
@@ -102,6 +102,8 @@ EXERCISE = Exercise(
     plain="τ = N_n + J₁ᵀ Λ₁ (ẍ₁ − J̇₁q̇) + (J₂N₁)ᵀ Λ₂ (ẍ₂ − J̇₂q̇ − J₂M⁻¹τ₁)",
     hints=(
         "Λ is the inertia of a task: (J M⁻¹ Jᵀ)⁻¹, with the projected Jacobian J N for lower levels.",
+        "Both tasks together may have more coordinates than the arm has joints, and then both cannot be met: "
+        "solve one level after the other, the second by least squares (np.linalg.pinv).",
         "The projector is N = I − M⁻¹ Jᵀ Λ J: it removes from q̈ the part that the level above uses.",
         "The levels above accelerate x₂ by J₂ M⁻¹ τ₁: subtract this effect.",
     ),

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from lessons.exercises.exercise import Exercise, GradeCheck, pushed
+from lessons.exercises.exercise import Exercise, GradeCheck, pushed, with_gains
 from lessons.exercises.laws import held, hierarchy
 from lessons.exercises.mistakes import Mistake, wrong
 from lessons.scenes.run_spec import RunSpec
@@ -33,7 +33,7 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
         GradeCheck(
             "Without active bounds the torque is the optimum.",
             "G, e⁰, H or f is wrong: the residual (28) is taken at the next knot",
-            pushed(FREE, seed, "link_3", 2.0, plane=True),
+            pushed(with_gains(FREE, seed, "position"), seed, "link_3", 2.0, plane=True),
             1e-6,
             beside="hiqp",
             points=3,
@@ -49,7 +49,7 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
         GradeCheck(
             "At the torque bound the torque is the optimum of the QP, not a clipped torque.",
             "the torque is not the optimum: the bounds must be constraints of the QP",
-            WEAK,
+            with_gains(WEAK, seed + 1, "position", K_p=200.0),
             1e-6,
             beside="hiqp",
             points=2,

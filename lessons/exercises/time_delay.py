@@ -12,7 +12,7 @@ from typing import Any
 
 from himpc.controllers.view import View
 from lessons.events import Set
-from lessons.exercises.exercise import Exercise, GradeCheck, pushed
+from lessons.exercises.exercise import Exercise, GradeCheck, pushed, with_gains
 from lessons.exercises.joint_pd import ALONE, ERROR
 from lessons.exercises.laws import held, wanted
 from lessons.exercises.mistakes import Mistake, wrong
@@ -26,7 +26,7 @@ HUNG = ((0.05, Set("plant.payload_kg", 3.0)),)
 LOADED = RunSpec("iiwa14-hold", set=(*ALONE, *GAINS), events=HUNG, duration=0.8)
 MISLED = RunSpec("iiwa14-hold", set=(*ALONE, *GAINS, "nominal.mass_scale=2"), events=HUNG, duration=0.8)
 FRICTION = RunSpec("planar3-hold", set=(*ALONE, "plant.damping=1"), duration=1.0)
-STILL = RunSpec("iiwa14-hold", set=(*ALONE, *GAINS), duration=0.2)
+STILL = RunSpec("iiwa14-hold", set=ALONE, duration=0.2)
 
 
 def checks(seed: int) -> tuple[GradeCheck, ...]:
@@ -53,15 +53,15 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
             pushed(FRICTION, seed, "link_3", 10.0, at=0.05, plane=True),
             0.05,
             measure=Measure(ERROR, "last"),
-            points=2,
+            points=1,
         ),
         GradeCheck(
             "The torque is equal to that of the equation.",
             "one of these terms is wrong: τ₀, M̄, q̈₀, K_p x̃ or K_v ẋ̃",
-            pushed(STILL, seed + 1, "link_5", 20.0, at=0.02),
+            pushed(with_gains(STILL, seed, "posture"), seed + 1, "link_5", 20.0, at=0.02),
             1e-6,
             beside="tdeosf",
-            points=3,
+            points=4,
         ),
     )
 

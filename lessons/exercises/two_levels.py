@@ -8,7 +8,7 @@ You need: exercise "one-level-qp"; lesson "inside-the-qp"
 
 from __future__ import annotations
 
-from lessons.exercises.exercise import Exercise, GradeCheck, pushed
+from lessons.exercises.exercise import Exercise, GradeCheck, pushed, with_gains
 from lessons.exercises.laws import held, hierarchy
 from lessons.exercises.mistakes import Mistake, wrong
 from lessons.scenes.run_spec import RunSpec
@@ -27,7 +27,7 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
         GradeCheck(
             "Without active bounds the torque is the optimum of both levels.",
             "a residual, a weight or a level is wrong",
-            pushed(FREE, seed, "link_3", 2.0, plane=True),
+            pushed(with_gains(FREE, seed, "position", "q1"), seed, "link_3", 2.0, plane=True),
             1e-6,
             beside="hiqp",
             points=2,
@@ -43,7 +43,7 @@ def checks(seed: int) -> tuple[GradeCheck, ...]:
         GradeCheck(
             "If the torque is not enough for both levels, the error of level 2 grows.",
             "the torque is not the optimum: the bounds must be constraints in the QPs of both levels",
-            WEAK,
+            with_gains(WEAK, seed + 1, "position", "q1", K_p=200.0),
             1e-6,
             beside="hiqp",
             points=3,

@@ -164,6 +164,22 @@ class Controller:
             rows.append(now.M @ q_ddot + now.bias)
         return np.vstack(rows)
 """
+_OSF_KKT = (
+    TASK
+    + """
+import numpy as np
+
+def torque(now):
+    one, two = now.levels
+    force = np.linalg.pinv(one.J @ np.linalg.solve(now.M, one.J.T)) @ (wanted(one) - one.J_dot_q_dot)
+    first = now.bias + one.J.T @ force
+    # The least error of level 2 among the accelerations that level 1 permits.
+    K = np.block([[two.J.T @ two.J, one.J.T], [one.J, np.zeros((len(one.J),) * 2)]])
+    asked = np.r_[two.J.T @ (wanted(two) - two.J_dot_q_dot), wanted(one) - one.J_dot_q_dot]
+    q_ddot = np.linalg.lstsq(K, asked, rcond=None)[0][: now.n]
+    return [first, now.bias + now.M @ q_ddot]
+"""
+)
 _TDE_CLASS = """
 import numpy as np
 
@@ -238,7 +254,7 @@ class Controller:
 )
 STYLES: dict[str, tuple[str, ...]] = {
     "joint-pd": (PD, _PD_CLASS, _PD_LOOP),
-    "null-space": (OSF, _OSF_ONE_BY_ONE, _OSF_CLASS),
+    "null-space": (OSF, _OSF_ONE_BY_ONE, _OSF_CLASS, _OSF_KKT),
     "time-delay": (TDE, _TDE_ESTIMATE, _TDE_CLASS),
     "one-level-qp": (ONE, _QP_OF_TORQUES, _ONE_OF_ACCELERATIONS),
     "two-levels": (QP, _TWO_BY_BASIS, _TWO_BY_ELIMINATION),

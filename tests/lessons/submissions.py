@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from right_laws import PD, RIGHT, TASK
+from right_laws import PD, RIGHT, TASK, TDE
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Controller:
 )
 MISTAKES: dict[str, dict[str, Mistake]] = {
     "joint-pd": {
-        "sign of K_p": Mistake("- level.K_p", "+ level.K_p", 2, "K_p has the wrong sign"),
+        "sign of K_p": Mistake("- level.K_p", "+ level.K_p", 0, "K_p has the wrong sign"),
         "no K_p": Mistake("level.K_p *", "0.0 *", 7, "K_p is missing"),
         "sign of K_v": Mistake("- level.K_v", "+ level.K_v", 2, "K_v has the wrong sign"),
         "no K_v": Mistake("level.K_v *", "0.0 *", 5, "K_v is missing"),
@@ -57,7 +57,15 @@ MISTAKES: dict[str, dict[str, Mistake]] = {
         "gravity of the start": Mistake("", _FROZEN, 7, "g(q) is computed at the start"),
         "no M̄": Mistake("now.M_bar *", "", 5, "M̄ is missing"),
         "no target": Mistake("level.error", 'level.x["posture"]', 5, "q_d is missing"),
-        "holds the torque": Mistake("", _HELD, 2, "the torque is constant"),
+        "holds the torque": Mistake("", _HELD, 0, "the torque is constant"),
+        "gains of the scenes": Mistake(
+            "",
+            PD.replace("level.K_v", "(180.0 if level.error.size == 7 else 400.0)").replace(
+                "level.K_p", "(1000.0 if level.error.size == 7 else 2000.0)"
+            ),
+            6,
+            "with the gains of the level",
+        ),
     },
     "null-space": {
         "no J̇q̇": Mistake("- level.J_dot_q_dot", "", 7, "J̇q̇ is missing"),
@@ -79,6 +87,12 @@ MISTAKES: dict[str, dict[str, Mistake]] = {
         "sign of K_v": Mistake("- level.K_v", "+ level.K_v", 3, "K_v has the wrong sign"),
     },
     "time-delay": {
+        "gains of the scenes": Mistake(
+            "",
+            TDE.replace("level.K_v", "20.0").replace("level.K_p", "100.0"),
+            6,
+            "one of these terms is wrong",
+        ),
         "holds the torque": Mistake("", _HELD, 1, "the torque is constant"),
         "sign of q̈₀": Mistake("- now.q_ddot", "+ now.q_ddot", 3, "q̈₀ has the wrong sign"),
         "no q̈₀": Mistake("- now.q_ddot", "", 3, "q̈₀ is missing"),
@@ -137,6 +151,15 @@ MISTAKES: dict[str, dict[str, Mistake]] = {
         "no R": Mistake("np.diag(level.R)", "1e-9 * np.eye(now.n)", 7, "R is missing"),
     },
     "distance-row": {
+        "negative distance": Mistake(
+            "room = np.maximum(distance - near.d_safe, 0.0)\n"
+            "    v_stop = a * (np.sqrt(t**2 + 2.0 * room / a) - t)",
+            "room = distance - near.d_safe\n"
+            "    v_stop = a * (np.sqrt(np.maximum(t**2 + 2.0 * room / a, 0.0)) - t)",
+            9,
+            "max(d − d_safe, 0)",
+            "begins below d_safe",
+        ),
         "no row": Mistake(
             "    return D, share",
             "    D, slopes, v_stop, speed = D[:0], slopes[:0], 0, 0\n    return D, share",
@@ -206,7 +229,7 @@ _LOG = ", ".join(f"[{0.02 * k:g}, {-0.01 * k:g}, {0.005 * k:g}]" for k in range(
 SUBMISSIONS: dict[str, Submission] = {
     **{f"right_{name.replace('-', '_')}": Submission(name, text, 10) for name, text in RIGHT.items()},
     "wrong_sign": Submission(
-        "joint-pd", MISTAKES["joint-pd"]["sign of K_p"].text("joint-pd"), 2, "wrong sign"
+        "joint-pd", MISTAKES["joint-pd"]["sign of K_p"].text("joint-pd"), 0, "wrong sign"
     ),
     "wrong_constant": Submission("time-delay", "def torque(now):\n    return [0.1] * now.n\n", 0, "sag"),
     "wrong_copied_log": Submission(
@@ -219,7 +242,7 @@ SUBMISSIONS: dict[str, Submission] = {
     "wrong_sleeps": _bad("import time; time.sleep(0.7)", 0, "takes longer than 0.5 s"),
     "wrong_exits": _bad("raise SystemExit", 0, "it ends the program"),
     "wrong_leaves": _bad("import os; os._exit(0)", 0, "it ends its own process"),
-    "wrong_prints": _bad("print('x' * 10**5)", 2, "comes back"),
+    "wrong_prints": _bad("print('x' * 10**5)", 0, "comes back"),
     "wrong_opens": _bad("open('/etc/hostname').read()", 0, "may not do that (open /etc/hostname)"),
     "wrong_kills": _bad("import os; os.kill(os.getppid(), 9)", 0, "may not do that (os.kill)"),
     "wrong_memory": _bad("held = [bytes(10**9) for _ in range(10**4)]", 0, "memory"),

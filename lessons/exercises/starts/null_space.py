@@ -21,6 +21,7 @@ def torque(now):
             - level.K_p * level.error
             - level.J_dot_q_dot
         )
+        # Both levels may ask for more than the joints can do: then J M⁻¹ Jᵀ is singular, and pinv is needed.
         Lambda = np.linalg.pinv(J @ M_inv @ J.T, rcond=1e-9, hermitian=True)
         # TODO: project J on the freedom that the levels above leave, and subtract their effect on ẍ.
         tau = tau + J.T @ Lambda @ wanted
