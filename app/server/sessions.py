@@ -104,7 +104,8 @@ class Sessions:
                 tidied, scenes = now, changed
                 give_back()
             if room:
-                self._spares.refill()
+                with contextlib.suppress(OSError, RuntimeError):  # a limit of the system is reached
+                    self._spares.refill()
 
     def close(self) -> None:
         """Ends all simulation processes."""
