@@ -13,7 +13,6 @@ from app.classes.room import Learners, Room, begin
 from app.classes.saved import SavedGathering, restored
 from app.classes.views import View, course, for_all, for_teacher
 from app.client.simulation_client import SimulationClient
-from app.client.state_code import code_of
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
 from lessons.replay.state import decode
@@ -118,10 +117,12 @@ class Hall(Room):
 
     def code_of(self, who: str) -> str:
         """Returns the state code of a learner. Raises InputError if there is no code."""
-        told = self._latest(who)
-        if told is None:
-            raise InputError("the robot of this learner does not answer")
-        return code_of(told)
+        code = next((each.code for each in self._learners() if each.token == who), "")
+        if not code:
+            raise InputError(
+                "this learner's state has no code: the robot was uploaded, or does not answer yet"
+            )
+        return code
 
     def show_state(self, code: str) -> None:
         """Loads a learner's state into the teacher's robot. Raises InputError if the code is not valid."""

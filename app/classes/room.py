@@ -15,7 +15,6 @@ from app.classes.queue import BuildQueue
 from app.classes.seats import Seats
 from app.client.simulation_client import SimulationClient
 from app.link.exercise import Lecture, Predict
-from app.link.messages import Told
 from robots import InputError
 
 RATE = 5.0
@@ -225,11 +224,6 @@ class Room(ABC):
 
     def _learners(self) -> Sequence[SimulationClient]:
         return () if self._sessions is None else self._sessions.learners
-
-    def _latest(self, who: str) -> Told | None:
-        """Returns the last reported run of a learner; None if there is none."""
-        learner = next((each for each in self._learners() if each.token == who), None)
-        return None if learner is None else learner.latest()
 
 
 def begin(learner: SimulationClient, lecture: Lecture | None, state: Gathering) -> None:

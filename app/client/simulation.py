@@ -38,6 +38,8 @@ class Simulation(ABC):
         self.ready: Ready | None = None
         self.status: Status | None = None
         self.settings: SceneSettings | None = None
+        self.code = ""
+        """The state code of the setting, as the process reported it; "" if there is none."""
         self.failure: str | None = None
         self.changed = 0
         self.tape = PoseHistory()
@@ -109,6 +111,7 @@ class Simulation(ABC):
                 case Status():
                     self.status = report
                     self.settings = report.settings or self.settings
+                    self.code = self.code if report.code is None else report.code
                     self._notices += report.notices
                 case LoadRefused(sentence):
                     self._refusals.append(sentence)
@@ -127,7 +130,7 @@ class Simulation(ABC):
         self.ready, self.settings = ready, ready.settings
         self._block = Block.for_robot(ready.robot, ready.layout.size, ready.block)
         if not ready.again:
-            self.status = None
+            self.status, self.code = None, ""
             self.tape.clear()
         self.score = RunStatistics(ready.layout)
         if ready.again and record is not None and history is not None:

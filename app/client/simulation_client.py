@@ -235,12 +235,6 @@ class SimulationClient(Simulation):
 
     # ---------------------------------------------------------------- questions
 
-    def latest(self) -> Told | None:
-        """Returns the last reported run, without its events; None before the first scene. Unlike `ask`, this
-        call does not wait for the simulation."""
-        ready = self.ready
-        return None if ready is None else Told(self.choice_of(ready), self.settings_of(ready), (), 0.0)
-
     def ask(self, timeout: float = 10.0) -> Told | None:
         """Requests the run so far; returns None if the simulation does not answer within `timeout` seconds.
         This call blocks: do not call it on the page's loop or on viser's."""

@@ -1,16 +1,11 @@
-"""The setting of a page as a state, and as a state code."""
+"""The setting of a page as a state."""
 
 from __future__ import annotations
 
 from app.link.choice import SceneChoice
 from app.link.messages import Told
-from lessons.replay.state import State, encode, state_of
+from lessons.replay.state import State, state_of
 from robots import InputError
-
-
-def code_of(told: Told) -> str:
-    """Returns the state code of the setting. Raises InputError if a state code cannot contain the setting."""
-    return encode(state_now(told))
 
 
 def state_now(told: Told) -> State:

@@ -49,6 +49,10 @@ def show(
             It cannot be detected behind a hub whose public address is unknown here, or if Jupyter is opened
             under another name.
 
+    The cell's output contains the address of the page with its token. The token is valid until `stop` or the
+    end of the program; until then, whoever gets the notebook with this output and can reach this machine can
+    use the robot.
+
     Raises:
         InputError: there is no such scene, lesson or setting, or the origin is not valid.
     """

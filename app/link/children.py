@@ -4,6 +4,7 @@ forked from this process."""
 from __future__ import annotations
 
 import contextlib
+import errno
 import multiprocessing as mp
 import os
 import signal
@@ -108,7 +109,39 @@ class Spawned:
             self._process.close()
 
 
-Child = Forked | Spawned
+class NotStarted:
+    """A process that could not be started; with the same methods as `Forked`."""
+
+    doing, pid, exitcode = "", None, None
+
+    def fileno(self) -> int:
+        return -1
+
+    def look(self) -> bool:
+        return True
+
+    def kill(self) -> None:
+        """Does nothing."""
+
+    def close(self) -> None:
+        """Does nothing."""
+
+
+Child = Forked | Spawned | NotStarted
+
+
+def why_not(error: OSError) -> str:
+    """Returns a sentence with the limit because of which a process cannot be started."""
+    limit = {
+        errno.EAGAIN: "the limit of processes is reached (ulimit -u, or that of the container)",
+        errno.EMFILE: "the limit of open files is reached (ulimit -n)",
+        errno.ENFILE: "the limit of open files of this computer is reached",
+        errno.ENOMEM: "there is not enough memory",
+    }.get(error.errno or 0, str(error))
+    return (
+        f"No simulation can be started: {limit}. Close pages or end other programs, then try again; the "
+        "person who started himpc-lab can also raise the limit, or lower --max-sessions."
+    )
 
 
 def spawned(worker: str, theirs: socket.socket) -> Spawned:

@@ -17,6 +17,7 @@ from robots.errors import InputError, unknown_name
 if TYPE_CHECKING:
     from lessons.replay.state import State
     from lessons.scenes.scene import Scene
+    from lessons.settings.settings import SceneSettings
 
 
 @final
@@ -186,10 +187,11 @@ class SceneChoice:
         choice = self.resolved()
         return choice.run.prepared(choice._bare())
 
-    def fitted(self) -> tuple[SceneChoice, Scene, tuple[str, ...]]:
-        """Returns the choice, the scene, and one reason per omitted task. Tasks from files are omitted if the
-        robot cannot have them. A file that was opened for one robot thus does not prevent the use of other
-        robots. Raises InputError if the choice cannot be loaded, or if the stack names an omitted task."""
+    def fitted(self) -> tuple[SceneChoice, Scene, SceneSettings, tuple[str, ...]]:
+        """Returns the choice, the scene, its settings before any assignment, and one reason per omitted task.
+        Tasks from files are omitted if the robot cannot have them. A file that was opened for one robot thus
+        does not prevent the use of other robots. Raises InputError if the choice cannot be loaded, or if the
+        stack names an omitted task."""
         from lessons.runs.named import misfits
 
         choice = self.resolved()
@@ -200,7 +202,8 @@ class SceneChoice:
             scene = kept.prepared(bare)
         except InputError:
             scene = run.prepared(bare)  # raises the error about the task
-        return replace(choice, run=kept), scene, tuple(out.values())
+        own = kept.loaded(bare) if kept.files or kept.tasks else bare
+        return replace(choice, run=kept), scene, own.settings, tuple(out.values())
 
     def _bare(self) -> Scene:
         """Returns the scene before any settings are applied."""

@@ -224,7 +224,12 @@ class _Nest:
             print("himpc-lab: a second thread runs in the fork server, which ends now", file=sys.stderr)
             self._end()
         report = socket.socket(fileno=status)
-        pid = os.fork()
+        try:
+            pid = os.fork()
+        except OSError:  # a limit is reached; the page hears the end of both sockets
+            theirs.close()
+            report.close()
+            return
         if pid == 0:
             self._be_a_child(theirs, report)
         theirs.close()

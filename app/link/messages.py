@@ -208,13 +208,14 @@ class Status:
 
     real_time_factor: simulated over real seconds; capped: simulated time had to be slowed down;
     over_budget: ticks whose control step took longer than T_s; late: ticks that missed their deadline;
-    resets: number of resets of the scene (the page then puts its gizmo back); targets: raw targets by task;
-    path: (N + 1, 3) predicted tip, m; settings: sent only after a change; gauge: norm and spectral radius of
-    I − M⁻¹M̄ while paused, when no row of telemetry contains them; mission: only if the scene has a mission;
-    lecture: state of a lesson, sent after a change; inside: sent while the page requests it; own: state of a
-    controller from a file; ranks: per level its number of available directions and its number of rows;
-    contacts: the points of contact after the last tick; objects: (k, 7), the poses of the free objects;
-    nearest: the names of the nearest pair, "" if no distance is measured; arm: only for an arm.
+    resets: number of resets of the scene (the page then moves its gizmo); targets: raw targets by task;
+    path: (N + 1, 3) predicted tip, m; settings: sent only after a change; gauge: norm and spectral radius
+    of I − M⁻¹M̄ while paused, when no row of telemetry contains them; mission: only if the scene has a
+    mission; lecture: state of a lesson, sent after a change; inside: sent while the page requests it;
+    own: state of a controller from a file; ranks: per level the number of available directions, and of
+    rows; contacts: the points of contact after the last tick; objects: (k, 7), the poses of the free
+    objects; nearest: the names of the nearest pair, "" if no distance is measured; arm: only for an arm;
+    code: the state code of the setting, sent after a change, "" if there is none.
     """
 
     t: float
@@ -241,6 +242,7 @@ class Status:
     objects: np.ndarray = field(default_factory=lambda: np.zeros((0, 7)))
     nearest: str = ""
     arm: ArmView | None = None
+    code: str | None = None
 
 
 @dataclass(frozen=True)
@@ -266,7 +268,6 @@ class SimulationFailed:
 @dataclass(frozen=True, eq=False)
 class Script:
     """Data that a leader sends to its ghost.
-
     events: new events in the leader's log; t: the time that the leader has reached, s; begin: if not None,
     the ghost starts again from this state before it applies the events.
     """
@@ -286,7 +287,6 @@ class Reached:
 @dataclass(frozen=True, eq=False)
 class Told:
     """A description with which a run can be repeated.
-
     choice: the scene as it was loaded; settings: the settings in force; log: (time, event) of every event
     that took effect since loading; t: time since the last reset, s.
     """

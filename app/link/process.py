@@ -8,7 +8,7 @@ import threading
 import time
 from collections.abc import Callable
 
-from app.link.children import Child
+from app.link.children import Child, NotStarted, why_not
 from app.link.messages import Command, Quit, Report, SimulationFailed
 from app.link.outbox import Outbox
 from app.link.wire import Wire
@@ -29,7 +29,8 @@ class Process:
         ours, self._theirs = socket.socketpair()
         self._wire = Wire(ours)
         self._instead = list(instead)
-        self._child = start(self._theirs)
+        self._failure = ""  # the reason why no child could be started
+        self._child: Child = self._started(start)
         self._outbox = Outbox(self._wire)
         self._lock = threading.Lock()
         self._listener: Callable[[Report], None] | None = None
@@ -91,17 +92,24 @@ class Process:
         self._ended.set()
         self._outbox.close()
         if not self._closed and not failed:
-            self._pass_on(SimulationFailed(_obituary(self._child.exitcode), died=True))
+            self._pass_on(SimulationFailed(self._failure or _obituary(self._child.exitcode), died=True))
         self._wire.hang_up()
         self._outbox.join()
         self._wire.close()
         self._theirs.close()
         self._child.close()
 
+    def _started(self, start: Start) -> Child:
+        try:
+            return start(self._theirs)
+        except OSError as error:
+            self._failure = why_not(error)
+            return NotStarted()
+
     def _follow(self) -> bool:
         """Reads reports until the child has ended; returns whether the last report was a failure."""
         failed, over = False, 0.0
-        while True:
+        while not self._failure:
             there, news = self._wait(None if not over else over - time.monotonic())
             if there and not over:
                 try:
@@ -118,6 +126,7 @@ class Process:
             elif over and time.monotonic() >= over:
                 self._child.kill()
                 return failed
+        return False
 
     def _wait(self, timeout: float | None) -> tuple[bool, bool]:
         """Waits; returns (whether the wire can be read, whether the child has news)."""
@@ -134,7 +143,7 @@ class Process:
             self._theirs.close()  # from now on, the socket is closed when the child ends
         elif ended and self._instead and not self._closed:
             self._child.close()
-            self._child = self._instead.pop(0)(self._theirs)
+            self._child = self._started(self._instead.pop(0))
             ended = False
         self.heard_at = time.monotonic()
         return ended

@@ -102,9 +102,13 @@ class Wire:
     def recv(self) -> Any:
         """Waits for the next message and returns it. Raises EOFError or OSError if the other end is
         closed."""
-        head, files = self._head()
+        head, files, _, _ = socket.recv_fds(self._end, _HEAD.size, _MOST_FILES)
         try:
-            size, count = _HEAD.unpack(head)
+            if not head:
+                raise EOFError
+            rest = bytearray(_HEAD.size - len(head))
+            self._fill(memoryview(rest))
+            size, count = _HEAD.unpack(head + rest)
             if count != len(files):
                 raise OSError(f"{len(files)} of {count} open files arrived: this process cannot open more")
             content = bytearray(size)
@@ -114,14 +118,6 @@ class Wire:
             for number in files:
                 os.close(number)
             raise
-
-    def _head(self) -> tuple[bytes, list[int]]:
-        head, files, _, _ = socket.recv_fds(self._end, _HEAD.size, _MOST_FILES)
-        rest = bytearray(_HEAD.size - len(head))
-        if not head:
-            raise EOFError
-        self._fill(memoryview(rest))
-        return head + rest, files
 
     def _fill(self, view: memoryview) -> None:
         while view:

@@ -57,7 +57,7 @@ for _name in (
         "read",
         "look",
         "ask",
-        "latest",
+        "code",
     ),
 ):
     setattr(Watcher, _name, _of_the_session(_name))
@@ -97,6 +97,7 @@ class Classroom:
         """Returns the session itself to a visitor with the token, otherwise a `Watcher`."""
         with self._lock:
             self._pages += 1
+            self._learner.attached = True
         if self.all_steer or any(map(self.is_right, tokens)):
             return self._learner
         return cast(SimulationClient, Watcher(self._learner, refuse))
@@ -106,8 +107,15 @@ class Classroom:
         with self._lock:
             self._pages -= 1
             last, self._left_at = not self._pages, time.monotonic()
+            self._learner.attached = not last
         if last and self._arm is not None:
             self._arm.send(PageLeft())
+
+    @property
+    def pages(self) -> int:
+        """The number of open pages."""
+        with self._lock:
+            return self._pages
 
     @property
     def deserted(self) -> bool:

@@ -4,24 +4,35 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any, NoReturn, Protocol
 
 from websockets.asyncio.server import ServerConnection
 from websockets.exceptions import ConnectionClosedError
 from websockets.frames import CloseCode, Frame, Opcode
+from websockets.http11 import Request
 
 from app.classes.words import LONGEST
 from app.server import budget
 from app.server.budget import Budget
+from app.server.connection_limits import ConnectionLimits
+from app.server.door import Answer
 from app.server.request_line import RequestLine, request_line
 from app.server.uploads import TRANSFER, Uploads
 from app.server.words import refusal
 
-if TYPE_CHECKING:
-    from app.server.guard import ConnectionGuard
-
 _SLICE = 4096  # B that are parsed between two checks of the limits
 _LINE = 8192  # largest length of a request's first line, B
+
+
+class Guard(Protocol):
+    """The guard of the server, see `app.server.guard.ConnectionGuard`."""
+
+    crowd: ConnectionLimits
+    taken: int
+
+    def address(self, connection: ServerConnection, request: Request | None) -> str | None: ...
+
+    def refuse(self, connection: ServerConnection, answer: Answer) -> None: ...
 
 
 class GuardedConnection(ServerConnection):
@@ -39,7 +50,7 @@ class GuardedConnection(ServerConnection):
         line: the first line of the request, as soon as it has arrived.
     """
 
-    def __init__(self, *of: Any, guard: ConnectionGuard, **more: Any) -> None:
+    def __init__(self, *of: Any, guard: Guard, **more: Any) -> None:
         super().__init__(*of, **more)
         self.uploads: Uploads | None = None
         self.refuse: Callable[[str], object] = _nothing_said

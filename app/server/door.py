@@ -78,7 +78,7 @@ class Door:
             return _foreign("The request must name one host and at most one origin.")
         if len(headers.get_all(USER_HEADER)) > 1:
             return _foreign(
-                f"The request names two accounts: the proxy must replace the header {USER_HEADER} of its visitor."
+                f"The request names two accounts: the proxy must replace the visitor's own {USER_HEADER}."
             )
         if not self._is_ours(hosts[0]):
             return _foreign(

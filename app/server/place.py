@@ -9,17 +9,12 @@ from __future__ import annotations
 
 import hashlib
 import json
-from typing import TYPE_CHECKING
 
 from app.adapter.names import STORED
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
-from app.link.messages import Told
 from lessons.course import COURSE
 from robots import InputError
-
-if TYPE_CHECKING:
-    from lessons.settings.settings import SceneSettings
 
 _KEY = "himpc-lab-place"
 
@@ -35,20 +30,15 @@ def keeping(text: str) -> str:
     return f"try {{ sessionStorage.setItem({json.dumps(_KEY)}, {json.dumps(text)}); }} catch {{}}"
 
 
-def written(choice: SceneChoice, settings: SceneSettings, start: SceneChoice) -> str:
+def written(choice: SceneChoice, code: str, start: SceneChoice) -> str:
     """Returns the place of a page as text: the step of a lesson, or the code of the scene and its settings.
-    start: the choice that new pages of this server show; only servers with the same start continue from the
-    place."""
+    code: "" if there is none, e.g. for an uploaded robot, which other servers do not have; start: the choice
+    that new pages of this server show; only servers with the same start continue from the place."""
     place: dict[str, str | int] = {"start": _digest(start)}
     exercise = choice.exercise
     if exercise is not None:
         return json.dumps({**place, "lesson": exercise.lesson, "step": exercise.place + 1})
-    from app.client.state_code import code_of  # imported here: the server listens before panels are loaded
-
-    try:
-        return json.dumps({**place, "code": code_of(Told(choice, settings, (), 0.0))})
-    except InputError:
-        return ""  # e.g. an uploaded robot, which other servers do not have
+    return json.dumps({**place, "code": code}) if code else ""
 
 
 def read(text: str | None, start: SceneChoice) -> SceneChoice | None:

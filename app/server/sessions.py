@@ -4,6 +4,7 @@ seconds after its tab was closed."""
 from __future__ import annotations
 
 import contextlib
+import gc
 import json
 import secrets
 import threading
@@ -99,12 +100,16 @@ class Sessions:
                 room = len(self._learners) < self.max_sessions
             for learner in ended:
                 learner.close()
+            if ended and not self.learners:  # the last page has gone: its recordings need not stay in memory
+                gc.collect()
+                give_back()
             changed = sum(learner.changed for learner in self.learners)
             if changed != scenes and now - tidied > _TIDY:
                 tidied, scenes = now, changed
                 give_back()
             if room:
-                self._spares.refill()
+                with contextlib.suppress(OSError, RuntimeError):  # a limit of the system is reached
+                    self._spares.refill()
 
     def close(self) -> None:
         """Ends all simulation processes."""

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import json
 import secrets
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -19,7 +19,7 @@ from app.adapter.removed_handle_errors import print_exception
 from app.client.progress import Notebook
 from app.client.simulation_client import SimulationClient
 from app.html.text import block
-from app.link.choice import SceneChoice
+from app.link.children import why_not
 from app.page.comfort import ASK_MOTION, ASK_WINDOW, MOTION, REDUCED, Comfort, window_size
 from app.page.inlet import Inlet
 from app.page.page import Page
@@ -78,8 +78,7 @@ class Visit:
         self._seat = ""
         self._asking: asyncio.Future[tuple[str | None, ...]] | None = None
         self._dark = False
-        self._place: SceneChoice | None = None  # the tab's place on another server
-        self._seen: tuple[object, object] | None = None  # the last stored scene and settings
+        self._stored: str | None = None  # the place that the tab stored last
         self._notebook = Notebook(LearnerProgress(), lambda _: None)
         self._comfort = Comfort(client, reduced=False)
         self._workers = Workers()
@@ -166,7 +165,17 @@ class Visit:
         room = self._room
         guide = room.guide if room is not None and self._teaches else None
         leads = guide is not None
-        learner = guide or self._sessions.enter(tokens, self._refuse, self._account)
+        entered = None
+        if guide is None or isinstance(self._sessions, Classroom):
+            try:
+                entered = self._sessions.enter(tokens, self._refuse, self._account)
+            except (OSError, RuntimeError) as error:  # RuntimeError: no thread can be started
+                known = error if isinstance(error, OSError) else OSError(errno.EAGAIN, str(error))
+                self.tell("There is no robot", why_not(known))
+                return
+        if watching is not None:
+            self._sessions.leave(watching.learner)  # left last, as a classroom counts its pages
+        learner = guide or entered
         if learner is None:
             self._turn_away(tokens, kept)
             return
@@ -205,25 +214,16 @@ class Visit:
 
     def _watch(self) -> None:
         """Checks every _PERIOD s, on viser's event loop, whether scene or settings have changed. If so, the
-        tab stores the page's new place (see `app.server.place`)."""
+        tab stores the page's new place (see `app.server.place`), as the simulation reported it."""
         if self._left or not isinstance(self._sessions, Sessions):
             return
         page = self._page
-        if page is not None:
-            choice, settings = page.learner.choice, page.learner.settings
-            new = self._seen is None or choice != self._seen[0] or settings is not self._seen[1]
-            if new and page.learner.ready is not None:
-                self._seen = choice, settings
-                with suppress(RuntimeError):  # the tab was closed
-                    keeping = self._steps.submit(self._keep_place, page, self._sessions.start)
-                    keeping.add_done_callback(print_exception)
+        if page is not None and page.learner.status is not None:
+            new = place.written(page.learner.choice, page.learner.code, self._sessions.start)
+            if new != self._stored:
+                self._stored = new
+                private.run_script(self._client, place.keeping(new))
         self._server.get_event_loop().call_later(_PERIOD, self._watch)
-
-    def _keep_place(self, page: Page, start: SceneChoice) -> None:
-        ready = page.learner.ready
-        if ready is not None and not self._left:
-            choice, settings = page.learner.choice_of(ready), page.learner.settings_of(ready)
-            private.run_script(self._client, place.keeping(place.written(choice, settings, start)))
 
     # ---------------------------------------------------------------- calls from the page
 

@@ -22,6 +22,8 @@ from robots import InputError
 POSE_PERIOD = 1 / 60  # s
 STATUS_PERIOD = 0.1  # s
 SCRIPT_PERIOD = 0.02  # s
+CODE_PERIOD = 1.0
+"""Shortest time, s, between two state codes while settings change."""
 _CHUNK = 0.01  # s: the longest run between two checks for commands
 _BEAT = 0.004
 """Time, s, between two checks for steps that are due. If the process woke up for each tick of a millisecond,
@@ -108,7 +110,7 @@ def _try(wire: Wire, choice: SceneChoice) -> SimulationRunner | None:
 
 def _simulate(wire: Wire, body: SimulationRunner) -> None:
     pacer = Pacer(time.perf_counter())
-    next_pose = next_status = next_script = 0.0
+    next_pose = next_status = next_script = next_code = 0.0
     stirred = time.perf_counter()
     while True:
         while wire.poll():
@@ -118,6 +120,7 @@ def _simulate(wire: Wire, body: SimulationRunner) -> None:
                 return
             if isinstance(command, Load):
                 wire.send(Loading())
+                next_code = 0.0
             answer = body.handle(command)
             if answer is not None:
                 wire.send(answer)
@@ -145,7 +148,10 @@ def _simulate(wire: Wire, body: SimulationRunner) -> None:
         if now >= next_status:
             # A run at full speed never reaches the requested speed, and does not count as slowed down.
             capped = pacer.capped(now) and body.pace == body.speed
-            wire.send(body.status(pacer.real_time_factor(now), capped))
+            status = body.status(pacer.real_time_factor(now), capped, coded=now >= next_code)
+            wire.send(status)
+            if status.code is not None:
+                next_code = now + CODE_PERIOD
             next_status = now + (PULSE if rests else STATUS_PERIOD)
         if now >= next_script:
             script = body.leader.script(body.session)

@@ -1,5 +1,4 @@
-"""The simulation behind one page, without process and clock. The worker runs it in real time; tests step it
-directly."""
+"""The simulation behind one page, without process and clock, which the worker adds."""
 
 from __future__ import annotations
 
@@ -34,6 +33,7 @@ from app.worker.leader import Leader
 from app.worker.loaded import Loaded, loaded_from
 from app.worker.outlet import Outlet
 from app.worker.reports.start import start
+from app.worker.state_code import StateCode
 from lessons.events import Reset, Set
 from lessons.scenes.scene import Scene
 from lessons.session.session import Session
@@ -60,6 +60,7 @@ class SimulationRunner:
     def _begin_anew(self, loaded: Loaded) -> None:
         """Begins a loaded scene. The robot of a lesson stands still until the lesson's script begins."""
         self.choice, self.scene, self.left_out = loaded.choice, loaded.scene, loaded.left_out
+        self._code = StateCode(loaded.choice, loaded.before)
         self.run, self.lecturer = loaded.run, loaded.lecturer
         self.running, self.speed = self.lecturer is None, 1.0
         self._fresh_start()
@@ -94,8 +95,7 @@ class SimulationRunner:
             self.write_poses()
 
     def news(self) -> Ready | None:
-        """Returns the message about a changed telemetry layout; None if there is no change since the last
-        call."""
+        """Returns the message about a telemetry layout that is new since the last call, or None."""
         told, self._outlet.told = self._outlet.told, True
         return None if told else replace(self.ready(), again=True)
 
@@ -141,7 +141,7 @@ class SimulationRunner:
                 self.speed = factor
             case ResetAll():
                 again = loaded_from(replace(self.choice, mine=()), self.scene, self._judged)
-                self._begin_anew(replace(again, left_out=self.left_out))
+                self._begin_anew(replace(again, before=self._code.before, left_out=self.left_out))
             case Load(choice):
                 return self._load(choice)
             case InsideRequest() as watch:
@@ -263,7 +263,7 @@ class SimulationRunner:
             world=self.run.world(),
         )
 
-    def status(self, real_time_factor: float = 0.0, capped: bool = False) -> Status:
+    def status(self, real_time_factor: float = 0.0, capped: bool = False, coded: bool = True) -> Status:
         run, session, notices = self.run, self.session, tuple(self.session.notices)
         session.notices.clear()
         settings, sent, ran = session.settings, self._sent, self.ticks > 0
@@ -292,6 +292,7 @@ class SimulationRunner:
             contacts=run.contacts(),
             objects=run.objects(),
             nearest=run.nearest(),
+            code=self._code.news(settings) if coded else None,
         )
 
     def close(self) -> None:

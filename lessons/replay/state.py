@@ -49,7 +49,12 @@ class State:
 
 
 def state_of(
-    run: RunSpec, settings: SceneSettings, *, lesson: str | None = None, step: int | None = None
+    run: RunSpec,
+    settings: SceneSettings,
+    *,
+    lesson: str | None = None,
+    step: int | None = None,
+    before: SceneSettings | None = None,
 ) -> State:
     """Returns the state of a scene whose settings have been changed.
 
@@ -57,13 +62,15 @@ def state_of(
         run: scene, robot and seed.
         settings: the present settings.
         lesson, step: see `State`.
+        before: the settings of the scene with its files, before any assignment; None: the scene is loaded.
 
     Raises:
         InputError: the scene cannot be loaded, or the settings cannot be written as assignments.
     """
     files = tuple(filter(is_file, settings.controllers))
     own = RunSpec(run.scene, run.urdf, run.tip, seed=run.seed, files=files, tasks=run.tasks)
-    return State(replace(own, set=differences(own.loaded().settings, settings)), lesson, step)
+    before = own.loaded().settings if before is None else before
+    return State(replace(own, set=differences(before, settings)), lesson, step)
 
 
 # ------------------------------------------------------------------ codes

@@ -17,9 +17,12 @@ from app.link.messages import Play
 from app.panels.run.classroom import Guesses
 from app.server.classroom import STEERING, Classroom, Watcher
 from app.server.passes import new_token
+from app.server.server import PageServer
+from browsing.wire import Wire, eventually
 from lessons.scenes.run_spec import RunSpec
 
 ROOT = Path(__file__).parents[2] / "app"
+LONG = 60.0
 
 
 def test_watchers_change_nothing() -> None:
@@ -97,3 +100,27 @@ def test_the_token_is_long_and_only_itself() -> None:
     assert len(token.token) == 22  # 128 bits
     assert token.is_right(token.token)
     assert not any(map(token.is_right, ("", token.token[:-1], token.token + "a", "\ud800é")))
+
+
+def test_pages_are_counted_also_if_a_watcher_enters_the_token_or_the_teacher_leads(
+    one_fork_server: None,
+) -> None:
+    """Otherwise an arm is not stopped after the last page, and /metrics is wrong."""
+    server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, classroom=True, class_names=False)
+    room = server.sessions
+    assert isinstance(room, Classroom)
+    try:
+        assert server.guard.load.attached == 0
+        with Wire(server.guest_link) as page:
+            assert eventually(lambda: page.find("Instructor's token") is not None, LONG)
+            token = page.find("Instructor's token")
+            assert token is not None
+            page.write(token, value=room.token)
+            assert eventually(lambda: page.find("Instructor's token") is None, LONG)
+            assert server.guard.load.attached == 1
+            with Wire(server.link):
+                assert eventually(lambda: room.pages == 2, LONG)
+            assert eventually(lambda: room.pages == 1, LONG)
+        assert eventually(lambda: room.pages == 0, LONG) and server.guard.load.attached == 0
+    finally:
+        server.close()

@@ -18,6 +18,7 @@ from app.link.wire import packed
 from app.server.server import PageServer
 from app.worker.simulation import SimulationRunner
 from benchmarks.learners import Viewers
+from browsing.wire import Wire
 from lessons.scenes.run_spec import RunSpec
 
 pytestmark = pytest.mark.usefixtures("one_fork_server")
@@ -103,3 +104,21 @@ def simulates(learner: SimulationClient) -> bool:
     """Returns whether the simulation has run for a moment."""
     status = learner.status
     return status is not None and status.t > 0.1
+
+
+def test_memory_is_given_back_after_the_last_page(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not while another page is open, as this takes some milliseconds."""
+    given: list[int] = []
+    server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=2, grace=0.1)
+    sessions = server.sessions
+    monkeypatch.setattr("app.server.sessions.give_back", lambda: given.append(len(sessions.learners)))
+    monkeypatch.setattr("app.server.sessions._TIDY", LONG)
+    try:
+        with Wire(server.guest_link):
+            with Wire(server.guest_link):
+                assert wait_until(lambda: len(sessions.learners) == 2, LONG)
+            assert wait_until(lambda: len(sessions.learners) == 1, LONG)
+            assert given == []
+        assert wait_until(lambda: given == [0], LONG)
+    finally:
+        server.close()

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import re
+import threading
 import urllib.error
 import urllib.request
+from dataclasses import replace
 from http import HTTPStatus
 
 import pytest
@@ -14,10 +16,13 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from app.link.choice import SceneChoice
+from app.link.messages import Post
 from app.server.load import Load, report
 from app.server.passes import HEADER
 from app.server.server import PageServer
 from browsing.wire import Wire, eventually
+from lessons.events import Set
+from lessons.replay.state import State, decode, encode
 from lessons.scenes.run_spec import RunSpec
 
 TOKEN = "a-token-of-ones-own-0"
@@ -106,5 +111,66 @@ def test_a_server_of_its_own_shows_a_full_house_on_the_page(one_fork_server: Non
             assert eventually(lambda: bool(server.sessions.learners) and bool(first.made))
             with Wire(server.link) as second:
                 assert eventually(lambda: second.shows("runs a robot for each of 1 pages"))
+    finally:
+        server.close()
+
+
+def test_a_change_of_a_setting_loads_no_robot_in_the_server(
+    one_fork_server: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The simulation makes the code that the tab stores, which another server could open."""
+    server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
+    try:
+        with Wire(server.guest_link):
+            assert eventually(lambda: len(server.sessions.learners) == 1, 60.0)
+            (learner,) = server.sessions.learners
+            assert eventually(lambda: learner.code != "", 60.0)
+            loaded: list[str] = []
+
+            def load(name: str, *_: object, **__: object) -> None:
+                loaded.append(name)
+                raise AssertionError("the server loads a scene")
+
+            monkeypatch.setattr("lessons.runs.named.scene_named", load)
+            monkeypatch.setattr("lessons.scenes.catalog.load_scene", load)
+            for horizon in (6, 7, 8):
+                learner.send(Post(Set("horizon", horizon)))
+
+                def stored(horizon: int = horizon) -> bool:
+                    code = learner.code
+                    kept = [str(visit._stored) for visit in server._visits.values()]
+                    return f"horizon={horizon}" in decode(code).run.set and all(code in each for each in kept)
+
+                assert eventually(stored, 60.0)
+            assert loaded == []
+    finally:
+        server.close()
+
+
+def test_a_code_is_opened_on_a_thread_of_the_page(
+    one_fork_server: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On viser's loop it would stop all pages while two scenes are loaded."""
+    ran: list[threading.Thread] = []
+
+    def noted(code: str) -> State:
+        ran.append(threading.current_thread())
+        return decode(code)
+
+    monkeypatch.setattr("app.panels.run.share.decode", noted)
+    server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
+    loops: list[threading.Thread] = []
+    server._viser.get_event_loop().call_soon_threadsafe(lambda: loops.append(threading.current_thread()))
+    try:
+        with Wire(server.guest_link) as page:
+            assert eventually(lambda: page.find("Open it") is not None, 60.0)
+            (learner,) = server.sessions.learners
+            assert eventually(lambda: learner.code != "", 60.0)
+            code, button = page.find("Somebody's code"), page.find("Open it")
+            assert code is not None and button is not None
+            page.write(code, value=encode(replace(decode(learner.code), lesson="one-task", step=1)))
+            page.write(button, value=True)
+            assert eventually(lambda: bool(ran), 60.0)
+            assert loops and ran[0] not in loops
     finally:
         server.close()

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import psutil
@@ -15,8 +17,8 @@ from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
 from app.link.forkserver import ForkServer
-from app.link.messages import Load, Play, Post, Speed, StepTicks
-from app.link.process import wait_until
+from app.link.messages import Load, Play, Post, SimulationFailed, Speed, StepTicks
+from app.link.process import Process, wait_until
 from app.link.spares import Spares
 from app.server.sessions import WORKER, Sessions
 from lessons.events import MoveTarget, Set
@@ -195,3 +197,62 @@ def test_sessions_resume_end_and_are_limited(one_fork_server: None) -> None:
     finally:
         sessions.close()
     assert not sessions.learners
+
+
+class Dead:
+    """A child whose fork server has ended before it started."""
+
+    doing, exitcode, pid = "", None, None
+
+    def __init__(self, _: object) -> None:
+        self._end, other = os.pipe()
+        os.close(other)
+
+    def fileno(self) -> int:
+        return self._end
+
+    def look(self) -> bool:
+        return True
+
+    def kill(self) -> None:
+        pass
+
+    def close(self) -> None:
+        os.close(self._end)
+
+
+def refused(_: object) -> Any:
+    raise BlockingIOError(errno.EAGAIN, "Resource temporarily unavailable")
+
+
+@pytest.mark.parametrize("ways", [(refused,), (Dead, refused)])
+def test_a_child_that_cannot_be_started_ends_with_a_sentence_that_names_the_limit(ways: Any) -> None:
+    process = Process(*ways)
+    heard: list[Any] = []
+    process.listen(heard.append)
+    assert wait_until(lambda: not process.alive and bool(heard), LONG)
+    (failure,) = heard
+    assert (
+        isinstance(failure, SimulationFailed)
+        and "limit of processes is reached (ulimit -u" in failure.sentence
+    )
+    process.close()
+
+
+def test_a_fork_server_that_cannot_fork_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    """If no process can be spawned either, the page says why; when there is room again, it gets its robot."""
+    spares = Spares("childless")
+    monkeypatch.setattr("app.link.spares.spawned", lambda *_: refused(_))
+    learner = SimulationClient("token", SceneChoice(RunSpec("planar3-hold")), spares)
+    try:
+        assert wait_until(lambda: learner.failure is not None, LONG)
+        assert "No simulation can be started: the limit of processes" in str(learner.failure)
+        trouble = learner.trouble()
+        assert trouble is not None and trouble.offer is not None
+        assert spares.server is not None and spares.server.alive
+        monkeypatch.undo()
+        learner.restart()
+        assert wait_until(lambda: learner.status is not None, LONG) and learner.failure is None
+    finally:
+        learner.close()
+        spares.close()

@@ -463,7 +463,7 @@ def test_a_place_that_cannot_be_read_is_none(text: str) -> None:
     opened, and only for a server that was started with the same scene."""
     start = SceneChoice(RunSpec("planar3-hold"))
     step = SceneChoice.of_lesson(LessonPlace.at("one-task", 2))
-    right = place.written(step, step.scene().settings, start)
+    right = place.written(step, "", start)
     assert place.read(right, start) == step
     assert place.read(right, step) is None
     assert place.read(text.replace('"S"', json.dumps(json.loads(right)["start"])), start) is None

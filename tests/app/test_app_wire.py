@@ -27,6 +27,21 @@ def test_a_message_brings_open_files_along() -> None:
     theirs.close()
 
 
+def test_files_are_closed_if_the_connection_ends_inside_a_message() -> None:
+    """The head of a message has nine bytes; the files come with the first one."""
+    for sent in (b"\0", b"\0" * 8, b"\0" * 8 + b"\1", b"\0" * 7 + b"\5\1abc"):
+        ours, theirs = socket.socketpair()
+        end, start = os.pipe()
+        socket.send_fds(ours, [sent], [start])
+        os.close(start)
+        ours.close()
+        with pytest.raises(EOFError if sent != b"\0" * 8 + b"\1" else Exception):
+            Wire(theirs).recv()
+        assert os.read(end, 1) == b"", "nobody has the other end of the pipe any more"
+        os.close(end)
+        theirs.close()
+
+
 def test_a_message_with_files_does_not_wait_for_who_does_not_read() -> None:
     """If the message waited, a page would block while its fork server is stopped."""
     ours, theirs = map(Wire, socket.socketpair())

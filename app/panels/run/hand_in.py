@@ -8,10 +8,8 @@ import viser
 
 from app.client.progress import Notebook
 from app.client.simulation_client import SimulationClient
-from app.client.state_code import code_of
 from app.html.text import block
 from lessons.replay.progress import LONGEST_NAME
-from robots import InputError
 
 
 def add_hand_in(gui: viser.GuiApi, learner: SimulationClient, notebook: Notebook) -> None:
@@ -26,13 +24,9 @@ def add_hand_in(gui: viser.GuiApi, learner: SimulationClient, notebook: Notebook
 
     @make.on_click
     def _(_: object) -> None:
-        told = learner.latest()
-        try:
-            code = "" if told is None else code_of(told)
-        except InputError:
-            code = ""  # an uploaded robot has no code; the text still contains the progress
         text.visible = False
-        text.value = notebook.to_hand_in(str(name.value).strip()[:LONGEST_NAME], code)
+        # An uploaded robot has no code; the text still contains the progress.
+        text.value = notebook.to_hand_in(str(name.value).strip()[:LONGEST_NAME], learner.code)
         text.visible = True
 
 

@@ -45,7 +45,7 @@ class SharePanel:
                 self._try(client, lambda told: self._save(client, told))
 
         @take.on_click
-        async def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
+        def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:  # on a worker: a scene is loaded twice
             try:
                 choose(SceneChoice.of_state(decode(str(given.value))))
             except InputError as error:
