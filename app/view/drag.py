@@ -12,7 +12,6 @@ import numpy as np
 import viser
 import viser.transforms as vtf
 
-from app.client.pending_edit import Send
 from app.html.palette import RGB
 from app.link.messages import Ready
 from app.view.coordinates import draggable, full, of_task, raw, xyzw
@@ -50,15 +49,15 @@ class Hand:
         targets: dict[str, np.ndarray],
         tip: np.ndarray,
         size: float,
-        post: Send,
+        post: Callable[..., None],
         clamp: Callable[[], bool],
         dragged: Callable[[], None],
         later: Later,
     ) -> None:
         """targets: the session's raw targets by task; tip (7,): pose of the robot's hand, position (m) and
-        quaternion wxyz; size: of the gizmo, m; clamp: returns whether the controller gets only reachable
-        targets; dragged: called at every move; later: schedules a call on viser's loop, on which drags
-        arrive."""
+        quaternion wxyz; size: of the gizmo, m; post: posts events that take effect at the same control tick;
+        clamp: returns whether the controller gets only reachable targets; dragged: called at every move;
+        later: schedules a call on viser's loop, on which drags arrive."""
         self.verdict: Reachability | None = None
         self._post, self._clamp, self._dragged = post, clamp, dragged
         self._targets = targets
@@ -106,14 +105,15 @@ class Hand:
             self._later(_PATIENCE, partial(self._wait_no_longer, question))
 
     def _give(self, gizmo: TargetGizmo, question: Question, place: np.ndarray) -> None:
-        """Posts a position (3,), m, and the orientation at the same moment of the drag. The orientation is
-        omitted if a later one was already posted."""
+        """Posts a position (3,), m, and the orientation at the same moment of the drag, together. The
+        orientation is omitted if a later one was already posted."""
         self._given, self._place = max(self._given, question.number), place
         axes = ["xyz".index(axis) for axis in gizmo.position.axes]
-        self._post(MoveTarget(gizmo.position.name, tuple(float(place[axis]) for axis in axes)))
+        moves = [MoveTarget(gizmo.position.name, tuple(float(place[axis]) for axis in axes))]
         if question.rotation is not None and gizmo.orientation is not None and question.number > self._turned:
             self._turned = question.number
-            self._post(MoveTarget(gizmo.orientation.name, xyzw(question.rotation)))
+            moves.append(MoveTarget(gizmo.orientation.name, xyzw(question.rotation)))
+        self._post(*moves)
 
     def _wait_no_longer(self, question: Question) -> None:
         with self._lock:

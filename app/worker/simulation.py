@@ -119,10 +119,11 @@ class SimulationRunner:
                 self.session.notices.append(
                     "The stack cannot be changed in a lesson: load its scene in the tab Robot."
                 )
-            case Post(event):
-                self.session.post(event)
-                if lecturer is not None:
-                    lecturer.touch(event)
+            case Post(event, also):
+                for each in (event, *also):
+                    self.session.post(each)
+                    if lecturer is not None:
+                        lecturer.touch(each)
             case RunStep(own, fast):
                 self._begin(own, fast)
             case Play(True) if lecturer is not None and lecturer.waiting:

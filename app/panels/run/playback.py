@@ -58,7 +58,7 @@ class PlaybackPanel:
         self._touched = -math.inf
 
         on_click(self._buttons, lambda: self._click(str(self._buttons.value)))
-        on_click(self._again, learner.restart)
+        self._again.on_click(lambda _: learner.restart())  # on a thread, as it starts a process
 
         @self._speed.on_update
         async def _(event: viser.GuiEvent[viser.GuiSliderHandle[float]]) -> None:

@@ -126,6 +126,12 @@ class StartPanel:
         colour = ink(GOOD if verdict.reachable else BAD)
         if verdict.reachable:
             text = "Target within reach."
+        elif verdict.fault:
+            text = f"Whether the robot can reach this target could not be checked ({verdict.fault}). " + (
+                "The robot gets no new position: drag again, or switch off Keep within reach."
+                if clamped
+                else "The controller gets your point unchanged."
+            )
         else:
             text = f"Out of reach by {quantity(verdict.missing, 'm')}. " + (
                 "The controller gets the nearest point instead (the ball without arrows)."

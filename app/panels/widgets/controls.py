@@ -197,6 +197,6 @@ def _step(low: float, high: float) -> float:
 
 
 def _tenth(value: float) -> float:
-    """Returns the step of a number input: a tenth of the value's decade. One click visibly changes any
-    value."""
-    return 10.0 ** (len(f"{1 / max(value, 1e-6):.0f}") * -1.0) if value < 1 else 0.1
+    """Returns the step of a number input: a tenth of the value's decade, at most 0.1. One click visibly
+    changes any value. For 0, which has no decade, the step is a thousandth of the unit."""
+    return min(0.1, 10.0 ** (math.floor(math.log10(value)) - 1)) if value > 0.0 else 1e-3
