@@ -18,7 +18,7 @@ from app.html.text import figure, readable
 from app.link.exercise import Lecture, LessonPlace, SignalCurve
 from app.panels.lesson.drawing import Bound, chart, scale, sketch
 from app.panels.lesson.prediction import Asking
-from app.panels.widgets.logarithmic import STEPS, place_of, value_at
+from app.panels.widgets.controls import STEPS, place_of, value_at
 from himpc.tasks import KINDS
 from lessons.course import COURSE, load_lesson
 from lessons.replay.progress import LearnerProgress, progress_from

@@ -11,8 +11,7 @@ import viser
 from viser import uplot
 
 from app.adapter import private
-from app.client.decimate import decimate
-from app.client.decimated import BUCKETS, WINDOW, PlotWindow
+from app.client.decimated import BUCKETS, WINDOW, PlotWindow, decimate
 from app.html.palette import RGB, css
 from app.html.text import block
 from app.panels.widgets.in_view import InView
