@@ -25,8 +25,8 @@ from app.panels.torque.tasks import TasksPanel
 from app.panels.widgets.snapshot import SessionSnapshot
 from app.view.coordinates import draggable
 from app.view.drag import Hand, TargetFrames
+from app.view.drag_target import Movable
 from app.view.ellipsoids import EllipsoidView
-from app.view.movable import Movable
 from app.view.pull import Pull
 from app.view.robot import CoverView, LinkPicker, RobotView, gizmo_size
 from app.view.targets import Targets

@@ -27,8 +27,8 @@ from app.panels.widgets.snapshot import SessionSnapshot
 from app.view.camera import FollowBase
 from app.view.coordinates import full
 from app.view.drag import TargetFrames
+from app.view.drag_target import Movable
 from app.view.goals import Goals
-from app.view.movable import Movable
 from app.view.obstacles import Obstacles, ReportedObstacles
 from app.view.robot import RobotView, gizmo_size, look_at
 from app.view.surroundings import Carried, People, ReachCircle

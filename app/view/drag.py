@@ -16,7 +16,7 @@ from app.adapter import private
 from app.html.palette import BAD, RGB
 from app.link.messages import Ready, TaskView
 from app.view.coordinates import draggable, full, of_task, raw, xyzw
-from app.view.movable import Movable, turned
+from app.view.drag_target import Gap, Handle, Movable, turned
 from app.view.reachability import Question, Reachability, ReachabilityWorker
 from lessons.events import MoveTarget
 from lessons.settings.torque import TorqueSettings
@@ -60,28 +60,23 @@ class TargetGizmo:
         called with the raw position and, if rings are shown, the raw rotation."""
         self.position, self.orientation = position, orientation
         self._rings = orientation is not None
-        x, y, z = (axis in position.axes for axis in "xyz")
-        active = (x, y, z)
-        self._gizmo = scene.add_transform_controls(
-            "/target",
-            scale=size,
-            position=start,
-            active_axes=active,
-            disable_rotations=True,
-            depth_test=False,
-            line_width=3.0,
-        )
-        self._turn = scene.add_transform_controls(
+
+        def dragged() -> None:
+            self._invites = False
+            self._say()
+            moved(self.raw, self.rotation if self._rings else None)
+
+        self._gizmo = Handle(scene, "/target", position.axes, size, dragged, position=start).control
+        self._turn = Handle(
+            scene,
             "/target/turn",
-            scale=size,
+            position.axes,
+            size,
+            dragged,
+            rings=True,
             wxyz=_wxyz(rotation),
-            active_axes=active,
-            disable_axes=True,
-            disable_sliders=True,
-            depth_test=False,
-            line_width=3.0,
             visible=orientation is not None,
-        )
+        ).control
         self._ball = scene.add_icosphere(
             "/target/ball", radius=_BALL, color=colour, opacity=0.8, cast_shadow=False
         )
@@ -97,16 +92,7 @@ class TargetGizmo:
         self._then = scene.add_icosphere(
             "/target_then", radius=_BALL, color=colour, opacity=0.8, visible=False, cast_shadow=False
         )
-        self._gap = scene.add_line_segments(
-            "/gap", np.zeros((1, 2, 3), np.float32), BAD, thickness=0.006, visible=False
-        )
-
-        @self._gizmo.on_update
-        @self._turn.on_update
-        async def _(_: viser.TransformControlsEvent) -> None:
-            self._invites = False
-            self._say()
-            moved(self.raw, self.rotation if self._rings else None)
+        self._gap = Gap(scene, "/gap", BAD, 0.006)
 
     @property
     def raw(self) -> np.ndarray:
@@ -139,13 +125,12 @@ class TargetGizmo:
         """Shows the result of the reachability check: the position that the controller gets, and its distance
         from the dragged position, m."""
         out = missing > 0.0
-        for handle in (self._ghost, self._accepted, self._gap):
-            handle.visible = out
+        self._ghost.visible = self._accepted.visible = out
         self._ball.visible = not out
         self._missing = missing
+        self._gap.show(self.raw, accepted if out else self.raw)
         if out:
             self._accepted.position = accepted
-            self._gap.points = np.array([[self.raw, accepted]], np.float32)
         self._say()
 
     def pause(self, words: str) -> None:

@@ -3,18 +3,16 @@ wrong."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import product
-from typing import Any
 
 import numpy as np
 import viser
 import viser.transforms as vtf
 
-from app.client.pending_edit import HOLD
 from app.html.palette import RGB
+from app.view.drag_target import Handle
 from robots.collision import Ball, Box, Floor, Obstacle
 
 _COLOUR: RGB = (180, 120, 110)
@@ -60,11 +58,9 @@ def _shapes(obstacles: tuple[Ball | Box, ...]) -> tuple[Ball | Box, ...]:
 
 
 class _Solid:
-    """One obstacle. The user's drag has priority: for a moment after it, `follow` does not move the
-    obstacle."""
+    """One obstacle with its arrows."""
 
     def __init__(self, scene: viser.SceneApi, index: int, obstacle: Ball | Box, moved: Moved) -> None:
-        self._touched = -float("inf")
         self._body: viser.BoxHandle | viser.IcosphereHandle
         if isinstance(obstacle, Box):
             turn = vtf.SO3.from_z_radians(obstacle.yaw).wxyz
@@ -86,32 +82,28 @@ class _Solid:
                 cast_shadow=False,
             )
             size = obstacle.radius
-        self._arrows = scene.add_transform_controls(
+        self._name, self._moved = obstacle.name, moved
+        self._handle = Handle(
+            scene,
             f"/obstacle_arrows/{index}",
-            scale=size + _ARROWS,
+            "xyz",
+            size + _ARROWS,
+            self._dragged,
             position=obstacle.centre,
-            disable_rotations=True,
             disable_sliders=True,
-            depth_test=False,
             line_width=2.0,
         )
-        self._arrows.on_update(self._listener(obstacle.name, moved))
+        self._arrows = self._handle.control
 
-    def _listener(
-        self, name: str, moved: Moved
-    ) -> Callable[[viser.TransformControlsEvent], Coroutine[Any, Any, None]]:
-        async def hear(_: viser.TransformControlsEvent) -> None:
-            self._touched = time.monotonic()
-            x, y, z = (float(value) for value in self._arrows.position)
-            self._body.position = (x, y, z)
-            moved(name, (x, y, z))
-
-        return hear
+    def _dragged(self) -> None:
+        x, y, z = (float(value) for value in self._arrows.position)
+        self._body.position = (x, y, z)
+        self._moved(self._name, (x, y, z))
 
     def follow(self, obstacle: Ball | Box, arrows: bool) -> None:
         if self._arrows.visible != arrows:
             self._arrows.visible = arrows
-        if time.monotonic() - self._touched < HOLD:
+        if self._handle.held:
             return
         for handle in (self._body, self._arrows):
             if not np.allclose(obstacle.centre, handle.position, rtol=0.0, atol=1e-4):
