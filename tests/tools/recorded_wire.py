@@ -18,6 +18,7 @@ from pathlib import Path
 
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace, parts_of
+from app.link.messages import Play
 from app.server.server import PageServer
 from browsing.wire import Wire, eventually
 from lessons.course import COURSE, load_lesson
@@ -45,6 +46,7 @@ def recorded(server: PageServer, choice: SceneChoice) -> list[str]:
     with Wire(server.url) as wire:
         assert eventually(lambda: bool(server.sessions.learners), 120.0)
         (learner,) = server.sessions.learners
+        learner.send(Play(False))  # the controls of a mission depend on its progress
         assert eventually(lambda: learner.status is not None, 120.0), learner.failure
         assert eventually(
             lambda: any(each["type"] == "GuiTabGroupMessage" for each in list(wire.made)), 120.0
