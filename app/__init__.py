@@ -2,7 +2,7 @@
 
 The path of a dragged target from the browser to the tick:
 1. The browser sends the pose of the gizmo. `server/guard` counts the bytes, `page/inlet` refuses values that
-   a control cannot have, and viser calls back on its loop: `view/target`, then `view/drag`.
+   a control cannot have, and viser calls back on its loop, in `view/drag`.
 2. `view/reachability`, on a thread of its own, computes the nearest pose that the robot can reach;
    `view/drag` posts a `MoveTarget`.
 3. `client/simulation_client` puts the message into `link/outbox`, which never waits. The outbox's thread

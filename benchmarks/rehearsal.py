@@ -27,7 +27,7 @@ import psutil
 
 from app.__main__ import main as himpc_lab
 from app.link.exercise import LessonPlace
-from app.panels.widgets.logarithmic import STEPS
+from app.panels.widgets.controls import STEPS
 from benchmarks.phones import Crowd
 from benchmarks.rehearsal_host import KEY, Host
 from benchmarks.rehearsal_people import Learner, Teacher

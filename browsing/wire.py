@@ -57,6 +57,7 @@ class Wire:
         meshes: owners of the objects in the 3D view that can be clicked and dragged, by name.
         notices: (title, body) of every notification.
         standing: (title, body) of the notifications that are still shown, by id.
+        nodes: kinds of the objects in the 3D view by name.
         eye: the last camera position that the server sent, m.
     """
 
@@ -70,6 +71,7 @@ class Wire:
         self.meshes: dict[str, str] = {}
         self.notices: list[tuple[str, str]] = []
         self.standing: dict[str, tuple[str, str]] = {}
+        self.nodes: dict[str, str] = {}
         self.eye: tuple[float, ...] = ()
         # Browsers send no pings, and a busy machine would answer them too late.
         self._socket = connect(
@@ -139,6 +141,8 @@ class Wire:
 
     def _take(self, message: dict[str, Any]) -> None:
         kind: str = message["type"]
+        if "name" in message and "props" in message:
+            self.nodes[message["name"]] = kind
         match kind:
             case "LocalStorageGetItemRequestMessage":
                 self.say(nothing_kept(message["request_uuid"]))
@@ -158,6 +162,8 @@ class Wire:
                 self.controls_3d[message["name"]] = message["owner"]
             case "MeshMessage":
                 self.meshes[message["name"]] = message["owner"]
+            case "RemoveSceneNodeMessage":
+                self.nodes.pop(message["name"], None)
             case "GuiRemoveMessage":
                 self.controls.pop(message["uuid"], None)
             case "GuiUpdateMessage" if message["uuid"] in self.controls:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from app.worker.lesson.rows import thinned
+from app.worker.lecturer import thinned
 from lessons.course import COURSE, load_lesson
 from lessons.recording.recording import Recording
 from lessons.recording.run import run

@@ -62,6 +62,23 @@ def test_the_page_and_python_have_one_robot(lab: Lab) -> None:
     assert rows["q"].shape == (len(rows["t"]), 3) and np.isfinite(rows["q"]).all()
 
 
+def test_a_target_moves_while_the_robot_is_paused(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
+    """`move` returns when the target is in force; for that, no tick must run."""
+    monkeypatch.setattr("app.jupyter.lab._PATIENCE", 20.0)
+    with Wire(lab.url) as page:
+        assert eventually(lambda: page.shows("t = "), LONG)
+        page.press_key("space")
+        learner = lab._learner
+        assert eventually(lambda: learner.status is not None and not learner.status.running, LONG)
+        for place in (0.5, 0.6):
+            lab.move("position", (place, 0.1))
+            assert learner.status is not None and not learner.status.running
+            assert tuple(learner.status.targets["position"]) == (place, 0.1)
+        page.press_key("space")
+        lab.move("position", (0.7, 0.1))
+        assert learner.status.running and tuple(learner.status.targets["position"]) == (0.7, 0.1)
+
+
 def test_wrong_input_is_a_sentence(lab: Lab) -> None:
     for wrong, words in (
         (lambda: lab.set("horizont", 7), "did you mean 'horizon'"),

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.worker.lesson.rows import BUCKETS, thinned
+from app.worker.lecturer import BUCKETS, thinned
 from docs.pages.curves import FLOORS, figure, label
 
 

@@ -1,5 +1,5 @@
-"""The rules of the architecture: imports have one direction, each heavy dependency is imported in one place,
-and files stay small."""
+"""The rules of the architecture: imports have one direction, and each heavy dependency is imported in one
+place."""
 
 from __future__ import annotations
 
@@ -628,16 +628,6 @@ def origins(path: Path) -> dict[str, str]:
 def stands_in(path: Path, module: str) -> bool:
     """Whether a file is the given module, or part of the package of that name."""
     return bool(module) and within(".".join(path.relative_to(ROOT).with_suffix("").parts), module)
-
-
-def test_files_stay_readable() -> None:
-    """No file of the packages is longer than 300 lines."""
-    long = {
-        str(path.relative_to(ROOT)): lines
-        for path in sources(*ORDER[:-1])
-        if (lines := len(path.read_text().splitlines())) > 300
-    }
-    assert not long
 
 
 def test_no_file_names_a_package_index() -> None:

@@ -164,8 +164,9 @@ class Shown:
 
     def _hear(self, command: Command) -> None:
         match command:
-            case Post(MoveTarget() as event):
-                self._drag(event)
+            case Post(MoveTarget() as event, also):
+                for each in (event, *also):
+                    self._drag(each)
             case Play(True) if not self._begun:
                 self._begun = True
             case Play(True):

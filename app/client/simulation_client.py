@@ -3,26 +3,25 @@ reloaded."""
 
 from __future__ import annotations
 
+import os
 import time
+from collections import deque
+from contextlib import suppress
 from dataclasses import replace
-from queue import Empty
-from typing import TYPE_CHECKING, final
+from queue import Empty, Queue
+from threading import Lock
+from typing import TYPE_CHECKING, NamedTuple, final
 
-from app.client.coming import Coming
 from app.client.ghost import GhostClient
-from app.client.priority import let_go_first
-from app.client.questions import Questions
-from app.client.refused import ARM_AGAIN, ARM_GHOST, STAYING, WAITING
-from app.client.rest import Rest
-from app.client.simulation import Simulation, aside
-from app.client.trouble import DEADLINE, Trouble
-from app.client.unheard import Unheard
+from app.client.in_class import Coming, Rest
+from app.client.simulation import DEADLINE, Simulation, Trouble, aside
 from app.link.choice import SceneChoice
 from app.link.exercise import Lecture, LessonPlace, Predict, RunStep
 from app.link.messages import (
     Command,
     Lead,
     Load,
+    Loading,
     LoadRefused,
     Play,
     Ready,
@@ -31,6 +30,7 @@ from app.link.messages import (
     Script,
     SimulationFailed,
     Status,
+    Tell,
     Told,
     WaitAt,
 )
@@ -42,6 +42,12 @@ if TYPE_CHECKING:
 
 SIMULATION = "simulation"
 """The name of the ghost of an arm."""
+STAYING = "Your teacher keeps the class at this step: wait for the next one."
+WAITING = "Your teacher runs this step for everybody: say what you expect, and wait."
+ARM_AGAIN = "Each start of himpc-lab arm drives the arm once: end this program and start it again."
+ARM_GHOST = "On this page the ghost is always the simulation of the arm, which gets the same targets."
+BEHIND = 10
+"""The niceness of a simulation minus that of the server. Pages are thus served first."""
 
 
 @final
@@ -292,3 +298,57 @@ class SimulationClient(Simulation):
         ghost, self.ghost = self.ghost, None
         if ghost is not None:
             ghost.close()
+
+
+@final
+class Questions:
+    """The questions that a process has not answered yet."""
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+        self._waiting: deque[Queue[Told | None]] = deque()
+
+    def ask(self, process: Process) -> Queue[Told | None] | None:
+        """Requests the run so far. Returns the queue that will get the answer; None if the process has
+        ended."""
+        answer: Queue[Told | None] = Queue()
+        with self._lock:
+            if not process.send(Tell()):
+                return None
+            self._waiting.append(answer)
+        return answer
+
+    def answer(self, told: Told) -> None:
+        """Passes an answer to the oldest question."""
+        with self._lock:
+            if self._waiting:
+                self._waiting.popleft().put(told)
+
+    def forget(self) -> None:
+        """Ends all questions without an answer; called when the process has ended."""
+        with self._lock:
+            while self._waiting:
+                self._waiting.popleft().put(None)
+
+
+class Unheard(NamedTuple):
+    """The scene (None: the present one), and the number of resets when it was requested."""
+
+    choice: SceneChoice | None
+    resets: int
+
+    def after(self, report: Report) -> Unheard | None:
+        """Returns None if the report answers this request, else this request."""
+        match report:
+            case Status(resets=resets) if resets != self.resets:
+                return None
+            case Loading() | Ready() | LoadRefused():
+                return None
+            case _:
+                return self
+
+
+def let_go_first(pid: int) -> None:
+    """Gives a process a lower priority than this one."""
+    with suppress(OSError):  # the process has ended, or the system forbids the change
+        os.setpriority(os.PRIO_PROCESS, pid, os.getpriority(os.PRIO_PROCESS, 0) + BEHIND)

@@ -55,10 +55,10 @@ def run(
     from lessons.recording.table import as_npz
 
     spec = _given(scene, urdf, tip, state)
-    if controller is not None:  # if given, it replaces the seed of the state code
+    if controller is not None:
         told = (each for each in spec.set if not each.startswith("controller="))
         spec = replace(spec, controller=controller, set=tuple(told))
-    seed = spec.seed if seed is None else seed
+    seed = spec.seed if seed is None else seed  # if given, it replaces the seed of the state code
     spec = replace(spec, duration=duration, seed=seed, tasks=task).admitting(*set)
     loaded = spec.prepared()
     if settings:

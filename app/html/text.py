@@ -116,8 +116,8 @@ _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def _power(value: float) -> str:
-    power = math.floor(math.log10(abs(value)))
-    return f"{value / 10.0**power:.2g}·10{str(power).translate(_RAISED)}"
+    mantissa, _, power = f"{value:.1e}".partition("e")  # rounds first, as the rounding may change the power
+    return f"{float(mantissa):g}·10{str(int(power)).translate(_RAISED)}"
 
 
 def free_name(wanted: str, taken: Sequence[str]) -> str:

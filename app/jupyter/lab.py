@@ -111,9 +111,9 @@ class Lab:
         self._until(lambda: _has(self.settings, path, value), f"'{path}' is not in force")
 
     def move(self, task: str, to: Sequence[float]) -> None:
-        """Moves a task's target, and returns when the controller has received it. to: position in m,
-        quaternion (x y z w) or joints in rad. Raises InputError for an unknown task and for invalid
-        numbers."""
+        """Moves a task's target, and returns when the target is in force, also while the robot is paused. to:
+        position in m, quaternion (x y z w) or joints in rad. Raises InputError for an unknown task and for
+        invalid numbers."""
         ready = self._ready()
         target = next((each.raw for each in ready.tasks if each.name == task and each.raw is not None), None)
         if target is None:
@@ -123,8 +123,15 @@ class Lab:
             raise InputError(f"the target of '{task}' has {target.size} finite numbers, and {to} were given")
         self._learner.send(Post(MoveTarget(task, value)))
         asked = self._learner.ask(_PATIENCE)  # answered after the target is in the mailbox
-        ticks = self._ticks()
-        self._until(lambda: asked is not None and self._ticks() != ticks, "the target did not arrive")
+        before = self._learner.status
+
+        def in_force() -> bool:  # a tick empties the mailbox; while paused, every report follows that
+            now = self._learner.status
+            if asked is None or now is None or now is before:
+                return False
+            return not now.running or before is None or now.ticks != before.ticks
+
+        self._until(in_force, "the target did not arrive")
 
     def rows(self) -> dict[str, Any]:
         """Returns the run since the last reset as arrays with the names of `himpc-lab run --npz`, 100 rows
@@ -149,10 +156,6 @@ class Lab:
 
     def __exit__(self, *_: object) -> None:
         self.stop()
-
-    def _ticks(self) -> int:
-        status = self._learner.status
-        return -1 if status is None else status.ticks
 
     def _ready(self) -> Ready:
         self._until(lambda: self._learner.status is not None, "the simulation does not answer")

@@ -17,7 +17,7 @@ from app.link.wire import Handle
 if TYPE_CHECKING:
     from himpc.plan import Binding
     from himpc.telemetry import Layout
-    from lessons.events import Event
+    from lessons.events import Event, MoveTarget
     from lessons.settings.settings import SceneSettings
     from robots import Robot
     from robots.world import World
@@ -27,9 +27,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Post:
-    """An event for the session's mailbox."""
+    """An event for the session's mailbox, and targets that take effect at the same control tick."""
 
     event: Event
+    also: tuple[MoveTarget, ...] = ()
 
 
 @dataclass(frozen=True)

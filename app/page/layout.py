@@ -16,13 +16,15 @@ from app.adapter.names import SHEET
 from app.client.ghost import GhostClient
 from app.client.moment import Moment, moment_of
 from app.client.progress import Notebook
+from app.client.simulation import Trouble
 from app.client.simulation_client import SimulationClient
-from app.client.trouble import Trouble
 from app.html.palette import level_colours, recoloured
 from app.link.choice import SceneChoice
 from app.link.messages import Post, Ready, Status
 from app.page.comfort import Comfort
-from app.page.ui import Context, face_for
+from app.page.scene_ui import Context, Face
+from app.page.torque_ui import TorqueFace
+from app.page.velocity_ui import VelocityFace
 from app.panels.lesson.course import Course
 from app.panels.run.active_constraints import BindingPanel
 from app.panels.run.compare import ComparePanel
@@ -43,11 +45,17 @@ from app.view.robot import RobotView
 from lessons.events import Event
 from lessons.own.folder import Folder
 from lessons.settings.settings import SceneSettings
+from lessons.settings.torque import TorqueSettings
+from lessons.settings.velocity import VelocitySettings
 
 _PHONE = f"<style>@media (max-width: 36em) {{ {SHEET} {{ width: 100vw !important }} }}</style>"
 """Makes viser's bottom sheet on a phone as wide as the screen; by default the sheet is narrower, with an
 empty strip beside it. The style applies while an HTML element that contains it is shown."""
 _HOTKEYS = ("1", "2", "3", "4", "5", "6", "7", "8", "9")
+_FACES: dict[type[SceneSettings], Callable[[Context], Face]] = {
+    TorqueSettings: TorqueFace,
+    VelocitySettings: VelocityFace,
+}
 
 
 class Stage:
@@ -275,3 +283,8 @@ def _floor(scene: viser.SceneApi, room: np.ndarray) -> viser.GridHandle:
         return scene.add_grid("/floor", width=4.0, height=4.0, cell_size=0.1, section_size=0.5)
     side = 2.0 * math.ceil(far + 1.0)
     return scene.add_grid("/floor", width=side, height=side, cell_size=0.5, section_size=1.0)
+
+
+def face_for(context: Context) -> Face:
+    """Returns the user interface for the kind of scene that is loaded."""
+    return _FACES[type(context.ready.settings)](context)

@@ -4,26 +4,25 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 import threading
 import time
 import traceback
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 import viser
 
 from app.adapter import private
 from app.client.progress import Notebook
+from app.client.simulation import Trouble
 from app.client.simulation_client import SimulationClient
-from app.client.trouble import Trouble
 from app.html.text import block, in_trouble
 from app.link.choice import SceneChoice
 from app.link.messages import Ready
-from app.page.cadence import Cadence
 from app.page.comfort import Comfort
-from app.page.fault import FaultNotice
 from app.panels.widgets.command import add_command
 from lessons.own.folder import Folder
 from lessons.scenes.names import ALL_SCENES
@@ -38,6 +37,11 @@ _BROKEN = (
 )
 
 _NOT_ITS_FILE = "This page may not open files of the machine that himpc-lab runs on."
+POSES, PLOTS, TEXTS = 30.0, 12.0, 3.75  # Hz, while simulated time is as fast as real time
+CALM = 6.0  # Hz, the rate of poses, plots and texts when the robot has stood still for STILL
+STILL = 1.0  # s
+LEAST = 1 / 3
+"""The smallest factor by which POSES and PLOTS are multiplied while simulated time is slowed down."""
 
 
 class Page:
@@ -288,3 +292,72 @@ class Page:
 
 def _words(error: Exception) -> str:
     return f"{type(error).__name__}: {error}"[:300]
+
+
+class FaultNotice:
+    """A notification at the top of the page. It stays until the code is corrected or the learner closes the
+    notification."""
+
+    def __init__(self, client: viser.ClientHandle) -> None:
+        self._client = client
+        self._said: str | None = None
+        self._shown: viser.NotificationHandle | None = None
+
+    def show(self, sentence: str | None) -> None:
+        """Shows the sentence of a fault; None removes the notification."""
+        if sentence == self._said:
+            return
+        self._said = sentence
+        # The notification is replaced, not updated. A closed notification would stay closed, and the new
+        # fault would not be shown.
+        if self._shown is not None:
+            self._shown.remove()
+        self._shown = None
+        if sentence is not None:
+            self._shown = self._client.add_notification("Your code", sentence, color="red")
+
+
+@final
+class Cadence:
+    """The rates of one page. Times are arguments, so that tests need no clock."""
+
+    def __init__(self) -> None:
+        self._shown: object = None
+        self._moved = -math.inf
+        self._share = 1.0
+        self._next_plots = self._next_texts = 0.0
+
+    def shown(self, instant: object, pace: float, now: float) -> float:
+        """Returns the time until the page should check for changes again, s.
+
+        Args:
+            instant: identifies the instant that is shown; None while no instant is shown.
+            pace: simulated seconds per real second if simulated time is slowed down, otherwise 1.
+            now: the present time, s.
+        """
+        if instant is None or instant != self._shown:
+            self._shown, self._moved = instant, now
+        self._share = min(1.0, max(LEAST, pace))
+        return 1 / CALM if self._calm(now) else 1 / (self._share * POSES)
+
+    def plots_due(self, now: float) -> bool:
+        """Returns whether the plots should be drawn now."""
+        if self._calm(now):
+            return True
+        if now < self._next_plots:
+            return False
+        # The page checks slightly too early or too late; this limit keeps the average rate.
+        late = now - 1 / (self._share * POSES)
+        self._next_plots = max(self._next_plots, late) + 1 / (self._share * PLOTS)
+        return True
+
+    def texts_due(self, now: float) -> bool:
+        """Returns whether the texts should be written now. Slowed simulated time does not reduce their
+        rate."""
+        if now < self._next_texts and not self._calm(now):
+            return False
+        self._next_texts = now + 1 / TEXTS
+        return True
+
+    def _calm(self, now: float) -> bool:
+        return now - self._moved > STILL

@@ -18,7 +18,7 @@ from app.panels.widgets.in_view import InView
 from app.panels.widgets.mirror import Bindings
 from app.panels.widgets.snapshot import SessionSnapshot
 from app.view.robot import RobotView
-from lessons.events import Event
+from lessons.events import Event, MoveTarget
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,9 +37,9 @@ class Context:
     dark: bool
     theme: Callable[[bool], None]
 
-    def post(self, event: Event) -> None:
-        """Puts an event into the session's mailbox."""
-        self.learner.send(Post(event))
+    def post(self, event: Event, *also: MoveTarget) -> None:
+        """Puts an event into the session's mailbox, with targets that take effect at the same tick."""
+        self.learner.send(Post(event, also))
 
     @property
     def settings(self) -> Any:

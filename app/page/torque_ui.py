@@ -24,14 +24,11 @@ from app.panels.torque.start import StartPanel
 from app.panels.torque.tasks import TasksPanel
 from app.panels.widgets.snapshot import SessionSnapshot
 from app.view.coordinates import draggable
-from app.view.cover import CoverView
-from app.view.drag import Hand
+from app.view.drag import Hand, TargetFrames
+from app.view.drag_target import Movable
 from app.view.ellipsoids import EllipsoidView
-from app.view.link_picker import LinkPicker
-from app.view.movable import Movable
 from app.view.pull import Pull
-from app.view.robot import RobotView, gizmo_size
-from app.view.target import TargetFrames
+from app.view.robot import CoverView, LinkPicker, RobotView, gizmo_size
 from app.view.targets import Targets
 from app.view.trails import Trails
 from app.view.world import ContactView, WorldView

@@ -24,15 +24,14 @@ from app.panels.velocity.start import BeginPanel, last_ball
 from app.panels.velocity.tasks import RolesPanel
 from app.panels.widgets.controls import Controls
 from app.panels.widgets.snapshot import SessionSnapshot
+from app.view.camera import FollowBase
 from app.view.coordinates import full
-from app.view.follow import FollowBase
+from app.view.drag import TargetFrames
+from app.view.drag_target import Movable
 from app.view.goals import Goals
-from app.view.movable import Movable
-from app.view.obstacles import Obstacles
-from app.view.reported import ReportedObstacles
+from app.view.obstacles import Obstacles, ReportedObstacles
 from app.view.robot import RobotView, gizmo_size, look_at
 from app.view.surroundings import Carried, People, ReachCircle
-from app.view.target import TargetFrames
 from app.view.trails import Trails
 from himpc.htmpc import base_joints
 from lessons.events import Appear, Set

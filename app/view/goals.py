@@ -13,13 +13,81 @@ from app.html.palette import RGB
 from app.html.text import free_name, quantity
 from app.link.messages import Ready, Status, TaskView
 from app.link.mission_view import MissionRow
-from app.view.goal import Goal
-from app.view.movable import Movable
+from app.view.drag_target import Gap, Handle, Movable
 from app.view.targets import Targets
 from lessons.events import Event, InsertTask, MoveTarget
 
+_BALL = 0.07  # m
+_DISC = 0.22  # m
+_GAP = 0.03  # m: shorter lines to the goal are not drawn
+_LIFT = 0.01  # m above the floor
 _THERE = 5e-3
 """Distance, m, below which a point has reached its goal."""
+
+
+class Goal:
+    """A ball, or a disc for a goal on the floor; a line from the controlled point; a label; and, if the goal
+    can be dragged, arrows along the world's axes."""
+
+    def __init__(
+        self,
+        scene: viser.SceneApi,
+        role: str,
+        axes: str,
+        colour: RGB,
+        start: np.ndarray,
+        size: float,
+        moved: Callable[[np.ndarray], None] | None,
+    ) -> None:
+        """start (3,): initial position, m; size: of the arrows, m; moved: called with the goal (3,), m, after
+        each move; None if the goal cannot be dragged."""
+        floor = "z" not in axes
+        self._lift = np.array([0.0, 0.0, _LIFT if floor else 0.0])
+        self._axes, self._moved = axes, moved
+        node = f"/goal/{role}"
+        position = start + self._lift
+        self._handle: Handle | None = None
+        if moved is None:
+            self._node = scene.add_frame(node, show_axes=False, position=position)
+        else:
+            self._handle = Handle(scene, node, axes, size, lambda: moved(self.place()), position=position)
+            self._node = self._handle.control
+        if floor:
+            scene.add_cylinder(
+                f"{node}/disc", radius=_DISC, height=0.015, color=colour, opacity=0.6, cast_shadow=False
+            )
+        else:
+            scene.add_icosphere(f"{node}/ball", radius=_BALL, color=colour, opacity=0.8, cast_shadow=False)
+        self._label = scene.add_label(f"{node}/label", role, position=(0.0, 0.0, 0.9 * size + 0.06))
+        self._gap = Gap(scene, f"/gap/{role}", colour, 0.008, _GAP)
+
+    def put(self, place: np.ndarray) -> None:
+        """Moves the goal as its arrows do, along the directions of the arrows only."""
+        if self._moved is not None and self._handle is not None:
+            active = ["xyz".index(axis) for axis in self._axes]
+            at = self.place()
+            at[active] = place[active]
+            self._handle.touch()
+            self._node.position = at + self._lift
+            self._moved(at)
+
+    def place(self) -> np.ndarray:
+        """Returns the position of the goal, (3,) m."""
+        return np.array(self._node.position, float) - self._lift
+
+    def follow(self, goal: np.ndarray | None, text: str) -> None:
+        """Updates the goal and its label. goal: the session's goal, (3,) m; None if the session has no goal;
+        the goal then stays at the position to which it was dragged."""
+        if self._label.text != text:
+            self._label.text = text
+        if goal is None or (self._handle is not None and self._handle.held):
+            return
+        if not np.allclose(goal, self.place(), rtol=0.0, atol=1e-4):
+            self._node.position = goal + self._lift
+
+    def reach_from(self, point: np.ndarray) -> None:
+        """Draws the line from the controlled point (3,), m, to the goal."""
+        self._gap.show(point + self._lift, self.place() + self._lift)
 
 
 def point(values: Sequence[float] | np.ndarray) -> np.ndarray:
@@ -124,11 +192,11 @@ class Goals:
         """Returns the goals, which can be moved without a mouse: positions first, then orientations."""
         free = {name: task for name, task in self._roles.items() if task.raw is not None}
         return [
-            *(Movable(name, goal.where, goal.put) for name, goal in self._goals.items() if name in free),
+            *(Movable(name, goal.place, goal.put) for name, goal in self._goals.items() if name in free),
             *self._rings.movables(),
         ]
 
     @property
     def places(self) -> dict[str, np.ndarray]:
         """The position at which each goal is drawn, (3,) m."""
-        return {name: goal.place for name, goal in self._goals.items()}
+        return {name: goal.place() for name, goal in self._goals.items()}

@@ -1,24 +1,30 @@
-"""The obstacles that the robot avoids, with arrows for dragging them."""
+"""The obstacles that the robot avoids, with arrows for dragging them, and those whose reported place is
+wrong."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from itertools import product
 
 import numpy as np
 import viser
 import viser.transforms as vtf
 
-from app.client.pending_edit import HOLD
 from app.html.palette import RGB
+from app.view.drag_target import Handle
 from robots.collision import Ball, Box, Floor, Obstacle
 
 _COLOUR: RGB = (180, 120, 110)
 _ARROWS = 0.35  # m: how far the arrows extend beyond the obstacle
 
 Moved = Callable[[str, tuple[float, float, float]], None]
+_WRONG: RGB = (150, 40, 30)
+_FILL = 0.12
+_LINE = 3.0  # pixels
+_ABOVE = 0.08  # m: height of a name above its obstacle
+
+Pair = tuple[Ball | Box, Ball | Box]
 
 
 class Obstacles:
@@ -52,11 +58,9 @@ def _shapes(obstacles: tuple[Ball | Box, ...]) -> tuple[Ball | Box, ...]:
 
 
 class _Solid:
-    """One obstacle. The user's drag has priority: for a moment after it, `follow` does not move the
-    obstacle."""
+    """One obstacle with its arrows."""
 
     def __init__(self, scene: viser.SceneApi, index: int, obstacle: Ball | Box, moved: Moved) -> None:
-        self._touched = -float("inf")
         self._body: viser.BoxHandle | viser.IcosphereHandle
         if isinstance(obstacle, Box):
             turn = vtf.SO3.from_z_radians(obstacle.yaw).wxyz
@@ -78,32 +82,28 @@ class _Solid:
                 cast_shadow=False,
             )
             size = obstacle.radius
-        self._arrows = scene.add_transform_controls(
+        self._name, self._moved = obstacle.name, moved
+        self._handle = Handle(
+            scene,
             f"/obstacle_arrows/{index}",
-            scale=size + _ARROWS,
+            "xyz",
+            size + _ARROWS,
+            self._dragged,
             position=obstacle.centre,
-            disable_rotations=True,
             disable_sliders=True,
-            depth_test=False,
             line_width=2.0,
         )
-        self._arrows.on_update(self._listener(obstacle.name, moved))
+        self._arrows = self._handle.control
 
-    def _listener(
-        self, name: str, moved: Moved
-    ) -> Callable[[viser.TransformControlsEvent], Coroutine[Any, Any, None]]:
-        async def hear(_: viser.TransformControlsEvent) -> None:
-            self._touched = time.monotonic()
-            x, y, z = (float(value) for value in self._arrows.position)
-            self._body.position = (x, y, z)
-            moved(name, (x, y, z))
-
-        return hear
+    def _dragged(self) -> None:
+        x, y, z = (float(value) for value in self._arrows.position)
+        self._body.position = (x, y, z)
+        self._moved(self._name, (x, y, z))
 
     def follow(self, obstacle: Ball | Box, arrows: bool) -> None:
         if self._arrows.visible != arrows:
             self._arrows.visible = arrows
-        if time.monotonic() - self._touched < HOLD:
+        if self._handle.held:
             return
         for handle in (self._body, self._arrows):
             if not np.allclose(obstacle.centre, handle.position, rtol=0.0, atol=1e-4):
@@ -112,3 +112,73 @@ class _Solid:
     def remove(self) -> None:
         self._body.remove()
         self._arrows.remove()
+
+
+class ReportedObstacles:
+    """The elements exist on the page only while a report differs from the true place."""
+
+    def __init__(self, scene: viser.SceneApi) -> None:
+        self._scene = scene
+        self._shown: list[Pair] = []
+        self._nodes: list[viser.SceneNodeHandle] = []
+
+    def show(self, obstacles: tuple[Obstacle, ...], reported: tuple[Obstacle, ...]) -> None:
+        """obstacles: the true obstacles; reported: the obstacles that the controller gets, with the same
+        names."""
+        true = {each.name: each for each in obstacles if not isinstance(each, Floor)}
+        told = [each for each in reported if not isinstance(each, Floor) and each.name in true]
+        pairs = [(true[each.name], each) for each in told if true[each.name] != each]
+        if pairs == self._shown:
+            return
+        self._shown = pairs
+        for node in self._nodes:
+            node.remove()
+        self._nodes = [node for index, pair in enumerate(pairs) for node in self._draw(index, *pair)]
+
+    def _draw(self, index: int, true: Ball | Box, told: Ball | Box) -> list[viser.SceneNodeHandle]:
+        scene, node = self._scene, f"/reported/{index}"
+        turn = vtf.SO3.from_z_radians(told.yaw if isinstance(told, Box) else 0.0).wxyz
+        root = scene.add_frame(node, show_axes=False, position=told.centre, wxyz=turn)
+        if isinstance(told, Box):
+            scene.add_box(
+                f"{node}/fill", color=_WRONG, dimensions=told.size, opacity=_FILL, cast_shadow=False
+            )
+            scene.add_line_segments(
+                f"{node}/outline", _edges(told), _WRONG, thickness=_LINE, thickness_units="screen"
+            )
+        else:
+            scene.add_icosphere(
+                f"{node}/fill", radius=told.radius, color=_WRONG, opacity=_FILL, cast_shadow=False
+            )
+            scene.add_icosphere(
+                f"{node}/outline",
+                radius=told.radius,
+                color=_WRONG,
+                subdivisions=2,
+                wireframe=True,
+                cast_shadow=False,
+            )
+        # The reported obstacle is named at its foot and the true obstacle at its top. The names do not hide
+        # each other.
+        names = [
+            scene.add_label(
+                f"{node}_name/told", f"{told.name}, as reported", position=_end(told, -1), anchor="top-center"
+            ),
+            scene.add_label(f"{node}_name/true", true.name, position=_end(true, 1), anchor="bottom-center"),
+        ]
+        return [root, *names]
+
+
+def _edges(box: Box) -> np.ndarray:
+    """Returns the twelve edges of a box about its centre, (12, 2, 3) m."""
+    corners = 0.5 * np.array(box.size) * np.array(list(product((-1.0, 1.0), repeat=3)))
+    pairs = [(a, b) for a in range(8) for b in range(a + 1, 8) if (a ^ b).bit_count() == 1]
+    return corners[np.array(pairs)].astype(np.float32)
+
+
+def _end(obstacle: Ball | Box, side: int) -> tuple[float, float, float]:
+    """Returns a point on the vertical line through the centre, m: the obstacle's lowest point (side −1), or a
+    point above its top (side 1)."""
+    x, y, z = obstacle.centre
+    half = 0.5 * obstacle.size[2] if isinstance(obstacle, Box) else obstacle.radius
+    return x, y, z + side * half + max(side, 0) * _ABOVE

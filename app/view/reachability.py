@@ -4,6 +4,7 @@ answered."""
 from __future__ import annotations
 
 import threading
+import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -30,16 +31,17 @@ class Question:
 class Reachability:
     """accepted: the target's position, or the nearest reachable position that was found; missing: distance
     between the two positions, m; turned_away: orientation error at the accepted position, rad (0 if no
-    orientation was requested)."""
+    orientation was requested); fault: why the target could not be checked, else ""."""
 
     question: Question
     accepted: np.ndarray
     missing: float
     turned_away: float
+    fault: str = ""
 
     @property
     def reachable(self) -> bool:
-        return self.missing == 0.0
+        return self.missing == 0.0 and not self.fault
 
 
 class ReachabilityWorker:
@@ -52,7 +54,8 @@ class ReachabilityWorker:
         answer: Callable[[Reachability], None],
     ) -> None:
         """place: called with the accepted position, (3,) m, as soon as it is known; answer: called with the
-        complete verdict afterwards. Both are called on this worker's thread."""
+        complete verdict afterwards. Both are called on this worker's thread. If a check fails, only `answer`
+        is called, and the next question is checked as usual."""
         self._robot = robot
         self._place, self._answer = place, answer
         self._wake = threading.Condition()
@@ -77,25 +80,34 @@ class ReachabilityWorker:
             return None if self._closed else question
 
     def _work(self) -> None:
-        judge = ReachJudge(self._robot)
-        data = self._robot.model.createData()
         q = self._robot.home
         while (question := self._next()) is not None:
-            # The initial guess is the last posture, as a dragged target moves little between two questions.
-            found = judge.solve(question.position, None, q, question.frame)
-            q = found.q
-            accepted, missing = question.position, 0.0
-            if not found.reachable:
-                pin.forwardKinematics(self._robot.model, data, found.q)
-                frame = self._robot.frame_id(question.frame)
-                accepted = pin.updateFramePlacement(self._robot.model, data, frame).translation.copy()
-                missing = found.position_error
-            self._place(question, accepted)
-            turned = 0.0
-            if question.rotation is not None:
-                pose = judge.solve(accepted, question.rotation, q, question.frame)
-                if not pose.reachable:
-                    turned = max(pose.rotation_error, np.radians(1.0))
-                elif missing == 0.0:
-                    q = pose.q
-            self._answer(Reachability(question, accepted, missing, turned))
+            try:
+                q = self._check(question, q)
+            except Exception as error:  # without an answer, no later drag would move the robot
+                traceback.print_exc()
+                q, fault = self._robot.home, f"{type(error).__name__}: {error}"
+                self._answer(Reachability(question, question.position, 0.0, 0.0, fault))
+
+    def _check(self, question: Question, q: np.ndarray) -> np.ndarray:
+        """Answers a question; returns the posture from which the next check begins, as a dragged target moves
+        little between two questions."""
+        model, judge = self._robot.model, ReachJudge(self._robot)
+        found = judge.solve(question.position, None, q, question.frame)
+        q = found.q
+        accepted, missing = question.position, 0.0
+        if not found.reachable:
+            data, frame = model.createData(), self._robot.frame_id(question.frame)
+            pin.forwardKinematics(model, data, q)
+            accepted = pin.updateFramePlacement(model, data, frame).translation.copy()
+            missing = found.position_error
+        self._place(question, accepted)
+        turned = 0.0
+        if question.rotation is not None:
+            pose = judge.solve(accepted, question.rotation, q, question.frame)
+            if not pose.reachable:
+                turned = max(pose.rotation_error, np.radians(1.0))
+            elif missing == 0.0:
+                q = pose.q
+        self._answer(Reachability(question, accepted, missing, turned))
+        return q

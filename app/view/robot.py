@@ -1,8 +1,8 @@
-"""The robot's links, placed by poses from the simulation."""
+"""The robot's links, placed by poses from the simulation; on request with their capsules, and clickable."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import pinocchio as pin
@@ -12,6 +12,8 @@ from app.adapter import private
 from app.html.palette import RGB
 from app.view.camera import look, turn
 from robots import Robot
+from robots.covering.cover_of import cover_of
+from robots.shapes.capsules import cover_parts
 from robots.shapes.link_shapes import link_shapes
 
 _STILL = 1e-4
@@ -19,6 +21,7 @@ _STILL = 1e-4
 The number applies to the position, m, and to each component of the quaternion."""
 _ARROW = 1.2
 """Length of an arrow with its head, as a multiple of the gizmo's size."""
+_OPACITY = 0.35
 
 
 class RobotView:
@@ -132,3 +135,62 @@ def look_at(camera: viser.CameraHandle, robot: Robot, base: np.ndarray) -> None:
     """Turns the camera to a robot. base: position of the robot's base, (3,) m."""
     eye, at, _ = camera_for(robot)
     turn(camera, eye + base, at + base)
+
+
+class LinkPicker:
+    """Makes links clickable on request only, as a clickable link hides objects behind it from the mouse."""
+
+    def __init__(self, view: RobotView, robot: Robot, chosen: Callable[[str], None]) -> None:
+        """chosen: called with the name of the link that was clicked."""
+        self._links, self._chosen, self._on = view.links, chosen, False
+        self._names: dict[int, str] = {}
+        for name in robot.frames:
+            self._names.setdefault(robot.model.frames[robot.frame_id(name)].parentJoint, name)
+
+    def follow(self, on: bool) -> None:
+        """on: whether links can be clicked."""
+        if on == self._on:
+            return
+        self._on = on
+        for joint, mesh in self._links:
+            if on and joint in self._names:
+                self._attach(mesh, self._names[joint])
+            else:
+                mesh.remove_click_callback("all")
+
+    def _attach(self, mesh: viser.MeshHandle, name: str) -> None:
+        @mesh.on_click
+        async def _(_: object) -> None:
+            self._chosen(name)
+
+
+class CoverView:
+    """One translucent mesh per body. A mesh is a child of the body's frame and moves with the links of
+    `RobotView`. Meshes are created when they are first shown."""
+
+    def __init__(self, scene: viser.SceneApi, robot: Robot, root: str = "/robot") -> None:
+        """root: name of the robot's node."""
+        self._scene, self._robot, self._root = scene, robot, root
+        self._nodes: list[viser.MeshHandle] | None = None
+        self._on = False
+
+    def draw(self, on: bool) -> None:
+        """on: whether the meshes are shown."""
+        if on == self._on:
+            return
+        self._on = on
+        if self._nodes is None:
+            self._nodes = [
+                self._scene.add_mesh_simple(
+                    f"{self._root}/{part.joint or 'base'}/cover",
+                    part.vertices,
+                    part.faces,
+                    color=part.colour,
+                    opacity=_OPACITY,
+                    cast_shadow=False,
+                    receive_shadow=False,
+                )
+                for part in cover_parts(cover_of(self._robot))
+            ]
+        for node in self._nodes:
+            node.visible = on

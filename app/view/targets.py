@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 import pinocchio as pin
 import viser
 import viser.transforms as vtf
 
-from app.client.pending_edit import HOLD, Send
+from app.client.pending_edit import Send
 from app.html.palette import BOUND, RGB
 from app.link.messages import Ready, TaskView
 from app.view.coordinates import draggable, full, of_task, xyzw
-from app.view.movable import Movable, turned
+from app.view.drag_target import Gap, Handle, Movable, turned
 from lessons.events import MoveTarget
 from robots import Robot
 
@@ -62,8 +60,7 @@ class Targets:
 
 
 class _Target:
-    """Arrows or rings, a mark, and a label. The user's drag has priority: for a moment after it, `follow`
-    does not move the target."""
+    """Arrows or rings, a mark, and a label."""
 
     def __init__(
         self,
@@ -76,23 +73,13 @@ class _Target:
         post: Send,
     ) -> None:
         self.name, self.task, self._robot, self._post = task.name, task, robot, post
-        self._touched = -float("inf")
         self._home = np.array(pin.centerOfMass(robot.model, robot.model.createData(), robot.home))
         node = f"/targets/{task.name}"
         self._base = scene.add_frame(node, show_axes=False)
         turning, flat = task.kind in _TURNING, task.kind == "plane_distance"
         along = "xyz" if task.kind == "pointing" else "x" if flat else task.axes
-        x, y, z = (axis in along for axis in "xyz")
-        self._control = scene.add_transform_controls(
-            f"{node}/control",
-            scale=size,
-            active_axes=(x, y, z),
-            disable_axes=turning,
-            disable_sliders=turning,
-            disable_rotations=not turning,
-            depth_test=False,
-            line_width=3.0,
-        )
+        self._handle = Handle(scene, f"{node}/control", along, size, self._moved, rings=turning)
+        self._control = self._handle.control
         mark = f"{node}/control/mark"
         if flat:
             scene.add_box(
@@ -102,17 +89,11 @@ class _Target:
             scene.add_icosphere(mark, radius=_BALL, color=colour, opacity=0.8, cast_shadow=False)
         above = (0.65 if turning or "z" not in along else 1.0) * size + 0.04
         scene.add_label(f"{node}/control/label", task.name, position=(0.0, 0.0, above))
-        self._gap = scene.add_line_segments(
-            f"/gaps/{task.name}", np.zeros((1, 2, 3), np.float32), colour, thickness=0.005, visible=False
-        )
+        self._gap = Gap(scene, f"/gaps/{task.name}", colour, 0.005, _BALL)
         self.follow(poses, task.raw, True)
 
-        @self._control.on_update
-        async def _(_: viser.TransformControlsEvent) -> None:
-            self._moved()
-
     def _moved(self) -> None:
-        self._touched = time.monotonic()
+        self._handle.touch()
         self._post(MoveTarget(self.name, self._value()))
 
     def movable(self) -> Movable:
@@ -153,7 +134,7 @@ class _Target:
         if self._control.visible != shown:
             self._control.visible = shown
         _put(self._base, base.translation, base.rotation)
-        if raw is None or time.monotonic() - self._touched < HOLD:
+        if raw is None or self._handle.held:
             return
         here = base.actInv(frame)
         if task.kind in _TURNING:
@@ -166,18 +147,8 @@ class _Target:
             else_ = self._home if task.kind == "com" else here.translation
             at = raw if task.kind == "pointing" else full(task, raw, else_)
             _put(self._control, at, np.eye(3))
-            self._reach(frame.translation, base.act(at))
-
-    def _reach(self, point: np.ndarray, goal: np.ndarray) -> None:
-        """Draws the line from the frame to its target."""
-        if self.task.kind == "com":
-            return
-        ends = np.array([[point, goal]], np.float32)
-        shown = bool(np.linalg.norm(point - goal) > _BALL)
-        if self._gap.visible != shown:
-            self._gap.visible = shown
-        if shown and not np.allclose(ends, self._gap.points, rtol=0.0, atol=1e-3):
-            self._gap.points = ends
+            if task.kind != "com":
+                self._gap.show(frame.translation, base.act(at))
 
     def remove(self) -> None:
         self._base.remove()

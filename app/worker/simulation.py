@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import math
+from dataclasses import dataclass, replace
 from typing import Any, final
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from app.link.choice import SceneChoice
 from app.link.inside import InsideRequest
 from app.link.messages import (
+    Begin,
     Command,
     Lead,
     Load,
@@ -21,6 +23,7 @@ from app.link.messages import (
     Report,
     ResetAll,
     RunStep,
+    Script,
     Speed,
     Status,
     StepTicks,
@@ -29,16 +32,92 @@ from app.link.messages import (
     WaitAt,
 )
 from app.link.ring import Block
-from app.worker.leader import Leader
-from app.worker.loaded import Loaded, loaded_from
+from app.worker.lecturer import Lecturer
 from app.worker.outlet import Outlet
-from app.worker.reports.start import start
+from app.worker.reports.start import SessionReport, start
 from app.worker.state_code import StateCode
 from lessons.events import Reset, Set
 from lessons.scenes.scene import Scene
 from lessons.session.session import Session
+from lessons.settings.assignments import parse_assignment
 from lessons.settings.settings import SceneSettings
 from robots import InputError
+
+
+class Leader:
+    """The events for a ghost. Before `begin` there is no ghost. Afterwards the ghost receives all events that
+    took effect, in order."""
+
+    def __init__(self) -> None:
+        self.on = False
+        self.until = math.inf
+        self._begin: Begin | None = None
+        self._told = 0
+        self._t = math.nan
+
+    def begin(self, choice: SceneChoice, session: Session) -> None:
+        """Called when the session has just been reset and the ghost begins. The simulation then waits until
+        the ghost has started."""
+        self.on, self.until = True, 0.0
+        self._begin = Begin(choice, session.settings)
+        self._told = len(session.log)
+
+    def end(self) -> None:
+        """Called when the ghost no longer follows."""
+        self.on, self.until = False, math.inf
+
+    def waits(self, t: float) -> bool:
+        """Returns whether a step to time t (s) would leave the ghost too far behind."""
+        return t > self.until + 1e-9
+
+    def script(self, session: Session) -> Script | None:
+        """Returns the events and the time reached since the last call; None if nothing has changed."""
+        if not self.on:
+            return None
+        begin, self._begin = self._begin, None
+        events = tuple(session.log[self._told :])
+        if begin is None and not events and session.t == self._t:
+            return None
+        self._told += len(events)
+        self._t = session.t
+        return Script(events, session.t, begin)
+
+
+@dataclass(frozen=True, eq=False)
+class Loaded:
+    """A scene at its start, which has passed all checks. mine: the learner's changes; before: the settings of
+    the scene before any assignment, None if they are not known; left_out: for each task of a file that is not
+    offered, the reason."""
+
+    choice: SceneChoice
+    scene: Scene
+    run: SessionReport
+    lecturer: Lecturer | None
+    mine: tuple[Post, ...]
+    before: SceneSettings | None = None
+    left_out: tuple[str, ...] = ()
+
+    def looks_like(self, choice: SceneChoice, session: Session) -> bool:
+        """Returns whether this is a step of the running lesson and looks the same. The page need not be
+        rebuilt then."""
+        then, now = choice.exercise, self.choice.exercise
+        if then is None or now is None or then.lesson != now.lesson:
+            return False
+        return self.run.session.layout == session.layout
+
+
+def loaded_from(choice: SceneChoice, scene: Scene | None, judged: bool) -> Loaded:
+    """Loads a scene. scene: replaces the scene of the choice; judged: whether the claims are judged, if the
+    choice is a step of a lesson. Raises InputError for a scene or robot that cannot be loaded."""
+    left_out: tuple[str, ...] = ()
+    before = None
+    if scene is None:
+        choice, scene, before, left_out = choice.fitted()
+    run = start(scene, choice.run.seed)
+    mine = tuple(Post(Set(*parse_assignment(each))) for each in choice.mine)
+    step = choice.exercise if judged else None
+    lecturer = None if step is None else Lecturer(step, run.session, choice.run.seed)
+    return Loaded(choice.resolved(), scene, run, lecturer, mine, before, left_out)
 
 
 @final
@@ -119,10 +198,11 @@ class SimulationRunner:
                 self.session.notices.append(
                     "The stack cannot be changed in a lesson: load its scene in the tab Robot."
                 )
-            case Post(event):
-                self.session.post(event)
-                if lecturer is not None:
-                    lecturer.touch(event)
+            case Post(event, also):
+                for each in (event, *also):
+                    self.session.post(each)
+                    if lecturer is not None:
+                        lecturer.touch(each)
             case RunStep(own, fast):
                 self._begin(own, fast)
             case Play(True) if lecturer is not None and lecturer.waiting:

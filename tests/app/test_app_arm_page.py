@@ -24,8 +24,7 @@ from app.arm.model import Model
 from app.arm.prepared import nominal, prepared
 from app.arm.shown import DEAF, GONE, LEFT, ONLY_TARGETS, PRESSED, STOPPED, Shown
 from app.client.moment import moment_of
-from app.client.refused import ARM_AGAIN, ARM_GHOST
-from app.client.simulation_client import SimulationClient
+from app.client.simulation_client import ARM_AGAIN, ARM_GHOST, SimulationClient
 from app.link.children import forked_here
 from app.link.choice import SceneChoice
 from app.link.forkserver import ForkServer

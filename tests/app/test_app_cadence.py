@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.page.cadence import CALM, LEAST, PLOTS, POSES, STILL, TEXTS, Cadence
+from app.page.page import CALM, LEAST, PLOTS, POSES, STILL, TEXTS, Cadence
 
 
 def looks(cadence: Cadence, begin: float, end: float, moves: bool, pace: float) -> tuple[float, float, float]:

@@ -19,8 +19,7 @@ from websockets.sync.client import ClientConnection, connect
 from app.__main__ import main
 from app.classes.newcomers import PER_MINUTE, Newcomers
 from app.classes.words import LONGEST, ONLY_HERE
-from app.client.refused import STAYING
-from app.client.simulation_client import SimulationClient
+from app.client.simulation_client import STAYING, SimulationClient
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
 from app.server.greeting import greeting

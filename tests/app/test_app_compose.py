@@ -12,7 +12,7 @@ from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.messages import Post
 from app.link.process import wait_until
-from app.panels.torque.add_task import AddTask
+from app.panels.torque.task_editor import AddTask
 from app.server.server import PageServer
 from browsing.wire import Wire
 from himpc.tasks.axes import OnAxes

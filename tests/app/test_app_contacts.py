@@ -11,7 +11,7 @@ import pytest
 from app.link.choice import SceneChoice
 from app.link.messages import ContactPoint, Post
 from app.panels.torque.plots import touching
-from app.view.cover import CoverView
+from app.view.robot import CoverView
 from app.view.world import ContactView, WorldView
 from app.worker.simulation import SimulationRunner
 from lessons.events import MoveTarget

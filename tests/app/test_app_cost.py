@@ -12,7 +12,7 @@ from viser import ClientHandle
 from websockets.sync.connection import Connection
 
 from app.adapter import private
-from app.client.decimate import decimate
+from app.client.decimated import decimate
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.process import wait_until

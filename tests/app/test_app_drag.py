@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from queue import Queue
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
 
 from app.link.choice import SceneChoice
-from app.link.messages import Ready
+from app.link.messages import Post, Ready
+from app.panels.torque.start import StartPanel
 from app.view import drag
 from app.view.drag import Hand
-from app.view.reachability import Question, Reachability
+from app.view.reachability import Question, Reachability, ReachabilityWorker
 from app.worker.simulation import SimulationRunner
 from lessons.events import Event, MoveTarget
 from lessons.scenes.run_spec import RunSpec
+from robots.reach import ReachJudge
 
 FAR = np.array([5.0, 0.0, 0.0])
 TIP = np.array([0.4, 0.0, 0.6, 1.0, 0.0, 0.0, 0.0])
@@ -71,7 +75,7 @@ class Held:
     """A dragged target with its scene and the events that it posted."""
 
     def __init__(self, ready: Ready, clamp: bool) -> None:
-        self.posted: list[Event] = []
+        self.posted: list[tuple[Event, ...]] = []
         self.waiting: list[tuple[float, Callable[[], None]]] = []
         self.scene: Any = Scene()
         self.targets = {task.name: task.raw for task in ready.tasks if task.raw is not None}
@@ -84,7 +88,7 @@ class Held:
             self.targets,
             TIP,
             0.2,
-            self.posted.append,
+            lambda *events: self.posted.append(events),
             lambda: clamp,
             lambda: None,
             lambda seconds, then: self.waiting.append((seconds, then)),
@@ -97,9 +101,11 @@ class Held:
         self.scene.moved()
 
     def take(self) -> dict[str, tuple[float, ...]]:
-        """Returns the targets posted since the last call, by task."""
-        posted = {each.task: each.value for each in self.posted if isinstance(each, MoveTarget)}
-        assert len(posted) == len(self.posted)
+        """Returns the targets posted since the last call, by task. They are posted together."""
+        assert len(self.posted) <= 1
+        events = [each for together in self.posted for each in together]
+        posted = {each.task: each.value for each in events if isinstance(each, MoveTarget)}
+        assert len(posted) == len(events)
         self.posted.clear()
         return posted
 
@@ -124,6 +130,47 @@ def test_without_the_clamp_nothing_waits(held: Callable[[bool], Held]) -> None:
     assert one.take() == {"position": (5.0, 0.0, 0.0), "orientation": pytest.approx((1.0, 0.0, 0.0, 0.0))}
     one.judge.place(one.judge.asked[-1], np.ones(3))
     assert one.take() == {} and one.waiting == []
+
+
+def test_position_and_orientation_of_a_drag_act_at_one_tick(held: Callable[[bool], Held]) -> None:
+    """One message contains both, so that no tick can come between them."""
+    one = held(False)
+    one.drag(np.array([0.5, 0.1, 0.5]))
+    ((first, *also),) = one.posted
+    body = SimulationRunner(SceneChoice(RunSpec("iiwa14-hold")))
+    body.tick(3)
+    body.handle(Post(first, tuple(each for each in also if isinstance(each, MoveTarget))))
+    body.tick()
+    assert [(t, event.task) for t, event in body.session.log if isinstance(event, MoveTarget)] == [
+        (pytest.approx(0.003), "position"),
+        (pytest.approx(0.003), "orientation"),
+    ]
+    body.close()
+
+
+def test_a_check_that_fails_is_told_of_and_the_next_one_works(
+    ready: Ready, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """The panel says that the target could not be checked. The controller gets no target that was not
+    checked, and a later drag moves the robot again."""
+    placed: list[np.ndarray] = []
+    answers: Queue[Reachability] = Queue()
+    worker = ReachabilityWorker(ready.robot, lambda _, place: placed.append(place), answers.put)
+    here = Question(TIP[:3], None, ready.robot.tip)
+    with monkeypatch.context() as patch:
+        patch.setattr(ReachJudge, "solve", lambda *_: 1 / 0)
+        worker.ask(here)
+        verdict = answers.get(timeout=30.0)
+    assert not verdict.reachable and not placed
+    panel = MagicMock()
+    for clamped, words in ((True, "switch off Keep within reach"), (False, "your point unchanged")):
+        StartPanel.show_verdict(panel, verdict, clamped)
+        assert "could not be checked (ZeroDivisionError" in panel._where.content
+        assert words in panel._where.content
+    worker.ask(here)
+    assert answers.get(timeout=30.0).reachable and np.allclose(placed, TIP[:3])
+    worker.close()
+    assert "ZeroDivisionError" in capfd.readouterr().err
 
 
 def test_within_reach_both_come_when_the_judge_answers(held: Callable[[bool], Held]) -> None:

@@ -7,7 +7,7 @@ from html import escape
 import pytest
 
 from app.html.text import figure, formula, readable
-from app.panels.lesson.exercise_cards import belonging_to, card, exercise_cards
+from app.panels.lesson.cards import belonging_to, card, exercise_cards
 from lessons.course import COURSE
 from lessons.exercises import EXERCISES, load_exercise, start_of
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import socket
 from collections.abc import Callable, Iterator
@@ -17,10 +18,12 @@ from app.link.forkserver import ForkServer
 from app.link.messages import Lead, Load, Play, Post, ResetAll, Script, WaitAt
 from app.link.process import wait_until
 from app.link.spares import Spares
-from app.link.wire import Wire
+from app.link.wire import Wire as Line
+from app.server.server import PageServer
 from app.server.sessions import WORKER
 from app.worker.ghost import GhostBody
 from app.worker.simulation import SimulationRunner
+from browsing.wire import Wire, eventually
 from lessons.events import Push, Reset, Set
 from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.lesson import Ghost
@@ -177,7 +180,7 @@ def test_a_scene_that_comes_too_late_leaves_no_memory(start: Callable[[str], Sim
     learner = start("planar3-hold")
     learner.close()
     late = SimulationRunner(SceneChoice(RunSpec("planar3-hold")))
-    here, there = (Wire(end) for end in socket.socketpair())
+    here, there = (Line(end) for end in socket.socketpair())
     there.send(late.ready())
     ready = here.recv()
     assert os.fstat(ready.block.number)
@@ -204,3 +207,29 @@ def test_a_ghost_goes_along_to_another_scene(start: Callable[[str], SimulationCl
         LONG,
     )
     assert learner.ghost is ghost and learner.choice.run.scene == "iiwa14-hold"
+
+
+@pytest.mark.usefixtures("one_fork_server")
+def test_a_button_that_starts_a_process_does_not_hold_up_other_pages(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It starts the process on a thread: on viser's loop, all pages would wait for it."""
+    waits: list[bool] = []
+
+    def start_ghost(*_: object) -> None:
+        try:
+            asyncio.get_running_loop()
+        except RuntimeError:
+            waits.append(False)
+        else:
+            waits.append(True)
+
+    monkeypatch.setattr(SimulationClient, "start_ghost", start_ghost)
+    server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
+    try:
+        with Wire(server.link) as page:
+            assert eventually(lambda: page.find("Start the ghost") is not None, LONG)
+            page.write(str(page.find("Ghost's controller")), value="osf")
+            page.write(str(page.find("Start the ghost")), value=True)
+            assert eventually(lambda: bool(waits))
+    finally:
+        server.close()
+    assert waits == [False]

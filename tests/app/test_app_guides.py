@@ -10,7 +10,7 @@ import pytest
 
 from app.html.palette import css, level_colours
 from app.link.messages import TaskView
-from app.panels.torque.guide import guide, spoken
+from app.panels.torque.start import guide, spoken
 from app.panels.velocity.start import guide as velocity_guide
 from app.view.coordinates import draggable
 from app.worker.reports.start import TorqueRun, start

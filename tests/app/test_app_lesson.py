@@ -13,7 +13,7 @@ import pytest
 from app.link.choice import SceneChoice
 from app.link.exercise import Lecture, LessonPlace, SignalCurve
 from app.link.messages import Command, Load, LoadRefused, Play, Post, Predict, Ready, ResetAll, RunStep
-from app.worker.lesson.rows import BUCKETS, LessonRows, thinned
+from app.worker.lecturer import BUCKETS, LessonRows, thinned
 from app.worker.simulation import SimulationRunner
 from himpc.telemetry import Layout
 from lessons.course import COURSE, load_lesson
@@ -154,7 +154,7 @@ def test_what_is_refused_leaves_everything_as_it_was(learn: Start, monkeypatch: 
     for name, place in (("deadlines", 2), ("one-task", 0)):
         choice = SceneChoice.of_lesson(LessonPlace(name, place))
         with monkeypatch.context() as patch:
-            patch.setattr("app.worker.loaded.Lecturer", refuse)
+            patch.setattr("app.worker.simulation.Lecturer", refuse)
             answer = body.handle(Load(choice))
         assert isinstance(answer, LoadRefused) and answer.sentence == "no lecturer here"
         mine = body.handle(Load(replace(choice, mine=("horizon",))))

@@ -18,7 +18,7 @@ from app.html.text import figure, readable
 from app.link.exercise import Lecture, LessonPlace, SignalCurve
 from app.panels.lesson.drawing import Bound, chart, scale, sketch
 from app.panels.lesson.prediction import Asking
-from app.panels.widgets.logarithmic import STEPS, place_of, value_at
+from app.panels.widgets.controls import STEPS, place_of, value_at
 from himpc.tasks import KINDS
 from lessons.course import COURSE, load_lesson
 from lessons.replay.progress import LearnerProgress, progress_from
@@ -100,6 +100,7 @@ def test_pictures_show_numbers_for_people_and_survive_bad_ones() -> None:
     assert figure(3850.0, "%") == "3850 %" and figure(2e5) == "2·10⁵"
     assert readable("It was 3.56e+03 %, not 2.1e-07 deg.") == "It was 3560 %, not 2.1·10⁻⁷°."
     assert figure(-2.5e-9) == "−2.5·10⁻⁹"
+    assert readable("9.96e-04 m and 9.97e+05 N") == "1·10⁻³ m and 1·10⁶ N"
     drawn = scale(0.1, 100.0, 5.0, 16.0, 1.5, "mm")
     assert "your guess 5 mm" in drawn and "measured 16 mm" in drawn
     assert "measured" not in scale(0.1, 100.0, 5.0, math.nan, 1.5, "mm")

@@ -3,6 +3,7 @@ the previous controller continues."""
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -15,10 +16,12 @@ from app.link.messages import Lead, Load, LoadRefused, Post, Ready
 from app.link.process import wait_until
 from app.server.server import PageServer
 from app.worker.ghost import GhostBody
+from app.worker.reports import own_code
 from app.worker.simulation import SimulationRunner
 from browsing.wire import Wire, eventually
 from lessons.authoring.new import text_of
 from lessons.events import Reset, Set
+from lessons.own.judge import judged
 from lessons.replay.script import script
 from lessons.replay.state import decode, encode, state_of
 from lessons.scenes.run_spec import RunSpec
@@ -83,6 +86,39 @@ def test_own_code_that_is_wrong_leaves_what_ran_before(body: SimulationRunner, f
     assert after(body, lambda: (now := body.status().own) is not None and now.saves == 1)
     assert (found := body.status().own) is not None
     assert found.fault is None
+
+
+def test_what_a_test_of_another_file_finds_says_nothing_about_this_file(
+    body: SimulationRunner, file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A saved file is still tested when the learner chooses another file. Its fault, or that it can be used,
+    is not shown as that of the other file."""
+    other, go_on = file.with_name("other.py"), threading.Event()
+    other.write_text(HOLDS)
+    choice, threads = body.choice, threading.active_count()
+    body.handle(Load(replace(choice, run=replace(choice.run, files=(str(file), str(other))))))
+
+    def waiting(code: str) -> str:
+        assert go_on.wait(LONG)
+        return judged(code)
+
+    monkeypatch.setattr(own_code, "judged", waiting)
+    for saved in ("def broken(:\n", HOLDS + "# saved\n"):
+        go_on.clear()
+        body.handle(Post(Set("controller", str(file))))
+        body.tick(5)
+        body.status()
+        file.write_text(saved)
+        body.status()  # the test of the file begins
+        body.handle(Post(Set("controller", str(other))))
+        body.tick(5)
+        body.status()
+        go_on.set()
+        assert wait_until(lambda: threading.active_count() <= threads, LONG)
+        own = body.status().own
+        assert own is not None
+        assert (own.file, own.fault, own.saves) == (str(other), None, 0)
+        file.write_text(HOLDS)
 
 
 def test_own_code_that_fails_can_be_reset(body: SimulationRunner, file: Path) -> None:

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 from lxml import etree
 
-from app.client.watching import Watching
 from app.html.palette import LEVELS
 from app.link.inside import Inside, InsideRequest
 from app.panels.inside import matrix as hessian
-from app.panels.inside import plane_svg, spectrum
+from app.panels.inside import spectrum
+from app.panels.inside.inside import Watching
+from app.panels.inside.plane import half_width, parts
 from lessons.events import MoveTarget
 from lessons.geometry.look import matrix_of, plane_of
 from lessons.geometry.plane import Plane
@@ -44,11 +45,11 @@ def parsed(markup: str) -> etree._Element:
 
 
 def drawn(plane: Plane, half: float) -> etree._Element:
-    return parsed("".join(plane_svg.parts(plane, half, {"reach": LEVELS[0], "pose": LEVELS[1]}, JOINTS)))
+    return parsed("".join(parts(plane, half, {"reach": LEVELS[0], "pose": LEVELS[1]}, JOINTS)))
 
 
 def test_points_stand_where_their_numbers_say(plane: Plane) -> None:
-    half = plane_svg.half_width(plane, None)
+    half = half_width(plane, None)
     root = drawn(plane, half)
     for name, w in (("optimum-1", plane.levels[0].solved), ("optimum-2", plane.levels[1].solved)):
         (mark,) = root.findall(f".//g[@class='{name}']")
@@ -62,8 +63,8 @@ def test_points_stand_where_their_numbers_say(plane: Plane) -> None:
 
 def test_what_is_far_off_is_an_arrow_with_its_numbers(plane: Plane) -> None:
     far = replace(plane, osf=np.array([50.0, -20.0]))
-    half = plane_svg.half_width(plane, None)
-    assert plane_svg.half_width(far, None) == half  # a distant OSF solution does not change the scale
+    half = half_width(plane, None)
+    assert half_width(far, None) == half  # a distant OSF solution does not change the scale
     (mark,) = drawn(far, half).findall(".//g[@class='osf']")
     x, y = (float(each) for each in re.findall(r"-?[\d.]+", mark.get("transform", ""))[:2])
     assert 50.0 < x < 410.0 and 10.0 < y < 370.0
@@ -71,10 +72,10 @@ def test_what_is_far_off_is_an_arrow_with_its_numbers(plane: Plane) -> None:
 
 
 def test_the_picture_holds_still_while_points_breathe(plane: Plane) -> None:
-    half = plane_svg.half_width(plane, None)
-    assert plane_svg.half_width(plane, 1.5 * half) == 1.5 * half
-    assert plane_svg.half_width(plane, 10.0 * half) == half
-    assert plane_svg.half_width(plane, 0.1 * half) == half
+    half = half_width(plane, None)
+    assert half_width(plane, 1.5 * half) == 1.5 * half
+    assert half_width(plane, 10.0 * half) == half
+    assert half_width(plane, 0.1 * half) == half
 
 
 def test_nothing_that_is_not_finite_is_drawn(plane: Plane) -> None:
@@ -111,7 +112,7 @@ def test_eigenvalues_stand_on_the_real_axis() -> None:
 
 def test_a_wish_is_sent_once_and_again_if_nothing_comes_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
     now = [100.0]
-    monkeypatch.setattr("app.client.watching.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("app.panels.inside.inside.time.monotonic", lambda: now[0])
     sent: list[InsideRequest] = []
     watching = Watching(sent.append)
     watching.ask(InsideRequest(), None)

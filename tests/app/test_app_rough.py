@@ -16,7 +16,7 @@ import psutil
 import pytest
 from children import LONG, Start, born, gone, running
 
-from app.client import trouble
+from app.client import simulation
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.forkserver import ForkServer
@@ -93,7 +93,7 @@ def test_a_load_that_hangs_can_be_cancelled(start: Start, monkeypatch: pytest.Mo
         and (said.state, said.offer) == ("LOADING", "Cancel")
         and "of at most 30 s" in said.sentence
     )
-    monkeypatch.setattr(trouble, "DEADLINE", 3.5)
+    monkeypatch.setattr(simulation, "DEADLINE", 3.5)
     assert wait_until(lambda: getattr(learner.trouble(), "state", "") == "SILENT", LONG)
     assert not gone(pid)  # the machine may only be slow, so the user decides
     learner.restart()

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from app.client.trouble import trouble_of
+from app.client.simulation import trouble_of
 from app.link.choice import SceneChoice
 from app.link.process import Process
 from lessons.scenes.run_spec import RunSpec

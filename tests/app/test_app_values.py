@@ -109,3 +109,23 @@ def test_a_press_whose_panel_goes_meanwhile_is_told_of(capfd: pytest.CaptureFixt
     finally:
         server.close()
     assert "Traceback" not in capfd.readouterr().err
+
+
+def test_one_click_on_a_number_changes_its_second_digit() -> None:
+    """The step of a number input is a tenth of the number's decade, at most 0.1."""
+    server = PageServer(
+        SceneChoice(RunSpec("planar3-hold", set=("M_bar=[0.04,0.5,30]",))), port=0, max_sessions=1
+    )
+    try:
+        with Wire(server.link) as page:
+
+            def steps() -> list[float]:
+                numbers = [
+                    each for each in list(page.controls.values()) if each["type"] == "GuiNumberMessage"
+                ]
+                return [each["props"]["step"] for each in numbers if each["value"] in (0.04, 0.5, 30.0)]
+
+            assert eventually(lambda: len(steps()) == 3)
+            assert steps() == pytest.approx([0.001, 0.01, 0.1])
+    finally:
+        server.close()

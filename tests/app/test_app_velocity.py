@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Iterator
+from dataclasses import replace
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
@@ -13,14 +15,18 @@ from app.html.text import free_name
 from app.link.choice import SceneChoice
 from app.link.messages import Play, Post, Ready, ResetAll, Status, StepTicks
 from app.link.mission_view import MissionView
+from app.panels.velocity.plots import TrackingPlots
+from app.panels.velocity.tasks import RolesPanel
 from app.server.server import PageServer
 from app.view.goals import open_row
 from app.worker.pacing import BACKLOG, Pacer
 from app.worker.simulation import SimulationRunner
 from browsing.wire import Wire, eventually
+from himpc import Level
 from himpc.rotation import exp3, from_quaternion, log3, quaternion
 from lessons.events import InsertTask, MoveLevel, MoveTarget, Push, Release, RemoveTask, Reset, Set
 from lessons.scenes.run_spec import RunSpec
+from lessons.settings.velocity import VelocitySettings
 
 pytestmark = pytest.mark.usefixtures("one_fork_server")
 
@@ -248,6 +254,44 @@ def test_a_row_counts_until_the_next_one_comes(body: SimulationRunner) -> None:
     assert np.array_equal(np.unique(known), history_times(body)) and (np.diff(known) >= 0).all()
     assert history.at(1.37)[t][0] == pytest.approx(1.3)
     assert np.isnan(history.window(8.0).columns(t)[-1]).all()
+
+
+def test_a_chart_whose_first_curve_has_no_values_draws_the_others(body: SimulationRunner) -> None:
+    """The hand has no task any more, and the error of the base is drawn. Bounds alone are no values."""
+    gui = MagicMock()
+    in_view = MagicMock(sees=lambda title: title.startswith("Error"))
+    plots = TrackingPlots(gui, in_view, body.ready(), dict.fromkeys(("ee", "base"), (0, 0, 0)))
+    note = gui.add_html.return_value
+    note.visible = False
+    layout, drawn = body.session.layout, gui.add_uplot.return_value
+
+    def draw(after: int) -> None:
+        body.tick(after)
+        history = History(body.block, layout)
+        history.pull()
+        for _ in range(12):
+            plots.draw(history.window(), None, 0.1)
+
+    body.handle(Post(RemoveTask("ee")))
+    draw(0)
+    assert note.visible and not drawn.mock_calls
+    draw(30)
+    assert not note.visible
+
+
+def test_a_level_has_its_name_on_the_page_as_it_is(
+    body: SimulationRunner, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A label is shown as text, so that nothing in it is replaced."""
+    gui = MagicMock()
+    settings = body.session.settings
+    assert isinstance(settings, VelocitySettings)
+    tasks = [replace(level.tasks[0], name=f"<{level.name}>") for level in settings.levels]
+    named = MagicMock(levels=[Level((task,)) for task in tasks])
+    monkeypatch.setattr("app.panels.velocity.tasks.Controls", MagicMock())
+    RolesPanel(gui, MagicMock(), named, dict.fromkeys(("<ee>", "<base>"), (0, 0, 0)), lambda: settings)
+    labels = [call.args[0] for call in gui.add_folder.call_args_list if call.args[0]]
+    assert labels == ["1 · <ee>", "2 · <base>"]
 
 
 def history_times(body: SimulationRunner) -> np.ndarray:

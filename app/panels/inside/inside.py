@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -9,16 +10,35 @@ import viser
 
 from app.client.moment import Moment
 from app.client.pending_edit import Send
-from app.client.watching import Watching
 from app.html.palette import RGB
 from app.html.text import block
-from app.link.inside import InsideRequest
+from app.link.inside import Inside, InsideRequest
 from app.link.messages import Command, Ready, Status
 from app.panels.inside.matrix import MatrixPanel
 from app.panels.inside.plane import PlanePanel
 from app.panels.inside.spectrum import SpectrumPicture
 from app.panels.widgets.in_view import InView
 from lessons.settings.torque import TorqueSettings
+
+_AGAIN = 0.4
+"""Time, s, after which an unanswered request is sent again. A simulation that was restarted has lost the
+request."""
+
+
+class Watching:
+    """Sends the request when it changes, and again while it is not answered."""
+
+    def __init__(self, send: Callable[[InsideRequest], None]) -> None:
+        self._send = send
+        self._wish, self._sent_at = InsideRequest(), 0.0
+
+    def ask(self, wish: InsideRequest, heard: Inside | None) -> None:
+        """heard: the simulation's last answer."""
+        now = time.monotonic()
+        mute = wish != InsideRequest() and heard is None and now - self._sent_at > _AGAIN
+        if wish != self._wish or mute:
+            self._wish, self._sent_at = wish, now
+            self._send(wish)
 
 
 class InsidePanel:

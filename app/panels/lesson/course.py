@@ -11,8 +11,7 @@ from app.client.progress import Notebook
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.exercise import Lecture, LessonPlace
-from app.panels.lesson.cards import add_cards, add_invitation
-from app.panels.lesson.exercise_cards import exercise_cards
+from app.panels.lesson.cards import add_cards, add_invitation, exercise_cards
 from app.panels.lesson.step import LessonPanel
 from app.panels.widgets.window import PopupWindow
 from lessons.settings.settings import SceneSettings

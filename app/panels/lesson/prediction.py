@@ -14,7 +14,7 @@ from app.html.text import badge, block, figure, readable
 from app.link.exercise import Answer, Lecture
 from app.panels.lesson.drawing import scale, sketch
 from app.panels.widgets.command import on_click
-from app.panels.widgets.logarithmic import STEPS, only_track, place_of, value_at
+from app.panels.widgets.controls import STEPS, only_track, place_of, value_at
 from lessons.teaching.prediction import Choice, Prediction, Sketch, Value
 
 _LETTERS = "ABCDEFG"

@@ -14,8 +14,8 @@ from app.html.palette import LEVELS, button
 from app.link.choice import SceneChoice
 from app.link.exercise import Lecture, LessonPlace, parts_of
 from app.link.messages import Post, Predict, ResetAll, RunStep
+from app.panels.lesson.cards import belonging_to
 from app.panels.lesson.claims import after, heading, idea, pictures, state
-from app.panels.lesson.exercise_cards import belonging_to
 from app.panels.lesson.prediction import Asking
 from app.panels.widgets.command import add_command, on_click
 from app.panels.widgets.controls import add_control

@@ -50,8 +50,9 @@ class ComparePanel:
         self._end = gui.add_button("Remove the ghost", visible=False)
         self._table = gui.add_html("", visible=False)
 
+        # The callbacks run on a thread, as they start processes or wait for one to end.
         @self._start.on_click
-        async def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
+        def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
             self._begin(event.client)
 
         @self._swap.on_click
@@ -59,7 +60,7 @@ class ComparePanel:
             self._change_sides(event.client)
 
         @self._end.on_click
-        def _(_: object) -> None:  # on a thread, as it waits for a process to end
+        def _(_: object) -> None:
             learner.stop_ghost()
 
     def _row(self, gui: viser.GuiApi, place: int) -> tuple[viser.GuiDropdownHandle[str], viser.GuiTextHandle]:

@@ -10,7 +10,7 @@ import viser
 
 from app.client.pending_edit import HOLD
 from app.panels.widgets.command import on_click
-from app.view.movable import Movable
+from app.view.drag_target import Movable
 
 _STEPS = {"1 mm": 1e-3, "1 cm": 1e-2, "5 cm": 5e-2}
 _FIRST = "1 cm"

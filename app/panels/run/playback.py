@@ -12,8 +12,8 @@ import viser
 
 from app.adapter.removed_handle_errors import unless_removed
 from app.client.pending_edit import HOLD, PendingEdit
+from app.client.simulation import Trouble
 from app.client.simulation_client import SimulationClient
-from app.client.trouble import Trouble
 from app.html.palette import BAD, GOOD, LEVELS
 from app.html.text import badge, block, esc, in_trouble
 from app.link.messages import ArmView, Play, Post, Speed, Status, StepTicks
@@ -58,7 +58,7 @@ class PlaybackPanel:
         self._touched = -math.inf
 
         on_click(self._buttons, lambda: self._click(str(self._buttons.value)))
-        on_click(self._again, learner.restart)
+        self._again.on_click(lambda _: learner.restart())  # on a thread, as it starts a process
 
         @self._speed.on_update
         async def _(event: viser.GuiEvent[viser.GuiSliderHandle[float]]) -> None:

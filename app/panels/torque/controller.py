@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections import deque
+
 import viser
 
 from app.html.palette import BAD, GOOD
 from app.html.text import bar, block, esc, formula
 from app.panels.inside.spectrum import SpectrumPicture
-from app.panels.torque.deadline import DeadlineFolder
 from app.panels.widgets.controls import Controls
 from app.panels.widgets.in_view import InView
 from app.panels.widgets.mirror import Bindings
@@ -17,6 +18,8 @@ from robots import Robot
 
 _DISTANCES = ("on", "d_safe", "margin", "reaction", "deceleration", "pull", "velocity_margin")
 _LIMITS = ("torque", "velocity", "position", "torque_scale", "velocity_scale", "torque_rate", "stall_guard")
+_LOOKS = 9
+"""Number of updates over which the share of late ticks is computed: about two seconds."""
 
 
 class ControllerPanel:
@@ -80,3 +83,29 @@ class ControllerPanel:
 
 def _verdict(value: float) -> str:
     return "" if value != value else " &lt; 1 ✓" if value < 1 else " ≥ 1"
+
+
+class DeadlineFolder:
+    """Two sliders, and a line with the share of late ticks."""
+
+    def __init__(self, gui: viser.GuiApi, controls: Controls[TorqueSettings]) -> None:
+        with gui.add_folder("Deadline"):
+            controls.add("deadline_ms", "solve_ms_per_knot")
+            self._line = gui.add_html("")
+        self._counts: deque[tuple[int, int]] = deque(maxlen=_LOOKS)
+
+    def update(self, now: SessionSnapshot[TorqueSettings]) -> None:
+        ticks, late = now.status.ticks, now.status.late
+        if self._counts and ticks < self._counts[-1][0]:
+            self._counts.clear()
+        if not self._counts or ticks > self._counts[-1][0]:
+            self._counts.append((ticks, late))
+        first_ticks, first_late = self._counts[0]
+        ran = ticks - first_ticks
+        if now.settings.deadline_ms == 0:
+            text = "Lockstep: no torque is ever late."
+        elif ran == 0:
+            text = "Late torques: no tick counted yet."
+        else:
+            text = f"Late torques: <b>{(late - first_late) / ran:.0%}</b> of the last {ran} ticks."
+        self._line.content = block(text)

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import viser
 
 from app.client.pending_edit import Send
-from app.html.palette import BAD, GOOD, RGB, ink
-from app.html.text import block, esc, quantity
-from app.link.messages import Ready
-from app.panels.torque.guide import AT_AN_ARM, guide
+from app.html.palette import BAD, BOUND, GOOD, RGB, ink
+from app.html.text import block, esc, quantity, swatch
+from app.link.messages import Ready, TaskView
 from app.panels.widgets.command import add_command, on_click
 from app.panels.widgets.snapshot import SessionSnapshot
+from app.view.coordinates import draggable
 from app.view.reachability import Reachability
+from himpc.stack import Level
 from lessons.events import Push, Set
 from lessons.settings.torque import TorqueSettings
 
@@ -29,6 +30,96 @@ _DIRECTIONS = {
 PUSH_SECONDS = 0.1
 _LOAD = 3.0  # kg
 _PICK_UP, _DROP = f"Pick up {_LOAD:g} kg", "Drop the payload"
+
+
+def guide(
+    tasks: tuple[TaskView, ...], levels: Sequence[Level], colours: Mapping[str, RGB], dragged: bool
+) -> str:
+    """Returns HTML that suggests what to try next, with the present names and places of the levels.
+
+    Args:
+        tasks: the tasks of the stack.
+        levels: all levels of the stack; disabled levels keep their places.
+        colours: the colour of each level.
+        dragged: whether the target has been dragged, so that the next suggestion is shown.
+    """
+    places = {level.name: place for place, level in enumerate(levels, start=1) if level.enabled}
+    position = draggable(tasks)[0]
+    if position is None:
+        return _paragraph(*_following(tasks, places))
+    return _paragraph(*(_next(places) if dragged else _first(position, places, colours)))
+
+
+def _first(position: TaskView, places: Mapping[str, int], colours: Mapping[str, RGB]) -> tuple[str, str]:
+    ball = f"The arrows are at the {swatch(colours.get(position.level, BOUND))}ball"
+    if position.level not in places:
+        return _DRAG, f"{ball}. The ball's level is switched off: switch it on in <b>Tasks</b>."
+    own = places[position.level]
+    axes = " and ".join(position.axes) if position.axes != "xyz" else ""
+    told = [
+        f"{ball}, and the robot follows{f' in {axes}' if axes else ''}: this is "
+        f"the task of {_name(position.level, own)}."
+    ]
+    above = {name: place for name, place in places.items() if place < own}
+    below = {name: place for name, place in places.items() if place > own}
+    if above:
+        told.append(f"Above it {'is' if len(above) == 1 else 'are'} {_listed(above)}.")
+    if below:
+        told.append(
+            f"Below it {_listed(below)} {'gets' if len(below) == 1 else 'get'} only the freedom that is left."
+        )
+    return _DRAG, " ".join(told)
+
+
+def _following(tasks: tuple[TaskView, ...], places: Mapping[str, int]) -> tuple[str, str]:
+    off = (
+        "Then switch a level off in the tab <b>Tasks</b>" if places else "Add a level in the tab <b>Tasks</b>"
+    )
+    rest = f"{off}, or push the robot below, and see which errors grow."
+    if any(task.kind == "position" for task in tasks):  # its target follows a curve and cannot be dragged
+        return "Watch the hand follow the curve.", rest
+    return "Push the robot below.", f"{off}, and see which errors grow."
+
+
+def _next(places: Mapping[str, int]) -> tuple[str, str]:
+    rest = "drag the target out of reach, push the robot below, or put 5 kg on its hand in <b>Plant</b>."
+    if len(places) < 2:
+        return "Now add a task.", f"Add a level in the tab <b>Tasks</b>, {rest}"
+    (top, first), (lower, place), *_ = places.items()
+    told = (
+        f"Open <b>Tasks</b> (or press {place}) and switch off {_name(lower, place)}: its error may grow. "
+        f"Does the error of {_name(top, first)} change? Then {rest}"
+    )
+    return "Now switch a level off.", told
+
+
+_DRAG = "Drag the target by its arrows."
+
+
+def _name(level: str, place: int) -> str:
+    return f"<b>{esc(spoken(level))}</b> (level {place})"
+
+
+def _listed(places: Mapping[str, int]) -> str:
+    return " and ".join(_name(level, place) for level, place in places.items())
+
+
+def spoken(level: str) -> str:
+    """Returns the name of a level as words."""
+    return level.replace("+", " and ").replace("_", " ")
+
+
+def _paragraph(head: str, rest: str) -> str:
+    return block(f'<div style="font-size:1.15em"><b>{head}</b></div>{rest}', "padding-top:0.5em")
+
+
+AT_AN_ARM = _paragraph(
+    "Run, then drag the target by its arrows.",
+    "The robot shows the measured arm. The ghost is the simulation, which gets the same targets; its errors "
+    "are dashed. If you press Stop gently or close this page, the arm brakes. The settings are those with "
+    "which <code>himpc-lab arm</code> was started.",
+)
+"""The guide of a page that shows an arm."""
 
 
 class StartPanel:
@@ -126,6 +217,12 @@ class StartPanel:
         colour = ink(GOOD if verdict.reachable else BAD)
         if verdict.reachable:
             text = "Target within reach."
+        elif verdict.fault:
+            text = f"Whether the robot can reach this target could not be checked ({verdict.fault}). " + (
+                "The robot gets no new position: drag again, or switch off Keep within reach."
+                if clamped
+                else "The controller gets your point unchanged."
+            )
         else:
             text = f"Out of reach by {quantity(verdict.missing, 'm')}. " + (
                 "The controller gets the nearest point instead (the ball without arrows)."

@@ -1,15 +1,19 @@
-"""The controls that change the name, frame and axes of a task while the robot moves."""
+"""The forms for a task: for a new one, and to change name, frame and axes while the robot moves."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields
+from typing import Any
 
 import viser
 
+from app.client.pending_edit import Send
 from app.html.palette import BAD, RGB, button
 from app.html.text import block, esc
 from app.panels.widgets.mirror import Bindings
-from himpc.tasks import Task
+from himpc.stack import Stack
+from himpc.tasks import KINDS, Task
 from himpc.tasks.axes import OnAxes
 from himpc.tasks.kinds import said
 from himpc.tasks.pointing import DIRECTIONS
@@ -18,6 +22,9 @@ from lessons.settings.torque import TorqueSettings
 from robots import Robot
 
 AXES = ("xyz", "xy", "xz", "yz", "x", "y", "z")
+_NORMALS = {"z, the floor": (0.0, 0.0, 1.0), "x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0)}
+_TOGETHER = "together with "
+_OWN = "a level of its own, at place "
 
 
 class TaskEditor:
@@ -62,3 +69,101 @@ class TaskEditor:
         self._gui.add_button(label, color=colour and button(colour)).on_click(
             lambda _: self._bindings.post(event())
         )
+
+
+class AddTask:
+    """A folder whose controls depend on the chosen kind of task. The button Add creates the task."""
+
+    def __init__(
+        self, gui: viser.GuiApi, post: Send, robot: Robot, stack: Stack, own: Mapping[str, Task]
+    ) -> None:
+        """own: tasks of the user's own files, by path."""
+        self._post, self._own = post, own
+        with gui.add_folder("Add a task", expand_by_default=False, order=-1.0):
+            self._kind = gui.add_dropdown("Kind", (*KINDS, *own), initial_value="position")
+            self._says = gui.add_html("")
+            with gui.add_folder(None):
+                self._frame = gui.add_dropdown(
+                    "Of frame",
+                    tuple(robot.frames),
+                    initial_value=robot.tip,
+                    hint="You can also click a link, see below",
+                )
+            with gui.add_folder(None):
+                self._pick = gui.add_checkbox(
+                    "Click a link",
+                    False,
+                    hint="While this is on, a click on a link of the robot chooses the link",
+                )
+            with gui.add_folder(None):
+                self._root = gui.add_dropdown("As seen from", tuple(robot.frames))
+            with gui.add_folder(None):
+                self._axes = gui.add_dropdown("Along axes", AXES)
+            with gui.add_folder(None):
+                self._axis = gui.add_dropdown("Its axis", DIRECTIONS, initial_value="z")
+            with gui.add_folder(None):
+                self._normal = gui.add_dropdown("Plane across", tuple(_NORMALS))
+            with gui.add_folder(None):
+                self._joint = gui.add_dropdown("Of joint", tuple(robot.joint_names))
+            with gui.add_folder(None):
+                self._level = gui.add_dropdown("On level", _places(stack), initial_value=_places(stack)[1])
+            with gui.add_folder(None):
+                self._name = gui.add_text("Its name", "", hint="If empty, the name of the kind")
+            self._add = gui.add_button("Add")
+        self._add.on_click(lambda _: self._post(Set("stack.add", self._wish())))
+        self._kind.on_update(lambda _: self._show())
+        self._show()
+
+    @property
+    def picking(self) -> bool:
+        """Whether a click on a link chooses the frame."""
+        return bool(self._pick.value)
+
+    def choose(self, frame: str) -> None:
+        """Chooses the link that was clicked."""
+        if frame in self._frame.options:
+            self._frame.value = frame
+
+    def _needs(self) -> set[str]:
+        own = self._own.get(self._kind.value)
+        found = {each.name for each in fields(own or KINDS[self._kind.value].makes[0])}
+        return found - {"joints"} if self._kind.value in ("posture", "damping") else found
+
+    def _show(self) -> None:
+        needs = self._needs()
+        own = self._own.get(self._kind.value)
+        self._says.content = block(esc(said(own)) if own else KINDS[self._kind.value].says)
+        for field, handle in (
+            ("frame", self._frame),
+            ("frame", self._pick),
+            ("root", self._root),
+            ("axes", self._axes),
+            ("axis", self._axis),
+            ("normal", self._normal),
+            ("joints", self._joint),
+        ):
+            handle.visible = field in needs
+
+    def _wish(self) -> dict[str, Any]:
+        needs = self._needs()
+        given = {
+            "frame": self._frame.value,
+            "root": self._root.value,
+            "axes": self._axes.value,
+            "axis": self._axis.value,
+            "normal": list(_NORMALS[self._normal.value]),
+            "joints": [self._joint.value],
+        }
+        wish: dict[str, Any] = {"task": self._kind.value}
+        wish |= {field: value for field, value in given.items() if field in needs}
+        if self._name.value.strip():
+            wish["name"] = self._name.value.strip()[:100]
+        level = self._level.value
+        if level.startswith(_TOGETHER):
+            return wish | {"with": level.removeprefix(_TOGETHER)}
+        return wish | {"level": int(level.removeprefix(_OWN))}
+
+
+def _places(stack: Stack) -> tuple[str, ...]:
+    own = [f"{_OWN}{place}" for place in range(1, len(stack) + 2)]
+    return (*own, *(f"{_TOGETHER}{level.name}" for level in stack))

@@ -3,21 +3,197 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
+import numpy as np
 import viser
+from numpy.typing import NDArray
 
 from app.client.pending_edit import PendingEdit
-from app.html.palette import DAMPING, RGB
-from app.html.text import block, formula, swatch
-from app.panels.torque.add_task import AddTask
-from app.panels.torque.joint_targets import Targets
-from app.panels.torque.level_card import LevelCard
+from app.html.palette import BAD, BOUND, DAMPING, RGB, css
+from app.html.text import badge, block, esc, formula, quantity, swatch
+from app.panels.torque.task_editor import AddTask, TaskEditor
+from app.panels.widgets.controls import Controls
 from app.panels.widgets.mirror import Bindings
 from app.panels.widgets.snapshot import SessionSnapshot
-from lessons.events import Event, MoveLevel, Set
+from himpc.stack import Level
+from himpc.tasks import Joints, Posture
+from himpc.telemetry import FALLBACKS
+from lessons.events import Event, MoveLevel, MoveTarget, Set
 from lessons.settings.torque import TorqueSettings
 from robots import Robot
+from robots.truth import joint_axis
+
+UP, DOWN = "▲ Up", "▼ Down"
+LINES = 3
+"""Number of lines of the longest usual text about a level, in a panel of the usual width."""
+Targets = Mapping[str, NDArray[np.float64]]
+"""The raw targets that can be moved, by task."""
+
+_TURN, _WAY = np.pi, 2.0
+"""Range of a slider on both sides of zero for a joint without limits, rad and m."""
+
+
+class LevelCard:
+    """The folder of one level."""
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        bindings: Bindings[TorqueSettings],
+        settings: TorqueSettings,
+        level: Level,
+        colours: dict[str, RGB],
+        place: int,
+        robot: Robot,
+        targets: Callable[[], Targets],
+        moves: Bindings[Targets],
+        shift: Callable[[str, int], None],
+        unfolded: bool,
+    ) -> None:
+        """targets: returns the present targets, which `moves` shows; shift: moves the level with this name by
+        a number of places; unfolded: whether the controls that edit the tasks are unfolded."""
+        name = self.name = level.name
+        self._colour = colours.get(name, BOUND)
+        self._folder = gui.add_folder(_title(place, name), order=float(place))
+        with self._folder:
+            self._live = gui.add_html(block("", lines=LINES))
+            on = gui.add_checkbox("Enabled", level.enabled, hint=f"Key {place + 1}")
+            move = gui.add_button_group("Priority", (UP, DOWN))
+            add_joint_targets(gui, moves, level, robot, targets)
+            with gui.add_folder("Gains and weights", expand_by_default=False):
+                controls = Controls(gui, bindings, settings)
+                for task in level.tasks:
+                    if len(level.tasks) > 1:
+                        gui.add_html(block(f"<b>{esc(task.name)}</b>"))
+                    controls.add(f"tasks.{task.name}.K_p", f"tasks.{task.name}.K_v")
+                controls.add(f"levels.{name}.Q", f"levels.{name}.R")
+            with gui.add_folder("Change", expand_by_default=unfolded):
+                for task in level.tasks:
+                    TaskEditor(gui, bindings, task, robot, alone=len(level.tasks) == 1)
+                if place > 0:
+                    above = settings.levels[place - 1].name
+                    merge = gui.add_button("Merge with the level above")
+                    merge.on_click(lambda _: bindings.post(Set("stack.merge", [name, above])))
+        bindings.bind(
+            on,
+            lambda s: any(each.enabled for each in s.levels if each.name == name),
+            lambda value: Set(f"levels.{name}.enabled", bool(value)),
+        )
+
+        @move.on_click
+        async def _(_: object) -> None:
+            shift(name, -1 if move.value == UP else 1)
+
+    def update(self, now: SessionSnapshot[TorqueSettings], level: Level, place: int) -> None:
+        title = _title(place, level.name)
+        if self._folder.label != title:
+            self._folder.label = title
+            self._folder.order = float(place)
+        errors = ", ".join(
+            (f"{esc(task.name)} " if len(level.tasks) > 1 else "")
+            + f"error <b>{quantity(now.error(task.name), task.unit)}</b>"
+            for task in level.tasks
+        )
+        notes = "" if level.enabled else " " + badge("OFF", DAMPING)
+        fallback = now.number(f"rung/{level.name}")
+        if level.enabled and fallback == fallback and fallback > 0:
+            notes += " " + badge(FALLBACKS[int(fallback)], BAD)
+        self._live.content = block(
+            f"{swatch(self._colour)}{errors}{notes}{_rank(now.status.ranks.get(level.name))}",
+            f"border-left:3px solid {css(self._colour)}",
+            LINES,
+        )
+
+
+def _title(place: int, name: str) -> str:
+    return f"{place + 1} · {name}"
+
+
+def _rank(found: tuple[int, int] | None) -> str:
+    """Returns a sentence with the number of directions that the level gets, and the number of its rows."""
+    if found is None:
+        return ""
+    rank, rows = found
+    short = (
+        "" if rank == rows else ": the levels above use the other directions, or the arm cannot move in them"
+    )
+    return f"<br>gets {rank} of {rows} directions{short}"
+
+
+def add_joint_targets(
+    gui: viser.GuiApi,
+    bindings: Bindings[Targets],
+    level: Level,
+    robot: Robot,
+    targets: Callable[[], Targets],
+) -> None:
+    """Adds a folder with a slider for each joint of every joint-space task whose target can be moved. If
+    there is no such task, no folder is added.
+
+    targets: returns the present targets. A target is sent as a whole: if several sliders move at once, each
+    change includes the changes that the other sliders have already requested.
+    """
+    tasks = [task for task in level.tasks if isinstance(task, (Joints, Posture)) and task.name in targets()]
+    if not tasks:
+        return
+    with gui.add_folder("Joint targets", expand_by_default=False):
+        for task in tasks:
+            wish: PendingEdit[tuple[float, ...]] = PendingEdit()
+            for place, joint in enumerate(task.coordinates(robot)):
+                label = joint if len(tasks) == 1 else f"{task.name}: {joint}"
+                with gui.add_folder(None):
+                    _add_slider(gui, bindings, label, robot, joint, task.name, place, wish, targets)
+
+
+def _add_slider(
+    gui: viser.GuiApi,
+    bindings: Bindings[Targets],
+    label: str,
+    robot: Robot,
+    joint: str,
+    task: str,
+    place: int,
+    wish: PendingEdit[tuple[float, ...]],
+    targets: Callable[[], Targets],
+) -> None:
+    at = robot.joint_names.index(joint)
+    unit, factor, step, far = (
+        ("m", 1.0, 0.001, _WAY) if joint_axis(robot.model, at + 1)[0] else ("°", np.degrees(1.0), 0.1, _TURN)
+    )
+    digits = round(-np.log10(step))
+
+    def shown(now: Targets) -> float:
+        return round(float(now[task][place] * factor), digits)
+
+    value = shown(targets())
+    low, high = robot.q_lower[at], robot.q_upper[at]
+    unbounded = not high - low < 10 * far
+    slider = gui.add_slider(
+        f"{label}, {unit}",
+        min=min(value, _inside(-far if unbounded else low, factor, digits)),
+        max=max(value, -_inside(-(far if unbounded else high), factor, digits)),
+        step=step,
+        initial_value=value,
+        hint="Target position of the joint, within the joint's limits",
+    )
+
+    def event(given: float) -> MoveTarget:
+        wanted = list(wish.now(tuple(targets()[task].tolist())))
+        wanted[place] = given / factor
+        return MoveTarget(task, wish.ask(tuple(wanted)))
+
+    def read(now: Targets) -> float:
+        # After a change of the stack, the targets may not contain this task until the sliders are rebuilt.
+        value = shown(now) if task in now else slider.value
+        return min(max(value, slider.min), slider.max)
+
+    bindings.bind(slider, read, event)
+
+
+def _inside(low: float, factor: float, digits: int) -> float:
+    """Returns the smallest number with `digits` decimals that is not below a limit."""
+    return float(np.ceil(low * factor * 10**digits - 1e-6) / 10**digits)
 
 
 class TasksPanel:

@@ -9,7 +9,7 @@ import viser
 
 from app.client.pending_edit import PendingEdit
 from app.html.palette import BAD, DAMPING, RGB, css
-from app.html.text import badge, block, esc, quantity, swatch
+from app.html.text import badge, block, quantity, swatch
 from app.panels.widgets.controls import Controls
 from app.panels.widgets.mirror import Bindings
 from app.panels.widgets.snapshot import SessionSnapshot
@@ -105,7 +105,7 @@ class _Card:
 
 
 def _title(place: int, name: str) -> str:
-    return f"{place + 1} · {esc(name)}"
+    return f"{place + 1} · {name}"
 
 
 def _find(settings: VelocitySettings, name: str) -> Level:

@@ -11,8 +11,7 @@ import viser
 from viser import uplot
 
 from app.adapter import private
-from app.client.decimate import decimate
-from app.client.decimated import BUCKETS, WINDOW, PlotWindow
+from app.client.decimated import BUCKETS, WINDOW, PlotWindow, decimate
 from app.html.palette import RGB, css
 from app.html.text import block
 from app.panels.widgets.in_view import InView
@@ -86,6 +85,7 @@ class Chart:
             span = (math.log10(span[0]), math.log10(span[1]))
         self._span = span
         self._title, self._in_view = title, in_view
+        self._measured = [not (line.dashed or line.fill) for line in lines]
         self._tolerance = _FINE * _TOP / (height - _AROUND)
         self._shows = self._blank = 0
         self._sent: tuple[np.ndarray, np.ndarray] | None = None
@@ -118,15 +118,15 @@ class Chart:
         """Shows the window. curves: returns the (2 · BUCKETS,) values of each line; called only while the
         chart is visible.
 
-        Values beyond the axis are drawn at its edge. uPlot cannot omit the time before the first known value.
-        There, a linear curve is constant, since a jump would look like a motion; a logarithmic curve lies on
-        the axis.
+        Values beyond the axis are drawn at its edge. uPlot cannot omit the time before the first known value
+        of a curve. There, a linear curve is constant, since a jump would look like a motion; a logarithmic
+        curve lies on the axis. The chart counts as empty if only bounds and marks have values.
         """
         if not self.in_view:
             return
         values = np.array(curves())
-        known = np.isfinite(values[0])
-        if np.count_nonzero(known) < 2:
+        known = np.isfinite(values)
+        if np.count_nonzero(known[self._measured].any(axis=0)) < 2:
             self._explain(blank=True)
             return
         self._explain(blank=False)
@@ -136,8 +136,9 @@ class Chart:
         values = np.clip(values, low, high)
         values[np.isnan(values)] = low
         if not self._log:
-            start = int(np.argmax(known))
-            values[:, :start] = values[:, start : start + 1]
+            begun = np.logical_or.accumulate(known, axis=1)
+            first = np.take_along_axis(values, known.argmax(axis=1)[:, None], axis=1)
+            values = np.where(begun, values, first)
         values = (values - low) * (_TOP / (high - low))
         kept = decimate(values, self._tolerance, window.first)
         self._send(kept, values[:, kept], window.ages()[kept])

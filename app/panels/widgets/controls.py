@@ -9,8 +9,9 @@ from typing import Any, Generic, TypeVar
 
 import viser
 
+from app.adapter.names import NUMBER_BOX, SLIDER_LABEL
+from app.adapter.private import dom_id
 from app.html.text import figure
-from app.panels.widgets.logarithmic import STEPS, only_track, place_of, value_at
 from app.panels.widgets.mirror import Bindings, scalar
 from lessons.events import Set
 from lessons.settings.entry import Entry
@@ -18,7 +19,26 @@ from lessons.settings.settings import SceneSettings
 from lessons.settings.values import SWITCH, WHOLE, WORD
 from lessons.teaching.control import Control, chosen
 
+STEPS = 200
+"""Number of steps of a logarithmic slider."""
 S = TypeVar("S", bound=SceneSettings)
+
+
+def place_of(value: float, low: float, high: float) -> int:
+    """Returns the position 0 … STEPS of a value on a logarithmic slider."""
+    share = math.log(max(value, 1e-300) / low) / math.log(high / low)
+    return round(STEPS * min(max(share, 0.0), 1.0))
+
+
+def value_at(place: float, low: float, high: float) -> float:
+    """Returns the value at a position of a logarithmic slider, with three digits."""
+    return float(f"{low * (high / low) ** (place / STEPS):.3g}")
+
+
+def only_track(slider: viser.GuiSliderHandle[Any]) -> str:
+    """Returns a style that hides the number box of a slider whose number is only a position."""
+    here = f'[id="{dom_id(slider)}"]'
+    return f"<style>{here} + {NUMBER_BOX},{here} {SLIDER_LABEL}{{display:none}}</style>"
 
 
 class Controls(Generic[S]):
@@ -197,6 +217,6 @@ def _step(low: float, high: float) -> float:
 
 
 def _tenth(value: float) -> float:
-    """Returns the step of a number input: a tenth of the value's decade. One click visibly changes any
-    value."""
-    return 10.0 ** (len(f"{1 / max(value, 1e-6):.0f}") * -1.0) if value < 1 else 0.1
+    """Returns the step of a number input: a tenth of the value's decade, at most 0.1. One click visibly
+    changes any value. For 0, which has no decade, the step is a thousandth of the unit."""
+    return min(0.1, 10.0 ** (math.floor(math.log10(value)) - 1)) if value > 0.0 else 1e-3

@@ -25,42 +25,53 @@ class File:
         self._saves = 0
         self._taken_at = 0.0
         self._fault: str | None = None
-        self._judging: threading.Thread | None = None
+        self._test: _Test | None = None
 
     def look(self, session: TorqueSession) -> OwnCode | None:
         """Checks the file and returns its state; None if the controller is one of the lab's own."""
         path = str(session.settings.controller)
         if not is_file(path):
-            self._stamp = None
+            self._stamp = self._test = None
             return None
-        if self._judging is not None and not self._judging.is_alive():
-            self._judging = None
-            self._take(session)
-        stamp = _stamp(path)
+        stamp, test = _stamp(path), self._test
         if self._stamp is None or self._stamp[0] != path:
-            self._stamp, self._fault = stamp, None
-        elif stamp is not None and stamp != self._stamp and self._judging is None:
-            self._stamp = stamp
-            self._judging = threading.Thread(target=self._judge, args=(path,), daemon=True)
-            self._judging.start()
+            # A test of the file before is not waited for: it says nothing about this file.
+            self._stamp, self._fault, self._test = stamp, None, None
+        elif stamp is not None and stamp != self._stamp and test is None:
+            self._test = _Test(stamp)
+            self._test.start()
+        elif test is not None and not test.is_alive():
+            self._test = None
+            if stamp == test.stamp:  # otherwise the file was saved again, and is tested again
+                self._stamp = stamp
+                self._take(session, test.fault)
         return OwnCode(path, self._fault or session.failure, self._saves, self._taken_at)
 
-    def _judge(self, path: str) -> None:
+    def _take(self, session: TorqueSession, fault: str | None) -> None:
         try:
-            judged(read(path))
-            self._fault = None
-        except InputError as error:
-            self._fault = f"{error}. The previous code continues to run."
-
-    def _take(self, session: TorqueSession) -> None:
-        if self._fault is not None:
-            return
-        try:
+            if fault is not None:
+                raise InputError(fault)
             session.renew()
         except InputError as error:
             self._fault = f"{error}. The previous code continues to run."
         else:
+            self._fault = None
             self._saves, self._taken_at = self._saves + 1, session.t
+
+
+class _Test(threading.Thread):
+    """The test of one version of a file; fault: the file's fault, None if it can be used."""
+
+    def __init__(self, stamp: Stamp) -> None:
+        super().__init__(daemon=True)
+        self.stamp, self.fault = stamp, "The file could not be tested"
+
+    def run(self) -> None:
+        try:
+            judged(read(self.stamp[0]))
+            self.fault = None
+        except InputError as error:
+            self.fault = str(error)
 
 
 def _stamp(path: str) -> Stamp | None:

@@ -9,15 +9,17 @@ from __future__ import annotations
 
 import contextlib
 import math
+from time import perf_counter
 from typing import Any
 
 import numpy as np
 
 from app.link.exercise import Answer, Lecture, LessonPlace, Phase, SignalCurve, signals_of
-from app.worker.lesson.reference_run import ghost_of
-from app.worker.lesson.rows import LessonRows, thinned
+from himpc.telemetry import Layout
 from lessons.events import Event
+from lessons.scenes.scene import Scene
 from lessons.session.session import Session
+from lessons.session.start import begin
 from lessons.settings.settings import SceneSettings, settings_after
 from lessons.teaching.challenge import Challenge
 from lessons.teaching.control import within
@@ -26,12 +28,84 @@ from lessons.teaching.measure import Measure, Signal
 from lessons.teaching.prediction import Choice, PredictionResult, Sketch, Value
 from robots import InputError
 
+BUCKETS = 120
 _JUDGE_EVERY = 5  # number of reports between two judgements, which are made twice a second
 _CHUNK = 0.01  # s: the longest computation of the ghost between two checks for commands
 FAST = 50.0
 """Simulation speed for a run that should end as soon as possible. No computer can reach this speed."""
 
 Array = np.ndarray
+
+
+class GhostRun:
+    """A run that is computed in small pieces, until `finished` is true."""
+
+    def __init__(self, scene: Scene, seed: int) -> None:
+        self._session = begin(scene, seed)
+        self._ticks = max(1, round(scene.duration / self._session.settings.T_s))
+        self.record = LessonRows(self._session.layout, self._ticks)
+
+    @property
+    def finished(self) -> bool:
+        session = self._session
+        return len(self.record) >= self._ticks or session.diverged_at is not None or session.over
+
+    def work(self, seconds: float) -> None:
+        """Continues the run for about this wall time."""
+        until = perf_counter() + seconds
+        while not self.finished and perf_counter() < until:
+            self.record.add(self._session.tick())
+
+
+def ghost_of(exercise: LessonPlace, seed: int) -> GhostRun | None:
+    """Returns the second robot's run if a claim or a prediction is compared with it; else None."""
+    step = exercise.part
+    if not isinstance(step, Step) or step.ghost is None:
+        return None
+    return GhostRun(exercise.run.but(*step.ghost.set).prepared(), seed)
+
+
+class LessonRows:
+    """Telemetry rows since the run's start; `record[field]` is (ticks, width), like a finished recording."""
+
+    def __init__(self, layout: Layout, room: int, rows: np.ndarray | None = None) -> None:
+        """room: expected number of rows; rows: the rows so far."""
+        self._layout = layout
+        self._rows = np.empty((max(room, 1), layout.size)) if rows is None else rows
+        self._count = 0 if rows is None else len(rows)
+
+    def __len__(self) -> int:
+        return self._count
+
+    def __getitem__(self, field: str) -> np.ndarray:
+        return self._rows[: self._count, self._layout.fields[field]]
+
+    def add(self, row: np.ndarray) -> None:
+        if self._count == len(self._rows):
+            self._rows = np.concatenate([self._rows, np.empty_like(self._rows)])
+        self._rows[self._count] = row
+        self._count += 1
+
+    def until(self, t: float) -> LessonRows:
+        """Returns the rows up to a time, s."""
+        count = int(np.searchsorted(self["t"][:, 0], t + 1e-9, "right"))
+        return LessonRows(self._layout, count, self._rows[:count])
+
+
+def thinned(t: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Decimates a curve to its two ends and at most 2 · BUCKETS points: the minimum and the maximum of the
+    finite values in each bucket, each at its own time."""
+    if len(t) <= 2 * BUCKETS:
+        return t.copy(), values.copy()
+    starts = np.arange(BUCKETS + 1) * (len(t) - 1) // BUCKETS + 1
+    starts[0] = 0
+    places = np.minimum(starts[:-1, None] + np.arange(np.diff(starts).max()), starts[1:, None] - 1)
+    found = values[places]
+    known = np.isfinite(found)
+    low = np.where(known, found, np.inf).argmin(axis=1)
+    high = np.where(known, found, -np.inf).argmax(axis=1)
+    kept = np.unique(np.concatenate([[0], starts[:-1] + low, starts[:-1] + high, [len(t) - 1]]))
+    return t[kept], values[kept]
 
 
 class Lecturer:

@@ -1,1 +1,0 @@
-"""The lecturer, which judges the run of the active step of a lesson."""
