@@ -1,25 +1,16 @@
-"""The classroom: all pages show one session, and only pages with the instructor's token control it. The
-classroom is also used for an arm, which every page controls."""
+"""The classroom: all pages show one session, and only pages with the instructor's token control it."""
 
 from __future__ import annotations
 
 import secrets
-import threading
-import time
 from collections.abc import Sequence
 from typing import ClassVar, cast
 
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
-from app.link.messages import PageLeft, Quit
-from app.link.process import Process, wait_until
 from app.link.spares import Spares
 from app.server.sessions import WORKER, Refuse
 
-RETURN = 5.0
-"""Time, s, within which a reloaded page connects again."""
-_PATIENCE = 60.0
-"""Longest time, s, to wait until an arm has come to rest and the files of its drive are written."""
 STEERING = "Only the instructor can control the robot: enter the instructor's token on this page first."
 
 
@@ -71,15 +62,13 @@ class Classroom:
 
     turns_away: ClassVar[bool] = False
 
-    def __init__(self, choice: SceneChoice, all_steer: bool = False, arm: Process | None = None) -> None:
-        """all_steer: whether every page controls the robot, without the token; arm: the process that watches
-        an arm, used in place of a simulation. When the last page is closed, the arm is stopped gently."""
-        self.all_steer, self._arm = all_steer, arm
-        self._lock, self._pages, self._left_at = threading.Lock(), 0, 0.0
+    def __init__(self, choice: SceneChoice, all_steer: bool = False) -> None:
+        """all_steer: whether every page controls the robot, without the token."""
+        self.all_steer = all_steer
         self.token = secrets.token_urlsafe(16)
         self.max_sessions = 1
         self._spares = Spares(WORKER)
-        self._learner = SimulationClient(self.token, choice, self._spares, arm)
+        self._learner = SimulationClient(self.token, choice, self._spares)
 
     @property
     def learners(self) -> tuple[SimulationClient, ...]:
@@ -95,30 +84,14 @@ class Classroom:
 
     def enter(self, tokens: Sequence[str], refuse: Refuse, account: str = "") -> SimulationClient:
         """Returns the session itself to a visitor with the token, otherwise a `Watcher`."""
-        with self._lock:
-            self._pages += 1
         if self.all_steer or any(map(self.is_right, tokens)):
             return self._learner
         return cast(SimulationClient, Watcher(self._learner, refuse))
 
     def leave(self, learner: SimulationClient) -> None:
-        """Called when a page was closed. The session continues; an arm is stopped after the last page."""
-        with self._lock:
-            self._pages -= 1
-            last, self._left_at = not self._pages, time.monotonic()
-        if last and self._arm is not None:
-            self._arm.send(PageLeft())
-
-    @property
-    def deserted(self) -> bool:
-        """Whether all pages were closed, and no page has connected again after a reload."""
-        with self._lock:
-            return not self._pages and 0.0 < self._left_at < time.monotonic() - RETURN
+        """Called when a page was closed. The session continues."""
 
     def close(self) -> None:
-        """Ends the simulation process. An arm is first brought to rest."""
-        arm = self._arm
-        if arm is not None and arm.send(Quit()):
-            wait_until(lambda: not arm.alive, _PATIENCE)
+        """Ends the simulation process."""
         self._learner.close()
         self._spares.close()

@@ -90,12 +90,3 @@ def spoken(level: str) -> str:
 
 def _paragraph(head: str, rest: str) -> str:
     return block(f'<div style="font-size:1.15em"><b>{head}</b></div>{rest}', "padding-top:0.5em")
-
-
-AT_AN_ARM = _paragraph(
-    "Run, then drag the target by its arrows.",
-    "The robot shows the measured arm. The ghost is the simulation, which gets the same targets; its errors "
-    "are dashed. If you press Stop gently or close this page, the arm brakes. The settings are those with "
-    "which <code>himpc-lab arm</code> was started.",
-)
-"""The guide of a page that shows an arm."""

@@ -11,7 +11,7 @@ from app.client.pending_edit import Send
 from app.html.palette import BAD, GOOD, RGB, ink
 from app.html.text import block, esc, quantity
 from app.link.messages import Ready
-from app.panels.torque.guide import AT_AN_ARM, guide
+from app.panels.torque.guide import guide
 from app.panels.widgets.command import add_command, on_click
 from app.panels.widgets.snapshot import SessionSnapshot
 from app.view.reachability import Reachability
@@ -47,7 +47,7 @@ class StartPanel:
         self.on_theme: Callable[[bool], None] = lambda _: None
         self.on_recall: Callable[[], None] = lambda: None
         self._dragged = False
-        told = AT_AN_ARM if ready.arm else guide(ready.tasks, settings.levels, colours, dragged=False)
+        told = guide(ready.tasks, settings.levels, colours, dragged=False)
         self._guide = gui.add_html(told)
         draggable = any(task.kind == "position" and task.raw is not None for task in ready.tasks)
         self._where = gui.add_html("", visible=draggable)
@@ -59,7 +59,7 @@ class StartPanel:
                 "Off: the controller gets your point unchanged, and you see how a singular arm moves.",
             )
             recall = gui.add_button("Bring the target to the hand")
-        with gui.add_folder("Push the robot", visible=not ready.arm):
+        with gui.add_folder("Push the robot"):
             bodies = ready.robot.joint_names
             body = gui.add_dropdown("Body", bodies, initial_value=bodies[-1])
             force = gui.add_slider("Force [N]", min=5.0, max=100.0, step=5.0, initial_value=30.0)
@@ -139,7 +139,7 @@ class StartPanel:
     def update(self, now: SessionSnapshot[TorqueSettings], colours: Mapping[str, RGB]) -> None:
         """Updates the names of the levels in the guide, and the label of the button."""
         tasks, levels = now.ready.tasks, now.settings.levels
-        told = AT_AN_ARM if now.ready.arm else guide(tasks, levels, colours, self._dragged)
+        told = guide(tasks, levels, colours, self._dragged)
         if self._guide.content != told:
             self._guide.content = told
         label = _DROP if now.settings.plant.payload_kg > 0 else _PICK_UP

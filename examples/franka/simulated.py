@@ -1,0 +1,64 @@
+"""Two simulated arms: one in the place of a real arm, and the model beside an arm."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from examples.franka.guard import Array, Limits, Reading
+from examples.franka.loop import Plan
+from himpc.export.native import NativeController
+from robots import Plant
+
+
+class SimulatedArm:
+    """An arm in MuJoCo. In real time the last torque acts for several periods if the caller is late."""
+
+    def __init__(self, plant: Plant, period: float, real_time: bool = False) -> None:
+        robot, self.plant, self._period = plant.robot, plant, period
+        self._due = time.monotonic() + period if real_time else None
+        self._data, self._tau, self._acted = robot.model.createData(), np.zeros(robot.n), np.zeros(robot.n)
+        rate, v = np.full(robot.n, 1000.0), robot.v_limit
+        self.limits = Limits(robot.tau_limit, rate, v, robot.q_lower, robot.q_upper)
+
+    def read(self) -> Reading:
+        passed = 1
+        if self._due is not None:
+            late = time.monotonic() - self._due
+            time.sleep(max(0.0, -late))
+            passed += max(0, int(late / self._period))
+            self._due += passed * self._period
+        for _ in range(passed):
+            gravity = pin.computeGeneralizedGravity(self.plant.robot.model, self._data, self.plant.q)
+            self._acted = self.plant.step(self._tau + gravity, self._period) - gravity
+        state = self.plant.measure(self._period)
+        return Reading(state.q, state.v, self._acted, state.t)
+
+    def write(self, tau: Array) -> None:
+        self._tau = np.clip(tau, -self.limits.tau, self.limits.tau)
+
+    def stop(self) -> None:
+        """A real arm holds its position by itself from here on."""
+
+
+class Model:
+    """The simulated robot beside the arm: the same controller, and the same drags at the same times."""
+
+    def __init__(self, plant: Plant, controller: NativeController, plan: Plan) -> None:
+        self._arm, self._controller, self._plan = SimulatedArm(plant, plan.period), controller, plan
+        self.q, self._t = plant.q, 0.0
+        plan.begin(controller, np.zeros(controller.n))
+
+    def at(self, row: Any) -> Array:
+        """Simulates until the time of a row, unless the arm is ending; returns the joints, (n,) rad."""
+        plan = self._plan
+        while self._t < row["t"] + 0.5 * plan.period and not row["ending"]:
+            reading = self._arm.read()
+            plan.drag(self._controller, self._t - plan.period, self._t)
+            wanted, _ = self._controller.tick(reading.q, reading.v, reading.tau)
+            self._arm.write(plan.limits.accepted(wanted, reading.tau, plan.period))
+            self.q, self._t = reading.q, self._t + plan.period
+        return self.q
