@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
 import multiprocessing
-import os
 import signal
 import sys
 import tempfile
@@ -19,8 +17,8 @@ import tyro
 
 from examples.franka.franka import LIMITS, Franka
 from examples.franka.guard import Array
-from examples.franka.loop import ASKED, Ended, Loop, Plan, Shared
-from examples.franka.simulated import Model, SimulatedArm
+from examples.franka.loop import Ended, Loop, Plan, Shared
+from examples.franka.simulated import Model, SimulatedArm, hurry, watch
 from himpc.export.image import Image, image_of
 from himpc.export.native import NativeController, build
 from lessons import load_scene, prepared
@@ -28,64 +26,26 @@ from lessons.session.torque import TorqueSession
 from robots import InputError, Plant
 from robots.errors import unknown_name
 
-_LOOK = 0.02  # s between two looks at the loop's rows
-_PATIENCE = 4.0  # s within which the loop must end after a request; it needs at most 2 s
 _NEAR = 0.05  # m or rad: largest error of a task at which the controller may take control
 Make = Callable[[], NativeController]
 Moves = tuple[tuple[float, str, float, float, float], ...]
 
 
-def drive(plan: Plan, arm: Callable[[], Any], make: Make, model: Model) -> tuple[Ended, Array, Array]:
-    """Runs the loop in a process of its own and watches it. Ctrl-C stops the arm gently. Returns how the
-    drive ended, the loop's rows, and the model's joints at these rows, (k, n) rad."""
-    controller, beside, why, wanted = make(), [], "", False
+def drive(plan: Plan, arm: Callable[[], Any], make: Make, model: Model) -> tuple[Ended, Shared]:
+    """Runs the loop, beside a process that watches it. Ctrl-C stops the arm gently."""
+    controller = make()
     shared = Shared(plan, controller.view("error").size)
-    ours, theirs = multiprocessing.Pipe(duplex=False)
-    fork = multiprocessing.get_context("fork")  # the child shares the memory and the imported modules
-    child = fork.Process(target=_work, args=(plan, arm, controller, shared, theirs))
-    child.start()
+    # The fork shares the memory. A watcher that ends or hangs is silent, and the loop stops the arm gently.
+    watcher = multiprocessing.get_context("fork").Process(target=watch, args=(model, shared), daemon=True)
+    watcher.start()
+    loop = Loop(arm(), controller, plan, shared)
+    before = signal.signal(signal.SIGINT, lambda *_: setattr(loop, "interrupted", True))
     try:
-        while child.is_alive() and not why:
-            # The row before the newest one is certainly complete.
-            for row in shared.rows[len(beside) : max(0, int(shared.count[0]) - 1)]:
-                beside.append(model.at(row))
-                shared.watched[0], away = row["t"], np.abs(row["q"] - model.q)
-                if not (row["ending"] or away.max() <= plan.tolerances.distance):
-                    why = f"joint {away.argmax() + 1} is {away.max():.2f} rad away from the model"
-                    break
-            ours.poll(_LOOK)
-    except KeyboardInterrupt:
-        why, wanted = "it was interrupted", True
+        return loop.run(), shared
     finally:
-        shared.stop[0] = 1
-        child.join(_PATIENCE)
-        ended = ours.recv() if ours.poll() else None
-        child.kill()
-        child.join()
-    rows = shared.rows[: int(shared.count[0])]
-    beside += [model.at(row) for row in rows[len(beside) :]]
-    if ended is None:
-        ended = Ended(f"the process of the loop ended (exit code {child.exitcode})", False, False)
-    return Ended(why, wanted, ended.gently) if ended.why == ASKED else ended, rows, np.array(beside)
-
-
-def _work(plan: Plan, arm: Callable[[], Any], controller: Any, shared: Shared, pipe: Any) -> None:
-    """The process of the loop. The watcher gets Ctrl-C, and asks the loop to end gently."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGALRM, signal.SIG_DFL)
-    hurry(50)
-    try:
-        ended = Loop(arm(), controller, plan, shared).run()
-    except Exception as error:
-        ended = Ended(f"the loop failed: {error}", False, False)
-    with contextlib.suppress(OSError):
-        pipe.send(ended)
-
-
-def hurry(priority: int) -> None:
-    """Requests real-time scheduling for this process, if the system allows it."""
-    with contextlib.suppress(OSError, AttributeError):
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+        signal.signal(signal.SIGINT, before)
+        watcher.kill()
+        watcher.join()
 
 
 def image_at(scene: Any, start: Array) -> tuple[Image, TorqueSession]:
@@ -163,12 +123,13 @@ def main(
         check_start(make(), start)
         drags = drags_of(drag, session, image)
         plan = Plan(limits, start, period, duration, drags, delay=delay, stuck=5.0)
-        hurry(10)  # below the loop
-        ended, rows, q_model = drive(plan, arm, make, Model(resting(beside.settings), make(), plan))
+        hurry(50)
+        ended, shared = drive(plan, arm, make, Model(resting(beside.settings), make(), plan))
     print(f"ended: {ended.why}; it {'came' if ended.gently else 'did not come'} to rest under control")
     if npz:
-        fields: Any = rows.dtype.names
-        np.savez_compressed(npz, q_model=q_model, **{name: rows[name] for name in fields})
+        rows: Any = shared.rows[: int(shared.count[0])]
+        fields: dict[str, Any] = {name: rows[name] for name in rows.dtype.names}
+        np.savez_compressed(npz, q_model=shared.q_model[: len(rows)], **fields)
     return 0 if ended.wanted and ended.gently else 1
 
 

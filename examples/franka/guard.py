@@ -66,10 +66,13 @@ class Guard:
         self._limits, self._most, self._period = limits, tolerances, period
         self._share, self._hurried, self._lost = 0.0, 0, 0
 
-    def check(self, reading: Reading, missed: int, hurried: bool, fallback: int, behind: float) -> str | None:
-        """Returns the reason why the control must end, or None. missed: periods missed before this one;
-        hurried: whether the requested torque changed faster than the arm accepts; fallback: an index of
-        `FALLBACKS`; behind: time, s, since the newest measurement that the watcher has compared."""
+    def check(
+        self, t: float, reading: Reading, missed: int, hurried: bool, fallback: int, at: float, away: Array
+    ) -> str | None:
+        """Returns the reason why the control must end at t, s after the start, or None. missed: periods
+        missed before; hurried: whether the requested torque changed faster than the arm accepts; fallback:
+        an index of `FALLBACKS`; at: the time, s, of the newest measurement that the watcher has compared
+        with the model; away: the distance of the joints then, (n,) rad."""
         most, limit, v = self._most, self._limits.v, np.abs(reading.v)
         self._share += (missed / (1 + missed) - self._share) * min(1.0, self._period * (1 + missed))
         self._hurried = self._hurried + 1 if hurried else 0
@@ -87,4 +90,8 @@ class Guard:
             return f"the requested torque changed too fast in {self._hurried} periods one after another"
         if self._lost > most.lost:
             return f"the controller had no torque in {self._lost} periods one after another"
-        return f"the watcher has been silent for {behind:.1f} s" if behind > most.silent else None
+        if not away.max() <= most.distance:
+            return f"joint {away.argmax() + 1} is {away.max():.2f} rad away from the model"
+        if t - at > most.silent:
+            return f"the watcher has been silent for {t - at:.1f} s"
+        return None

@@ -20,7 +20,6 @@ from himpc.export.native import NativeController
 from himpc.tick.kernel.arrays import PERIOD
 
 RAMP_SECONDS, MOST_SECONDS = 0.5, 1.5  # of a gentle stop: until the torque is zero, and at most
-ASKED = "the watcher requested it"
 _STILL = 0.02  # rad/s
 _CALMING = 0.3  # torque that brakes a joint at its largest velocity, as a share of its largest torque
 _MOVED = 0.02  # rad, allowed motion between the first reading of the arm and the start of the loop
@@ -36,9 +35,9 @@ class Ended(NamedTuple):
 
 @dataclass(frozen=True)
 class Plan:
-    """A drive: limits in force; the pose, rad, at which the targets begin; period and duration, s; drags, (s
-    after the start, task, values as of `himpc_set`), in order; delay: periods after which a torque acts, 0: as
-    the arm reports; stuck: time, s, after which a call of the arm ends the process, 0: never."""
+    """A drive: limits in force; the pose, rad, at which the targets begin; period and duration, s; drags: (s
+    after the start, task, values as of `himpc_set`); delay: periods after which a torque acts, 0: as the arm
+    reports; stuck: time, s, after which a call of the arm ends the process, 0: never."""
 
     limits: Limits
     start: Array
@@ -63,25 +62,29 @@ class Plan:
 
 
 class Shared:
-    """Memory of loop and watcher; neither waits for the other. The loop writes `rows` and their `count`, the
-    watcher `stop` and `watched`: until when, s after the start, it has compared the arm."""
+    """Memory of loop and watcher; neither waits for the other. The loop writes `rows` and their `count`. The
+    watcher writes `q_model`, its joints at these rows, and `watched` and `away`, see `Guard`."""
 
     def __init__(self, plan: Plan, errors: int) -> None:
         numbers = [(name, float) for name in ("t", "missed", "us", "fallback", "ending")]
         vectors = [(name, float, len(plan.start)) for name in ("q", "v", "tau_0", "tau")]
         kind = np.dtype([*numbers, *vectors, ("error", float, errors)])
-        most = round((plan.duration + 2 * MOST_SECONDS) / plan.period)
-        memory = mmap.mmap(-1, 24 + most * kind.itemsize)
-        self.count, self.stop = np.ndarray(1, np.int64, memory), np.ndarray(1, np.int64, memory, 8)
-        self.watched, self.rows = np.ndarray(1, float, memory, 16), np.ndarray(most, kind, memory, 24)
+        n, most = len(plan.start), round((plan.duration + 2 * MOST_SECONDS) / plan.period)
+        self.rows, self.q_model = _memory(most, kind), _memory((most, n), float)
+        self.count, self.watched, self.away = _memory(1, np.int64), _memory(1, float), _memory(n, float)
+
+
+def _memory(shape: Any, kind: Any) -> Array:
+    """Returns zeros that forked processes share."""
+    return np.ndarray(shape, kind, mmap.mmap(-1, int(np.prod(shape)) * np.dtype(kind).itemsize))
 
 
 class Loop:
-    """Drives an arm until its time is over, the watcher asks for the end or the guard finds a reason."""
+    """Drives an arm until its time is over, Ctrl-C, or until the guard finds a reason."""
 
     def __init__(self, arm: Any, controller: NativeController, plan: Plan, shared: Shared) -> None:
         self._arm, self._controller, self._plan, self._shared = arm, controller, plan, shared
-        self._first = self._t = 0.0
+        self._first, self._t, self.interrupted = 0.0, 0.0, False
         self._missed, self._tau, self._error = 0, np.zeros(controller.n), controller.view("error")
         self._sent = deque([self._tau] * (plan.delay + 1), plan.delay + 1)
 
@@ -115,9 +118,10 @@ class Loop:
             acted = self._sent[0] if plan.delay else reading.tau
             wanted, fallback = controller.tick(reading.q, reading.v, acted)
             hurried = self._write(reading, wanted, fallback, begun)
-            why = guard.check(reading, self._missed, hurried, fallback, t - shared.watched[0])
-            if why or shared.stop[0]:
-                return why or ASKED, not why
+            state = (t, reading, self._missed, hurried, fallback)
+            why = guard.check(*state, shared.watched[0], shared.away)
+            if why or self.interrupted:
+                return why or "it was interrupted", not why
             if t >= plan.duration:
                 return f"the {plan.duration:g} s are over", True
 

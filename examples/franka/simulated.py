@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
+import signal
 import time
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from examples.franka.guard import Array, Limits, Reading
-from examples.franka.loop import Plan
+from examples.franka.loop import Plan, Shared
 from himpc.export.native import NativeController
 from robots import Plant
+
+LOOK = 0.02  # s between two looks at the loop's rows
 
 
 class SimulatedArm:
@@ -49,16 +53,38 @@ class Model:
 
     def __init__(self, plant: Plant, controller: NativeController, plan: Plan) -> None:
         self._arm, self._controller, self._plan = SimulatedArm(plant, plan.period), controller, plan
-        self.q, self._t = plant.q, 0.0
+        self._q, self._t = plant.q, -plan.period
         plan.begin(controller, np.zeros(controller.n))
 
-    def at(self, row: Any) -> Array:
-        """Simulates until the time of a row, unless the arm is ending; returns the joints, (n,) rad."""
+    def at(self, t: float) -> Array:
+        """Simulates until t, s after the start; returns the joints, (n,) rad."""
         plan = self._plan
-        while self._t < row["t"] + 0.5 * plan.period and not row["ending"]:
+        while self._t < t - 0.5 * plan.period:
+            since, self._t = self._t, self._t + plan.period
             reading = self._arm.read()
-            plan.drag(self._controller, self._t - plan.period, self._t)
+            plan.drag(self._controller, since, self._t)
             wanted, _ = self._controller.tick(reading.q, reading.v, reading.tau)
             self._arm.write(plan.limits.accepted(wanted, reading.tau, plan.period))
-            self.q, self._t = reading.q, self._t + plan.period
-        return self.q
+            self._q = reading.q
+        return self._q
+
+
+def watch(model: Model, shared: Shared) -> None:
+    """Simulates the model at each row of the loop, and reports how far it is from the arm, until the loop's
+    process ends. The row before the newest one is certainly complete."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    hurry(10)  # below the loop
+    done, loop = 0, os.getppid()
+    while os.getppid() == loop:
+        for k in range(done, max(0, int(shared.count[0]) - 1)):
+            row, done = shared.rows[k], k + 1
+            shared.q_model[k] = model.at(row["t"])
+            shared.away[:] = np.abs(row["q"] - shared.q_model[k])
+            shared.watched[0] = row["t"]
+        time.sleep(LOOK)
+
+
+def hurry(priority: int) -> None:
+    """Requests real-time scheduling for this process, if the system allows it."""
+    with contextlib.suppress(OSError, AttributeError):
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
