@@ -27,7 +27,6 @@ COMMANDS: dict[str, str] = {
     "reproduce": "compare our results with the papers' tables and figures",
     "sweep": "run a grid of settings and draw a map; a stopped sweep can be continued",
     "export": "export a controller as C or WebAssembly, with its numbers and a recorded run to replay",
-    "arm": "drive a real arm, or a simulated one, by an exported controller",
     "tune": "find M̄ step by step, as Remark 4 of the HIMPC paper says",
 }
 """One line per command; the function `NAME(…) -> exit code` is in `app/commands/NAME.py`."""

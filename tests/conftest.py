@@ -35,7 +35,6 @@ settings.load_profile("same-every-time")
 
 _TOGETHER = (
     ("tests/app/browser/",),
-    ("tests/app/test_app_arm_",),
     (
         "tests/lessons/test_lessons_course.py",
         "tests/lessons/test_lessons_quoted.py",
@@ -43,8 +42,8 @@ _TOGETHER = (
     ),
     ("tests/test_site.py", "tests/test_site_live.py"),
 )
-"""Beginnings of the paths of test files that share an expensive resource: a browser, the compiled controller
-of an arm, all runs of the course, or the built site."""
+"""Beginnings of the paths of test files that share an expensive resource: a browser, all runs of the course,
+or the built site."""
 
 
 class OneWorkerForWhatIsShared(LoadScopeScheduling):

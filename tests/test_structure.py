@@ -35,7 +35,6 @@ DOORS = {
     "jupyter_core": ("app/jupyter/frame.py",),
     "psutil": ("robots/processes/family.py",),
     "pyseccomp": ("lessons/exercises/inside/confine.py",),
-    "pylibfranka": ("robots/arms/franka.py",),
     "py_landlock": ("lessons/exercises/inside/confine.py",),
 }
 
@@ -104,7 +103,7 @@ def test_himpc_is_tested_without_lessons_and_app() -> None:
 
 
 APP = {
-    "commands": ("server", "arm", "html", "link", "__main__"),
+    "commands": ("server", "html", "link", "__main__"),
     "jupyter": ("server", "client", "link"),
     "server": ("classes", "page", "panels", "client", "html", "link", "worker", "adapter"),
     "classes": ("client", "html", "link"),
@@ -113,14 +112,12 @@ APP = {
     "view": ("client", "html", "link", "adapter"),
     "client": ("html", "link"),
     "worker": ("link",),
-    "arm": ("worker", "link"),
     "link": (),
     "html": (),
     "adapter": (),
 }
 """The folders that each folder of app/ may import beside itself: page and simulation meet only in `link`.
-Only the server imports both; it passes the entry point of the simulation on. The loop of a real arm stands
-beside the simulation, whose reports it uses."""
+Only the server imports both; it passes the entry point of the simulation on."""
 
 
 def test_app_is_the_folders_it_says() -> None:
@@ -269,7 +266,6 @@ ROBOTS = {
     "covering": ("mechanics", "shapes", "per_robot", "robot", "geometry", "urdf", "meshes"),
     "plant": (*("mechanics", "world", "truth", "robot", "settings", "signals", "runge_kutta", "errors"),),
     "servo": ("plant", "robot", "settings", "ranges", "signals"),
-    "arms": ("plant", "robot", "errors"),
     "loading": (
         *("plant", "covering", "floor", "mechanics", "shapes", "robot", "geometry", "urdf", "meshes"),
         *("processes", "catalog", "inertia", "report", "errors"),
@@ -282,7 +278,7 @@ geometry as data; the plant and the geometry of an imported robot are made from 
 @pytest.mark.parametrize("part", ROBOTS)
 def test_robots_are_built_in_one_direction(part: str) -> None:
     """Imports go in the direction errors, urdf, geometry ← robot ← world, shapes ← mechanics ← covering,
-    plant ← loading, arms. Imports for types and inside functions count as well."""
+    plant ← loading. Imports for types and inside functions count as well."""
     assert not against_the_order("robots", part)
 
 

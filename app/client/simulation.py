@@ -101,7 +101,7 @@ class Simulation(ABC):
         self._start()
 
     def _start(self) -> None:
-        process = self._process = self._source()
+        process = self._process = self._spares.take()
         self._loading = False
 
         def hear(report: Report) -> None:
@@ -109,10 +109,6 @@ class Simulation(ABC):
             self._heard(process, report)
 
         process.listen(hear)
-
-    def _source(self) -> Process:
-        """Returns the process that is used first."""
-        return self._spares.take()
 
     @property
     def pid(self) -> int | None:

@@ -7,7 +7,6 @@ import os
 import time
 from collections import deque
 from contextlib import suppress
-from dataclasses import replace
 from queue import Empty, Queue
 from threading import Lock
 from typing import TYPE_CHECKING, NamedTuple, final
@@ -40,12 +39,8 @@ from app.link.spares import Spares
 if TYPE_CHECKING:
     from lessons.teaching import lesson
 
-SIMULATION = "simulation"
-"""The name of the ghost of an arm."""
 STAYING = "Your teacher keeps the class at this step: wait for the next one."
 WAITING = "Your teacher runs this step for everybody: say what you expect, and wait."
-ARM_AGAIN = "Each start of himpc-lab arm drives the arm once: end this program and start it again."
-ARM_GHOST = "On this page the ghost is always the simulation of the arm, which gets the same targets."
 BEHIND = 10
 """The niceness of a simulation minus that of the server. Pages are thus served first."""
 
@@ -56,10 +51,7 @@ class SimulationClient(Simulation):
 
     who = "The simulation"
 
-    def __init__(self, token: str, choice: SceneChoice, spares: Spares, arm: Process | None = None) -> None:
-        """arm: the process that watches an arm, used in place of a simulation. This process is never
-        replaced. Its ghost is the simulation that gets the same targets."""
-        self._arm = arm
+    def __init__(self, token: str, choice: SceneChoice, spares: Spares) -> None:
         self.token = token
         self.choice = self._start_choice = choice
         self.attached = False
@@ -77,17 +69,11 @@ class SimulationClient(Simulation):
         self._unheard: Unheard | None = None
         super().__init__(spares)
         self.send(Load(choice))
-        if arm is not None:
-            self._replace_ghost(SIMULATION, ())
-
-    def _source(self) -> Process:
-        return self._arm or super()._source()
 
     def trouble(self) -> Trouble | None:
         """Returns the problem of the simulation or its ghost that the page should show, or None."""
         ghost = self.ghost
-        found = super().trouble() or (None if ghost is None else ghost.trouble())
-        return found if found is None or self._arm is None else replace(found, offer=None)
+        return super().trouble() or (None if ghost is None else ghost.trouble())
 
     def load(self, choice: SceneChoice) -> None:
         """Loads another scene; uses a new process if the present one has a problem. A learner who is kept at
@@ -149,9 +135,6 @@ class SimulationClient(Simulation):
 
     def _begin_anew(self, command: Load | ResetAll, choice: SceneChoice | None, patience: float) -> None:
         """Sends the command, or starts a new process if the present one has a problem or has just ended."""
-        if self._arm is not None:
-            self._refuse(ARM_AGAIN)
-            return
         with self._lock:
             ended = self.failure is not None or not self._process.alive or self.quiet >= patience
             if ended and self.trouble() is not None:
@@ -163,9 +146,6 @@ class SimulationClient(Simulation):
     def restart(self, choice: SceneChoice | None = None) -> None:
         """Starts a new process with another scene, or with the last one. The old process is ended, by force
         if it does not answer. This call waits for neither process."""
-        if self._arm is not None:
-            self._refuse(ARM_AGAIN)
-            return
         with self._lock:
             if self._closed:
                 return
@@ -257,10 +237,7 @@ class SimulationClient(Simulation):
         """Starts a ghost: a second robot in the same scene, with the present settings and the changes in
         `ghost.set`. The scene is reset, and both robots begin together. An existing ghost is replaced. If
         `ghost.set` does not fit the scene, a notice says so and there is no ghost."""
-        if self._arm is None:
-            self._replace_ghost(ghost.words, ghost.set)
-        else:
-            self._refuse(ARM_GHOST)
+        self._replace_ghost(ghost.words, ghost.set)
 
     def _replace_ghost(self, words: str, own: tuple[str, ...]) -> None:
         with self._lock:
@@ -276,12 +253,6 @@ class SimulationClient(Simulation):
 
     def stop_ghost(self) -> None:
         """Ends the ghost; the robot continues alone."""
-        if self._arm is None:
-            self._end_ghost()
-        else:
-            self._refuse(ARM_GHOST)
-
-    def _end_ghost(self) -> None:
         with self._lock:
             before, self.ghost = self.ghost, None
         self.send(Lead(False))
@@ -291,7 +262,7 @@ class SimulationClient(Simulation):
     def _lost_ghost(self, ghost: GhostClient, sentence: str) -> None:
         if ghost is self.ghost:
             self._refuse(f"There is no ghost: {sentence}")
-            self._end_ghost()
+            self.stop_ghost()
 
     def close(self) -> None:
         super().close()

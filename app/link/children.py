@@ -150,18 +150,6 @@ def spawned(worker: str, theirs: socket.socket) -> Spawned:
     return Spawned(mp.get_context("spawn").Process(target=_run, args=(worker, theirs), daemon=True))
 
 
-def forked_here(work: Callable[[Wire], object], theirs: socket.socket) -> Spawned:
-    """Returns a fork of this process, which shares all loaded data. Call this before threads start. Unlike
-    other children, the fork does not end with this process.
-
-    Args:
-        work: the function that the child runs with its end of the socket.
-        theirs: the child's end of the socket.
-    """
-    fork = mp.get_context("fork")
-    return Spawned(fork.Process(target=lambda: work(Wire(theirs)), daemon=False))
-
-
 def _run(worker: str, theirs: socket.socket) -> None:
     end_with_parent()
     import_module(worker).main(Wire(theirs))

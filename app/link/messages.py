@@ -106,11 +106,6 @@ class Tell:
 
 
 @dataclass(frozen=True)
-class PageLeft:
-    """The last page was closed. A drive of an arm is then stopped gently; a simulation continues."""
-
-
-@dataclass(frozen=True)
 class Quit:
     """End the process."""
 
@@ -129,7 +124,6 @@ Command = (
     | Predict
     | RunStep
     | InsideRequest
-    | PageLeft
     | Quit
 )
 
@@ -162,18 +156,6 @@ class TaskView:
 
 
 @dataclass(frozen=True)
-class ArmView:
-    """The status of an arm. missed: number of periods so far in which the controller gave no torque; begun:
-    whether the controller has taken control; ended: the reason of the stop, "" before; behind: delay of the
-    ghost, s."""
-
-    missed: int
-    begun: bool
-    ended: str
-    behind: float
-
-
-@dataclass(frozen=True)
 class ContactPoint:
     """A point at which the robot touches an object or itself. between: two names, first the object or the
     other link, then the link on which the force acts; position, m, and force, N, in the world frame."""
@@ -187,8 +169,7 @@ class ContactPoint:
 class Ready:
     """A scene is loaded and its first tick can run. room: (k, 3) points, m, that the camera should show
     besides the robot; again: the same run continues with another stack; left_out: a sentence for each of the
-    user's own tasks that is not offered; world: the objects around the robot; arm: whether the robot is a
-    real arm."""
+    user's own tasks that is not offered; world: the objects around the robot."""
 
     choice: SceneChoice
     block: Handle  # of the shared memory
@@ -200,7 +181,6 @@ class Ready:
     again: bool = False
     left_out: tuple[str, ...] = ()
     world: World = ()
-    arm: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,8 +195,8 @@ class Status:
     mission; lecture: state of a lesson, sent after a change; inside: sent while the page requests it;
     own: state of a controller from a file; ranks: per level the number of available directions, and of
     rows; contacts: the points of contact after the last tick; objects: (k, 7), the poses of the free
-    objects; nearest: the names of the nearest pair, "" if no distance is measured; arm: only for an arm;
-    code: the state code of the setting, sent after a change, "" if there is none.
+    objects; nearest: the names of the nearest pair, "" if no distance is measured; code: the state code of
+    the setting, sent after a change, "" if there is none.
     """
 
     t: float
@@ -242,7 +222,6 @@ class Status:
     contacts: tuple[ContactPoint, ...] = ()
     objects: np.ndarray = field(default_factory=lambda: np.zeros((0, 7)))
     nearest: str = ""
-    arm: ArmView | None = None
     code: str | None = None
 
 

@@ -121,8 +121,7 @@ class Stage:
         self._playback = PlaybackPanel(gui, self._learner, loop, self._face.fastest)
         self._time_line = TimeLine(gui, self._learner, loop)
         exercise = self._learner.choice_of(self._ready).exercise
-        offered = not self._ready.arm
-        self._course = Course(gui, self._learner, exercise, notebook, choose, self._settings, loop, offered)
+        self._course = Course(gui, self._learner, exercise, notebook, choose, self._settings, loop)
         tabs = gui.add_tab_group()
         plots = tabs if narrow else gui.add_panel()
         if not narrow:

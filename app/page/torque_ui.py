@@ -202,7 +202,7 @@ class TorqueFace:
         context, T_s = self._context, self._context.settings.T_s
         self._frames.show(bool(self._start.frames.value))
         self._trails.show(bool(self._start.trace.value), bool(self._start.prediction.value))
-        running = moment.status.running or not moment.live or context.ready.arm
+        running = moment.status.running or not moment.live
         self._hand.show(self._frames, context.settings, moment.latest, context.ready.layout.fields, running)
         self._hand.look_back(None if moment.live else moment.status.targets)
         tips = moment.way[:, -1, :3] if len(moment.way) else np.zeros((0, 3))

@@ -1,25 +1,17 @@
-"""The classroom: all pages show one session, and only pages with the instructor's token control it. The
-classroom is also used for an arm, which every page controls."""
+"""The classroom: all pages show one session, and only pages with the instructor's token control it."""
 
 from __future__ import annotations
 
 import secrets
 import threading
-import time
 from collections.abc import Sequence
 from typing import ClassVar, cast
 
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
-from app.link.messages import PageLeft, Quit
-from app.link.process import Process, wait_until
 from app.link.spares import Spares
 from app.server.sessions import WORKER, Refuse
 
-RETURN = 5.0
-"""Time, s, within which a reloaded page connects again."""
-_PATIENCE = 60.0
-"""Longest time, s, to wait until an arm has come to rest and the files of its drive are written."""
 STEERING = "Only the instructor can control the robot: enter the instructor's token on this page first."
 
 
@@ -71,15 +63,14 @@ class Classroom:
 
     turns_away: ClassVar[bool] = False
 
-    def __init__(self, choice: SceneChoice, all_steer: bool = False, arm: Process | None = None) -> None:
-        """all_steer: whether every page controls the robot, without the token; arm: the process that watches
-        an arm, used in place of a simulation. When the last page is closed, the arm is stopped gently."""
-        self.all_steer, self._arm = all_steer, arm
-        self._lock, self._pages, self._left_at = threading.Lock(), 0, 0.0
+    def __init__(self, choice: SceneChoice, all_steer: bool = False) -> None:
+        """all_steer: whether every page controls the robot, without the token."""
+        self.all_steer = all_steer
         self.token = secrets.token_urlsafe(16)
         self.max_sessions = 1
+        self._lock, self._pages = threading.Lock(), 0
         self._spares = Spares(WORKER)
-        self._learner = SimulationClient(self.token, choice, self._spares, arm)
+        self._learner = SimulationClient(self.token, choice, self._spares)
 
     @property
     def learners(self) -> tuple[SimulationClient, ...]:
@@ -103,13 +94,10 @@ class Classroom:
         return cast(SimulationClient, Watcher(self._learner, refuse))
 
     def leave(self, learner: SimulationClient) -> None:
-        """Called when a page was closed. The session continues; an arm is stopped after the last page."""
+        """Called when a page was closed. The session continues."""
         with self._lock:
             self._pages -= 1
-            last, self._left_at = not self._pages, time.monotonic()
-            self._learner.attached = not last
-        if last and self._arm is not None:
-            self._arm.send(PageLeft())
+            self._learner.attached = self._pages > 0
 
     @property
     def pages(self) -> int:
@@ -117,16 +105,7 @@ class Classroom:
         with self._lock:
             return self._pages
 
-    @property
-    def deserted(self) -> bool:
-        """Whether all pages were closed, and no page has connected again after a reload."""
-        with self._lock:
-            return not self._pages and 0.0 < self._left_at < time.monotonic() - RETURN
-
     def close(self) -> None:
-        """Ends the simulation process. An arm is first brought to rest."""
-        arm = self._arm
-        if arm is not None and arm.send(Quit()):
-            wait_until(lambda: not arm.alive, _PATIENCE)
+        """Ends the simulation process."""
         self._learner.close()
         self._spares.close()

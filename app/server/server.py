@@ -57,7 +57,6 @@ class PageServer:
         proxy_only: bool = False,
         embed_in: Sequence[str] = (),
         all_steer: bool = False,
-        room: Classroom | None = None,
         class_file: ClassFile | None = None,
     ) -> None:
         """Starts the server.
@@ -79,7 +78,6 @@ class PageServer:
             proxy_only: only a proxy that sends the token in its header is admitted.
             embed_in: origins whose pages may show the page in a frame.
             all_steer: every page of a classroom controls the robot.
-            room: all pages show the robot of this room.
             class_file: the file with which the class continues after a new start.
 
         Raises:
@@ -110,7 +108,7 @@ class PageServer:
         self.proxy_only = proxy_only
         self.guard = ConnectionGuard(Door())
         alone = Classroom(choice, all_steer) if classroom else None
-        self.sessions = room or alone or Sessions(choice, max_sessions, grace)
+        self.sessions = alone or Sessions(choice, max_sessions, grace)
         self._own_files, self._key, self._refers = own_files, key, refers
         self._visits: dict[int, Visit] = {}
         self._closed = False  # if True, no new visit begins

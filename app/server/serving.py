@@ -7,28 +7,20 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 from app.server.greeting import greeting
 from app.server.opening import opened_in_a_browser
 from app.server.server import PageServer
 
 
-def serve(
-    server: PageServer,
-    *,
-    open_browser: bool = True,
-    drain: float = 0.0,
-    over: Callable[[], bool] = lambda: False,
-) -> int:
-    """Serves the pages of a server until Ctrl-C, SIGTERM, or until `over` returns True. Then closes the
-    server.
+def serve(server: PageServer, *, open_browser: bool = True, drain: float = 0.0) -> int:
+    """Serves the pages of a server until Ctrl-C or SIGTERM. Then closes the server.
 
     Args:
         server: the server, which was just started.
         open_browser: whether to open the first page in a browser.
         drain: time, s, for which open pages continue after SIGTERM.
-        over: called twice a second; True ends the server.
     """
     stop, now, by_hand = threading.Event(), threading.Event(), threading.Event()
     try:
@@ -37,7 +29,7 @@ def serve(
                 print(line, flush=True)
             if open_browser:
                 until_the_end.enter_context(opened_in_a_browser(server.first_link))
-            while not stop.wait(0.5) and not over():
+            while not stop.wait(0.5):
                 pass
             server.drain(drain, now)
             if by_hand.is_set():

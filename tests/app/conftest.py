@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import partial
-from typing import TYPE_CHECKING
 
 import pytest
 from children import Start
@@ -16,9 +15,6 @@ from app.link.forkserver import ForkServer
 from app.link.spares import Spares
 from app.server.sessions import WORKER
 from lessons.scenes.run_spec import RunSpec
-
-if TYPE_CHECKING:
-    from arm_bench import Bench
 
 
 @pytest.fixture(scope="session")
@@ -66,11 +62,3 @@ def start(lent: dict[str, ForkServer | None]) -> Iterator[Start]:
         learner.close()
     for spares in made:
         spares.close()
-
-
-@pytest.fixture(scope="session")
-def bench(tmp_path_factory: pytest.TempPathFactory) -> Bench:
-    """Returns a scene prepared for drives of an arm. Its controller is compiled once."""
-    from arm_bench import Bench
-
-    return Bench(tmp_path_factory.mktemp("arm"))

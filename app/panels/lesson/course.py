@@ -30,16 +30,14 @@ class Course:
         choose: Callable[[SceneChoice], None],
         settings: Callable[[], SceneSettings],
         loop: asyncio.AbstractEventLoop,
-        offered: bool = True,
     ) -> None:
-        """exercise: the active step, if there is one; offered: whether this page can begin lessons."""
+        """exercise: the active step, if there is one."""
         self._gui, self._learner, self._notebook = gui, learner, notebook
         self._exercise = exercise
         self._choose, self._settings, self._loop = choose, settings, loop
-        self._offered = offered
         self._list = PopupWindow(gui, "All lessons", "L", self._fill)
         self._panel: LessonPanel | None = None
-        if exercise is None and offered:
+        if exercise is None:
             add_invitation(gui, notebook, choose)
 
     def add_first_tabs(
@@ -67,7 +65,7 @@ class Course:
 
     def add_last_tab(self, tabs: viser.GuiTabGroupHandle) -> None:
         """Adds the list of lessons, if no lesson is active."""
-        if self._panel is None and self._offered:
+        if self._panel is None:
             with tabs.add_tab("Lessons"):
                 self._fill()
 

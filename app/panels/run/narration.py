@@ -37,7 +37,6 @@ class Facts:
         levels: (name, whether it is on), highest priority first.
         errors: for each task its error and the unit, m or rad.
         limits: active limits, as (kind, joint).
-        rest: the word that is shown while no simulated time passes.
     """
 
     running: bool
@@ -45,7 +44,6 @@ class Facts:
     levels: tuple[tuple[str, bool], ...]
     errors: dict[str, tuple[float, str]]
     limits: frozenset[tuple[str, str]]
-    rest: str = "paused"
 
 
 def facts_of(now: SessionSnapshot[SceneSettings]) -> Facts:
@@ -62,7 +60,6 @@ def facts_of(now: SessionSnapshot[SceneSettings]) -> Facts:
             if f"error/{task.name}" in fields
         },
         frozenset((each.kind, each.joint) for each in status.binding),
-        "paused" if status.arm is None else "the arm is not driven",
     )
 
 
@@ -84,7 +81,7 @@ class Narration:
         before, self._before = self._before, now
         if before is None:
             self._told = {name: error for name, (error, _) in now.errors.items() if math.isfinite(error)}
-            self._waiting += [] if now.running else [now.rest]
+            self._waiting += [] if now.running else ["paused"]
         else:
             for sentence in (*_switched(before, now), *self._reached(now), *self._arrived(before, now)):
                 if sentence not in self._waiting:
@@ -123,7 +120,7 @@ def _switched(before: Facts, now: Facts) -> list[str]:
     if now.resets != before.resets:
         found.append("robot back at its start")
     if now.running != before.running:
-        found.append("running" if now.running else now.rest)
+        found.append("running" if now.running else "paused")
     was = dict(before.levels)
     for place, (name, on) in enumerate(now.levels, start=1):
         if was.get(name, on) != on:

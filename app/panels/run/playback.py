@@ -14,9 +14,9 @@ from app.adapter.removed_handle_errors import unless_removed
 from app.client.pending_edit import HOLD, PendingEdit
 from app.client.simulation import Trouble
 from app.client.simulation_client import SimulationClient
-from app.html.palette import BAD, GOOD, LEVELS
-from app.html.text import badge, block, esc, in_trouble
-from app.link.messages import ArmView, Play, Post, Speed, Status, StepTicks
+from app.html.palette import GOOD, LEVELS
+from app.html.text import badge, block, in_trouble
+from app.link.messages import Play, Post, Speed, StepTicks
 from app.panels.widgets.command import add_command, on_click
 from app.panels.widgets.mirror import on_scale
 from app.panels.widgets.snapshot import SessionSnapshot
@@ -24,8 +24,6 @@ from lessons.events import Reset
 from lessons.settings.settings import SceneSettings
 
 _PAUSE, _RUN, _STEP, _RESET, _RESET_ALL = "Pause", "Run", "Step", "Reset", "Reset all"
-_STOP = "Stop gently"
-_LATE = 0.5  # s: a delay of an arm's ghost is shown only if it is longer than this
 
 
 class PlaybackPanel:
@@ -75,7 +73,7 @@ class PlaybackPanel:
 
     def _click(self, choice: str) -> None:
         learner = self._learner
-        if choice in (_PAUSE, _RUN, _STOP):
+        if choice in (_PAUSE, _RUN):
             running = self._running.now(learner.status is not None and learner.status.running)
             learner.send(Play(self._running.ask(not running)))
         elif choice == _STEP:
@@ -108,9 +106,6 @@ class PlaybackPanel:
 
     def update(self, now: SessionSnapshot[SceneSettings]) -> None:
         status = now.status
-        if status.arm is not None:
-            self._show_arm(status, status.arm)
-            return
         first = _PAUSE if status.running else _RUN
         if self._buttons.options[0] != first:
             self._buttons.options = (first, _STEP, _RESET, _RESET_ALL)
@@ -127,23 +122,3 @@ class PlaybackPanel:
             f"{state} &nbsp;t = {status.t:.2f} s &nbsp;·&nbsp; {factor}"
             f"<br>{ticks} over the {budget:g} ms budget ({share:.1f} %)"
         )
-
-    def _show_arm(self, status: Status, arm: ArmView) -> None:
-        """Shows the buttons and the status of an arm, which can only be started and stopped."""
-        first = _STOP if status.running else _RUN
-        if self._buttons.options != (first,):
-            self._buttons.options = (first,)
-            self._speed.visible = False
-        self._buttons.visible = not arm.ended
-        self._status.content = block(_of_arm(status, arm))
-
-
-def _of_arm(status: Status, arm: ArmView) -> str:
-    """Returns the status line of an arm."""
-    if not arm.begun:
-        return f"{badge('ARM', LEVELS[1])} &nbsp;at rest: Run starts the control; the arm holds its position"
-    state = badge("ARM STOPPED", BAD) if arm.ended else badge("ARM RUNNING", GOOD)
-    line = f"{state} &nbsp;t = {status.t:.2f} s<br>{arm.missed} of {status.ticks + arm.missed} periods missed"
-    if arm.behind > _LATE and not arm.ended:
-        line += f" &nbsp;·&nbsp; simulation {arm.behind:.1f} s behind"
-    return f"{line}<br>stopped: {esc(arm.ended)}" if arm.ended else line

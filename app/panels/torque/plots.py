@@ -38,7 +38,7 @@ class LevelPlots:
         self._place = gui.add_folder(None)
         self._charts: list[Chart] = []
         self._furnished = any(not isinstance(thing.shape, Floor) for thing in ready.world)
-        self._settings, self._measured = settings, ready.arm
+        self._settings = settings
         self._build(ghost=False)
 
     def rebuild(self, ready: Ready) -> None:
@@ -66,7 +66,6 @@ class LevelPlots:
         errors, step, leaks, near = (
             [*lines, *of_ghost(lines, ghost)] for lines in (errors, step, leaks, near)
         )
-        leaks = leaks[2:] if self._only_simulated(ghost) else leaks
         kept = ChartLine("bound: no closer", BAD, dashed=True, fill=0.12)
         # An area over the whole height marks the time in which the robot touches something.
         errors += [ChartLine("contact", BAD, fill=0.12, width=0.0)] if contacts else []
@@ -93,15 +92,9 @@ class LevelPlots:
         error, *distance, step, leak = self._charts
         error.show(window, lambda: self._errors_and_contacts(window, windows))
         step.show(window, lambda: [*(_times(each) for each in windows), np.full(2 * BUCKETS, 1e3 * T_s)])
-        simulated = windows[1:] if self._only_simulated(ghost is not None) else windows
-        leak.show(window, lambda: [curve for each in simulated for curve in self._leaks(each, window)])
+        leak.show(window, lambda: [curve for each in windows for curve in _leaks(each)])
         for near in distance:
             near.show(window, lambda: _distances(window, windows))
-
-    def _only_simulated(self, ghost: bool) -> bool:
-        """Returns whether the chart shows only the leaks of the simulation. The leaks of a measured arm are
-        unknown."""
-        return self._measured and ghost
 
     def _errors_and_contacts(self, window: PlotWindow, windows: list[PlotWindow]) -> list[np.ndarray]:
         curves = [curve for each in windows for curve in self._errors(each)]
@@ -117,13 +110,6 @@ class LevelPlots:
             else nothing
             for task in self._tasks
         ]
-
-    def _leaks(self, window: PlotWindow, first: PlotWindow) -> list[np.ndarray]:
-        """Returns the leaks of a simulated robot or ghost; the leaks of a measured arm (first window) are
-        NaN."""
-        if self._measured and window is first:
-            return [np.full(2 * BUCKETS, np.nan)] * 2
-        return _leaks(window)
 
 
 def _times(window: PlotWindow) -> np.ndarray:

@@ -113,15 +113,6 @@ def _paragraph(head: str, rest: str) -> str:
     return block(f'<div style="font-size:1.15em"><b>{head}</b></div>{rest}', "padding-top:0.5em")
 
 
-AT_AN_ARM = _paragraph(
-    "Run, then drag the target by its arrows.",
-    "The robot shows the measured arm. The ghost is the simulation, which gets the same targets; its errors "
-    "are dashed. If you press Stop gently or close this page, the arm brakes. The settings are those with "
-    "which <code>himpc-lab arm</code> was started.",
-)
-"""The guide of a page that shows an arm."""
-
-
 class StartPanel:
     """The controls of the first tab, and a guide that depends on what the learner has already done."""
 
@@ -138,7 +129,7 @@ class StartPanel:
         self.on_theme: Callable[[bool], None] = lambda _: None
         self.on_recall: Callable[[], None] = lambda: None
         self._dragged = False
-        told = AT_AN_ARM if ready.arm else guide(ready.tasks, settings.levels, colours, dragged=False)
+        told = guide(ready.tasks, settings.levels, colours, dragged=False)
         self._guide = gui.add_html(told)
         draggable = any(task.kind == "position" and task.raw is not None for task in ready.tasks)
         self._where = gui.add_html("", visible=draggable)
@@ -150,7 +141,7 @@ class StartPanel:
                 "Off: the controller gets your point unchanged, and you see how a singular arm moves.",
             )
             recall = gui.add_button("Bring the target to the hand")
-        with gui.add_folder("Push the robot", visible=not ready.arm):
+        with gui.add_folder("Push the robot"):
             bodies = ready.robot.joint_names
             body = gui.add_dropdown("Body", bodies, initial_value=bodies[-1])
             force = gui.add_slider("Force [N]", min=5.0, max=100.0, step=5.0, initial_value=30.0)
@@ -236,7 +227,7 @@ class StartPanel:
     def update(self, now: SessionSnapshot[TorqueSettings], colours: Mapping[str, RGB]) -> None:
         """Updates the names of the levels in the guide, and the label of the button."""
         tasks, levels = now.ready.tasks, now.settings.levels
-        told = AT_AN_ARM if now.ready.arm else guide(tasks, levels, colours, self._dragged)
+        told = guide(tasks, levels, colours, self._dragged)
         if self._guide.content != told:
             self._guide.content = told
         label = _DROP if now.settings.plant.payload_kg > 0 else _PICK_UP
