@@ -58,7 +58,9 @@ def test_a_changed_setting_gives_another_digest(folders: dict[str, Path], tmp_pa
     other = exported("iiwa14-hold", "x86_64-linux", tmp_path, *FEW, "--set", "levels.position.R=2")
     one = controller_in(folders["iiwa14-hold"])
     with pytest.raises(ValueError, match="another controller"):
-        NativeController(other / "himpc.so", (other / "controller.bin").read_bytes(), one.manifest)
+        NativeController(
+            folders["iiwa14-hold"] / "himpc.so", (other / "controller.bin").read_bytes(), one.manifest
+        )
 
 
 def test_none_of_a_thousand_images_with_one_wrong_bit_is_accepted(folders: dict[str, Path]) -> None:
@@ -157,11 +159,12 @@ def test_the_functions_of_the_header_refuse_and_report(folders: dict[str, Path])
     for (int i = 0; i < HIMPC_N; i++) lots[i] = 1e8, low[i] = -1e8, high[i] = 1e8;
     printf("%d ", himpc_set_weights(c, HIMPC_LEVEL_NAMES[0], 7.0, -1.0));
     printf("%d ", himpc_set_limits(c, lots, lots, low, high));
-    printf("%d %d ", himpc_set_weights(c, HIMPC_LEVEL_NAMES[0], 7.0, 1.0), himpc_set_budget(c, 1e6));
+    printf("%d ", himpc_set_weights(c, HIMPC_LEVEL_NAMES[0], 7.0, 1.0));
+    printf("%d ", himpc_set_budget(c, 1e6));
     int fallback = himpc_tick(c, q, v, NULL, tau);
     printf("%d %d %d ", fallback, himpc_level_fallback(c, "position"), himpc_active_rows(c, "position") >= 0);
-    printf("%d %d %d ", himpc_enable(c, "orientation", 0), himpc_active_rows(c, "orientation"),
-           himpc_level_fallback(c, "nobody"));
+    printf("%d ", himpc_enable(c, "orientation", 0));
+    printf("%d %d ", himpc_active_rows(c, "orientation"), himpc_level_fallback(c, "nobody"));
     printf("%d ", himpc_error(c, "nobody") == NULL);
     printf("%.17g %.17g\\n", himpc_error(c, "position")[2], himpc_error(c, "posture")[6]);
     return 0;

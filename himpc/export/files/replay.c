@@ -13,7 +13,7 @@
 
 enum { RUNS = 2, MOVE = 11 }; /* two controllers take turns; a move: tick, task, count, up to 8 numbers */
 
-static _Alignas(HIMPC_ALIGNMENT) char memory[RUNS][HIMPC_BYTES];
+static struct { _Alignas(HIMPC_ALIGNMENT) char bytes[HIMPC_BYTES]; } memory[RUNS];
 
 static void *whole(const char *path, size_t *size) {
     FILE *file = fopen(path, "rb");
@@ -69,7 +69,7 @@ static int hostile(himpc_controller *c, const double *q, const double *v) {
     }
     printf("hostile states: %d torques outside the limits; fallbacks", bad);
     for (int k = 0; k <= HIMPC_HOLD; k++) printf(" %s %d", HIMPC_FALLBACKS[k], seen[k]);
-    printf("; longest period %.0f us\n", longest);
+    printf("\nlongest period %.0f us\n", longest);
     return bad ? 1 : 0;
 }
 
@@ -108,7 +108,7 @@ int main(int argc, char **argv) {
     himpc_controller *c[RUNS];
     int answer = 0;
     for (int k = 0; k < RUNS; k++)
-        if (!image || !vector || !(c[k] = himpc_create(memory[k], HIMPC_BYTES, image, size))) answer = 2;
+        if (!image || !vector || !(c[k] = himpc_create(memory[k].bytes, HIMPC_BYTES, image, size))) answer = 2;
     if (answer)
         fprintf(stderr, "controller.bin or vector.bin is missing or damaged, or does not belong to himpc.h: export again\n");
     else if (argc > 1 && !strcmp(argv[1], "hostile")) {
