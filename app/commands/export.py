@@ -43,8 +43,8 @@ def export(
         ticks: length of the recorded run, in periods.
         seed: seed of the recorded run.
         prefix: first part of all names in C, for programs with more than one exported controller.
-        budget: largest number of multiplications for changes of active rows in a period (50 million by
-            default). It bounds the time of a period, since the code reads no clock.
+        budget: largest number of multiplications for changes of active rows in a period; by default that of
+            himpc-lab, at most 50 million. It bounds the time of a period, since the code reads no clock.
     """
     from himpc.export.entries import PREFIX
     from himpc.export.folder import files_of
