@@ -22,8 +22,11 @@ MOVE = 8
 
 
 _MATHEMATICS = "`sin`, `cos`, `tan`, `atan2`, `hypot`, `exp` and `expm1`"
-_JOINED = {"linux": ", and `sincos`, a GNU extension,", "macos": ", and `__sincos_stret` of macOS,"}
-"""Functions that a code generator calls in place of sine and cosine of one angle, by system."""
+_ALSO = {
+    "linux": ", and `sincos`, a GNU extension",
+    "macos": ", and `__sincos_stret` and `bzero` of macOS",
+}
+"""Functions that a code generator calls in place of others, by system."""
 _LOOP = """\
 | `loop.cpp` | a loop in real time, with MuJoCo's C library as the robot. To build it, \
 set MUJOCO to the folder of the Python package mujoco: \
@@ -101,7 +104,7 @@ def _readme(image: Image, target: Target, name: str, object_name: str, ticks: in
         extra = "| `himpc.mjs` | the JavaScript interface |\n| `replay.mjs` | replays `vector.bin` |\n"
     else:
         commands = f"    {target.compiler} -O2 replay.c {object_name} -lm -o replay\n    ./replay"
-        needs = f"{_MATHEMATICS}{_JOINED.get(name.rpartition('-')[2], '')} of libm, `memcpy` and `memset`"
+        needs = f"{_MATHEMATICS} of libm, `memcpy` and `memset`{_ALSO.get(name.rpartition('-')[2], '')}"
         extra = "| `replay.c` | replays `vector.bin` |\n" + _LOOP.format(object=object_name)
     return renamed((FILES / "README.md").read_text("utf-8"), prefix).format(
         controller=image.manifest["controller"],
