@@ -33,7 +33,7 @@ def header(manifest: dict[str, Any], torques: Sequence[float], prefix: str) -> s
         "horizon": manifest["horizon"],
         "bytes": manifest["bytes"],
         "period": repr(float(manifest["period_s"])),
-        "fallbacks": ", ".join(f"HIMPC_{name.upper()}" for name in FALLBACKS),
+        "fallbacks": ", ".join(f"{prefix.upper()}_{name.upper()}" for name in FALLBACKS),
         "fallback_names": _strings(FALLBACKS),
         "tasks": "; ".join(
             f"{_plain(each['name'])} ({each['rows']} rows, {each['target']} target)" for each in tasks
