@@ -236,6 +236,25 @@ def test_few_claims_are_left_to_the_lab() -> None:
     assert names == ["dynamic_leak"] and len(STEPS) >= 42
 
 
+def test_plots_and_their_legends_are_in_the_window(site: Path, browser: Browser) -> None:
+    """In a small window the cards scroll, and a line shows this. The labels of the axis of the errors differ
+    while all errors are zero. Joints have other colours than levels."""
+    page = browser.new_page(viewport={"width": 1100, "height": 750})
+    page.set_default_timeout(SLOW)
+    page.goto((site / "try.html").as_uri() + "#iiwa14-hold")
+    page.wait_for_function("() => HIMPC.shown?.frame?.t > 0.1")
+    bottoms = "[...document.querySelectorAll('.u-legend')].map((each) => each.getBoundingClientRect().bottom)"
+    assert max(page.evaluate(bottoms)) <= 750
+    assert page.locator(".hl-side[data-below]").count() == 1
+    page.evaluate("(() => { const side = document.querySelector('.hl-side'); side.scrollTop = 1e4; })()")
+    page.wait_for_function("() => document.querySelector('.hl-side[data-above]:not([data-below])')")
+    marks = "[...document.querySelectorAll('.hl-mark')].map((each) => getComputedStyle(each).backgroundColor)"
+    lines = "[...document.querySelectorAll('.hl-plots figure:last-child .u-marker')]"
+    joints = page.evaluate(f"{lines}.map((each) => getComputedStyle(each).borderTopColor)")
+    assert len(joints) > 7 and not set(joints) & set(page.evaluate(marks))
+    page.close()
+
+
 @pytest.mark.parametrize(("width", "height"), [(1440, 900), (390, 844)])
 def test_try_it(site: Path, browser: Browser, width: int, height: int) -> None:
     """The page is opened from a file. The robot is pushed, its target is dragged with mouse and keys, levels
@@ -346,6 +365,13 @@ def test_the_program_is_small_and_typed_and_its_packages_are_pinned() -> None:
         for kind in ("dependencies", "devDependencies")
         for each in told[kind].values()
     )
+    lock = json.loads((front.PROGRAM / "package-lock.json").read_text())
+    root, *packages = lock["packages"].values()
+    assert {kind: root[kind] for kind in ("dependencies", "devDependencies")} == {
+        kind: told[kind] for kind in ("dependencies", "devDependencies")
+    }
+    assert packages and all({"version", "integrity"} <= set(each) for each in packages)
+    assert not [each for each in packages if "resolved" in each]
     checked = subprocess.run(
         ("npm", "run", "--silent", "check"), cwd=front.PROGRAM, capture_output=True, text=True
     )

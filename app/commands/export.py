@@ -27,6 +27,8 @@ def export(
     set: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="PATH=VALUE")] = (),
     ticks: int = 1000,
     seed: int = 0,
+    prefix: str = "himpc",
+    budget: float | None = None,
 ) -> int:
     """Write a scene's controller as C or WebAssembly: code, parameters, header, and a recorded run to replay.
 
@@ -41,8 +43,13 @@ def export(
         set: change a setting, e.g. --set horizon=10 --set levels.2.enabled=false.
         ticks: length of the recorded run, in periods.
         seed: seed of the recorded run, from 0 to 2⁶³ − 1.
+        prefix: first part of all names in C, for programs with more than one exported controller.
+        budget: largest number of multiplications for changes of active rows in a period; by default that of
+            himpc-lab, at most 50 million. It bounds the time of a period, since the code reads no clock.
     """
+    from himpc.export.entries import PREFIX
     from himpc.export.folder import files_of
+    from himpc.export.header import check_prefix
     from himpc.export.image import image_of
     from himpc.export.link import check_linker
     from himpc.export.objects import target_named
@@ -54,6 +61,13 @@ def export(
     from robots.mechanics.saving import saved
 
     wanted = target_named(target)
+    check_prefix(prefix)
+    if target == "wasm32" and prefix != PREFIX:
+        raise InputError(
+            "--prefix changes names in C: a module of the target wasm32 needs none, leave it out"
+        )
+    if budget is not None and not 0.0 < budget <= 1e9:
+        raise InputError(f"--budget is {budget:g}: give a number above 0 and at most 1e9")
     if not 1 <= ticks <= 100_000:
         raise InputError(f"--ticks is {ticks}: give a number from 1 to 100000")
     if target == "wasm32":
@@ -69,7 +83,7 @@ def export(
     if loaded.settings.limits != as_torque_scene(spec.prepared(), "export's").settings.limits:
         print(WITHOUT, flush=True)
     session = TorqueSession(replace(loaded, events=()), seed)
-    image = image_of(session.controller, loaded.robot, session.references)
+    image = image_of(session.controller, loaded.robot, session.references, budget)
     force = in_force(loaded.robot, loaded.settings.for_controller().limits)
     torques = [
         max(*pair) for pair in zip(loaded.robot.tau_limit.tolist(), force.tau_upper.tolist(), strict=True)
@@ -78,7 +92,7 @@ def export(
     print("compiling the controller: up to a minute …", flush=True)
     settings = loaded.settings
     plant = saved(loaded.robot, settings.plant, loaded.world, settings.T_s)
-    files = files_of(image, wanted, torques, recorded(loaded, ticks, seed), target, plant)
+    files = files_of(image, wanted, torques, recorded(loaded, ticks, seed), target, plant, prefix)
     _write(folder, files)
     for name, content in files.items():
         print(f"{len(content):9,} bytes  {folder / name}")

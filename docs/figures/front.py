@@ -87,9 +87,10 @@ def write(site: Path) -> None:
 
 
 def _program(path: Path) -> None:
-    """Bundles the program. If its packages are missing, they are installed first, in exact versions."""
+    """Bundles the program. If its packages are missing, they are installed first, in the versions of
+    package-lock.json."""
     if not (PROGRAM / "node_modules").exists():
-        install = ("npm", "install", "--no-package-lock", "--ignore-scripts", "--no-audit", "--no-fund")
+        install = ("npm", "ci", "--ignore-scripts", "--no-audit", "--no-fund")
         subprocess.run(install, cwd=PROGRAM, check=True, stdout=subprocess.DEVNULL)
     subprocess.run(("node", "build.mjs", str(path)), cwd=PROGRAM, check=True)
 

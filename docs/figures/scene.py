@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import fields, replace
 from typing import Any
@@ -48,7 +49,8 @@ def scene_data(
     for N in sorted({settings.horizon, *horizons}):
         changed = settings.changed("horizon", N)
         assert isinstance(changed, TorqueSettings)
-        made[N] = image_of(controller_of(changed, robot), robot, references)
+        # A simulation may have any limits that himpc-lab's settings have.
+        made[N] = image_of(controller_of(changed, robot), robot, references, multiple=math.inf)
         images[str(N)] = _told(made[N], pack)
     image = made[settings.horizon]
     targets = {task["name"]: task["target"] for task in image.manifest["tasks"]}
@@ -160,7 +162,7 @@ def _told(image: Image, pack: Pack) -> dict[str, Any]:
     """Returns the memory, and those parts of its manifest that the page needs."""
     manifest = image.manifest
     kept = [{key: each[key] for key in ("name", "type", "shape", "offset")} for each in manifest["arrays"]]
-    told = {key: manifest[key] for key in ("joints", "tasks", "levels")}
+    told = {key: manifest[key] for key in ("joints", "digest", "tasks", "levels")}
     return {"memory": pack.add(image.memory), "manifest": told | {"arrays": kept}}
 
 

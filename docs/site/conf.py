@@ -11,6 +11,7 @@ html_theme = "furo"
 html_title = "himpc-lab"
 html_math_renderer = "mathml"
 html_static_path = ["_static"]
+html_favicon = "_static/icon.svg"
 html_css_files = ["site.css"]
 html_js_files = ["film.js", "figures.js"]
 html_show_sphinx = False

@@ -14,13 +14,31 @@ MAGIC, LAYOUT, SIZE, JOINTS, FIRST = range(5)
 """Indices of the words at the beginning of a controller's memory: a constant that marks such a memory, the
 number of the kernel's layout, the number of bytes, and the number of joints. From FIRST on, each array of
 ARRAYS has two words: the byte at which it begins and its number of elements."""
+NAMES = FIRST + 2 * len(ARRAYS)
+"""Index of the word with a digest of the names of controller, robot, joints, tasks and levels."""
+DIGEST = NAMES + 1
+"""Index of the word with the digest of all other words of an image: it names the controller with all its
+numbers, and it shows whether a bit of the image is wrong."""
 WORDS = 32
 """Number of these words, 8 bytes each."""
 SIGN = struct.unpack("<q", b"himpclab")[0]
+_START, _PRIME = 0xCBF29CE484222325, 0x100000001B3
 EXPORTED = ("himpc_tick", "himpc_reset", "himpc_set", "himpc_check")
-"""The functions of the object file."""
+"""The functions of the object file, unless their names begin with another prefix than PREFIX."""
+PREFIX = "himpc"
 _TYPES = (VECTOR, INDICES, INDICES, INDICES, VECTOR, INDICES, WHOLE, WHOLE, VECTOR, VECTOR, VECTOR, VECTOR)
 _ARRAY = "ptr, ptr, i64, i64, ptr, i64, i64"
+
+
+def digest_of(image: bytes) -> int:
+    """Returns the digest of an image, 64 bits: FNV-1a over words of 8 bytes, with the word DIGEST as 0. After
+    each word the upper half is folded into the lower half. Each step can be inverted, so two images that
+    differ in one word have different digests."""
+    whole, found = (1 << 64) - 1, _START
+    for place, (word,) in enumerate(struct.iter_unpack("<Q", image)):
+        found = ((found ^ (0 if place == DIGEST else word)) * _PRIME) & whole
+        found ^= found >> 32
+    return found
 
 
 def kernel_text() -> tuple[str, list[str]]:
@@ -67,19 +85,42 @@ def entries_text(control_name: str, layout: int) -> str:
             [("%values", "%k")] * 4,
         )
         + f"""
-define i32 @himpc_check(ptr %c, i32 %size) {{
+define i32 @himpc_check(ptr %c, i32 %size, i64 %digest) {{
   %enough = icmp uge i32 %size, {8 * WORDS}
   br i1 %enough, label %look, label %no
 look:
-{_word(MAGIC, "magic")}{_word(LAYOUT, "layout")}{_word(SIZE, "bytes")}
+{_word(MAGIC, "magic", 1)}{_word(LAYOUT, "layout", 1)}{_word(SIZE, "bytes", 1)}{_word(DIGEST, "stored", 1)}
   %given = zext i32 %size to i64
   %a = icmp eq i64 %magic, {SIGN}
   %b = icmp eq i64 %layout, {layout}
-  %d = icmp ule i64 %bytes, %given
+  %d = icmp eq i64 %bytes, %given
   %ab = and i1 %a, %b
   %abd = and i1 %ab, %d
-  %r = select i1 %abd, i32 0, i32 -1
+  br i1 %abd, label %mine, label %no
+mine:
+  %count = lshr i64 %given, 3
+  %same = icmp eq i64 %stored, %digest
+  br i1 %same, label %loop, label %other
+loop:
+  %k = phi i64 [0, %mine], [%next, %loop]
+  %h = phi i64 [{_signed(_START)}, %mine], [%mixed, %loop]
+  %at = getelementptr i64, ptr %c, i64 %k
+  %read = load i64, ptr %at, align 1
+  %own = icmp eq i64 %k, {DIGEST}
+  %word = select i1 %own, i64 0, i64 %read
+  %x = xor i64 %h, %word
+  %m = mul i64 %x, {_PRIME}
+  %upper = lshr i64 %m, 32
+  %mixed = xor i64 %m, %upper
+  %next = add i64 %k, 1
+  %more = icmp ult i64 %next, %count
+  br i1 %more, label %loop, label %end
+end:
+  %whole = icmp eq i64 %mixed, %stored
+  %r = select i1 %whole, i32 0, i32 -3
   ret i32 %r
+other:
+  ret i32 -2
 no:
   ret i32 -1
 }}
@@ -87,9 +128,13 @@ no:
     )
 
 
-def _word(place: int, name: str) -> str:
+def _word(place: int, name: str, align: int = 8) -> str:
     where = f"  %{name}.at = getelementptr i8, ptr %c, i64 {8 * place}\n"
-    return where + f"  %{name} = load i64, ptr %{name}.at, align 8\n"
+    return where + f"  %{name} = load i64, ptr %{name}.at, align {align}\n"
+
+
+def _signed(word: int) -> int:
+    return word - (1 << 64) if word >> 63 else word
 
 
 def _entry(

@@ -9,7 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from himpc.export.header import header
+from himpc.export.entries import PREFIX
+from himpc.export.header import header, renamed
 from himpc.export.image import Image
 from himpc.export.link import linked
 from himpc.export.objects import Target, object_code
@@ -20,10 +21,16 @@ MOVE = 8
 """Largest number of values of a move in a recorded run."""
 
 
+_MATHEMATICS = "`sin`, `cos`, `tan`, `atan2`, `hypot`, `exp` and `expm1`"
+_ALSO = {
+    "linux": ", and `sincos`, a GNU extension",
+    "macos": ", and `__sincos_stret` and `bzero` of macOS",
+}
+"""Functions that a code generator calls in place of others, by system."""
 _LOOP = """\
 | `loop.cpp` | a loop in real time, with MuJoCo's C library as the robot. To build it, \
 set MUJOCO to the folder of the Python package mujoco: \
-`g++ -O2 -I$MUJOCO/include loop.cpp himpc.o $MUJOCO/libmujoco.so.* -Wl,-rpath,$MUJOCO -o loop` |
+`g++ -O2 -I$MUJOCO/include loop.cpp {object} $MUJOCO/libmujoco.so.* -Wl,-rpath,$MUJOCO -o loop` |
 """
 
 
@@ -44,7 +51,13 @@ class Recorded(NamedTuple):
 
 
 def files_of(
-    image: Image, target: Target, torques: Sequence[float], recorded: Recorded, name: str, plant: bytes
+    image: Image,
+    target: Target,
+    torques: Sequence[float],
+    recorded: Recorded,
+    name: str,
+    plant: bytes,
+    prefix: str = PREFIX,
 ) -> Mapping[str, bytes]:
     """Returns the files of a controller for a target by their names.
 
@@ -55,21 +68,22 @@ def files_of(
         recorded: a run to replay.
         name: the name of the target.
         plant: the simulated robot, for MuJoCo's C library.
+        prefix: the beginning of all names in C, and of the names of header and object file.
     """
-    code = object_code(target)
+    code = object_code(target, prefix)
     wasm = target.ending == "wasm"
-    object_name = f"himpc.{target.ending}"
+    object_name = f"{prefix}.{target.ending}"
     own = ("himpc.mjs", "replay.mjs") if wasm else ("replay.c", "loop.cpp")
     manifest = {"target": name, "object": object_name, **image.manifest}
     return {
         object_name: linked(code) if wasm else code,
         "controller.bin": image.memory,
         "controller.json": (json.dumps(manifest, indent=1, allow_nan=False) + "\n").encode(),
-        "himpc.h": header(image.manifest, torques).encode(),
-        **{each: (FILES / each).read_bytes() for each in own},
+        f"{prefix}.h": header(image.manifest, torques, prefix).encode(),
+        **{each: renamed((FILES / each).read_text("utf-8"), prefix).encode() for each in own},
         "vector.bin": vector_of(recorded),
         "plant.mjb": plant,
-        "README.md": _readme(image, target, object_name, len(recorded.rows)).encode(),
+        "README.md": _readme(image, target, name, object_name, len(recorded.rows), prefix).encode(),
     }
 
 
@@ -83,25 +97,23 @@ def vector_of(recorded: Recorded) -> bytes:
     return counts.tobytes() + moves.astype("<f8").tobytes() + recorded.rows.astype("<f8").tobytes()
 
 
-def _readme(image: Image, target: Target, object_name: str, ticks: int) -> str:
+def _readme(image: Image, target: Target, name: str, object_name: str, ticks: int, prefix: str) -> str:
     wasm = target.ending == "wasm"
     if wasm:
         commands, needs = "    node replay.mjs", "`sin`, `cos` and similar functions of JavaScript"
         extra = "| `himpc.mjs` | the JavaScript interface |\n| `replay.mjs` | replays `vector.bin` |\n"
     else:
         commands = f"    {target.compiler} -O2 replay.c {object_name} -lm -o replay\n    ./replay"
-        needs, extra = "libm", "| `replay.c` | replays `vector.bin` |\n" + _LOOP
-    return (
-        (FILES / "README.md")
-        .read_text()
-        .format(
-            controller=image.manifest["controller"],
-            robot=image.manifest["robot"],
-            period=image.manifest["period_s"],
-            object=f"`{object_name}`",
-            ticks=ticks,
-            commands=commands,
-            needs=needs,
-            extra=extra,
-        )
+        needs = f"{_MATHEMATICS} of libm, `memcpy` and `memset`{_ALSO.get(name.rpartition('-')[2], '')}"
+        extra = "| `replay.c` | replays `vector.bin` |\n" + _LOOP.format(object=object_name)
+    return renamed((FILES / "README.md").read_text("utf-8"), prefix).format(
+        controller=image.manifest["controller"],
+        robot=image.manifest["robot"],
+        period=image.manifest["period_s"],
+        budget=f"{image.manifest['budget']:,.0f}",
+        object=f"`{object_name}`",
+        ticks=ticks,
+        commands=commands,
+        needs=needs,
+        extra=extra,
     )

@@ -8,17 +8,24 @@ from pathlib import Path
 from typing import Any
 
 from himpc.cascade.level import FALLBACKS
+from himpc.export.image import MULTIPLE
+from robots.errors import InputError
 
 
-def header(manifest: dict[str, Any], torques: Sequence[float]) -> str:
+def header(manifest: dict[str, Any], torques: Sequence[float], prefix: str) -> str:
     """Returns the header of a controller.
 
     Args:
         manifest: the manifest of its `Image`.
         torques: N·m, the largest torque of each joint.
+        prefix: see `renamed`.
     """
     tasks, levels = manifest["tasks"], manifest["levels"]
+    at = {each["name"]: each["offset"] for each in manifest["arrays"]}
     names = {
+        **{name: at[name] for name in ("error", "active", "rung", "place")},
+        "digest": f"0x{manifest['digest']}ULL",
+        "multiple": f"{MULTIPLE:g}",
         "controller": manifest["controller"],
         "robot": _plain(manifest["robot"]),
         "joints": ", ".join(map(_plain, manifest["joints"])),
@@ -26,13 +33,14 @@ def header(manifest: dict[str, Any], torques: Sequence[float]) -> str:
         "horizon": manifest["horizon"],
         "bytes": manifest["bytes"],
         "period": repr(float(manifest["period_s"])),
-        "fallbacks": ", ".join(f"HIMPC_{name.upper()}" for name in FALLBACKS),
+        "fallbacks": ", ".join(f"{prefix.upper()}_{name.upper()}" for name in FALLBACKS),
         "fallback_names": _strings(FALLBACKS),
         "tasks": "; ".join(
             f"{_plain(each['name'])} ({each['rows']} rows, {each['target']} target)" for each in tasks
         ),
         "task_count": len(tasks),
         "task_names": _strings([each["name"] for each in tasks]),
+        "task_first": ", ".join(str(each["first"]) for each in tasks),
         "task_rows": ", ".join(str(each["rows"]) for each in tasks),
         "levels": "; ".join(_plain(each["name"]) for each in levels),
         "level_count": len(levels),
@@ -41,8 +49,25 @@ def header(manifest: dict[str, Any], torques: Sequence[float]) -> str:
         "torques": ", ".join(repr(float(each)) if each < 1e300 else "HUGE_VAL" for each in torques),
         "most_rows": max([len(manifest["joints"]), *(each["rows"] for each in (*tasks, *levels))]),
     }
-    text = (Path(__file__).parent / "files" / "himpc.h").read_text()
+    text = renamed((Path(__file__).parent / "files" / "himpc.h").read_text("utf-8"), prefix)
     return re.sub(r"@(\w+)@", lambda found: str(names[found[1]]), text)
+
+
+def renamed(text: str, prefix: str) -> str:
+    """Returns the text of a file with `prefix` in place of himpc in all names of functions, constants and
+    files."""
+    return re.sub(
+        r"\b(himpc|HIMPC)(?=[_.])", lambda found: prefix if found[1].islower() else prefix.upper(), text
+    )
+
+
+def check_prefix(prefix: str) -> None:
+    """Raises InputError if names in C cannot begin with a prefix."""
+    if not re.fullmatch(r"[a-z][a-z0-9_]{0,29}", prefix):
+        raise InputError(
+            f"--prefix {prefix}: give at most 30 lower-case letters, digits and underscores that begin "
+            "with a letter, such as left"
+        )
 
 
 def _plain(name: str) -> str:

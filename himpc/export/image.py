@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from hashlib import sha256
 from typing import Any, get_type_hints
 
 import numpy as np
@@ -11,7 +13,19 @@ import numpy as np
 from himpc.controllers.controller import Controller
 from himpc.controllers.nhimpc import NHIMPC
 from himpc.controllers.weighted import DAMPING_SHARE, Weighted, accumulated
-from himpc.export.entries import ARRAYS, FIRST, JOINTS, LAYOUT, MAGIC, SIGN, SIZE, WORDS
+from himpc.export.entries import (
+    ARRAYS,
+    DIGEST,
+    FIRST,
+    JOINTS,
+    LAYOUT,
+    MAGIC,
+    NAMES,
+    SIGN,
+    SIZE,
+    WORDS,
+    digest_of,
+)
 from himpc.export.kernel.loop_arrays import (
     BUDGET,
     DAMPS,
@@ -43,6 +57,9 @@ from robots import InputError, Robot
 
 _LINE = 64
 """Arrays begin at multiples of this number of bytes."""
+MULTIPLE = 2.0
+"""A setting may raise limits of torque and velocity to this multiple of the robot's own limits, which is also
+the end of the page's sliders."""
 _MOST_LEVELS = 10
 """Largest number of levels. Each further level doubles the size of the table of all sets of enabled
 levels."""
@@ -61,13 +78,21 @@ class Image:
     manifest: dict[str, Any]
 
 
-def image_of(controller: Controller, robot: Robot, references: Mapping[str, Reference]) -> Image:
+def image_of(
+    controller: Controller,
+    robot: Robot,
+    references: Mapping[str, Reference],
+    budget: float | None = None,
+    multiple: float = MULTIPLE,
+) -> Image:
     """Returns the memory of a controller before its first period.
 
     Args:
         controller: HIMPC, HIQP, NHIMPC or Weighted on the compiled route.
         robot: the robot of the controller.
         references: the references of all tasks by name, before the first period.
+        budget: largest number of multiplications for changes of active rows in a period; None: `budget_of`.
+        multiple: see MULTIPLE. With an infinite number, a simulation may set any limits, also infinite ones.
 
     Raises:
         InputError: the controller uses something that cannot be exported.
@@ -89,8 +114,11 @@ def image_of(controller: Controller, robot: Robot, references: Mapping[str, Refe
     )
     f["setup"][[ON_ACCELERATION, LEVELS, DAMPS, BUDGET, SIMPLE]] = (
         *(settings.R_on == "acceleration", len(tables), strict and settings.damping),
-        *(budget_of(arena), strict),
+        *(budget_of(arena) if budget is None else budget, strict),
     )
+    far = np.inf if np.isinf(multiple) else 0.0
+    f["widest"][:2] = multiple * robot.tau_limit, multiple * robot.v_limit
+    f["widest"][2:] = robot.q_lower - far, robot.q_upper + far
     f["order"][:] = f["place"][:] = np.arange(len(tables))
     f["goal"][:], f["tau_limit"][:], f["weight"][:] = arena.f["limits"], robot.tau_limit, 1.0
     for place, level in enumerate(form.levels):
@@ -102,27 +130,27 @@ def image_of(controller: Controller, robot: Robot, references: Mapping[str, Refe
     if strict:
         f["damped"][: 1 << len(settings.stack)] = _damped(robot, settings)
     tasks = [_write_reference(arena, f, span, references) for span in spans]
-    memory, offsets = _joined(arena, loop, loop_where, robot.n)
     levels = [
         {"name": level.name, "index": place, "rows": level.rows.stop - level.rows.start}
         | {"tasks": [task.name for task in level.level.tasks], "enabled": level.level.enabled}
         for place, level in enumerate(form.levels)
     ]
-    return Image(
-        memory,
-        {
-            "controller": type(controller).__name__,
-            "robot": robot.name,
-            "joints": list(robot.joint_names),
-            "period_s": settings.T_s,
-            "horizon": settings.horizon,
-            "bytes": len(memory),
-            "layout": layout_number(),
-            "tasks": tasks,
-            "levels": levels,
-            "arrays": _listed(arena, f, loop_where, offsets),
-        },
-    )
+    named = {
+        "budget": float(f["setup"][BUDGET]),
+        "controller": type(controller).__name__,
+        "robot": robot.name,
+        "joints": list(robot.joint_names),
+        "period_s": settings.T_s,
+        "horizon": settings.horizon,
+        "layout": layout_number(),
+        "tasks": tasks,
+        "levels": levels,
+    }
+    memory, offsets = _joined(arena, loop, loop_where, robot.n, sha256(json.dumps(named).encode()).digest())
+    digest = digest_of(memory)
+    memory = memory[: 8 * DIGEST] + digest.to_bytes(8, "little") + memory[8 * DIGEST + 8 :]
+    made = {"bytes": len(memory), "digest": f"{digest:016x}"}
+    return Image(memory, named | made | {"arrays": _listed(arena, f, loop_where, offsets)})
 
 
 def _levels(robot: Robot, settings: Settings, strict: bool) -> tuple[StackForm, list[Task], list[LevelTable]]:
@@ -164,6 +192,7 @@ def _write_reference(
     told: dict[str, Any] = {
         "name": task.name,
         "index": place,
+        "first": span.start,
         "rows": rows,
         "unit": task.unit,
         "target": "none",
@@ -194,7 +223,9 @@ def _write_reference(
     return told | {"target": "fixed"}
 
 
-def _joined(arena: Arena, loop: Array, loop_where: Array, n: int) -> tuple[bytes, dict[str, int]]:
+def _joined(
+    arena: Arena, loop: Array, loop_where: Array, n: int, names: bytes
+) -> tuple[bytes, dict[str, int]]:
     """Returns the words that describe where the arrays begin, followed by all arrays."""
     given = (*arena.arguments, loop, loop_where)
     words, offsets, end = np.zeros(WORDS, np.int64), {}, 8 * WORDS
@@ -205,6 +236,7 @@ def _joined(arena: Arena, loop: Array, loop_where: Array, n: int) -> tuple[bytes
         offsets[name], end = start, start + array.nbytes
         words[FIRST + 2 * place : FIRST + 2 * place + 2] = start, array.size
     words[[MAGIC, LAYOUT, SIZE, JOINTS]] = SIGN, layout_number(), end, n
+    words[NAMES] = int.from_bytes(names[:8], "little", signed=True)
     return words.astype("<i8").tobytes() + b"".join(pieces), offsets
 
 

@@ -54,13 +54,13 @@ class NativeController:
 
     def __init__(self, library: Path, image: bytes, manifest: dict[str, Any]) -> None:
         """library: the library that `build` returns; image, manifest: see `Image`. Raises ValueError if the
-        image is for another kernel."""
+        image is damaged, is not that of the manifest, or is for another kernel."""
         self._c = ctypes.CDLL(str(library))
         pointer, whole = ctypes.c_void_p, ctypes.c_int
         self._c.himpc_tick.argtypes = [pointer] * 5
         self._c.himpc_set.argtypes = [pointer, whole, whole, pointer, whole]
         self._c.himpc_reset.argtypes = [pointer] * 2
-        self._c.himpc_check.argtypes = [pointer, ctypes.c_uint]
+        self._c.himpc_check.argtypes = [pointer, ctypes.c_uint, ctypes.c_uint64]
         self.manifest = manifest
         self.n = len(manifest["joints"])
         self._room = np.zeros(len(image) // 8 + _ALIGNMENT // 8)
@@ -71,7 +71,7 @@ class NativeController:
         self._numbers = np.zeros((4, self.n))
         self._places = [row.ctypes.data for row in self._numbers]
         if self.check(len(image)) != 0:
-            raise ValueError("this memory of a controller is for another kernel")
+            raise ValueError("this image is damaged, or it is for another controller or another kernel")
         self.reset()
 
     @classmethod
@@ -79,8 +79,8 @@ class NativeController:
         return cls(library, image.memory, image.manifest)
 
     def check(self, size: int) -> int:
-        """Returns the result of `himpc_check` for the controller's memory."""
-        return self._c.himpc_check(self._at, size)
+        """Returns the result of `himpc_check` for the memory, which is an image until `reset`."""
+        return self._c.himpc_check(self._at, size, int(self.manifest["digest"], 16))
 
     def reset(self, tau: Array | None = None) -> None:
         """Clears everything except the settings. tau: the torque that acts now, (n,) N·m; None: zero."""

@@ -11,7 +11,7 @@ from pathlib import Path
 import llvmlite.binding as llvm
 
 from himpc.compilation.compiled import kept
-from himpc.export.entries import EXPORTED, entries_text, kernel_text
+from himpc.export.entries import EXPORTED, PREFIX, entries_text, kernel_text
 from himpc.export.kernel.whole_tick import control
 from himpc.export.layout import layout_number
 from robots.errors import InputError, unknown_name
@@ -68,18 +68,22 @@ def target_named(name: str) -> Target:
     return TARGETS[name]
 
 
-def object_code(target: Target) -> bytes:
-    """Returns an object file for a target; it is kept on disk.
+def object_code(target: Target, prefix: str = PREFIX) -> bytes:
+    """Returns an object file for a target; it is kept on disk. Names of functions begin with `prefix`.
 
     Raises:
         InputError: this build of LLVM cannot make code for the target.
     """
-    return kept(control.py_func, f"{target.triple}-{_own_digest()}", lambda: _made(target))
+    key = "-".join([target.triple, _own_digest(), *([] if prefix == PREFIX else [prefix])])
+    return kept(control.py_func, key, lambda: _made(target, prefix))
 
 
-def _made(target: Target) -> bytes:
+def _made(target: Target, prefix: str) -> bytes:
     machine, head = _machine(target)
-    whole = llvm.parse_assembly(_retargeted(_portable(), head))
+    text = _retargeted(_portable(), head)
+    for name in EXPORTED:
+        text = re.sub(rf"@{name}\b", f"@{prefix}{name.removeprefix(PREFIX)}", text)
+    whole = llvm.parse_assembly(text)
     whole.verify()
     _optimise(whole, machine, llvm.create_pipeline_tuning_options(speed_level=2))
     foreign = {each.name for each in whole.functions if each.is_declaration}

@@ -88,8 +88,9 @@ class Handover:
 
 def _filter_of(controller: Controller) -> DistanceFilter | None:
     """Returns a filter for the settings of a controller that keeps distances, otherwise None."""
-    keeps = isinstance(controller, HIMPC) and controller.settings.limits.avoidance.on
-    return DistanceFilter(controller.robot, controller.settings) if keeps else None
+    if isinstance(controller, HIMPC) and controller.settings.limits.avoidance.on:
+        return DistanceFilter(controller.robot, controller.settings)
+    return None
 
 
 def settled(controller: Controller) -> Controller:

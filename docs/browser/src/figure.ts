@@ -86,6 +86,11 @@ export class Figure {
     root.classList.add("hl-figure");
     root.classList.toggle("hl-wide", asked.wide);
     root.replaceChildren(element("div", { class: "hl-view" }, ...(view ? [view.canvas] : [])), side, plots.root);
+    const mark = side.onscroll = (): void => {
+      side.toggleAttribute("data-above", side.scrollTop > 1);
+      side.toggleAttribute("data-below", side.scrollTop + side.clientHeight < side.scrollHeight - 1);
+    };
+    for (const each of [side, this.panel.root]) new ResizeObserver(mark).observe(each);
     void this.recode();
     return side;
   }

@@ -5,7 +5,9 @@ import { element, LEVELS } from "./panel";
 import type { Frame } from "./worker";
 
 const WINDOW_S = 8;
-const JOINTS = ["#d72626", "#e27000", "#258964", "#027d99", "#3079f0", "#e700c6", "#ff2172"];
+const JOINTS = ["#d72626", "#96661c", "#6f7f00", "#8257e6", "#77808c", "#b5528f", "#4f8a8b"]; // none is a level's
+/** mm or °: the axis of the errors is at least this long, so that its labels, of three decimals, differ. */
+const LEAST = 1e-2;
 
 interface Line { label: string; stroke: string; factor: number }
 
@@ -18,7 +20,7 @@ export class Plots {
     const errors = tasks.map(({ name, unit, level }) => ({ label: `${name}, ${unit === "m" ? "mm" : "°"}`,
       stroke: LEVELS[level % 6], factor: unit === "m" ? 1e3 : 180 / Math.PI }));
     const shares = Array.from({ length: joints }, (_, k) => ({ label: `joint ${k + 1}`, stroke: JOINTS[k % 7], factor: 100 }));
-    this.add("Errors of the tasks, mm and °", 1, errors, (_, __, high) => [0, Math.max(1e-3, 1.1 * high)]);
+    this.add("Errors of the tasks, mm and °", 1, errors, (_, __, high) => [0, Math.max(LEAST, 1.1 * high)]);
     for (const [k, what] of ["Torques", "Velocities"].entries())
       this.add(`${what}, % of their bounds`, 1 + tasks.length + k * joints, shares,
         (_, low, high) => [Math.min(-110, low), Math.max(110, high)], [100, -100]);

@@ -2,9 +2,15 @@
 
    Units: rad and N m of revolute joints (m and N of prismatic ones), m, s; world frame. Joints: @joints@.
    Nothing allocates, no function keeps anything outside a controller's memory; several controllers may be used in
-   several threads, each by one at a time. Only libm is needed. */
-#ifndef HIMPC_H
+   several threads, each by one at a time. Only libm is needed. C99, C++11. */
+#ifdef HIMPC_H
+#if HIMPC_DIGEST != @digest@
+#error "two exported controllers have the prefix himpc: export one of them with --prefix"
+#endif
+#else
 #define HIMPC_H
+/* The digest of controller.bin: of robot, joints, tasks and all numbers. */
+#define HIMPC_DIGEST @digest@
 
 #include <math.h>
 #include <stddef.h>
@@ -18,7 +24,8 @@ enum {
     HIMPC_N = @n@,         /* joints */
     HIMPC_HORIZON = @horizon@,    /* knots */
     HIMPC_BYTES = @bytes@, /* of a controller's memory */
-    HIMPC_ALIGNMENT = 64
+    HIMPC_ALIGNMENT = 64,
+    HIMPC_LIMIT_MULTIPLE = @multiple@ /* largest limits of torque and velocity, in multiples of the robot's own */
 };
 #define HIMPC_PERIOD @period@ /* s */
 
@@ -39,6 +46,13 @@ enum {
     HIMPC_NO_HIERARCHY = -4 /* this controller has no strict hierarchy */
 };
 
+/* What is wrong with an image. */
+enum {
+    HIMPC_OTHER_KERNEL = -1,     /* it is no image, or an image for another kernel */
+    HIMPC_OTHER_CONTROLLER = -2, /* its robot, joints, tasks or settings are others */
+    HIMPC_DAMAGED = -3           /* a bit is wrong */
+};
+
 /* One period: the torque tau (N m) to apply from now on. q (rad), v (rad/s): measured; tau_applied (N m): the torque
    that acted during the last period, NULL: that of the last call. HIMPC_N numbers each. For every state, also one
    that is not finite, tau is finite and within the limits in force. Returns which fallback acted, HIMPC_SOLVE if
@@ -48,27 +62,31 @@ int himpc_tick(himpc_controller *c, const double *q, const double *v, const doub
 int himpc_reset(himpc_controller *c, const double *tau);
 /* Changes a setting; himpc_set_... below are easier to use. */
 int himpc_set(himpc_controller *c, int what, int index, const double *values, int count);
-/* 0 if this memory is a controller that this kernel can run. */
-int himpc_check(const void *memory, unsigned size);
+/* 0 if these bytes are the image with this digest (HIMPC_DIGEST), all bits of it, and this kernel can run it;
+   else what is wrong. A controller that has run is no image any more. */
+int himpc_check(const void *image, unsigned size, unsigned long long digest);
 
 enum { HIMPC_TARGET, HIMPC_M_BAR, HIMPC_GAINS, HIMPC_WEIGHT_Q, HIMPC_WEIGHT_R, HIMPC_LIMITS, HIMPC_ENABLED,
-       HIMPC_ORDER };
+       HIMPC_ORDER, HIMPC_WEIGHTS, HIMPC_BUDGET };
 
 /* Tasks: @tasks@. */
 enum { HIMPC_TASKS = @task_count@ };
 static const char *const HIMPC_TASK_NAMES[] = { @task_names@ };
 static const int HIMPC_TASK_ROWS[] = { @task_rows@ };
+static const int HIMPC_TASK_FIRST[] = { @task_first@ };
 /* Levels, highest priority first: @levels@. */
 enum { HIMPC_LEVELS = @level_count@ };
 static const char *const HIMPC_LEVEL_NAMES[] = { @level_names@ };
 static const int HIMPC_LEVEL_ROWS[] = { @level_rows@ };
-/* N m: no torque is ever larger, unless himpc_set_limits raises the limits. */
+/* N m: no torque is ever larger, unless himpc_set_limits raises the limits. The robot's own limits times
+   HIMPC_LIMIT_MULTIPLE are the most that it accepts. */
 static const double HIMPC_LARGEST_TORQUE[HIMPC_N] = { @torques@ };
 
-/* A controller in `memory` of HIMPC_BYTES bytes, from the content of controller.bin; NULL if it does not fit. */
+/* A controller in `memory` of HIMPC_BYTES bytes, from the content of controller.bin; NULL if it does not fit, see
+   himpc_check. */
 static inline himpc_controller *himpc_create(void *memory, size_t size, const void *image, size_t image_size) {
     if (image_size < HIMPC_BYTES || size < HIMPC_BYTES || (size_t)memory % HIMPC_ALIGNMENT) return NULL;
-    if (himpc_check(image, HIMPC_BYTES)) return NULL;
+    if (himpc_check(image, HIMPC_BYTES, HIMPC_DIGEST)) return NULL;
     memcpy(memory, image, HIMPC_BYTES);
     himpc_reset((himpc_controller *)memory, NULL);
     return (himpc_controller *)memory;
@@ -111,17 +129,23 @@ static inline int himpc_set_gains(himpc_controller *c, const char *task, double 
     for (int i = 0; i < HIMPC_TASK_ROWS[k]; i++) values[i] = K_p, values[HIMPC_TASK_ROWS[k] + i] = K_v;
     return himpc_set(c, HIMPC_GAINS, k, values, 2 * HIMPC_TASK_ROWS[k]);
 }
-/* Weights of (31) of a level, the same for all of its rows and all joints: Q, R. */
+/* Weights of (31) of a level, the same for all of its rows and all joints: Q, R. A controller without a strict
+   hierarchy has one R: there use himpc_set with HIMPC_WEIGHT_Q. */
 static inline int himpc_set_weights(himpc_controller *c, const char *level, double Q, double R) {
-    double values[@most_rows@];
-    int k = himpc_level(level), answer;
+    double values[2 * @most_rows@];
+    int k = himpc_level(level);
     if (k < 0) return HIMPC_MISFIT;
-    for (int i = 0; i < @most_rows@; i++) values[i] = Q;
-    if ((answer = himpc_set(c, HIMPC_WEIGHT_Q, k, values, HIMPC_LEVEL_ROWS[k]))) return answer;
-    for (int i = 0; i < @most_rows@; i++) values[i] = R;
-    return himpc_set(c, HIMPC_WEIGHT_R, k, values, HIMPC_N);
+    for (int i = 0; i < HIMPC_LEVEL_ROWS[k] + HIMPC_N; i++) values[i] = i < HIMPC_LEVEL_ROWS[k] ? Q : R;
+    return himpc_set(c, HIMPC_WEIGHTS, k, values, HIMPC_LEVEL_ROWS[k] + HIMPC_N);
 }
-/* Limits of torque (N m), velocity (rad/s) and position (rad). Those in force close in on tighter ones gently. */
+/* The largest number of multiplications for changes of active rows in a period: it bounds the time of a period, since
+   no clock is read. If it is used up, fallbacks act. */
+static inline int himpc_set_budget(himpc_controller *c, double multiplications) {
+    return himpc_set(c, HIMPC_BUDGET, 0, &multiplications, 1);
+}
+/* Limits of torque (N m), velocity (rad/s) and position (rad). Those in force close in on tighter ones gently. Refused
+   are numbers that are not finite, torques and velocities above HIMPC_LIMIT_MULTIPLE times the robot's own, and
+   positions outside the robot's own range. Only a joint without limits of position may have infinite ones. */
 static inline int himpc_set_limits(himpc_controller *c, const double torque[HIMPC_N], const double velocity[HIMPC_N],
                                    const double lower[HIMPC_N], const double upper[HIMPC_N]) {
     double values[4 * HIMPC_N];
@@ -142,6 +166,23 @@ static inline int himpc_set_order(himpc_controller *c, const char *const levels[
     double values[HIMPC_LEVELS];
     for (int i = 0; i < HIMPC_LEVELS; i++) values[i] = himpc_level(levels[i]);
     return himpc_set(c, HIMPC_ORDER, 0, values, HIMPC_LEVELS);
+}
+
+/* What the last period found. After HIMPC_HOLD these are the results of an earlier period.
+   The error of each row of a task (m, rad), HIMPC_TASK_ROWS numbers; NULL: there is no such task. */
+static inline const double *himpc_error(const himpc_controller *c, const char *task) {
+    int k = himpc_task(task);
+    return k < 0 ? NULL : (const double *)((const char *)c + @error@) + HIMPC_TASK_FIRST[k];
+}
+/* Number of active rows of a level; -1: there is no such level, or it is off. */
+static inline int himpc_active_rows(const himpc_controller *c, const char *level) {
+    int k = himpc_level(level), place = k < 0 ? -1 : (int)((const double *)((const char *)c + @place@))[k];
+    return place < 0 ? -1 : (int)((const double *)((const char *)c + @active@))[place];
+}
+/* Which fallback gave the increments of a level; -1: there is no such level, or it is off. */
+static inline int himpc_level_fallback(const himpc_controller *c, const char *level) {
+    int k = himpc_level(level), place = k < 0 ? -1 : (int)((const double *)((const char *)c + @place@))[k];
+    return place < 0 ? -1 : (int)((const double *)((const char *)c + @rung@))[place];
 }
 
 #ifdef __cplusplus

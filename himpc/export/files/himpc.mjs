@@ -1,7 +1,8 @@
 // The exported controller in a browser or in Node. One module may hold many controllers.
 const { sin, cos, tan, atan2, hypot, exp, expm1, log, sqrt, pow } = Math;
 const env = { sin, cos, tan, atan2, hypot, exp, expm1, log, sqrt, pow };
-export const TARGET = 0, M_BAR = 1, GAINS = 2, Q = 3, R = 4, LIMITS = 5, ENABLED = 6, ORDER = 7;
+export const TARGET = 0, M_BAR = 1, GAINS = 2, Q = 3, R = 4, LIMITS = 5, ENABLED = 6, ORDER = 7, WEIGHTS = 8, BUDGET = 9;
+const WRONG = ["was made for another kernel", "belongs to another controller.json", "is damaged"];
 export const FALLBACKS = ["solve", "soften", "feasible", "previous", "inherit", "brake", "hold"];
 
 /**
@@ -9,7 +10,7 @@ export const FALLBACKS = ["solve", "soften", "feasible", "previous", "inherit", 
  * @typedef {{ name: string, index: number, rows: number, target: string }} Task
  * @typedef {{ name: string, index: number, rows: number, tasks: string[] }} Level
  * @typedef {{ name: string, type: string, shape: number[], offset: number }} Listed
- * @typedef {{ joints: string[], tasks: Task[], levels: Level[], arrays: Listed[] }} Manifest
+ * @typedef {{ joints: string[], digest: string, tasks: Task[], levels: Level[], arrays: Listed[] }} Manifest
  */
 
 /** Makes what creates controllers. @param {ArrayBuffer} wasm bytes of himpc.wasm */
@@ -32,7 +33,8 @@ export async function kernel(wasm) {
     const n = manifest.joints.length;
     const at = take(image.byteLength), given = take(8 * Math.max(4 * n, 64));
     new Uint8Array(memory.buffer, at, image.byteLength).set(image);
-    if (himpc_check(at, image.byteLength)) throw new Error("controller.bin was made for another kernel: export again");
+    const wrong = himpc_check(at, image.byteLength, BigInt.asIntN(64, BigInt(`0x${manifest.digest}`)));
+    if (wrong) throw new Error(`controller.bin ${WRONG[-wrong - 1]}: export again`);
     const numbers = (offset, count) => new Float64Array(memory.buffer, offset, count);
     /** @type {(what: number, index: number, values: ArrayLike<number>) => void} */
     const set = (what, index, values) => {

@@ -52,7 +52,7 @@ int main(int argc, char **argv) {
     himpc_controller *c = himpc_create(memory, sizeof memory, image.data(), image.size());
     Robot robot{mj_loadModel("plant.mjb", nullptr), nullptr};
     if (!c || !robot.model || vector.size() < 16) {
-        std::fprintf(stderr, "controller.bin, vector.bin or plant.mjb is missing or of another version\n");
+        std::fprintf(stderr, "controller.bin, vector.bin or plant.mjb is missing or damaged, or does not belong to himpc.h\n");
         return 2;
     }
     robot.data = mj_makeData(robot.model);

@@ -13,6 +13,8 @@
 
 enum { RUNS = 2, MOVE = 11 }; /* two controllers take turns; a move: tick, task, count, up to 8 numbers */
 
+static struct { _Alignas(HIMPC_ALIGNMENT) char bytes[HIMPC_BYTES]; } memory[RUNS];
+
 static void *whole(const char *path, size_t *size) {
     FILE *file = fopen(path, "rb");
     if (!file) return NULL;
@@ -20,16 +22,11 @@ static void *whole(const char *path, size_t *size) {
     *size = (size_t)ftell(file);
     rewind(file);
     void *data = malloc(*size + 64);
-    if (data && fread(data, 1, *size, file) != *size) data = NULL;
+    size_t read = data ? fread(data, 1, *size, file) : 0;
     fclose(file);
-    return data;
-}
-
-static himpc_controller *made(const void *image, size_t size) {
-    uintptr_t memory = (uintptr_t)malloc(size + HIMPC_ALIGNMENT);
-    if (!memory) return NULL;
-    memory = (memory + HIMPC_ALIGNMENT - 1) / HIMPC_ALIGNMENT * HIMPC_ALIGNMENT;
-    return himpc_create((void *)memory, size, image, size);
+    if (read == *size) return data;
+    free(data);
+    return NULL;
 }
 
 static double now_us(void) {
@@ -47,6 +44,7 @@ static int hostile(himpc_controller *c, const double *q, const double *v) {
     const double wild[] = {NAN, INFINITY, -INFINITY, 1e300, -1e300, 1e8, 1e4, 100.0, -100.0, 10.0, -10.0, 3.0, 0.0};
     const int count = (int)(sizeof wild / sizeof *wild);
     double x[HIMPC_N], y[HIMPC_N], z[HIMPC_N], tau[HIMPC_N];
+    double longest = 0.0;
     int bad = 0, seen[HIMPC_HOLD + 1] = {0};
     uint32_t seed = 1;
     for (int k = 0; k < 500; k++) {
@@ -60,7 +58,10 @@ static int hostile(himpc_controller *c, const double *q, const double *v) {
             z[a] = wild[dice[2] % (uint32_t)count];
             tau[a] = NAN;
         }
+        double begun = now_us();
         int fallback = himpc_tick(c, x, y, k % 3 ? z : NULL, tau);
+        double us = now_us() - begun;
+        if (us > longest) longest = us;
         if (fallback < 0 || fallback > HIMPC_HOLD) bad++;
         else seen[fallback]++;
         for (int a = 0; a < HIMPC_N; a++)
@@ -68,23 +69,14 @@ static int hostile(himpc_controller *c, const double *q, const double *v) {
     }
     printf("hostile states: %d torques outside the limits; fallbacks", bad);
     for (int k = 0; k <= HIMPC_HOLD; k++) printf(" %s %d", HIMPC_FALLBACKS[k], seen[k]);
-    printf("\n");
+    printf("\nlongest period %.0f us\n", longest);
     return bad ? 1 : 0;
 }
 
-int main(int argc, char **argv) {
-    size_t size = 0, vector_size = 0;
-    void *image = whole("controller.bin", &size), *vector = whole("vector.bin", &vector_size);
-    himpc_controller *c[RUNS];
-    for (int k = 0; k < RUNS; k++)
-        if (!image || !vector || !(c[k] = made(image, size))) {
-            fprintf(stderr, "controller.bin or vector.bin is missing, or was made for another kernel: export again\n");
-            return 2;
-        }
+static int replay(himpc_controller *const c[RUNS], const void *vector) {
     const int64_t *counts = vector; /* ticks, moves */
     const double *move = (const double *)vector + 2, *row = move + MOVE * counts[1];
     const double *moves_end = row;
-    if (argc > 1 && !strcmp(argv[1], "hostile")) return hostile(c[0], row, row + HIMPC_N);
     double worst = 0.0, tau[HIMPC_N], *us = calloc((size_t)counts[0] + 1, sizeof(double));
     if (!us) return 2;
     int fallbacks = 0;
@@ -92,7 +84,7 @@ int main(int argc, char **argv) {
     for (int64_t k = 0; k < counts[0]; k++, row += 4 * HIMPC_N) {
         for (; move < moves_end && (int64_t)move[0] == k; move += MOVE)
             for (int i = 0; i < RUNS; i++)
-                if (himpc_set(c[i], HIMPC_TARGET, (int)move[1], move + 3, (int)move[2])) return 3;
+                if (himpc_set(c[i], HIMPC_TARGET, (int)move[1], move + 3, (int)move[2])) worst = INFINITY;
         for (int i = 0; i < RUNS; i++) {
             double begun = now_us();
             int fallback = himpc_tick(c[i], row, row + HIMPC_N, row + 2 * HIMPC_N, tau);
@@ -106,5 +98,25 @@ int main(int argc, char **argv) {
     qsort(us, (size_t)counts[0], sizeof(double), ascending);
     printf("%lld ticks: largest difference %.1e N m, median %.1f us a tick, longest %.0f us, %d ticks with a fallback\n",
            (long long)counts[0], worst, us[counts[0] / 2], us[counts[0] - 1], fallbacks);
+    free(us);
     return worst <= 1e-6 ? 0 : 1;
+}
+
+int main(int argc, char **argv) {
+    size_t size = 0, vector_size = 0;
+    void *image = whole("controller.bin", &size), *vector = whole("vector.bin", &vector_size);
+    himpc_controller *c[RUNS];
+    int answer = 0;
+    for (int k = 0; k < RUNS; k++)
+        if (!image || !vector || !(c[k] = himpc_create(memory[k].bytes, HIMPC_BYTES, image, size))) answer = 2;
+    if (answer)
+        fprintf(stderr, "controller.bin or vector.bin is missing or damaged, or does not belong to himpc.h: export again\n");
+    else if (argc > 1 && !strcmp(argv[1], "hostile")) {
+        const double *row = (const double *)vector + 2 + MOVE * ((const int64_t *)vector)[1];
+        answer = hostile(c[0], row, row + HIMPC_N);
+    } else
+        answer = replay(c, vector);
+    free(image);
+    free(vector);
+    return answer;
 }

@@ -7,6 +7,7 @@ import math
 from himpc.compilation.compiled import inline_kernel
 from himpc.controllers.himpc import ENABLE_SECONDS, FAINTEST
 from himpc.export.kernel.follow import MISFIT, NO_HIERARCHY, NOT_USABLE, drag
+from himpc.export.kernel.loop_arrays import BUDGET as ALLOWED
 from himpc.export.kernel.loop_arrays import DAMPS, FADING, LEVELS, ON_ACCELERATION, SIMPLE, LoopArrays
 from himpc.limits.limits import POSITION_MARGIN
 from himpc.limits.ramp import RAMP_SECONDS
@@ -17,7 +18,7 @@ from himpc.tick.kernel.cascade import AFRESH, FIRST, LAST
 from himpc.tick.kernel.linear import copy, copy_rows, dot
 from himpc.tick.tables import ACCURACY
 
-TARGET, M_BAR, GAINS, WEIGHT_Q, WEIGHT_R, LIMITS, ENABLED, ORDER = range(8)
+TARGET, M_BAR, GAINS, WEIGHT_Q, WEIGHT_R, LIMITS, ENABLED, ORDER, WEIGHTS, BUDGET = range(10)
 """The kinds of settings."""
 _MODE = 9
 """Index in `sizes` of the kind of position limits."""
@@ -29,18 +30,19 @@ def adjust(t: TickArrays, p: LoopArrays, what: int, index: int, values: Array, c
     MISFIT, NOT_USABLE or NO_HIERARCHY.
 
     Args:
-        what: TARGET … ORDER.
-        index: index of the task (TARGET, GAINS) or of the level (WEIGHT_Q, WEIGHT_R, ENABLED).
+        what: TARGET … BUDGET.
+        index: index of the task (TARGET, GAINS) or of the level (WEIGHT_Q, WEIGHT_R, WEIGHTS, ENABLED).
         values, count: the numbers of the setting. TARGET: see `drag`. M_BAR: (n) kg·m². GAINS: K_p (m) 1/s²,
             then K_v (m) 1/s. WEIGHT_Q: (m). WEIGHT_R: (n). LIMITS: torque (n) N·m, velocity (n) rad/s, lower
-            and upper position (n) rad each. ENABLED: 0 or 1. ORDER: the indices of all levels (r), highest
-            priority first; a damping level stays the last.
+            and upper position (n) rad each, see `LoopArrays.widest`. ENABLED: 0 or 1. ORDER: the indices of
+            all levels (r), highest priority first; a damping level stays the last. WEIGHTS: Q (m), R (n).
+            BUDGET: the largest number of multiplications for changes of active rows in a period.
     """
     n, r = t.q.size, int(p.setup[LEVELS])
     if not dot(values, values, count) < 1e18 and what != LIMITS:
         return NOT_USABLE
     of_task = what in (TARGET, GAINS)
-    if what < 0 or what > ORDER or index < 0 or index >= (len(t.task) if of_task else r):
+    if what < 0 or what > BUDGET or index < 0 or index >= (len(t.task) if of_task else r):
         return MISFIT
     if what == TARGET:
         return drag(t, p, index, values, count)
@@ -51,26 +53,33 @@ def adjust(t: TickArrays, p: LoopArrays, what: int, index: int, values: Array, c
         first, last = t.task[index, 2], t.task[index, 2] + t.task[index, 3]
     size = last - first
     wanted = n if what in (M_BAR, WEIGHT_R) else 2 * size if what == GAINS else size
-    if what == ENABLED:
+    if what in (ENABLED, BUDGET):
         wanted = 1
     elif what == ORDER:
         wanted = r
+    elif what == WEIGHTS:
+        wanted = size + n
     if count != wanted:
         return MISFIT
     if what != ENABLED and what != ORDER:
         for k in range(count):
             if not (values[k] > 0.0 or (what == GAINS and values[k] == 0.0)):
                 return NOT_USABLE
-    tied = what in (WEIGHT_R, ENABLED, ORDER) or (what == M_BAR and p.setup[ON_ACCELERATION] != 0.0)
+    tied = what in (WEIGHT_R, ENABLED, ORDER, WEIGHTS) or (what == M_BAR and p.setup[ON_ACCELERATION] != 0.0)
     if tied and p.setup[SIMPLE] == 0.0:
         return NO_HIERARCHY
     if what == GAINS:
         copy(values, t.K_p[first:last], size)
         copy(values[size:], t.K_v[first:last], size)
         write_rows(t, p, first, last)
-    elif what == WEIGHT_Q:
+    elif what in (WEIGHT_Q, WEIGHTS):
         copy(values, p.Q[first:last], size)
         write_rows(t, p, first, last)
+        if what == WEIGHTS:
+            copy(values[size:], p.R[index], n)
+            arrange(t, p)
+    elif what == BUDGET:
+        p.setup[ALLOWED] = values[0]
     elif what == ENABLED:
         switch(t, p, index, values[0] != 0.0)
     elif what == ORDER:
@@ -83,10 +92,13 @@ def adjust(t: TickArrays, p: LoopArrays, what: int, index: int, values: Array, c
 
 @inline_kernel
 def set_limits(p: LoopArrays, values: Array, n: int) -> int:
-    """Sets the desired limits. The limits in force approach them, see `close_in`."""
+    """Sets the desired limits. The limits in force approach them, see `close_in`. Limits beyond
+    `LoopArrays.widest` are not usable, and neither are limits that are not finite where that is finite."""
     for a in range(n):
         torque, speed, low, high = values[a], values[n + a], values[2 * n + a], values[3 * n + a]
-        if not (torque > 0.0 and speed > 0.0 and low < high):
+        if not (0.0 < torque <= p.widest[0, a] and 0.0 < speed <= p.widest[1, a]):
+            return NOT_USABLE
+        if not (p.widest[2, a] <= low < high <= p.widest[3, a]):
             return NOT_USABLE
     for a in range(n):
         p.goal[0, a], p.goal[1, a], p.goal[2, a] = -values[a], values[a], values[n + a]

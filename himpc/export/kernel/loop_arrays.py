@@ -47,6 +47,13 @@ class LoopArrays(NamedTuple):
     high: Annotated[Array, "N n", "N·m", "largest values of velocity rows from which later rows can be met"]
     before: Annotated[Array, "r N n", "N·m", "increments of the previous iteration"]
     weights: Annotated[Array, "n", "1/(N·m)²", "R of one level"]
+    # A constant of the export.
+    widest: Annotated[
+        Array,
+        "4 n",
+        "N·m, rad/s, rad",
+        "largest limits that a setting may give: torque, velocity, both ends",
+    ]
 
 
 SHAPES: dict[str, str] = {
@@ -122,4 +129,5 @@ def loop_arrays_of(loop: Array, where: Whole, t: TickArrays) -> LoopArrays:
         matrix(loop, where[23], N, n),
         matrices(loop, where[24], r, N, n),
         vector(loop, where[25], n),
+        matrix(loop, where[26], 4, n),
     )
