@@ -1,10 +1,10 @@
 """Compares the results of all scenes under all controllers with those of another commit.
 
 python benchmarks/same_as.py COMMIT [--seconds S] [--scenes NAME ...] runs every scene with every controller
-that fits, without a page, here and in a checkout of COMMIT. It compares the results of `himpc-lab run
---json`, except the keys of `TIMING`. With --tolerance T, two numbers may differ by T times the larger of the two, or
-by 1e-9 if that is more, and the keys of `_HOW` (the route and its residuals) are not compared. The exit code
-is 1 if any result differs.
+that fits, without a page, here and in a checkout of COMMIT. It compares the results that the option --json of
+`himpc-lab run` writes, except the keys of `TIMING`. With --tolerance T, two numbers may differ by T times the
+larger of the two, or by 1e-9 if that is more, and the keys of `_HOW` (the route and its residuals) are not
+compared. The exit code is 1 if any result differs.
 """
 
 from __future__ import annotations

@@ -256,7 +256,7 @@ def _rivals(results: Results, quick: bool) -> Section:
     ]
     return Section(
         notes=(
-            "Unstable: the run loses control (a level-1 error above 0.5 m, or a speed far beyond its limit).",
+            "Unstable: the run loses control (a speed of more than 20 times its limit).",
         ),
         rows=tuple(rows),
     )
