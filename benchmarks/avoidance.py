@@ -6,12 +6,14 @@
 
 Every chain drags the hands of a robot four times, once a second, in position alone or in position and
 orientation. Each new target is 0.1 to 0.6 m from the present target in a random direction, so that many
-targets lie in the floor, in the robot or out of reach. Then the robot has three seconds to come to rest. With
-`--often`, all targets jump every 80 ms for two seconds instead: positions by normal samples of 0.3 m,
-orientations of 0.6 rad, postures of 0.3 rad. With `--balls`, a ball is dragged through the arm four times
-instead, at 0.15 to 0.5 m/s, from 0.6 m before a moving link to 0.6 m behind it. The ball does not pass
-through the first three joints, which cannot move out of its way. Any controller can run; `--off` switches
-distances off.
+targets lie in the floor, in the robot or out of reach. Then the robot has three seconds to come to rest.
+
+With `--often`, all targets jump every 80 ms for two seconds instead, from their values at the start:
+positions by normal samples of 0.3 m, orientations of 0.6 rad, postures of 0.3 rad. (Jumps from the present
+values would add up, and the references, whose speed is limited, would still move three seconds later.) With
+`--balls`, a ball is dragged through the arm four times instead, at 0.15 to 0.5 m/s, from 0.6 m before a
+moving link to 0.6 m behind it. The ball does not pass through the first three joints, which cannot move out
+of its way. Any controller can run; `--off` switches distances off.
 
 The program prints a line of a Markdown table for each robot: the drags; the largest force between bodies
 whose distance is kept, and these bodies; the chains in which this force exceeds 50 N; the largest share of
@@ -38,6 +40,7 @@ from numpy.typing import NDArray
 import lessons.course
 from benchmarks.crossing import BALL_M, crossing
 from himpc.controllers.controller import Controller
+from himpc.kinematics.configuration import Configuration
 from himpc.plan import Plan
 from lessons.events import MoveTarget
 from lessons.scenes.catalog import torque_scene
@@ -136,19 +139,23 @@ def drags(session: TorqueSession, rng: np.random.Generator) -> list[MoveTarget]:
 
 
 def jumps(session: TorqueSession, rng: np.random.Generator) -> list[MoveTarget]:
-    """Returns a jump of every target."""
-    found = []
+    """Returns a jump of every target, from its value at the start of the run."""
+    found, start = [], _at_start(session)
     for task in (task for level in session.settings.levels for task in level.tasks):
-        target = session.target(task.name)
-        if target is None:
+        if session.target(task.name) is None:
             continue
-        if target.raw.ndim == 2:
-            goal = pin.Quaternion(pin.exp3(rng.normal(0.0, JUMP_RAD, 3)) @ target.raw).coeffs()
+        raw = task.target(start)
+        if raw.ndim == 2:
+            goal = pin.Quaternion(pin.exp3(rng.normal(0.0, JUMP_RAD, 3)) @ raw).coeffs()
         else:
-            size = JUMP_M if task.unit == "m" else JUMP_JOINT
-            goal = target.raw + rng.normal(0.0, size, target.raw.size)
+            goal = raw + rng.normal(0.0, JUMP_M if task.unit == "m" else JUMP_JOINT, raw.size)
         found.append(MoveTarget(task.name, tuple(goal.tolist())))
     return found
+
+
+def _at_start(session: TorqueSession) -> Configuration:
+    robot, scene = session.robot, session.scene
+    return Configuration(robot, robot.model.createData(), scene.q_0, np.zeros(robot.n))
 
 
 class Timed:

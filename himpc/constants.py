@@ -73,17 +73,3 @@ SLOWEST = 0.02
 LEAST_SHARE = 1e-9
 """Least factor on the velocity limits of a stalled robot. It is positive, and an infinite limit stays
 infinite."""
-
-PRESSING = 0.2
-"""Share of a torque limit: if the torque of a joint changes by more than this while the joints are still, the
-robot presses against something. The largest share of a free robot that was measured is 0.18."""
-FORGETS = 1.0
-"""rad (m): a change of the torque is forgotten while the robot moves by this."""
-TREND_SECONDS = 0.03
-"""s: time constant of the mean that tells whether a robot presses harder."""
-STOPPING, RELEASE = 0.02, 0.05
-"""s: time constants with which a robot that presses is stopped and released."""
-CREEP = 1e-3
-"""rad/s: the velocity limit of a stopped robot's joint is not reduced below this."""
-WEAK_PULL = 0.05
-"""m: the largest error on which tasks of a robot act that begins to press, see `Avoidance.pull`."""

@@ -204,7 +204,7 @@ LESSON = Lesson(
     name="deadlines",
     card=card_of(__doc__),
     scene="planar3-hold",
-    set=("avoidance.on=false",),
+    set=("avoidance.on=false", "limits.stall_guard=false"),
     steps=(ONE_MORE, SLOWER, REPAIR),
     challenge=CHALLENGE,
 )

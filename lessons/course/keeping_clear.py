@@ -254,6 +254,6 @@ LESSON = Lesson(
     name="keeping-clear",
     card=card_of(__doc__),
     scene="iiwa14-table",
-    set=("avoidance.on=false",),
+    set=("avoidance.on=false", "limits.stall_guard=false"),
     steps=(BELOW, FIRST_TASK, INSIDE, BEHIND),
 )

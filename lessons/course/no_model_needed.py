@@ -270,7 +270,7 @@ LESSON = Lesson(
     name="no-model-needed",
     card=card_of(__doc__),
     scene="iiwa14-hold",
-    set=("avoidance.on=false",),
+    set=("avoidance.on=false", "limits.stall_guard=false"),
     steps=(LOAD, SMALL, FURTHER, LARGE),
     challenge=CHALLENGE,
 )

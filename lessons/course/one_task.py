@@ -223,7 +223,7 @@ LESSON = Lesson(
     name="one-task",
     card=card_of(__doc__),
     scene="planar3-hold",
-    set=("avoidance.on=false", *ONLY_THE_HAND),
+    set=("avoidance.on=false", "limits.stall_guard=false", *ONLY_THE_HAND),
     steps=(SPRING, DAMPER, PRICE, FREE),
     challenge=CHALLENGE,
 )

@@ -238,7 +238,7 @@ LESSON = Lesson(
     name="stopping-takes-distance",
     card=card_of(__doc__),
     scene="planar3-hold",
-    set=("avoidance.on=false", *ONLY_JOINTS, NO_STOPS),
+    set=("avoidance.on=false", "limits.stall_guard=false", *ONLY_JOINTS, NO_STOPS),
     steps=(PRINTED, LONGER, VIABLE),
     challenge=CHALLENGE,
 )

@@ -186,7 +186,7 @@ LESSON = Lesson(
     card=card_of(__doc__),
     scene="hold",
     urdf=LAMP,
-    set=("avoidance.on=false",),
+    set=("avoidance.on=false", "limits.stall_guard=false"),
     steps=(LOAD, WRONG, TUNE),
     challenge=CHALLENGE,
 )

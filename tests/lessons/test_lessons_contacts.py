@@ -15,6 +15,7 @@ from lessons.scenes.catalog import torque_scene
 from lessons.scenes.names import SCENES
 from lessons.scenes.torque_scene import TorqueScene
 from lessons.session.torque import TorqueSession
+from lessons.settings.assignments import with_assignments
 
 DRAGGED = [name for name in SCENES if "hold" in name or name.startswith("baxter") or name == "planar3-plane"]
 PAPERS = [name for name in SCENES if name.endswith(("circle", "circle-paper", "conflict", "singular"))]
@@ -53,7 +54,9 @@ DOWN = ((0.0, MoveTarget("position", (0.55, 0.1, -0.15))),)
 def test_a_hand_that_is_dragged_into_the_floor_presses_on_it() -> None:
     """With contacts the hand stays above the floor, and the summary states depth, force and duration. Without
     contacts it passes through the floor."""
-    scene = replace(load("panda-hold"), events=DOWN)
+    scene = load("panda-hold")
+    blind = with_assignments(scene.settings, ["avoidance.on=false"])
+    scene = replace(scene, settings=blind, events=DOWN)
     pressing = run(scene, 2.0, to_the_end=True)
     bare = replace(scene.settings, plant=replace(scene.settings.plant, contacts=False))
     through = run(replace(scene, settings=bare), 2.0, to_the_end=True)

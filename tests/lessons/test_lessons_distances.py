@@ -20,6 +20,7 @@ from lessons.scenes.torque_scene import TorqueScene
 from lessons.session.torque import TorqueSession
 from lessons.settings.assignments import with_assignments
 
+OFF = "avoidance.on=false"
 DOWN = ((0.0, MoveTarget("position", (0.55, 0.1, -0.15))),)
 
 
@@ -37,7 +38,7 @@ def test_an_arm_that_is_dragged_into_the_floor_stops_before_it_and_comes_to_rest
     assert found["contact_depth"].max() == 0.0
     assert float(np.abs(session.plant.v).max()) < 0.05
     assert session.diverged_at is None
-    blind = run(replace(scene("iiwa14-hold"), events=DOWN), 2.0)
+    blind = run(replace(scene("iiwa14-hold", OFF), events=DOWN), 2.0)
     assert blind["contact_depth"].max() > 0.0
 
 
@@ -151,7 +152,7 @@ def test_distances_are_measured_where_there_is_something_to_measure() -> None:
     """With only a floor, distances are measured only if they are kept. Among objects they are always
     measured, but the bound is NaN if none is kept."""
     rows = [TorqueSession(each).tick().copy() for each in (
-        scene("iiwa14-hold"), scene("iiwa14-hold", "avoidance.on=true"), scene("iiwa14-table"),
+        scene("iiwa14-hold", OFF), scene("iiwa14-hold"), scene("iiwa14-table", OFF),
     )]  # fmt: skip
     fields = TorqueSession(scene("iiwa14-hold")).layout.fields
     known = [[np.isfinite(row[fields[name].start]) for name in ("distance", "distance_kept")] for row in rows]
@@ -160,8 +161,8 @@ def test_distances_are_measured_where_there_is_something_to_measure() -> None:
 
 def test_a_scene_without_rows_of_distances_is_as_before() -> None:
     """If avoidance is switched off, neither d_safe nor another of its settings changes a bit of the run."""
-    plain = run(scene("iiwa14-hold"), 0.1)
-    changed = run(scene("iiwa14-hold", "avoidance.d_safe=0.1", "avoidance.pull=0.01"), 0.1)
+    plain = run(scene("iiwa14-hold", OFF), 0.1)
+    changed = run(scene("iiwa14-hold", OFF, "avoidance.d_safe=0.1", "avoidance.pull=0.01"), 0.1)
     assert np.array_equal(plain["tau"], changed["tau"])
 
 

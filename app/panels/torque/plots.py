@@ -8,6 +8,7 @@ import viser
 
 from app.client.decimated import BUCKETS, PlotWindow
 from app.html.palette import BAD, BOUND, GOOD, LEVELS, RGB
+from app.html.text import block
 from app.link.messages import Ready
 from app.panels.widgets.chart import Chart, ChartLine, of_ghost
 from app.panels.widgets.in_view import InView
@@ -18,6 +19,10 @@ _ERROR = (1e-3, 1e3)  # mm or degrees
 _TIME = (1e-2, 1e2)  # ms
 _LEAK = (1e-12, 1e2)  # m/s² or rad/s²
 _DISTANCE = (0.0, 250.0)  # mm
+_COVERS = (
+    "The distance is that of the covers of the links, which are a few millimetres thicker than the links. "
+    "At 0 the links do not touch yet."
+)
 
 
 class LevelPlots:
@@ -81,6 +86,8 @@ class LevelPlots:
                 )
                 if distances or span is not _DISTANCE
             ]
+            if distances:
+                self._gui.add_html(block(_COVERS))
 
     def draw(self, window: PlotWindow, ghost: PlotWindow | None, settings: TorqueSettings) -> None:
         """Draws the plots of the window. ghost: the ghost's data over the same interval. If the plant has

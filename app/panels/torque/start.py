@@ -170,7 +170,7 @@ class StartPanel:
                 "Capsules for distances",
                 False,
                 hint="The capsules that contain the links. A controller that keeps distances measures them "
-                "between these capsules",
+                "between these capsules, which are a few millimetres thicker than the links",
             )
         self.dark = gui.add_checkbox("Dark theme", dark)
 

@@ -255,9 +255,7 @@ def _rivals(results: Results, quick: bool) -> Section:
         _own("OSF on RT4: control is lost at", "s", _lost(results[rt4("osf")])),
     ]
     return Section(
-        notes=(
-            "Unstable: the run loses control (a level-1 error above 0.5 m, or a speed far beyond its limit).",
-        ),
+        notes=("Unstable: the run loses control (a speed of more than 20 times its limit).",),
         rows=tuple(rows),
     )
 
