@@ -95,9 +95,11 @@ FURTHER = Further(
             {"asked": (ASKED, ".2f"), "force": (SPRING, ".1f"), "mass": (SPRING / ASKED, ".1f")},
         ),
         Question(
-            "Which $K_p$ would make the ghost press with 50 N at one centimetre?",
+            "By the fourth line, which $K_p$ would make the ghost press with 50 N at one centimetre and at "
+            "rest? Would this arm press so?",
             r"$K_p = f / (\Lambda\, |\tilde x|) = ⟨K_p⟩$ 1/s², more than thirteen times the ghost's own "
-            r"$K_p$.",
+            r"$K_p$. But the line holds at rest only. With this $K_p$ and $K_v = 2 \sqrt{K_p}$, joints pass "
+            "their speed limits after the impact, and the hand comes to rest 5 cm beside its target.",
             {"K_p": (50.0 / (SPRING / ASKED * 0.01), ".0f")},
         ),
     ),

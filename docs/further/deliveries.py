@@ -10,8 +10,11 @@ from docs.further.kit import Further, Line, Question, measured
 
 RATIO = measured("deliveries", "The round takes at most 0.7 times as long.")
 STRICT = measured("deliveries", "Two tasks at a time are still faster")
-RADIUS = 1.2
-TURN = math.radians(40)
+RADIUS = 1.865
+"""The distance of the base from the point below the hand at the limit of the arm's reach, m."""
+HAND, OLD, NEW = np.array([0.0, 2.0]), np.array([-1.75, -0.7]), np.array([-1.2, -0.4])
+TURN = float(np.subtract(*(math.atan2(*(each - HAND)[::-1]) for each in (NEW, OLD))))
+DRIVEN = measured("deliveries", "Between 8 s and 14 s the base moves")
 
 
 def _serial(rng: np.random.Generator) -> tuple[float, float]:
@@ -106,12 +109,18 @@ FURTHER = Further(
             "one run but must reach the place in the other run.",
         ),
         Question(
-            r"The base waits at the edge of the circle, $\rho = 1.2$ m from the point below the hand. The "
-            "next person moves so that the direction to this person turns by 40°. How far does the base "
-            "drive while the hand stays?",
-            r"The base drives $\rho\,\varphi = ⟨way⟩$ m. This distance is not wasted: it is the part of the "
-            "new way that the base can drive before the ball is taken.",
-            {"way": (RADIUS * TURN, ".2f")},
+            r"In the fourth step the hand is above (0, 2) m, and $\rho = 1.865$ m. The place of the base "
+            "moves from (−1.75, −0.7) m to (−1.2, −0.4) m. By which angle does the direction from the hand "
+            "to the place turn, and how far does a base drive that rests at the edge of the circle?",
+            r"The direction turns by ⟨turn⟩°, and the base drives $\rho\,\varphi = ⟨way⟩$ m. In the lesson "
+            "it drives ⟨driven⟩ m between 8 s and 14 s: at 8 s it has 5 cm to go to its first point at the "
+            "edge. This distance is not wasted: it is the part of the new way that the base can drive before "
+            "the ball is taken.",
+            {
+                "turn": (math.degrees(TURN), ".1f"),
+                "way": (RADIUS * TURN, ".2f"),
+                "driven": (DRIVEN, ".2f"),
+            },
         ),
     ),
 )

@@ -102,8 +102,9 @@ class HTMPC:
 
         Args:
             q, v: measured joint positions and velocities, (n,).
-            previews: the reference of every task by its name, with N knots at distances T_s = Δt. The first
-                knot is the time of this tick plus `delay_s`.
+            previews: the reference of every task by its name, at knots 0 … N at distances Δt (N + 1
+                samples), as `himpc.references.previews` returns them. Knot 0 is the time of this tick plus
+                `delay_s`.
 
         Returns:
             the plan. It is finite and inside the bounds for every state. A measured state that is not

@@ -13,7 +13,7 @@ from himpc.kinematics.configuration import Configuration
 from himpc.references import Preview
 from himpc.rotation import exp3
 from himpc.tasks import FramePosition, OrientationTask, Task
-from robots import Robot
+from robots import InputError, Robot
 
 Array = NDArray[np.float64]
 Desired = list[Array] | Array
@@ -84,11 +84,12 @@ def desired_values(task: Task, preview: Preview, N: int) -> Desired:
     """Returns r of (6) at knots 0 … N.
 
     Raises:
-        ValueError: the preview does not have N + 1 knots.
+        InputError: the preview does not have N + 1 samples.
     """
     if len(preview.displacement) != N + 1:
-        raise ValueError(
-            f"the preview of task '{task.name}' has {len(preview.displacement)} knots, not {N + 1}"
+        raise InputError(
+            f"the preview of task '{task.name}' has {len(preview.displacement)} samples, not {N + 1}: knots "
+            f"0 to {N} are needed, as `previews(references, t, dt, {N})` returns them"
         )
     if preview.value.ndim == 1:
         return preview.value + preview.displacement

@@ -221,10 +221,11 @@ MOVES = Step(
     """,
     do="Move the people yourself, while the ball waits and while the robot is on its way.",
     why=r"""
-    Until 8 s the base waits as near to the old place as the arm's reach allows. Then it moves along the
-    limit of this reach to the point nearest to the new place. At 16.5 s the hand turns to the new goal, and
-    a second later the hand is within two centimetres of this goal. The goals changed twice, and the
-    controller received only new references. The goals are positions in the room in which the people move.
+    At 8 s the base drives along the limit of the arm's reach, 5 cm before the point nearest to the old
+    place. Then it drives back along this limit to the point nearest to the new place. At 16.5 s the hand
+    turns to the new goal, and a second later the hand is within two centimetres of this goal. The goals
+    changed twice, and the controller received only new references. The goals are positions in the room in
+    which the people move.
     """,
     prediction=Choice(
         "At 16.5 s the goal jumps by 36 cm, when the hand has almost arrived. One second later the hand is …",

@@ -131,7 +131,7 @@ INSIDE = Step(
     why=r"""
     The bound applies to all levels, and the order decides which task has an error. The hand's position
     comes first: the hand reaches its target, and its orientation is off by 28°. With the orientation first
-    the position has the error: then the hand stays 6 cm away. Where the bound is not active, no task has an
+    the position has the error: then the hand stays 6 cm away. Where the bound is not active, it causes no
     error.
     """,
     prediction=Choice(
@@ -188,21 +188,23 @@ BEHIND = Step(
 
     $$\min_\tau \lVert \bar M^{-1} (\tau - \tau_{\mathrm{nom}}) \rVert^2,$$
 
-    within the bounds of the torque and under the same rows, but only for the next step. The ghost has its
-    rows inside the hierarchy.
+    within the bounds of the torque and under the same rows of distances, but only for the next step. The
+    ghost has its rows inside the hierarchy.
     """,
     do="Switch off the orientation and the posture. How near does the hand come now?",
     why=r"""
-    The filter is as safe as the rows: the arm touches nothing. But the filter does not use the order of the
-    tasks. The tasks of orientation and posture move the elbow towards the post, the filter changes the sum
-    of all torques as little as possible, and the hand has the error: it stops 27 cm before its target. The
-    lower levels are to blame: with both of them switched off the hand is 5 cm away at that time, and still
-    comes closer. One of these two levels is enough to hold the hand back: if only the posture is switched
-    off, 23 cm are left, and if only the orientation is switched off, 19 cm are left. An order of tasks does
-    not hold if the bounds are applied after it.
+    With the filter, too, the arm touches nothing. But the filter has no rows of speed: with other drags a
+    joint exceeds its limit, which the rows inside the hierarchy prevent. And it does not use the order of
+    the tasks. The tasks of orientation and posture move the elbow towards the post, the filter changes the
+    sum of all torques as little as possible, and the hand has the error: it stops 27 cm before its target.
+    The lower levels are to blame: with both of them switched off the hand is 5 cm away at that time, and
+    still comes closer. One of these two levels is enough to hold the hand back: if only the posture is
+    switched off, 23 cm are left, and if only the orientation is switched off, 19 cm are left. An order of
+    tasks does not hold if the bounds are applied after it.
     """,
     prediction=Choice(
-        "The rows are the same, but a filter after all levels imposes them. At the end the hand …",
+        "The rows of distances are the same, but a filter after all levels imposes them. At the end the "
+        "hand …",
         (
             Option("is at its target, as the ghost's hand is", high=5.0),
             Option("is a few centimetres away", 5.0, 100.0),

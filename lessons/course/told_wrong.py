@@ -112,13 +112,13 @@ THERE = Step(
     do="How late can the report be corrected? Find the latest time with which the robot keeps its 5 cm.",
     why=r"""
     The robot drives 40 cm into the crate; until 7 s its base is never more than 3 mm from its line. The
-    bound keeps a distance from the reported crate, not from the true one. The time of the
-    correction is decisive. A correction at 5 s is early enough: 5 cm are kept and the hand stays on its
-    line. A correction at 5.4 s is nearly too late: 2 cm are left. The hand swings out by 12 cm meanwhile:
-    (7c) bounds level 1, too. A correction at 5.6 s is too late: the robot overlaps the crate by 7 cm. A
-    larger margin helps against small errors of a report. The authors of HTMPC keep a map instead, and infer
-    with Bayes' rule from the observations which objects still stand at their places in the map (given, not
-    measured here).
+    bound keeps a distance from the reported crate, not from the true one. The time of the correction is
+    decisive. A correction at 5 s is early enough: 5 cm are kept and the hand stays on its line. A
+    correction at 5.4 s is nearly too late: 2 cm are left. The hand swings out by 12 cm meanwhile, because
+    the base's acceleration may change by at most 10 m/s³: without this bound it swings out by 3 cm. A
+    correction at 5.6 s is too late: the robot overlaps the crate by 7 cm. A larger margin helps against
+    small errors of a report. The authors of HTMPC keep a map instead, and infer with Bayes' rule from the
+    observations which objects still stand at their places in the map (given, not measured here).
     """,
     prediction=Choice(
         "The crate is reported beside the line until 7 s. The least distance to the crate is …",

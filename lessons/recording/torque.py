@@ -42,7 +42,8 @@ def block(recording: Recording) -> dict[str, Any]:
 
 def _contact(recording: Recording) -> dict[str, float]:
     """Returns the deepest penetration (m), the largest force (N) and the time in contact (s), with the
-    robot's own links and with the world; a contact counts for the whole tick in which it occurs."""
+    robot's own links and with the world; a contact counts for the whole tick in which it occurs. The largest
+    force is a peak, which depends on the plant's time step (see `himpc.telemetry.Layout`)."""
     force, depth = recording["contact_force"], recording["contact_depth"]
     touching = (force > 0.0) | (depth > 0.0)
     return {

@@ -96,7 +96,7 @@ class Measure:
     Attributes:
         signal: the signal.
         statistic: "largest" absolute value, "smallest" value, "rms", "mean", "range" (greatest minus least),
-            "last" (mean over the last 50 ticks) or "sum".
+            "last" (mean over the last 50 ms, at least one tick) or "sum".
         after, until: start and end of the window, s.
         over_ghost: whether the number is divided by the same number of the ghost's run. The unit is then "×".
     """
@@ -137,7 +137,10 @@ class Measure:
         t = rows["t"][:, 0]
         inside = (t >= self.after - 1e-9) & (t < self.until - 1e-9)
         values = self.signal.over(rows)[inside]
-        values = values[np.isfinite(values)]
+        known = np.isfinite(values)
+        values, t = values[known], t[inside][known]
+        if self.statistic == "last" and t.size:
+            values = values[t > t[-1] - _END + 1e-9]
         return float(_STATISTICS[self.statistic](values)) if values.size else math.nan
 
 
@@ -233,9 +236,8 @@ DERIVED: Mapping[str, Callable[[RunRows], Array]] = {
 signals exist in velocity-level scenes only."""
 
 
-def _last(values: Array) -> float:
-    return float(values[-50:].mean())
-
+_END = 0.05
+"""The time over which "last" is a mean, s."""
 
 _WORDS: Mapping[Statistic, str] = {
     "largest": "largest",
@@ -253,6 +255,6 @@ _STATISTICS: Mapping[Statistic, Callable[[Array], float]] = {
     "rms": lambda values: np.sqrt((values**2).mean()),
     "mean": lambda values: values.mean(),
     "range": lambda values: values.max() - values.min(),
-    "last": _last,
+    "last": lambda values: values.mean(),
     "sum": lambda values: values.sum(),
 }

@@ -262,7 +262,8 @@ def test_previews_of_positions_and_rotations_become_goals() -> None:
     turn = np.array([[0.0, 0.0], [0.2, 0.1]])
     goals = desired_values(orientation, Preview(R, turn, turn, turn), 1)
     np.testing.assert_allclose(log3(goals[1] @ R.T), [0.2, 0.0, 0.1], atol=1e-12)
-    with pytest.raises(ValueError, match=r"'p' has 2 knots, not 6"):
+    needed = r"'p' has 2 samples, not 6: .* `previews\(references, t, dt, 5\)`"
+    with pytest.raises(InputError, match=needed):
         desired_values(position, Preview(np.ones(3), displacement, displacement, displacement), 5)
     knots = Knots(arm, arm.model.createData(), arm.home[None])
     assert knots.errors(orientation, [R]).shape == (1, 2)

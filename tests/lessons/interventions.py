@@ -4,8 +4,8 @@ Each row quotes a sentence and names a run that shows the effect, the assignment
 the measured values with and without it. `interventions_all` contains all rows: those of the course are in
 `interventions_tasks`, `interventions_limits` and `interventions_mobile`, those of the documents in
 `interventions_documents`, and those for sentences that replace refuted ones in
-`interventions_reader`, `interventions_fourth_reader`, `interventions_fifth_reader` and
-`interventions_sixth_reader`.
+`interventions_reader`, `interventions_fourth_reader`, `interventions_fifth_reader`,
+`interventions_sixth_reader` and `interventions_seventh_reader`.
 """
 
 from __future__ import annotations

@@ -8,6 +8,7 @@ from interventions_fourth_reader import FOURTH_ROWS
 from interventions_limits import LIMIT_ROWS
 from interventions_mobile import MOBILE_ROWS
 from interventions_reader import READER_ROWS
+from interventions_seventh_reader import SEVENTH_ROWS
 from interventions_sixth_reader import SIXTH_ROWS
 from interventions_tasks import TASK_ROWS
 
@@ -20,4 +21,5 @@ ROWS = (
     *FOURTH_ROWS,
     *FIFTH_ROWS,
     *SIXTH_ROWS,
+    *SEVENTH_ROWS,
 )

@@ -332,7 +332,15 @@ QUOTED = (
     Quoted(
         "a-blind-arm/0", "for one centimetre of error it presses with 4 N", _of(FORCE, "last"), 3.5, 4.5, None
     ),
-    Quoted("a-blind-arm/2", "its motors have nothing to push against", _of(TORQUE), 10, 20),
+    Quoted("a-blind-arm/2", "presses with 655 N", _of(FORCE, "mean", 5.0), 650, 660, None),
+    Quoted(
+        "a-blind-arm/2",
+        "the hand moves by less than a millimetre meanwhile",
+        _of(Signal("distance from the start", "mm"), "range", 2.0, 5.0),
+        0.0,
+        1.0,
+    ),
+    Quoted("a-blind-arm/3", "its motors have nothing to push against", _of(TORQUE), 10, 20),
     Quoted("keeping-clear/1", "15 cm above a target", _of(HAND, "last"), 145, 155),
     Quoted("keeping-clear/2", "orientation is off by 28°", _of(TILT, "last"), 27.5, 28.5),
     Quoted("keeping-clear/3", "it stops 27 cm before its target", _of(HAND, "last"), 265, 275),

@@ -62,7 +62,8 @@ def test_a_hand_that_is_dragged_into_the_floor_presses_on_it() -> None:
     through = run(replace(scene, settings=bare), 2.0, to_the_end=True)
     told = summary(pressing)["contact"]
     assert 0.0 < told["max_depth_m"] < 3e-3
-    assert told["max_force_N"] > 20.0
+    assert told["max_force_N"] == pressing["contact_force"].max()
+    assert pressing["contact_force"][-300:].mean() > 20.0  # a peak depends on the plant's time step
     assert 0.1 < told["time_s"] < 2.0
     assert summary(through)["contact"] == {"max_depth_m": 0.0, "max_force_N": 0.0, "time_s": 0.0}
     lowest = [found["x/position"][:, 2].min() for found in (pressing, through)]

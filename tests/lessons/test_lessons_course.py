@@ -238,7 +238,7 @@ def test_claims_are_judged_on_a_run_half_done() -> None:
         ("rms", math.sqrt(10.0)),
         ("mean", -2.0),
         ("range", 4.0),
-        ("last", -2.0),
+        ("last", 0.0),
         ("sum", -6.0),
     ],
 )
@@ -247,6 +247,13 @@ def test_statistics(statistic: str, value: float) -> None:
     rows = {"t": np.arange(5.0)[:, None], "v": np.array([[1.0], [-2.0], [-4.0], [0.0], [np.nan]])}
     measure = Measure(Signal("v"), statistic, after=1.0)  # pyright: ignore[reportArgumentType]
     assert measure.value(rows) == pytest.approx({"rms": math.sqrt(20 / 3)}.get(statistic, value))
+
+
+@pytest.mark.parametrize(("T_s", "ticks"), [(0.001, 50), (0.002, 25), (0.1, 1)])
+def test_the_end_of_a_run_lasts_50_ms_at_every_rate(T_s: float, ticks: int) -> None:
+    v = np.arange(400.0)
+    rows = {"t": np.cumsum(np.full(400, T_s))[:, None], "v": v[:, None]}
+    assert Measure(Signal("v"), "last").value(rows) == v[-ticks:].mean()
 
 
 def test_a_measure_over_the_ghost_is_a_ratio() -> None:

@@ -6,6 +6,7 @@ disappears.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -19,9 +20,10 @@ from quoted import step_of
 from test_lessons_quoted import texts
 
 from docs.further import further
+from docs.further.deliveries import HAND, RADIUS, TURN
 from himpc.controllers import null_space_control
 from lessons.course import COURSE, load_lesson
-from lessons.events import Set
+from lessons.events import MoveTarget, Set
 from lessons.recording.run import run
 from lessons.recording.summary import summary
 from lessons.scenes.run_spec import RunSpec
@@ -127,6 +129,79 @@ def test_clipped_torques_do_not_lie_on_the_line() -> None:
 
     assert leak(1.0) > 0.1
     assert leak(1.4) < 1e-12  # nothing is clipped
+
+
+def test_weak_motors_hold_a_pressing_arm_at_rest() -> None:
+    """*A blind arm*: if motors with a quarter of the torque clip it, the arm presses as hard as with the
+    bound of a quarter inside the QPs, and stays at rest. With that bound the elbow swings four times a
+    second."""
+    told_here = told("a-blind-arm/2")
+    assert "Motors a quarter as strong would leave 220 N, at rest, too" in told_here
+    assert "the elbow swings four times a second" in told_here
+    scene = load_lesson("a-blind-arm").run_of(step_of("a-blind-arm/2")).but("limits.torque=false").prepared()
+    weak = replace(scene.robot, tau_limit=0.25 * scene.robot.tau_limit)
+    found = run(replace(scene, robot=weak), 5.0)
+    late = found["t"][:, 0] > 2.0
+    assert np.abs(found["tau"][late]).max(axis=0)[[1, 3]] == pytest.approx(weak.tau_limit[[1, 3]])
+    assert found["contact_force"][late].mean() == pytest.approx(218.5, abs=3.0)
+    assert np.abs(found["v"][late] / scene.robot.v_limit).max() < 0.05
+    bounded = run(load_lesson("a-blind-arm").run_of(step_of("a-blind-arm/2")).prepared(), 5.0)
+    elbow = bounded["v"][bounded["t"][:, 0] > 2.0, 4]
+    upwards = np.flatnonzero((elbow[:-1] < 0.0) & (elbow[1:] >= 0.0))
+    assert 1e3 / np.diff(upwards).mean() == pytest.approx(4.0, abs=0.4)
+
+
+def test_a_distance_that_is_not_at_its_bound_changes_no_error() -> None:
+    """*Keeping clear*: on a way that leads past no object, no row of a distance is active, and all errors are
+    those of the arm that keeps no distances. The posture has an error in both cases."""
+    assert "Where the bound is not active, it causes no error" in told("keeping-clear/2")
+    free = ((0.1, MoveTarget("position", (0.5, 0.1, 0.6))),)
+    kept, bare = (
+        run(RunSpec("iiwa14-table", set=(f"avoidance.on={on}",), events=free, duration=2.4).prepared())
+        for on in ("true", "false")
+    )
+    levels = ("position", "orientation", "posture")
+    assert not any(kept[f"active/{name}"].max() > 0.0 for name in levels)
+    for name in levels:
+        np.testing.assert_allclose(kept[f"error/{name}"], bare[f"error/{name}"], atol=1e-3)
+    assert math.degrees(np.linalg.norm(kept["error/posture"][-1])) > 30.0
+
+
+def test_a_filter_behind_the_levels_bounds_no_speed() -> None:
+    """*Keeping clear*: in a run of three drags a joint exceeds its limit with the filter, and not with the
+    rows; without the rows of speed it exceeds its limit there, too. Nothing is touched in these runs."""
+    assert "with other drags a joint exceeds its limit, which the rows" in told("keeping-clear/3")
+    places = ((0.42, -0.02, 0.6), (0.26, 0.0, 0.31), (0.2, 0.06, 0.45))
+    drags = tuple((0.1 + 0.8 * k, MoveTarget("position", place)) for k, place in enumerate(places))
+
+    def fastest(*more: str) -> float:
+        spec = RunSpec("iiwa14-table", set=("avoidance.on=true", *more), events=drags, duration=2.5)
+        found = run(spec.prepared())
+        assert found["contact_force"].max() == 0.0
+        return float(np.abs(found["v"] / found.session.robot.v_limit).max())
+
+    assert fastest("controller=himpc_filtered") > 1.01
+    assert fastest("controller=himpc") < 0.95
+    assert fastest("controller=himpc", "limits.velocity=false") > 1.01
+
+
+def test_the_base_still_drives_when_people_move() -> None:
+    """*Deliveries*: at 8 s the base is at the limit of the arm's reach, 5 cm before the point where it rests
+    if nobody moves; then it drives back along this limit. The page of the lesson names the same numbers."""
+    assert "5 cm before the point nearest to the old place" in told("deliveries/3")
+    assert "at 8 s it has 5 cm to go" in told("further/deliveries")
+    lesson = load_lesson("deliveries")
+    stays, moves = (run(lesson.run_of(lesson.steps[k]).prepared(), 13.95) for k in (2, 3))
+    rest = stays["x/base"][-1]
+    now = int(np.searchsorted(moves["t"][:, 0], 8.0 - 1e-9))
+    assert 1e3 * np.linalg.norm(moves["x/base"][now] - rest) == pytest.approx(50.0, abs=2.0)
+    arm = moves["x/base"][now:] - moves["x/ee"][now:, :2]
+    np.testing.assert_allclose(np.linalg.norm(arm, axis=1), RADIUS, atol=1e-3)
+    np.testing.assert_allclose(moves["x/ee"][now, :2], HAND, atol=1e-3)
+    angle = np.unwrap(np.arctan2(arm[:, 1], arm[:, 0]))
+    assert angle[-1] - angle[0] == pytest.approx(math.radians(4.8), abs=math.radians(0.1))
+    towards = stays["x/base"][-1] - stays["x/ee"][-1, :2]
+    assert angle[-1] - math.atan2(towards[1], towards[0]) == pytest.approx(TURN, abs=math.radians(0.1))
 
 
 @pytest.mark.parametrize(("K_p", "period"), [(100.0, 0.628), (400.0, 0.314)])

@@ -66,7 +66,8 @@ GIVEN: dict[str, tuple[str, ...]] = {
     "when-tasks-fight/2": ("2",),
     "seeing-ahead/2": ("8", "0.3", "1", "42"),  # one of them is the improvement of the paper
     "seeing-ahead/3": ("20",),
-    "deliveries/3": ("8", "16.5"),
+    "deliveries/3": ("8", "5", "16.5"),  # 5 cm are tested in test_lessons_interventions
+    "a-blind-arm/2": ("quarter", "220"),  # tested in test_lessons_interventions
     "sensors-are-coarse/0": ("4",),
     "inside-the-qp/0": ("2",),
     "inside-the-qp/2": ("tenth",),

@@ -82,18 +82,28 @@ const STATISTICS: Record<string, (values: number[]) => number> = {
   rms: (values) => Math.sqrt(sum(values.map((each) => each ** 2)) / values.length),
   mean: (values) => sum(values) / values.length,
   range: (values) => values.reduce((a, b) => Math.max(a, b)) - values.reduce((a, b) => Math.min(a, b)),
-  last: (values) => sum(values.slice(-50)) / Math.min(50, values.length),
+  last: (values) => sum(values) / values.length,
   sum,
 };
 
+/** The time over which "last" is a mean, s. */
+const END = 0.05;
+
 /** Returns the measured number up to now; NaN as long as there are no values. */
 export function measured(measure: MeasureData, rows: Rows, ghost: Rows | null): number {
-  const values: number[] = [];
+  let values: number[] = [];
+  const times: number[] = [];
   for (let row = 0; row < rows.count; row++) {
     const t = rows.at(row, "t")[0];
     if (!(t >= measure.after - 1e-9 && t < (measure.until ?? Infinity) - 1e-9)) continue;
     const value = signalAt(measure.signal, rows, row);
-    if (isFinite(value)) values.push(value);
+    if (!isFinite(value)) continue;
+    values.push(value);
+    times.push(t);
+  }
+  if (measure.statistic === "last") {
+    const end = times[times.length - 1] - END + 1e-9;
+    values = values.filter((_, k) => times[k] > end);
   }
   const own = values.length ? STATISTICS[measure.statistic](values) : NaN;
   if (!measure.over_ghost) return own;
