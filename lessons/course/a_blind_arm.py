@@ -266,7 +266,7 @@ LESSON = Lesson(
     name="a-blind-arm",
     card=card_of(__doc__),
     scene="iiwa14-table",
-    set=("avoidance.on=false",),
+    set=("avoidance.on=false", "limits.stall_guard=false"),
     steps=(UNSEEN, BOUND, UNREST, SEEN),
     challenge=CHALLENGE,
 )
