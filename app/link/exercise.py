@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from lessons.course import load_lesson
-from lessons.own.files import is_file
+from lessons.own.files import is_lesson
 from robots import InputError
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ class RunStep:
 
 
 def _lesson(name: str) -> Lesson:
-    if not is_file(name):
+    if not is_lesson(name):
         return load_lesson(name)
     from lessons.authoring.lesson import lesson_named
 

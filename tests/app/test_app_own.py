@@ -183,9 +183,9 @@ def test_own_code_is_told_of_at_the_top_of_the_page(file: Path) -> None:
 def test_own_scene_and_lesson_open(tmp_path: Path) -> None:
     from lessons.authoring.new import text_of
 
-    scene, lesson = tmp_path / "scene.py", tmp_path / "lesson.py"
+    scene, lesson = tmp_path / "scene.py", tmp_path / "lesson.md"
     scene.write_text(text_of("scene", None, "scene.py"))
-    lesson.write_text(text_of("lesson", None, "lesson.py"))
+    lesson.write_text(text_of("lesson", None, "lesson.md"))
     for choice in (SceneChoice.starting(str(scene)), SceneChoice.opening(str(lesson))):
         body = SimulationRunner(choice)
         body.tick(3)
