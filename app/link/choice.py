@@ -70,6 +70,7 @@ class SceneChoice:
     @classmethod
     def of_lesson(cls, exercise: LessonPlace) -> SceneChoice:
         """Returns a step of a lesson. Raises InputError for an unknown lesson."""
+        exercise = exercise if exercise.text is not None else exercise.opened
         return cls(exercise.run, exercise=exercise)
 
     @classmethod

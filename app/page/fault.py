@@ -1,4 +1,4 @@
-"""A notification about an error in the user's own code. It stays visible when the panel is scrolled, and
+"""A notification about an error in a file of the user. It stays visible when the panel is scrolled, and
 appears above the sheet on a phone."""
 
 from __future__ import annotations
@@ -26,4 +26,4 @@ class FaultNotice:
             self._shown.remove()
         self._shown = None
         if sentence is not None:
-            self._shown = self._client.add_notification("Your code", sentence, color="red")
+            self._shown = self._client.add_notification("Your file", sentence, color="red")

@@ -17,11 +17,11 @@ from robots import InputError
 def lesson_named(name: str) -> Lesson:
     """Returns a lesson by its name or file. Raises InputError if there is none, or the file cannot be
     used."""
-    return _lesson_of(read(name)) if is_lesson(name) else load_lesson(name)
+    return lesson_of(read(name)) if is_lesson(name) else load_lesson(name)
 
 
 @lru_cache(maxsize=64)
-def _lesson_of(source: Source) -> Lesson:
+def lesson_of(source: Source) -> Lesson:
     """Returns the lesson of a file. A file is tested again only if its content has changed."""
     lesson = read_lesson(source.path, source.path, source.text)
     for number, step in enumerate(lesson.steps, start=1):

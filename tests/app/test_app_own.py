@@ -164,7 +164,7 @@ def test_own_code_is_told_of_at_the_top_of_the_page(file: Path) -> None:
             assert page.shows("YOUR CODE")
 
             def faults() -> list[str]:  # visible at every position of the panel
-                return [body for title, body in list(page.standing.values()) if title == "Your code"]
+                return [body for title, body in list(page.standing.values()) if title == "Your file"]
 
             assert ["line 2: NameError" in each for each in faults()] == [True]
             file.write_text("def torque(now):\n    return now.q[7]\n")
@@ -176,6 +176,26 @@ def test_own_code_is_told_of_at_the_top_of_the_page(file: Path) -> None:
             assert eventually(lambda: learner.choice.run.scene == "planar3-circle")
             assert learner.settings is not None
             assert str(file) in learner.settings.controllers
+    finally:
+        server.close()
+
+
+def test_a_saved_lesson_is_shown_at_the_same_step(tmp_path: Path) -> None:
+    """A save that cannot be used is one sentence with line and column; the page keeps the version before."""
+    file = tmp_path / "lesson.md"
+    text = text_of("lesson", None, "lesson.md")
+    file.write_text(text)
+    server = PageServer(SceneChoice.opening(str(file)), port=0, max_sessions=1)
+    try:
+        with Wire(server.link) as page:
+            assert eventually(lambda: page.shows("The hand carries 2 kg"), LONG)
+            file.write_text(text.replace("- run:", "- runs:"))
+            assert eventually(lambda: page.shows("line 15, column 3: There is no key of a step 'runs'"), LONG)
+            assert page.shows("YOUR LESSON")
+            assert page.shows("The hand carries 2 kg")
+            file.write_text(text.replace("The hand carries 2 kg", "The hand carries two kilograms"))
+            assert eventually(lambda: page.shows("The hand carries two kilograms"), LONG)
+            assert eventually(lambda: not page.shows("YOUR LESSON"), LONG)
     finally:
         server.close()
 
