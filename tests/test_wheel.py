@@ -133,4 +133,5 @@ def test_it_runs_without_the_checkout(command: Path, tmp_path: Path) -> None:
         )
     )
     assert result["finite"]
-    assert "lamp" in run(python, tmp_path, ["-c", "from lessons.course.your_robot import *; print(LAMP)"])
+    lamp = "from lessons.course import load_lesson; print(load_lesson('your-robot').urdf)"
+    assert "lamp" in run(python, tmp_path, ["-c", lamp])

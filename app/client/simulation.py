@@ -37,7 +37,7 @@ class Trouble:
     """state: a word for the badge; sentence: the problem; offer: label of the button that starts the scene
     again; None if the learner can only wait."""
 
-    state: Literal["STOPPED", "SILENT", "LOADING", "PREPARING", "YOUR CODE"]
+    state: Literal["STOPPED", "SILENT", "LOADING", "PREPARING", "YOUR CODE", "YOUR LESSON"]
     sentence: str
     offer: str | None = "Start again"
 

@@ -27,7 +27,8 @@ def lessons(
     faults, one sentence per fault is printed, and the exit code is 1.
 
     Args:
-        check: names of the lessons to check, or Python files of your own; --check without names: all lessons.
+        check: names of the lessons to check, or Markdown files of your own; --check without names: all
+            lessons.
         json: write JSON to this file, or to standard output for "-".
     """
     from lessons.authoring.lesson import lesson_named

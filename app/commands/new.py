@@ -12,7 +12,7 @@ def new(
     file: tyro.conf.Positional[str],
     start: Annotated[str | None, tyro.conf.arg(name="from", metavar="NAME")] = None,
 ) -> int:
-    """Write a short, commented Python file that runs and that you can change.
+    """Write a short file that runs and that you can change: Python, or Markdown for a lesson.
 
     Args:
         kind: the kind of file.

@@ -42,7 +42,7 @@ def serve(
     """Open the page: a robot under HIMPC whose target you can drag.
 
     Args:
-        lesson: lesson to start with, see himpc-lab lessons, or a Python file of your own.
+        lesson: lesson to start with, see himpc-lab lessons, or a Markdown file of your own.
         scene: scene to start with, or a Python file of your own; iiwa14-hold by default, hold with --urdf.
         controller: controller to start with, or a Python file of your own; its code is reloaded whenever
             you save the file.

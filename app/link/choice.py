@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, final
 
 from app.link.exercise import LessonPlace
 from lessons.course import COURSE
-from lessons.own.files import is_file, read
+from lessons.own.files import is_file, is_lesson, read
 from lessons.scenes.names import ALL_SCENES
 from lessons.scenes.run_spec import RunSpec
 from robots.catalog import CATALOG
@@ -64,13 +64,14 @@ class SceneChoice:
     def opening(cls, lesson: str) -> SceneChoice:
         """Returns the first step of a lesson whose file has not been read yet. Raises InputError for an
         unknown lesson."""
-        if lesson not in COURSE and not is_file(lesson):
+        if lesson not in COURSE and not is_lesson(lesson):
             raise unknown_name("lesson", lesson, COURSE)
         return cls(RunSpec(""), exercise=LessonPlace(lesson))
 
     @classmethod
     def of_lesson(cls, exercise: LessonPlace) -> SceneChoice:
         """Returns a step of a lesson. Raises InputError for an unknown lesson."""
+        exercise = exercise if exercise.text is not None else exercise.opened
         return cls(exercise.run, exercise=exercise)
 
     @classmethod
@@ -125,9 +126,9 @@ class SceneChoice:
         from lessons.own.judge import judged
         from lessons.settings.assignments import assignment
 
-        kind = judged(read(path))
-        if kind == "lesson":
+        if is_lesson(path):
             return SceneChoice.opening(path)
+        kind = judged(read(path))
         if kind == "scene":
             return SceneChoice.starting(path)
         run = replace(self.run, events=None, duration=None)
@@ -147,7 +148,7 @@ class SceneChoice:
         told = (value.strip().strip('"') for path, _, value in set_to if path == "controller")
         named = (*run.files, *run.tasks, *self.scenes, run.scene, run.controller or "", lesson or "", *told)
         urdf = () if run.urdf is None or run.urdf in CATALOG else (run.urdf,)
-        return frozenset((*filter(is_file, named), *urdf))
+        return frozenset((*(name for name in named if is_file(name) or is_lesson(name)), *urdf))
 
     @property
     def asked(self) -> frozenset[str]:
@@ -155,7 +156,7 @@ class SceneChoice:
         name other files."""
         if self.exercise is None:
             return self.paths
-        return frozenset(filter(is_file, (self.exercise.lesson,)))
+        return frozenset(filter(is_lesson, (self.exercise.lesson,)))
 
     def without_places(self, sentence: str) -> str:
         """Returns the sentence with file names instead of full paths, so that it reveals no folders of the
@@ -169,7 +170,11 @@ class SceneChoice:
         """Whether the names in the choice are enough to know that it can be loaded: it contains no file,
         frame or setting of the user's own."""
         scene, seed = self.run.scene, self.run.seed
-        if self.run.files or self.run.tasks or (self.exercise is not None and is_file(self.exercise.lesson)):
+        if (
+            self.run.files
+            or self.run.tasks
+            or (self.exercise is not None and is_lesson(self.exercise.lesson))
+        ):
             return False
         if self.exercise is not None:
             return not scene

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from lessons.course import load_lesson
-from lessons.own.files import is_file
+from lessons.own.files import Source, is_lesson, read
 from robots import InputError
 
 if TYPE_CHECKING:
@@ -33,24 +33,37 @@ class LessonPlace:
     Attributes:
         lesson: name of the lesson, or path of the user's own file.
         place: number of the step, 0-based.
+        text: the text of the user's own file when the lesson was opened. The page shows this version until a
+            sound one is saved.
     """
 
     lesson: str
     place: int = 0
+    text: str | None = None
 
     @classmethod
     def at(cls, lesson: str, step: int) -> LessonPlace:
         """Returns a step by its number; 1 is the first step. Raises InputError if there is no such lesson or
         step."""
-        count = len(parts_of(_lesson(lesson)))
+        count = len(parts_of(cls(lesson).whole))
         if not 1 <= step <= count:
             raise InputError(f"lesson '{lesson}' has no step {step}: choose one from 1 to {count}")
         return cls(lesson, step - 1)
 
     @property
+    def opened(self) -> LessonPlace:
+        """The same place with the text of the user's file as it is now. Raises InputError if it cannot be
+        read."""
+        return replace(self, text=read(self.lesson).text) if is_lesson(self.lesson) else self
+
+    @property
     def whole(self) -> Lesson:
-        """The whole lesson. Raises InputError for an unknown lesson."""
-        return _lesson(self.lesson)
+        """The whole lesson. Raises InputError for an unknown or wrong lesson."""
+        if not is_lesson(self.lesson):
+            return load_lesson(self.lesson)
+        from lessons.authoring.lesson import lesson_of
+
+        return lesson_of(read(self.lesson) if self.text is None else Source(self.lesson, self.text))
 
     @property
     def part(self) -> Step | Challenge:
@@ -79,14 +92,6 @@ class RunStep:
 
     own: bool = True
     fast: bool = False
-
-
-def _lesson(name: str) -> Lesson:
-    if not is_file(name):
-        return load_lesson(name)
-    from lessons.authoring.lesson import lesson_named
-
-    return lesson_named(name)
 
 
 def parts_of(lesson: Lesson) -> tuple[Step | Challenge, ...]:

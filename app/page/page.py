@@ -23,6 +23,7 @@ from app.html.text import block, in_trouble
 from app.link.choice import SceneChoice
 from app.link.messages import Ready
 from app.page.comfort import Comfort
+from app.page.lesson_file import LessonFile
 from app.panels.widgets.command import add_command
 from lessons.own.folder import Folder
 from lessons.scenes.names import ALL_SCENES
@@ -67,6 +68,7 @@ class Page:
         self._greet = greet
         self._client = client
         self._fault = FaultNotice(client)
+        self._lesson_file = LessonFile()
         self._dark = dark
         self._own_files = own_files
         self._event_loop = loop
@@ -135,6 +137,7 @@ class Page:
                 self._drop_stage()  # another scene was loaded meanwhile; it is built in the next cycle
                 return
         self._pass_on()
+        self._show_saved_lesson()
         stage = self._stage
         if stage is None:
             self._show_early_trouble()
@@ -167,15 +170,23 @@ class Page:
         else:
             self._build(ready)
 
+    def _show_saved_lesson(self) -> None:
+        """Opens the step of the user's own lesson again when its file was saved."""
+        saved = self._lesson_file.saved(self.learner.choice)
+        if saved is not None:
+            self.learner.load(saved)
+            self._client.add_notification("Saved lesson is shown", "", color="green", auto_close_seconds=4.0)
+
     def _own_trouble(self) -> Trouble | None:
         """Returns the fault of the learner's own code, if there is one. Also shows a notice when saved code
         takes effect."""
         status = self.learner.status
         own = None if status is None else status.own
         fault = None if own is None or own.fault is None else self.learner.choice.without_places(own.fault)
-        self._fault.show(fault)
+        self._fault.show(fault or self._lesson_file.fault)
         if own is None:
-            return None
+            wrong = self._lesson_file.fault
+            return None if wrong is None else Trouble("YOUR LESSON", wrong, None)
         if own.saves > self._saves:
             self._client.add_notification(
                 "Saved code is running",
@@ -314,7 +325,7 @@ class FaultNotice:
             self._shown.remove()
         self._shown = None
         if sentence is not None:
-            self._shown = self._client.add_notification("Your code", sentence, color="red")
+            self._shown = self._client.add_notification("Your file", sentence, color="red")
 
 
 @final

@@ -6,17 +6,20 @@ import os
 from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
+from typing import Literal
 
 from himpc.tasks import KINDS
-from lessons.course import COURSE
+from lessons.course import COURSE, lesson_file
 from lessons.exercises import EXERCISES, start_of
 from lessons.exercises.own import exercise_in
 from lessons.outputs import write_files
-from lessons.own.files import is_file
-from lessons.own.kinds import Kind
+from lessons.own.files import LESSON_SUFFIX, SUFFIX, is_file
+from lessons.own.kinds import Kind as PythonKind
 from lessons.scenes.names import ALL_SCENES
 from robots import InputError
 from robots.errors import unknown_name
+
+Kind = PythonKind | Literal["lesson"]
 
 EXAMPLES: tuple[str, ...] = ("pd", "osf", "one_level_qp", "himpc_one_page")
 """Controllers that can be used as a template."""
@@ -59,20 +62,21 @@ def text_of(kind: Kind, start: str | None, file: str) -> str:
     elif kind == "controller":
         text = _read("lessons.examples", start or EXAMPLES[0])
     elif kind == "lesson" and start is not None:
-        text = _read("lessons.course", start.replace("-", "_"))
+        text = lesson_file(start).read_text(encoding="utf-8")
     elif kind == "scene" and start is not None:
         text = _SCENE.format(scene=start)
     elif kind == "task" and start is not None:
         text = _task(start)
     else:
-        text = _read("lessons.authoring.begin", kind)
+        text = _read("lessons.authoring.begin", kind, LESSON_SUFFIX if kind == "lesson" else SUFFIX)
     return text.replace("FILE.py", file)
 
 
 def write_new(kind: Kind, path: str, start: str | None = None) -> None:
     """Writes a new file. Raises InputError if the file exists already or cannot be written."""
-    if not is_file(path):
-        raise InputError(f"{path}: give a name that ends with .py, e.g. my_{kind}.py")
+    suffix = LESSON_SUFFIX if kind == "lesson" else SUFFIX
+    if not path.endswith(suffix):
+        raise InputError(f"{path}: give a name that ends with {suffix}, e.g. my_{kind}{suffix}")
     text = text_of(kind, start, path)
     if os.path.lexists(path):
         raise InputError(f"{path} exists already: give another name, or remove it first")
@@ -82,8 +86,8 @@ def write_new(kind: Kind, path: str, start: str | None = None) -> None:
         raise InputError(f"{path} cannot be written ({error.strerror}): give another path") from None
 
 
-def _read(package: str, name: str) -> str:
-    return Path(str(files(package) / f"{name}.py")).read_text(encoding="utf-8")
+def _read(package: str, name: str, suffix: str = SUFFIX) -> str:
+    return Path(str(files(package) / f"{name}{suffix}")).read_text(encoding="utf-8")
 
 
 def _task(word: str) -> str:

@@ -1,11 +1,9 @@
-"""The lessons of the course, one per file; the docstring of each file is the card of its lesson.
-
-Each file defines `LESSON`, and is imported when its lesson is first needed.
-"""
+"""The lessons of the course, one Markdown file each; a file is read when its lesson is first needed."""
 
 from __future__ import annotations
 
-from importlib import import_module
+from functools import cache
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robots.errors import unknown_name
@@ -44,5 +42,17 @@ def load_lesson(name: str) -> Lesson:
     """Returns the lesson with this name. Raises InputError with the nearest name if there is none."""
     if name not in COURSE:
         raise unknown_name("lesson", name, COURSE)
-    lesson: Lesson = import_module(f"lessons.course.{name.replace('-', '_')}").LESSON
-    return lesson
+    return _read(name)
+
+
+@cache
+def _read(name: str) -> Lesson:
+    from lessons.teaching.reader import read_lesson
+
+    path = lesson_file(name)
+    return read_lesson(name, str(path), path.read_text(encoding="utf-8"))
+
+
+def lesson_file(name: str) -> Path:
+    """Returns the file of a lesson of the course."""
+    return Path(__file__).with_name(f"{name}.md")

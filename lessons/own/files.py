@@ -1,4 +1,4 @@
-"""Reads and executes a user's Python file, and reports an error in it as one sentence."""
+"""Reads a user's file, executes it if it is Python, and reports an error in it as one sentence."""
 
 from __future__ import annotations
 
@@ -17,12 +17,18 @@ from robots import InputError
 from robots.errors import shortened
 
 SUFFIX = ".py"
+LESSON_SUFFIX = ".md"
 LARGEST = 1_000_000  # bytes
 
 
 def is_file(name: str) -> bool:
     """Returns whether a text given as a name is the path of a Python file."""
     return name.endswith(SUFFIX)
+
+
+def is_lesson(name: str) -> bool:
+    """Returns whether a text given as a name is the path of a file with a lesson."""
+    return name.endswith(LESSON_SUFFIX)
 
 
 @dataclass(frozen=True)
@@ -59,11 +65,11 @@ def read(path: str) -> Source:
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else "no such path"
         raise InputError(
-            f"{shortened(path, 200)}: cannot be read ({reason}); give the path of a Python file, "
-            "or begin with himpc-lab new"
+            f"{shortened(path, 200)}: cannot be read ({reason}); give the path of a file, or begin "
+            "with himpc-lab new"
         ) from None
     if len(data) > LARGEST:
-        raise InputError(f"{path}: has more than {LARGEST // 1_000_000} MB; give the source of a program")
+        raise InputError(f"{path}: has more than {LARGEST // 1_000_000} MB; give a shorter file")
     try:
         return Source(path, data.decode())
     except UnicodeDecodeError as error:

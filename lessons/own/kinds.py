@@ -8,14 +8,13 @@ from typing import Any, Literal, get_args
 
 from robots import InputError
 
-Kind = Literal["controller", "scene", "task", "lesson", "exercise"]
+Kind = Literal["controller", "scene", "task", "exercise"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 
 _DEFINES: dict[Kind, str] = {
     "controller": "a function torque(now) or a class Controller with a method torque(self, now)",
     "scene": "SCENE, or a function scene() that returns one",
     "task": "TASK",
-    "lesson": "LESSON",
     "exercise": "EXERCISE = own_exercise(…)",
 }
 
@@ -27,14 +26,13 @@ def kind_of(module: ModuleType) -> Kind:
         "controller": "torque" in names or "Controller" in names,
         "scene": "SCENE" in names or callable(names.get("scene")),
         "task": "TASK" in names,
-        "lesson": "LESSON" in names,
         # In a student's solution, EXERCISE is only the name of an exercise.
         "exercise": not isinstance(names.get("EXERCISE", ""), str),
     }
     found: list[Kind] = [kind for kind in KINDS if defined[kind]]
     if not found:
         raise InputError(
-            f"{path}: defines neither a controller nor a scene, task, lesson or exercise: "
+            f"{path}: defines neither a controller nor a scene, task or exercise: "
             + "; ".join(f"{_a(kind)} is {what}" for kind, what in _DEFINES.items())
         )
     if len(found) > 1:

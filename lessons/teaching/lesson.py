@@ -104,12 +104,12 @@ class Step:
         for field in ("text", "do", "why"):
             object.__setattr__(self, field, cleandoc(getattr(self, field)))
         if not self.claims:
-            raise ValueError(f"step '{self.title}' has no claims: give at least one Claim(…)")
+            raise ValueError(f"step '{self.title}' has no claims: give at least one")
         for claim in self.claims:
             if not claim.fails_with or not claim.because:
                 raise ValueError(f"claim '{claim.text}': fails_with=… is missing or not explained")
             if claim.measure.over_ghost and self.ghost is None:
-                raise ValueError(f"claim '{claim.text}' compares with a ghost: give the step ghost=Ghost(…)")
+                raise ValueError(f"claim '{claim.text}' compares with a ghost: give the step one")
 
 
 @dataclass(frozen=True)

@@ -100,7 +100,7 @@ def test_files_of_ones_own_are_opened_by_path(server: PageServer, tmp_path: Path
 def test_a_scene_and_a_lesson_are_opened_instead(tmp_path: Path) -> None:
     here = SceneChoice(RunSpec("planar3-hold"))
     for kind in ("scene", "lesson"):
-        path = tmp_path / f"{kind}.py"
+        path = tmp_path / (f"{kind}.py" if kind == "scene" else f"{kind}.md")
         path.write_text(text_of(kind, None, path.name))
         found = here.with_file(str(path)).admitting(here).resolved()
         assert found.scene().name == (str(path) if kind == "scene" else "iiwa14-hold")

@@ -16,7 +16,7 @@ from app.view.coordinates import draggable
 from app.worker.reports.start import TorqueRun, start
 from himpc.htmpc import base_joints
 from himpc.stack import Level
-from lessons.course import your_robot
+from lessons.course import load_lesson
 from lessons.scenes.catalog import load_scene, prepared
 from lessons.scenes.names import SCENES, VELOCITY_SCENES
 from lessons.settings.velocity import VelocitySettings
@@ -30,7 +30,7 @@ CHANGES = (
 
 def opened(scene: str, change: str = "") -> tuple[tuple[TaskView, ...], Sequence[Level]]:
     """Returns the page's data of a scene's tasks, and its stack."""
-    urdf = your_robot.LAMP if scene == "hold" else None
+    urdf = load_lesson("your-robot").urdf if scene == "hold" else None
     run = start(prepared(load_scene(scene, urdf), None, (change,) if change else ()), 0)
     assert isinstance(run, TorqueRun)
     return run.tasks(), run.session.settings.levels

@@ -200,7 +200,7 @@ def test_own_code_is_told_of_at_the_top_of_the_page(file: Path) -> None:
             assert page.shows("YOUR CODE")
 
             def faults() -> list[str]:  # visible at every position of the panel
-                return [body for title, body in list(page.standing.values()) if title == "Your code"]
+                return [body for title, body in list(page.standing.values()) if title == "Your file"]
 
             assert ["line 2: NameError" in each for each in faults()] == [True]
             file.write_text("def torque(now):\n    return now.q[7]\n")
@@ -216,12 +216,32 @@ def test_own_code_is_told_of_at_the_top_of_the_page(file: Path) -> None:
         server.close()
 
 
+def test_a_saved_lesson_is_shown_at_the_same_step(tmp_path: Path) -> None:
+    """A save that cannot be used is one sentence with line and column; the page keeps the version before."""
+    file = tmp_path / "lesson.md"
+    text = text_of("lesson", None, "lesson.md")
+    file.write_text(text)
+    server = PageServer(SceneChoice.opening(str(file)), port=0, max_sessions=1)
+    try:
+        with Wire(server.link) as page:
+            assert eventually(lambda: page.shows("The hand carries 2 kg"), LONG)
+            file.write_text(text.replace("- run:", "- runs:"))
+            assert eventually(lambda: page.shows("line 15, column 3: There is no key"), LONG)
+            assert page.shows("YOUR LESSON")
+            assert page.shows("The hand carries 2 kg")
+            file.write_text(text.replace("The hand carries 2 kg", "The hand carries two kilograms"))
+            assert eventually(lambda: page.shows("The hand carries two kilograms"), LONG)
+            assert eventually(lambda: not page.shows("YOUR LESSON"), LONG)
+    finally:
+        server.close()
+
+
 def test_own_scene_and_lesson_open(tmp_path: Path) -> None:
     from lessons.authoring.new import text_of
 
-    scene, lesson = tmp_path / "scene.py", tmp_path / "lesson.py"
+    scene, lesson = tmp_path / "scene.py", tmp_path / "lesson.md"
     scene.write_text(text_of("scene", None, "scene.py"))
-    lesson.write_text(text_of("lesson", None, "lesson.py"))
+    lesson.write_text(text_of("lesson", None, "lesson.md"))
     for choice in (SceneChoice.starting(str(scene)), SceneChoice.opening(str(lesson))):
         body = SimulationRunner(choice)
         body.tick(3)

@@ -71,8 +71,8 @@ def test_the_file_of_an_exercise_runs_as_it_is_told_to(name: str, capsys: pytest
 
 
 def test_new_lesson_of_ones_own_is_checked(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["new", "lesson", "my_lesson.py"]) == 0
-    assert main(["lessons", "--check", "my_lesson.py"]) == 0
+    assert main(["new", "lesson", "my_lesson.md"]) == 0
+    assert main(["lessons", "--check", "my_lesson.md"]) == 0
     assert "faults: 0" in capsys.readouterr().out
 
 

@@ -37,7 +37,7 @@ def file(tmp_path: Path):
     return write
 
 
-@pytest.mark.parametrize("kind", ["controller", "scene", "task", "lesson", "exercise"])
+@pytest.mark.parametrize("kind", ["controller", "scene", "task", "exercise"])
 def test_own_file_is_what_it_defines(kind, file) -> None:
     assert kind_of(execute(read(file(text_of(kind, None, "mine.py"))))) == kind
 
@@ -97,7 +97,7 @@ FAULTS = {
     "no file": (None, "cannot be read"),
     "no text": (b"\xff\xfe\x00torque", "UTF-8"),
     "empty": ("", "defines neither"),
-    "two things": ("TASK = 1\nLESSON = 2\n", "defines a task and a lesson"),
+    "two things": ("TASK = 1\nSCENE = 2\n", "defines a scene and a task"),
     "syntax": ("def torque(now)\n    return 1\n", r"mine.py, line 1: expected ':'"),
     "indentation": ("def torque(now):\nreturn 1\n", r"mine.py, line 2"),
     "missing name at import": ("x = nothing\n", r"mine.py, line 1: NameError"),
@@ -130,7 +130,7 @@ FAULTS = {
     "memory at import": ("x = [0] * 10**12\n", "line 1: .*memory"),
     "no function": ("torque = 3\n", "torque must be a function"),
     "no method": ("class Controller:\n    pass\n", "a method torque"),
-    "a lesson instead": ("LESSON = 1\n", "is a lesson, but a controller is needed"),
+    "a task instead": ("TASK = 1\n", "is a task, but a controller is needed"),
     "constructor": ("class Controller:\n    def __init__(self, x): ...\n    def torque(self, n): ...\n", "x"),
     "missing name in a tick": (HOLDS.replace("now.bias", "nowbias"), r"mine.py, line 2: NameError"),
     "arguments": ("def torque():\n    return 0\n", "TypeError"),
@@ -315,12 +315,17 @@ def test_own_scene_that_is_wrong_is_one_sentence(text: str, words: str, file) ->
 
 
 def test_own_lesson_is_named_after_its_file(file) -> None:
-    path = file(text_of("lesson", None, "mine.py"))
+    path = file(text_of("lesson", None, "mine.md"), "mine.md")
     lesson = lesson_named(path)
     assert lesson.name == path
     assert lesson.card.question == "Does a heavier hand sag?"
-    with pytest.raises(InputError, match="line 1: ValueError: a lesson's docstring"):
-        lesson_named(file("from lessons.teaching.lesson import card_of; LESSON = card_of('')\n", "no.py"))
+
+
+def test_own_lesson_may_have_a_scene_and_a_robot_beside_it(file) -> None:
+    """A lesson is data, and no program is run by reading it; its scene may be a Python file in its folder."""
+    file(text_of("scene", None, "scene.py"), "scene.py")
+    text = text_of("lesson", None, "mine.md").replace("scene: iiwa14-hold", "scene: scene.py")
+    assert lesson_named(file(text.replace("osf", "weighted"), "mine.md")).scene.endswith("scene.py")
 
 
 def test_own_controller_is_made_afresh_for_every_robot(file) -> None:

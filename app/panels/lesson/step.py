@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 
 import viser
 
@@ -177,7 +178,7 @@ class LessonPanel:
             self._go(self._exercise.place - 1)
 
     def _go(self, place: int) -> None:
-        self._choose(self._learner.choice.at(LessonPlace(self._exercise.lesson, place)))
+        self._choose(self._learner.choice.at(replace(self._exercise, place=place)))
 
     # ---------------------------------------------------------------- showing
 

@@ -11,7 +11,7 @@ from app.html.text import badge, block, esc
 from app.link.choice import SceneChoice
 from app.link.messages import Ready
 from app.panels.widgets.command import on_click
-from lessons.own.files import is_file
+from lessons.own.files import is_file, is_lesson
 from lessons.own.folder import Folder
 from lessons.scenes.run_spec import RunSpec
 from robots import CATALOG, InputError
@@ -104,7 +104,7 @@ class RobotPanel:
     def _add_file(self, gui: viser.GuiApi, current: SceneChoice, own_files: Folder) -> None:
         with gui.add_folder("A file of your own"):
             gui.add_html(block(_FILES))
-            path = gui.add_text("Python file", "", hint="Path on the machine that runs this page")
+            path = gui.add_text("File", "", hint="Path on the machine that runs this page")
             answer = _answer(gui)
             load = gui.add_button("Open file")
 
@@ -114,8 +114,8 @@ class RobotPanel:
             second."""
             name = path.value.strip()
             self._wait(answer)
-            if not is_file(name):
-                self.refuse("First enter the path of a Python file. The path must end with .py.")
+            if not (is_file(name) or is_lesson(name)):
+                self.refuse("First enter the path of a Python file (.py) or of a lesson (.md).")
                 return
             try:
                 choice = current.with_file(own_files.admits(name))

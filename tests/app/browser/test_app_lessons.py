@@ -64,8 +64,8 @@ def test_a_lesson_is_walked_through(learner_page: Page, school: PageServer, name
 
 
 def test_a_lesson_of_ones_own_is_walked_through(browser: Browser, tmp_path: Path) -> None:
-    file = tmp_path / "mine.py"
-    file.write_text(text_of("lesson", None, "mine.py"))
+    file = tmp_path / "mine.md"
+    file.write_text(text_of("lesson", None, "mine.md"))
     server = PageServer(SceneChoice.opening(str(file)), port=0, max_sessions=1)
     page = open_page(browser, server.link, 1000, 700)
     try:
