@@ -13,7 +13,7 @@ STRICT = measured("deliveries", "Two tasks at a time are still faster")
 RADIUS = 1.865
 """The distance of the base from the point below the hand at the limit of the arm's reach, m."""
 HAND, OLD, NEW = np.array([0.0, 2.0]), np.array([-1.75, -0.7]), np.array([-1.2, -0.4])
-TURN = float(np.subtract(*(math.atan2(*(each - HAND)[::-1]) for each in (NEW, OLD))))
+TURN = math.atan2(*(NEW - HAND)[::-1]) - math.atan2(*(OLD - HAND)[::-1])
 DRIVEN = measured("deliveries", "Between 8 s and 14 s the base moves")
 
 

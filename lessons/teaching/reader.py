@@ -116,13 +116,13 @@ class _Part:
 
     @contextmanager
     def named(self) -> Iterator[None]:
-        """Adds file, line and column to the message of an error."""
+        """Adds file, line and column to the message of an error, unless it names its line already."""
         try:
             yield
-        except _Placed:
-            raise
         except ValueError as error:
-            raise _Placed(f"{self.path}, line {self.line}, column {self.column}: {error}") from None
+            if str(error).startswith(f"{self.path}, line "):
+                raise
+            raise InputError(f"{self.path}, line {self.line}, column {self.column}: {error}") from None
 
     def text(self, heading: str = "") -> str:
         return "\n".join(self.texts.get(heading, [])).strip("\n")
@@ -156,10 +156,6 @@ class _Part:
                 raise InputError(f"'{shortened(text, 100)}' does not have the form '{example}'")
         found = {name: value for name, value in match.groupdict().items() if value is not None}
         return {name: value if name in _TEXT_GROUPS else float(value) for name, value in found.items()}
-
-
-class _Placed(InputError):
-    """An error whose message names its place already."""
 
 
 def read_lesson(name: str, path: str, text: str) -> Lesson:
