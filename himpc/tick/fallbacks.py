@@ -3,7 +3,6 @@ arena's budget. A level whose optimum is not found within this budget gets a fal
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from time import perf_counter_ns
 
@@ -18,7 +17,7 @@ from himpc.limits.rows import coming_to_rest
 from himpc.prediction.joint import JointState
 from himpc.tick.kernel.arena import Arena
 from himpc.tick.kernel.arrays import PERIOD, T_S, Array
-from himpc.tick.kernel.cascade import ALONE, KNOTS, LAST, SOFTENED
+from himpc.tick.kernel.cascade import ALONE, LAST, SOFTENED
 from himpc.tick.kernel.control_period import LEVELS, LINEARIZE, NOT_FINITE, ONE_LEVEL, control_period
 from himpc.tick.kernel.goldfarb_idnani import TOLERANCE
 from himpc.tick.printed import printed_problem
@@ -100,9 +99,8 @@ def _climb_down(arena: Arena, place: int, like: Rows, budget: FallbackBudget) ->
         # widens them a little.
         if solve_level(arena, place, TOLERANCE):
             return "solve"
-        above, reached = f["U"][place - 1], f["U"][place].copy()
-        known = [reached, *_continued(arena, place)]
-        return _on_the_way(arena, place, containing(rows, above), "inherit", above, known)
+        above = f["U"][place - 1]
+        return _on_the_way(arena, place, containing(rows, above), "inherit", above, f["U"][place].copy())
     rows = resting
     if widened is not None:
         _write(arena, widened)
@@ -117,7 +115,7 @@ def _climb_down(arena: Arena, place: int, like: Rows, budget: FallbackBudget) ->
             return "soften"
     optimal = bool(arena.i["known"][1]) and f["rung"][place] <= SOFTENED
     fallback, U = last_resort(widened or rows, f["U_was"][place].copy() if optimal else None)
-    fallback = _on_the_way(arena, place, widened or rows, fallback, U, [wanted])
+    fallback = _on_the_way(arena, place, widened or rows, fallback, U, wanted)
     _write(arena, rows if place else containing(rows, f["U"][place]))
     return fallback
 
@@ -131,43 +129,22 @@ def _contradict(rows: Rows, widened: Rows) -> bool:
 
 
 def _on_the_way(
-    arena: Arena, place: int, rows: Rows, fallback: Fallback, U: Array, wanted: Sequence[Array]
+    arena: Arena, place: int, rows: Rows, fallback: Fallback, U: Array, wanted: Array
 ) -> Fallback:
-    """Moves U, which satisfies the rows, towards each of the points `wanted` in turn, to the point of least
-    cost that the rows allow. Returns "feasible" after a move, otherwise the argument `fallback`."""
+    """Moves U, which satisfies the rows, towards `wanted`, the point that the kernel reached, if this
+    improves the cost. Returns "feasible" after a move, otherwise the argument `fallback`."""
     f = arena.f
-    problem = printed_problem(arena, place)
-    for each in wanted:
-        end = towards(rows, U, each)
-        if end is not None and place and not arena.i["level"][place, ALONE]:
-            above = slice(0, int(arena.i["level"][place - 1, LAST]))
-            if np.abs(f["B"][:, above] @ (end - U)[:, :, None]).max(initial=0.0) > LEAK:
-                end = None
-        if end is not None:
-            # The cost is a parabola along the way.
-            first, middle, last = (problem.cost(U + share * (end - U)) for share in (0.0, 0.5, 1.0))
-            bend = 2.0 * (first + last) - 4.0 * middle
-            share = min((first - last + bend) / (2.0 * bend), 1.0) if bend > 0.0 else 1.0
-            moved = end if share == 1.0 else U + share * (end - U)
-            if share > 0.0 and problem.cost(moved) < first:
-                fallback, U = "feasible", moved
+    on_the_way = towards(rows, U, wanted)
+    if on_the_way is not None and place and not arena.i["level"][place, ALONE]:
+        above = slice(0, int(arena.i["level"][place - 1, LAST]))
+        if np.abs(f["B"][:, above] @ (on_the_way - U)[:, :, None]).max(initial=0.0) > LEAK:
+            on_the_way = None
+    if on_the_way is not None:
+        problem = printed_problem(arena, place)
+        if problem.cost(on_the_way) < problem.cost(U):
+            fallback, U = "feasible", on_the_way
     _put(arena, place, Point(U, NO_ROWS, 0.0, "unsolved"))
     return fallback
-
-
-def _continued(arena: Arena, place: int) -> list[Array]:
-    """Returns the increments of the level above, plus what this level added to them in the previous tick:
-    shifted by one knot, and without its part along the directions of the levels above. Returns no point if
-    the previous tick is not known."""
-    f, i = arena.f, arena.i
-    if not i["known"][1]:
-        return []
-    change, metric = np.zeros_like(f["U"][place]), f["metric"][place]
-    change[:-1] = (f["U_was"][place] - f["U_was"][place - 1])[1:]
-    taken = f["Q"] * (np.arange(metric.size) < i["start"][:, None])[:, None]
-    change -= metric * (taken @ (taken.transpose(0, 2, 1) @ (change / metric)[:, :, None]))[:, :, 0]
-    change[i["level"][place, KNOTS] :] = 0.0
-    return [f["U"][place - 1] + change]
 
 
 def _coming_to_rest(arena: Arena) -> Array:
