@@ -26,7 +26,7 @@ from robots.world import Thing
 def test_the_simulation_reports_what_the_robot_touches() -> None:
     """A hand is dragged into the floor; the status reports the contact, with a force that pushes the hand
     upwards."""
-    body = SimulationRunner(SceneChoice(RunSpec("panda-hold")))
+    body = SimulationRunner(SceneChoice(RunSpec("panda-hold").for_export()))
     try:
         assert [thing.shape.name for thing in body.ready().world] == ["floor"]
         assert body.status().contacts == ()

@@ -49,8 +49,8 @@ def press(wire: Wire, label: str) -> None:
 
 
 def open_file(wire: Wire, path: Path) -> None:
-    assert eventually(lambda: wire.find("Python file") is not None, LONG)
-    wire.write(str(wire.find("Python file")), value=str(path))
+    assert eventually(lambda: wire.find("Your file") is not None, LONG)
+    wire.write(str(wire.find("Your file")), value=str(path))
     press(wire, "Open file")
 
 

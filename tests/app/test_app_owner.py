@@ -94,10 +94,10 @@ def test_files_are_opened_only_on_the_page_of_the_owners_address(own: Path, mark
         assert server.link != server.guest_link
         with Wire(server.guest_link) as guest:
             assert built(guest)
-            assert guest.find("Python file") is None and guest.find("File") is None
+            assert guest.find("Your file") is None and guest.find("File") is None
         with Wire(server.link) as page:
             assert built(page)
-            ask(page, "Python file", "law.py", "Open file")  # relative to the folder
+            ask(page, "Your file", "law.py", "Open file")  # relative to the folder
             assert eventually(mark.exists, LONG)
             learner = server.sessions.learners[-1]
             assert eventually(
@@ -113,7 +113,7 @@ def test_without_a_folder_nobody_opens_files(own: Path) -> None:
     with serving(None, max_sessions=1) as server, Wire(server.link) as page:
         assert server.link == server.guest_link
         assert built(page)
-        assert page.find("Python file") is None and page.find("File") is None
+        assert page.find("Your file") is None and page.find("File") is None
 
 
 def test_who_watches_a_classroom_opens_no_files(own: Path) -> None:
@@ -124,7 +124,7 @@ def test_who_watches_a_classroom_opens_no_files(own: Path) -> None:
             with Wire(link) as page:
                 assert built(page)
                 assert page.shows("you are watching")
-                assert page.find("Python file") is None and page.find("File") is None
+                assert page.find("Your file") is None and page.find("File") is None
         assert isinstance(server.sessions, Classroom)
         for link, offered in ((server.guest_link, False), (server.link, True)):
             with Wire(link) as page:
@@ -132,7 +132,7 @@ def test_who_watches_a_classroom_opens_no_files(own: Path) -> None:
                 page.write(str(page.find("Instructor's token")), value=server.sessions.token)
                 assert eventually(lambda page=page: not page.shows("you are watching"), LONG)
                 assert built(page, times=2)
-                assert (page.find("Python file") is not None) is offered
+                assert (page.find("Your file") is not None) is offered
 
 
 def test_a_request_that_a_proxy_passes_on_is_not_the_owners(own: Path) -> None:
@@ -172,7 +172,7 @@ def test_nothing_outside_the_folder_is_opened(own: Path, mark: Path) -> None:
         assert built(page)
         said = answer(page)
         for field, button, tried in (
-            ("Python file", "Open file", (*paths, *nowhere)),
+            ("Your file", "Open file", (*paths, *nowhere)),
             ("File", "Load file", (robot, "../robot.urdf", "up/robot.urdf", "../nothing.urdf")),
         ):
             sentences = set[str]()

@@ -222,7 +222,7 @@ def test_strangers_that_a_forgotten_proxy_lets_through_run_nothing(
             brought = (server.link if forwarded else server.guest_link).partition("?")[2]
             with Wire(f"{proxy}/?{brought}") as page:
                 assert eventually(lambda: page.folders("Import report") > 0, LONG)
-                assert page.find("Python file") is None and page.find("File") is None
+                assert page.find("Your file") is None and page.find("File") is None
     finally:
         server.close()
 

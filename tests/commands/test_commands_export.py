@@ -21,7 +21,8 @@ from himpc.limits.rows import build_rows
 from himpc.prediction.joint import JointState
 from himpc.references import previews
 from himpc.tick.kernel import control_period
-from lessons.scenes.catalog import torque_scene
+from lessons.scenes.catalog import as_torque_scene, torque_scene
+from lessons.scenes.run_spec import RunSpec
 from lessons.session.torque import TorqueSession
 from tests.commands.exported import controller_in, exported, needed, replayed, rows_of, told
 
@@ -119,8 +120,8 @@ def test_without_optima_the_joints_brake_inside_the_rows(folders: dict[str, Path
 def test_settings_do_what_they_do_in_python(folders: dict[str, Path]) -> None:
     """M̄, gains, weights, limits and the order of the levels are changed, and levels are switched off and on.
     The torques stay those of a Python controller with the same settings."""
-    scene = torque_scene("iiwa14-hold")
-    settings = replace(scene.settings.for_controller())
+    scene = as_torque_scene(RunSpec("iiwa14-hold").for_export().prepared(), "the test")
+    settings = scene.settings.for_controller()
     python, one = HIMPC(scene.robot, settings), controller_in(folders["iiwa14-hold"])
     references = TorqueSession(scene).references
     low, high = settings.stack[0], settings.stack[1:]

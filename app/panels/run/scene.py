@@ -104,7 +104,7 @@ class RobotPanel:
     def _add_file(self, gui: viser.GuiApi, current: SceneChoice, own_files: Folder) -> None:
         with gui.add_folder("A file of your own"):
             gui.add_html(block(_FILES))
-            path = gui.add_text("File", "", hint="Path on the machine that runs this page")
+            path = gui.add_text("Your file", "", hint="Path on the machine that runs this page")
             answer = _answer(gui)
             load = gui.add_button("Open file")
 
