@@ -34,7 +34,7 @@ NO_CLASS = Answer(
 GUESSED = Answer(
     HTTPStatus.TOO_MANY_REQUESTS,
     "Too many wrong codes",
-    "<p>Many wrong codes came from your network. This page tries again by itself.</p>",
+    "<p>Your network sent many wrong codes. This page tries again by itself.</p>",
     (("Retry-After", "5"), ("Refresh", "5"), ("Cache-Control", "no-store")),
 )
 

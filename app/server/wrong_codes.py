@@ -75,8 +75,8 @@ class WrongCodes:
 
 
 _SAYS = (
-    "himpc-lab: more than {} different wrong codes of the class came from {}: somebody may be guessing. "
-    "Answers to phones that open their page from there now take {:g} s."
+    "himpc-lab: {1} sent more than {0} different wrong codes of the class: somebody may be guessing. "
+    "Answers to phones that open their page from there now take {2:g} s."
 )
 
 

@@ -9,7 +9,6 @@ IN_DOCS = (
     *(
         "serving",
         "export",
-        "arm",
         "authoring",
         "instructors",
         "disagreements",

@@ -69,7 +69,7 @@ class Guard:
     def check(
         self, t: float, reading: Reading, missed: int, hurried: bool, fallback: int, at: float, away: Array
     ) -> str | None:
-        """Returns the reason why the control must end at t, s after the start, or None. missed: periods
+        """Returns why the control must end at t, s after the start, or None. missed: periods
         missed before; hurried: whether the requested torque changed faster than the arm accepts; fallback:
         an index of `FALLBACKS`; at: the time, s, of the newest measurement that the watcher has compared
         with the model; away: the distance of the joints then, (n,) rad."""

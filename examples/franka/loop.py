@@ -1,5 +1,5 @@
 """The loop of an arm, at 1 kHz: read, one period of the exported controller, write. Drags are timed here, by
-the arm's own clock, so that no other process can delay them."""
+the arm's own clock; no other process can delay them."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Plan:
         controller.reset(tau)
 
     def drag(self, controller: NativeController, since: float, t: float) -> None:
-        """Moves the targets whose time is after `since` and not after t."""
+        """Moves the targets with a time in (since, t]."""
         for at, task, values in self.drags:
             if since < at <= t:
                 controller.set(TARGET, task, values)

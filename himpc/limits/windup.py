@@ -52,7 +52,7 @@ def wound_up(before: Windup, tau: Array, v: Array, largest_torque: Array, moves:
     """Returns the wind-up one period later.
 
     Time-delay estimation counts the force of a contact as a disturbance, and presses harder in every period.
-    Its torque then rises although no joint moves. A torque that changes because the robot moves (gravity in
+    Its torque then rises although no joint moves. A change of the torque of a moving robot (gravity in
     another posture) is forgotten at the rate max|q̇| / FORGETS. If the remaining change exceeds PRESSING, the
     robot is stopped while the change grows, and until a reference moves.
 

@@ -34,8 +34,8 @@ def lesson_of(source: Source) -> Lesson:
 
 
 def _refuse(lesson: Lesson, source: Source, number: int, error: InputError) -> NoReturn:
-    """Raises InputError with the place of the setting with which a step cannot be run; if no setting is to
-    blame, with the number of the step."""
+    """Raises InputError with the place of the setting with which a step cannot be run; for any other
+    reason, with the number of the step."""
     chosen: tuple[str, ...] = ()
     for step, place, setting in assignments(source.path, source.text):
         if step in (0, number):

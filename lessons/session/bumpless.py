@@ -27,8 +27,8 @@ class Handover:
     s = 3x² − 2x³ rises from 0 to 1 in HANDOVER_SECONDS. The torques of two controllers differ, for example by
     the error of a model; the blend spreads this step over time. Both controllers get the measured state and
     the torque that acted. Therefore the blend lies within the torque bounds if both torques do. If the new
-    controller keeps distances, a `DistanceFilter` changes the blend, since the old torque may lead to a
-    collision. Evidence and prediction are those of the new controller.
+    controller keeps distances, a `DistanceFilter` changes the blend: no distance bounds the old torque.
+    Evidence and prediction are those of the new controller.
     """
 
     def __init__(self, old: Controller, new: Controller) -> None:

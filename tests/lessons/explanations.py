@@ -21,7 +21,6 @@ from lessons.teaching.lesson import Step
 ROOT = Path(__file__).parents[2]
 _IN_DOCS = (
     *(
-        "arm",
         "authoring",
         "disagreements",
         "export",

@@ -138,7 +138,7 @@ TEXTS = (
     )),
     # ---------------------------------------- behaviour of the program
     Exempt("software", LESSONS + "grade_attacks.py::test_a_table_of_grades_is_no_program_of_a_spreadsheet", (
-        ("instructors", "In the file of the table, an apostrophe precedes cells"),
+        ("instructors", "In the file of the table, an apostrophe precedes every"),
     )),
     Exempt("software", LESSONS + "own_tasks.py::test_a_code_tells_an_own_task_by_its_content", (
         ("instructors", "A state code (*Export*, *Write it down*) contains"),

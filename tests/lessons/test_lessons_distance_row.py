@@ -19,7 +19,8 @@ from lessons.exercises.inside.now import numbers_of, rebuilt, shape_of
 from lessons.exercises.mistakes import Diagnosis, Law
 from lessons.own.files import Source, execute
 from lessons.own.kinds import law_of
-from lessons.scenes.catalog import as_torque_scene, torque_scene
+from lessons.scenes.catalog import as_torque_scene
+from lessons.scenes.run_spec import RunSpec
 from lessons.session.torque import TorqueSession
 from lessons.settings.torque import TorqueSettings
 from robots import Robot
@@ -41,7 +42,8 @@ def seen_by(views: list[View], law: Law, settings: TorqueSettings, robot: Robot)
 def seen(law: Law) -> list[View]:
     """Returns the views that a law receives while the robot passes the post."""
     found: list[View] = []
-    scene = as_torque_scene(EXERCISE.checks(0)[-1].run.prepared(), "it")
+    (past,) = (check for check in EXERCISE.checks(0) if "past the post" in check.text)
+    scene = as_torque_scene(past.run.prepared(), "it")
     session = TorqueSession(scene, controllers=partial(seen_by, found, law))
     while session.t < scene.duration - 1e-9:
         session.tick()
@@ -103,6 +105,7 @@ def test_near_is_empty_and_costs_nothing_unless_distances_are_kept(monkeypatch: 
 
     monkeypatch.setattr(own, "Distances", refused)
     found: list[View] = []
-    TorqueSession(torque_scene("iiwa14-table"), controllers=partial(seen_by, found, RIGHT)).tick()
+    off = as_torque_scene(RunSpec("iiwa14-table").but("avoidance.on=false").prepared(), "it")
+    TorqueSession(off, controllers=partial(seen_by, found, RIGHT)).tick()
     near = found[0].near
     assert (near.names, near.d.shape, near.gradient.shape) == ((), (0,), (0, 7))

@@ -6,8 +6,7 @@ import type { Frame } from "./worker";
 
 const WINDOW_S = 8;
 const JOINTS = ["#d72626", "#96661c", "#6f7f00", "#8257e6", "#77808c", "#b5528f", "#4f8a8b"]; // none is a level's
-/** mm or °: the axis of the errors is at least this long, so that its labels, of three decimals, differ. */
-const LEAST = 1e-2;
+const LEAST = 1e-2; // mm or °: the axis of the errors is at least this long; its labels have three decimals
 
 interface Line { label: string; stroke: string; factor: number }
 

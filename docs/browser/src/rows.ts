@@ -86,25 +86,18 @@ const STATISTICS: Record<string, (values: number[]) => number> = {
   sum,
 };
 
-/** The time over which "last" is a mean, s. */
-const END = 0.05;
+const END = 0.05 - 1e-9; // s: "last" is a mean over this time
 
 /** Returns the measured number up to now; NaN as long as there are no values. */
 export function measured(measure: MeasureData, rows: Rows, ghost: Rows | null): number {
-  let values: number[] = [];
-  const times: number[] = [];
+  const points: [number, number][] = [];
   for (let row = 0; row < rows.count; row++) {
-    const t = rows.at(row, "t")[0];
-    if (!(t >= measure.after - 1e-9 && t < (measure.until ?? Infinity) - 1e-9)) continue;
-    const value = signalAt(measure.signal, rows, row);
-    if (!isFinite(value)) continue;
-    values.push(value);
-    times.push(t);
+    const t = rows.at(row, "t")[0], inside = t >= measure.after - 1e-9 && t < (measure.until ?? Infinity) - 1e-9;
+    const value = inside ? signalAt(measure.signal, rows, row) : NaN;
+    if (isFinite(value)) points.push([t, value]);
   }
-  if (measure.statistic === "last") {
-    const end = times[times.length - 1] - END + 1e-9;
-    values = values.filter((_, k) => times[k] > end);
-  }
+  const from = measure.statistic === "last" && points.length ? points[points.length - 1][0] - END : -Infinity;
+  const values = points.flatMap(([t, value]) => (t > from ? [value] : []));
   const own = values.length ? STATISTICS[measure.statistic](values) : NaN;
   if (!measure.over_ghost) return own;
   const other = ghost ? measured({ ...measure, over_ghost: false }, ghost, null) : NaN;
