@@ -23,7 +23,8 @@ from himpc.tasks import (
 )
 from himpc.tasks.frame import FrameTask
 from lessons.events import MoveTarget
-from lessons.scenes.catalog import torque_scene
+from lessons.scenes.catalog import as_torque_scene, torque_scene
+from lessons.scenes.run_spec import RunSpec
 from lessons.session.torque import TorqueSession
 
 Array = NDArray[np.float64]
@@ -58,7 +59,7 @@ def test_torques_with_any_kind_are_those_of_the_printed_route(kind: str, place: 
     """The closed loops of both routes agree while the target moves; the kernel receives the rows of the task.
     Orientations on one or two axes are computed by the kernel itself; their targets start 100° away, mostly
     about a free axis."""
-    scene = torque_scene("iiwa14-hold")
+    scene = as_torque_scene(RunSpec("iiwa14-hold").for_export().prepared(), "it")
     levels = list(scene.settings.levels)
     levels.insert(place, Level((GIVEN[kind](),)))
     taken = replace(scene.settings, levels=tuple(levels), controller=controller)
