@@ -22,6 +22,7 @@ from examples.franka.simulated import Model, SimulatedArm, hurry, watch
 from himpc.export.image import Image, image_of
 from himpc.export.native import NativeController, build
 from lessons import load_scene, prepared
+from lessons.scenes.run_spec import NOT_EXPORTED
 from lessons.session.torque import TorqueSession
 from robots import InputError, Plant
 from robots.errors import unknown_name
@@ -101,7 +102,7 @@ def main(
         npz: file for one row per period.
     """
     loaded = load_scene(scene)
-    changed: Any = prepared(loaded, None, set)
+    changed: Any = prepared(loaded, None, (*NOT_EXPORTED, *set))
     period, described, simulated = changed.settings.T_s, changed.robot, robot == "simulated"
     if not (0.0 < duration <= 600.0 and 0 <= delay <= 20 and (simulated or period == 1e-3)):
         raise InputError("--duration must be above 0 and at most 600 s, --delay from 0 to 20, T_s 0.001 s")
