@@ -57,7 +57,7 @@ class HIMPC(TorqueController):
         """Clears plan and memory; τ₀ (n,) N·m is the torque acting now, and q̈ and ẍ start at zero."""
         super().reset(tau_0)
         self._memory: Memory | None = None
-        self._guard = guard_of(self._settings, len(self._form.tasks), self.robot.tau_limit)
+        self._guard = guard_of(self._settings, len(self._form.tasks), self.robot)
         self._asked: list[LevelProblem] = []
         if self.kernel is not None:
             self.kernel.forget()
@@ -86,7 +86,7 @@ class HIMPC(TorqueController):
         check_solver(settings, explicit)
         prepared = prepare(self.robot, settings)
         goal = in_force(self.robot, settings.limits)
-        guard = guard_of(settings, len(prepared.form.tasks), self.robot.tau_limit)
+        guard = guard_of(settings, len(prepared.form.tasks), self.robot)
         load = LoadModel(self.robot, settings.nominal) if settings.M_bar_adapt else None
         distances = Distances(self.robot, avoidance) if explicit and avoidance.on else None
         kernel = None if explicit else self._compile(settings, prepared)

@@ -22,11 +22,12 @@ class Avoidance:
         margin: m, added to d_safe, to compensate for the delay of time-delay estimation.
         reaction: the time in s that passes before the robot brakes, as the bound assumes.
         deceleration: the deceleration in m/s² of a pair that comes closer, as the bound assumes.
-        pull: m, the largest error on which tasks of positions act while `on`; for other tasks the largest
-            error is TURN_PULL · pull, rad. A larger error, for example of a target that cannot be reached,
-            acts like the largest one. 0: no limit.
-        velocity_margin: share of the velocity limits that is not used while `on`. Time-delay estimation
-            reacts late when other joints accelerate a joint that is at its limit.
+        pull: m, the largest error on which tasks of positions act while `on` or with `Limits.stall_guard`;
+            for other tasks the largest error is TURN_PULL · pull, rad. A larger error, for example of a
+            target that cannot be reached, acts like the largest one. 0: no limit.
+        velocity_margin: share of the velocity limits that is not used while `on` or with
+            `Limits.stall_guard`. Time-delay estimation reacts late when other joints accelerate a joint
+            that is at its limit.
     """
 
     on: bool = False

@@ -33,7 +33,7 @@ class Limits:
             iiwa's circle by 17 % with rate 0, which is (32e) as printed, and by 0.2 % with 15 (`himpc-lab
             reproduce himpc-limits`).
         torque_rate: N·m/s; largest change of each joint's torque per second; 0: not imposed.
-        stall_guard: whether a robot that presses without progress comes to rest, also if no distances are
+        stall_guard: whether a robot that presses or makes no progress comes to rest, also if no distances are
             kept. Without this guard, as printed, time-delay estimation increases the torque without end.
         avoidance: the distances that are kept.
     """

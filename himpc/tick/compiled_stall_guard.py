@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from himpc.constants import PROGRESS
 from himpc.limits import LimitsInForce
-from himpc.tick.distances import Distances
+from himpc.tick.distances import Anywhere, Distances
 from himpc.tick.kernel.slow_down import slow_down
 
 Array = NDArray[np.float64]
@@ -33,7 +33,7 @@ class CompiledStallGuard:
         self._limits: tuple[LimitsInForce, Array, Array] | None = None
 
     def limits(
-        self, limits: LimitsInForce, tau: Array, v: Array, distances: Distances | None
+        self, limits: LimitsInForce, tau: Array, v: Array, distances: Distances | Anywhere | None
     ) -> LimitsInForce:
         """Returns the limits in force at this tick, see `StallGuard.limits`."""
         assert distances is not None

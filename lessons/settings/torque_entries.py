@@ -47,7 +47,7 @@ TORQUE_ENTRIES = (
               "limit ranks above all levels. 0: not imposed",
           "N·m/s", 0.0, 2000.0, 10.0, name="torque rate limit"),
     Entry("limits.stall_guard", "Rest when blocked",
-          "A robot whose torque rises without progress of its tasks comes to rest, also if no distances are "
+          "A robot that presses, or whose tasks make no progress, comes to rest, also if no distances are "
               "kept. Without this guard, as printed, time-delay estimation increases the torque until it is "
               "at its limit. himpc, hiqp, nhimpc and weighted have the guard, and always while they keep "
               "distances",
@@ -67,12 +67,13 @@ TORQUE_ENTRIES = (
           "Deceleration that the bound assumes for the approach to an object", "m/s²", 0.1, 20.0,
           0.1, name="deceleration of distances"),
     Entry("avoidance.pull", "Pull",
-          "While distances are kept, a larger error of a position has the effect of this error. For other "
-              "tasks the limit is five times this number, in rad. 0: no limit",
+          "While distances are kept or a blocked robot is guarded, a larger error of a position has the "
+              "effect of this error. For other tasks the limit is five times this number, in rad. 0: no "
+              "limit",
           "m", 0.0, 2.0, 0.01, name="pull of targets"),
     Entry("avoidance.velocity_margin", "Free velocity",
-          "Share of the velocity limits that is not used while distances are kept, for the delay of "
-              "time-delay estimation",
+          "Share of the velocity limits that is not used while distances are kept or a blocked robot is "
+              "guarded, for the delay of time-delay estimation",
           "", 0.0, 0.5, 0.01, name="margin of velocities"),
     Entry("route", "Route", "Method that computes the torque; both methods give the same torque"),
     Entry("solver", "QP solver",
