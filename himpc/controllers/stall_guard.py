@@ -80,11 +80,11 @@ class WindupGuard:
     """
 
     def __init__(
-        self, stall: StallGuard | CompiledStallGuard, around: Anywhere, largest: Array, T_s: float
+        self, stall: StallGuard | CompiledStallGuard, robot: Robot, M_bar: Array, margin: float, T_s: float
     ) -> None:
-        """stall: the guard for an obstacle that is near. largest: the torque with which a joint may press,
-        (n,) N·m, see `taken_back`."""
-        self._stall, self._around, self._largest, self._T_s = stall, around, largest, T_s
+        """stall: the guard for an obstacle that is near. M_bar: (n,) kg·m². margin: see `Avoidance`."""
+        self._stall, self._around, self._T_s = stall, Anywhere(carried(robot), margin), T_s
+        self._v_limit, self._largest = robot.v_limit, taken_back(M_bar, robot.v_limit, T_s)
         self.windup: Windup | None = None
 
     @property
@@ -107,7 +107,7 @@ class WindupGuard:
         """Returns the limits in force at this tick, see `StallGuard.limits`."""
         moves = self.fastest > PROGRESS
         before = free(tau) if self.windup is None else self.windup
-        self.windup = wound_up(before, tau, v, self._largest, limits.v_limit, moves, self._T_s)
+        self.windup = wound_up(before, tau, v, self._largest, self._v_limit, moves, self._T_s)
         return stopped(self._stall.limits(limits, tau, v, self._around), self.windup)
 
     @property
@@ -135,5 +135,4 @@ def guard_of(
     stall = kind(tasks, T_s, avoidance.pull or math.inf)
     if avoidance.on:
         return stall
-    around = Anywhere(carried(robot), avoidance.velocity_margin)
-    return WindupGuard(stall, around, taken_back(np.array(settings.M_bar), robot.v_limit, T_s), T_s)
+    return WindupGuard(stall, robot, np.array(settings.M_bar), avoidance.velocity_margin, T_s)

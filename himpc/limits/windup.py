@@ -17,7 +17,7 @@ PRESSING = 0.5
 """Share of a velocity limit that a joint would gain if the contact were lost. If it is larger, the robot
 presses against something. The largest share that was measured on robots that touch nothing is 0.39."""
 CARRIED = 1.2
-"""Share of a velocity limit. The motors of a free robot keep its joints below this; a joint that is faster is
+"""Share of a velocity limit of the robot. A free robot's joints stay below this; a joint that is faster is
 moved by a contact."""
 FORGETS = 1.0
 """rad (m): a change of the torque is forgotten while the robot moves by this."""
@@ -82,7 +82,7 @@ def wound_up(
         tau: torque that acts, (n,) N·m.
         v: measured, (n,) rad/s.
         largest: the result of `taken_back`.
-        v_limit: the user's velocity limits, (n,) rad/s.
+        v_limit: of the robot, (n,) rad/s.
         moves: whether a reference moves.
         T_s: control period, s.
     """
