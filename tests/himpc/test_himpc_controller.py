@@ -196,6 +196,8 @@ def test_a_change_that_is_refused_at_its_last_part_changes_nothing(iiwa: Robot, 
 def test_a_message_about_the_nominal_model_names_it(iiwa: Robot) -> None:
     with pytest.raises(InputError, match=r"^nominal\.damping has 2 values"):
         make_controller("osf", iiwa, iiwa_settings(iiwa, nominal=NominalSettings(damping=(0.1, 0.2))))
+    with pytest.raises(InputError, match=r"^nominal\.gravity is 'no'; give true or false"):
+        make_controller("osf", iiwa, iiwa_settings(iiwa, nominal=NominalSettings(gravity="no")))  # pyright: ignore
 
 
 # ------------------------------------------------------------------ evidence

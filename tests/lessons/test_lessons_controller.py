@@ -21,7 +21,7 @@ def test_six_joints_under_a_full_stack(example_urdf: Callable[[str], str]) -> No
     scene = torque_scene("hold", example_urdf("ur_description/urdf/ur10_robot.urdf"))
     assert scene.robot.n == 6
     third = Level((Joints(name="q1", joints=scene.robot.joint_names[:1]),))
-    settings = replace(scene.settings, levels=(*scene.settings.levels[:2], third))
+    settings = replace(scene.settings, stack=(*scene.settings.levels[:2], third))
     for route in ("compiled", "explicit"):
         session = TorqueSession(replace(scene, settings=replace(settings, route=route)))
         start = session.robot.home

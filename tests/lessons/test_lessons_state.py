@@ -248,7 +248,7 @@ def test_what_a_code_cannot_carry_is_said() -> None:
     assert isinstance(hold, TorqueScene)
     first, *others = hold.settings.levels
     own = replace(first, tasks=(OwnKind(name="position"),))
-    other = replace(hold.settings, levels=(own, *others))
+    other = replace(hold.settings, stack=(own, *others))
     with pytest.raises(InputError, match="cannot be written"):
         state_of(RunSpec("planar3-hold"), other)
 

@@ -62,7 +62,7 @@ def test_torques_with_any_kind_are_those_of_the_printed_route(kind: str, place: 
     scene = as_torque_scene(RunSpec("iiwa14-hold").for_export().prepared(), "it")
     levels = list(scene.settings.levels)
     levels.insert(place, Level((GIVEN[kind](),)))
-    taken = replace(scene.settings, levels=tuple(levels), controller=controller)
+    taken = replace(scene.settings, stack=tuple(levels), controller=controller)
     compiled, printed = (
         TorqueSession(replace(scene, settings=replace(taken, route=route)))
         for route in ("compiled", "explicit")
@@ -115,7 +115,7 @@ def test_an_own_rotation_on_some_axes_is_told_of_these(controller: str, route: s
     task has rows."""
     scene = torque_scene("iiwa14-hold")
     levels = (scene.settings.levels[0], Level((OwnTurn(name="x", axes="xy"),)), scene.settings.levels[2])
-    taken = replace(scene.settings, levels=levels, controller=controller, route=route)
+    taken = replace(scene.settings, stack=levels, controller=controller, route=route)
     session = TorqueSession(replace(scene, settings=taken))
     target = session.target("x")
     assert target is not None
