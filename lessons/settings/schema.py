@@ -25,8 +25,9 @@ def values(node: Any, keys: Keys) -> Iterator[Any]:
     if not keys:
         yield node
     elif isinstance(node, tuple):
-        for element in (each for at, each in enumerate(node) if _is_meant(keys[0], at, each)):
-            yield from values(element, keys[1:])
+        for index, element in enumerate(node):
+            if _is_meant(keys[0], index, element):
+                yield from values(element, keys[1:])
     else:
         yield from values(getattr(node, str(keys[0])), keys[1:])
 
@@ -37,15 +38,15 @@ def written(node: Any, keys: Keys, value: Any) -> Any:
         return value
     if isinstance(node, tuple):
         return tuple(
-            written(each, keys[1:], value) if _is_meant(keys[0], at, each) else each
-            for at, each in enumerate(node)
+            written(element, keys[1:], value) if _is_meant(keys[0], index, element) else element
+            for index, element in enumerate(node)
         )
     name = str(keys[0])
     return replace(node, **{name: written(getattr(node, name), keys[1:], value)})
 
 
-def _is_meant(key: str | int | None, at: int, element: Any) -> bool:
-    return key is None or key == (at if isinstance(key, int) else element.name)
+def _is_meant(key: str | int | None, index: int, element: Any) -> bool:
+    return key is None or key == (index if isinstance(key, int) else element.name)
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,16 +109,16 @@ def setting(
         shown: replaces the description of the annotation.
     """
     path, form = pattern.replace("*", what), form_of(hint)
-    told = [shown] if shown else marks(hint, Shown) or [Shown(path.rpartition(".")[2], name=path)]
+    own = [shown] if shown else marks(hint, Shown) or [Shown(path.rpartition(".")[2], name=path)]
     return Setting(
         path,
-        told[0].of(what),
+        own[0].of(what),
         form,
         lambda settings: next(values(settings, keys)),
         lambda settings, value: written(settings, keys, form.fit(path, value)),
         pattern,
         shorthand,
-        told[1] if len(told) > 1 else None,
+        own[1] if len(own) > 1 else None,
     )
 
 
@@ -156,11 +157,11 @@ def settings_of_levels(
     """
     for name in (*names, *gains):
         shared, pattern = name in gains, f"levels.*.{name}"
-        hint, told = field_types(Task if shared else Level)[name], shown.get(pattern)
+        hint, own = field_types(Task if shared else Level)[name], shown.get(pattern)
         rest: Keys = ("tasks", None, name) if shared else (name,)
-        for at, (level, _) in enumerate(shape):
-            yield setting(pattern, hint, (*stack, level, *rest), level, told, shared)
-            yield setting(pattern, hint, (*stack, at, *rest), str(at + 1), told, True)
+        for index, (level, _) in enumerate(shape):
+            yield setting(pattern, hint, (*stack, level, *rest), level, own, shared)
+            yield setting(pattern, hint, (*stack, index, *rest), str(index + 1), own, True)
     for name in gains:
         for task in (task for _, tasks in shape for task in tasks):
             yield setting(

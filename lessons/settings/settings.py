@@ -49,11 +49,11 @@ class SceneSettings(ABC):
 
     @classmethod
     @abstractmethod
-    def special(cls, found: Mapping[str, Setting], shape: Shape) -> Iterable[Setting]:
+    def special(cls, table: Mapping[str, Setting], shape: Shape) -> Iterable[Setting]:
         """Returns the settings that are not fields, or whose change has other effects than a field's.
 
         Args:
-            found: the settings that are fields.
+            table: the settings that are fields.
             shape: the names of the levels and tasks.
         """
 
@@ -135,7 +135,7 @@ class SceneSettings(ABC):
 @cache
 def _fields(of: type[SceneSettings]) -> Mapping[str, Setting]:
     """The settings of a class that are fields, by path, without the options of a scene."""
-    return MappingProxyType({each.path: each for each in settings_of(of)})
+    return MappingProxyType({setting.path: setting for setting in settings_of(of)})
 
 
 @lru_cache(maxsize=64)
@@ -143,17 +143,18 @@ def _table(
     of: type[SceneSettings], shape: Shape, options: type[Any], controllers: tuple[str, ...]
 ) -> Mapping[str, Setting]:
     """`SceneSettings.table` for the names of the levels, tasks, options and controllers."""
-    found = dict(_fields(of))
+    table = dict(_fields(of))
     if is_dataclass(options):
-        found |= {each.path: each for each in settings_of(options, keys=("options",), every=True)}
+        of_scene = settings_of(options, keys=("options",), every=True)
+        table |= {setting.path: setting for setting in of_scene}
     form = Form(WORD, words=controllers)
-    found["controller"] = replace(
-        found["controller"],
+    table["controller"] = replace(
+        table["controller"],
         form=form,
         change=lambda settings, name: replace(settings, controller=form.fit("controller", name)),
     )
-    found |= {each.path: each for each in of.special(found, shape)}
-    return MappingProxyType(dict(sorted(found.items(), key=lambda item: of.rank(item[0]))))
+    table |= {setting.path: setting for setting in of.special(table, shape)}
+    return MappingProxyType(dict(sorted(table.items(), key=lambda item: of.rank(item[0]))))
 
 
 def settings_after(settings: S, events: Iterable[Event]) -> S:

@@ -119,13 +119,13 @@ class TorqueSettings(ControllerSettings, SceneSettings):
         return super().after(event)
 
     @classmethod
-    def special(cls, found: Mapping[str, Setting], shape: Shape) -> Iterable[Setting]:
+    def special(cls, table: Mapping[str, Setting], shape: Shape) -> Iterable[Setting]:
         """Besides the fields there are "stack", a list of levels as `lessons.settings.stack.read_stack` reads
         it; "order", the names of all levels, highest priority first ("a,b,c" or a list); "Q" or "R" for all
         levels (one number, or one per level); "levels.NAME.KEY" with the level's name or its place 1 … r, KEY
         one of Q, R, horizon, enabled, K_p, K_v (gains of all its tasks); "tasks.NAME.K_p|K_v". If a value has
         one number per joint, a place 1 … n after the path selects the number of that joint: "M_bar.3"."""
-        controller, route = found["controller"], found["route"]
+        controller, route = table["controller"], table["route"]
         words = controller.form.words
         yield replace(controller, change=lambda s, name: controller.change(s, _known(words, name)))
         yield replace(route, change=lambda s, value: route.change(s, _now(value)))

@@ -107,16 +107,16 @@ class VelocitySettings(SceneSettings):
         return self.with_obstacle(event.ball()) if isinstance(event, Appear) else super().after(event)
 
     @classmethod
-    def special(cls, found: Mapping[str, Setting], shape: Shape) -> Iterable[Setting]:
+    def special(cls, table: Mapping[str, Setting], shape: Shape) -> Iterable[Setting]:
         """Besides the fields, also those of HTMPCSettings ("horizon", "delta_m", "formulation", …) and of the
         scene's options ("peak", "seats", …; "order" takes effect when a run starts), there are "Q" for all
         levels (a new formulation sets its own) and "levels.NAME.Q|enabled" with the level's name or its place
         1 … r."""
-        formulation, controller = found["formulation"], found["controller"]
+        formulation, controller = table["formulation"], table["controller"]
         yield replace(controller, change=lambda s, value: _at_its_rate(controller.change(s, value)))
         yield replace(formulation, change=lambda s, value: _with_its_weight(formulation.change(s, value)))
-        if "order" in found:
-            order = found["order"]
+        if "order" in table:
+            order = table["order"]
             yield replace(order, change=lambda s, value: order.change(s, _roles(s, value)))
         yield setting_of_all_levels("Q", _STACK, _OF_LEVELS["Q"])
         yield from settings_of_levels(shape, _STACK, ("enabled", "Q"), (), _OF_LEVELS)
