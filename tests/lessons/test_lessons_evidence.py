@@ -102,7 +102,9 @@ def test_where_no_note_can_stand_there_is_no_reason(name: str) -> None:
 
 
 def test_every_step_is_measured_beyond_its_claims() -> None:
+    """Each step has a note, and a learner sees no marks."""
     assert [name for name, k in STEPS if not load_lesson(name).steps[k].notes] == []
+    assert [name for name, k in STEPS if "[^" in texts(load_lesson(name).steps[k])] == []
 
 
 def test_a_number_or_reason_without_its_note_is_found() -> None:
