@@ -59,7 +59,7 @@ def test_the_stored_cover_contains_the_robot(name: str) -> None:
     solids."""
     robot = load_robot(name)
     cover = cover_of(robot)
-    for patch in patches(replace(robot, urdf_text="<robot/>")):
+    for patch in patches(replace(robot, urdf_text='<robot name="bare"/>')):
         assert outside(cover, patch.joint, on(patch.corners)) + patch.swell <= ROUNDING, patch.link
     shapes = link_shapes(robot)
     if any(shape.name.startswith("body") for shape in shapes):
