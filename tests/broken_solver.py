@@ -42,7 +42,7 @@ def break_kernel(monkeypatch: pytest.MonkeyPatch, place: int | None = None) -> N
     def broken(*given: Any) -> int:
         *arena, parts, first, room = given
         data, where, whole, whole_where = arena
-        count = whole[whole_where[WHOLE_AT.sizes] + 4]
+        count = whole[whole_where[WHOLE_AT["sizes"]] + 4]
         if parts & ONE_LEVEL:
             return healthy(*given) if place is not None and first != place else first
         if not parts & LEVELS:
@@ -50,10 +50,10 @@ def break_kernel(monkeypatch: pytest.MonkeyPatch, place: int | None = None) -> N
         if parts & LINEARIZE and healthy(*arena, LINEARIZE, 0, 0.0) == NOT_FINITE:
             return NOT_FINITE
         for level in range(first, count):
-            data[where[AT.U] + level * whole[whole_where[WHOLE_AT.sizes] + 8]] = np.nan
+            data[where[AT["U"]] + level * whole[whole_where[WHOLE_AT["sizes"]] + 8]] = np.nan
             if place is None or level == place or healthy(*arena, ONE_LEVEL, level, 0.0) == level:
                 return level
-            data[where[AT.rung] + level] = 0.0
+            data[where[AT["rung"]] + level] = 0.0
         return healthy(*arena, parts & ~(LINEARIZE | LEVELS), 0, room)
 
     monkeypatch.setattr(fallbacks, "control_period", broken)

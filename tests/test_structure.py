@@ -34,6 +34,7 @@ DOORS = {
     "IPython": ("app/jupyter/lab.py",),
     "jupyter_core": ("app/jupyter/frame.py",),
     "psutil": ("robots/processes/family.py",),
+    "yourdfpy": ("robots/shapes/read.py",),
     "pyseccomp": ("lessons/exercises/inside/confine.py",),
     "py_landlock": ("lessons/exercises/inside/confine.py",),
 }
@@ -260,10 +261,10 @@ ROBOTS = {
     "collision": ("spheres", "robot", "errors"),
     "world": ("collision", "ranges", "errors"),
     "cover_shapes": ("world", "collision", "robot", "geometry"),
-    "shapes": ("truth", "robot", "geometry", "urdf", "meshes"),
+    "shapes": ("truth", "per_robot", "robot", "geometry", "meshes"),
     "mechanics": ("world", "collision", "truth", "robot", "geometry", "inertia", "settings", "errors"),
     "floor": ("mechanics", "world", "collision", "robot"),
-    "covering": ("mechanics", "shapes", "per_robot", "robot", "geometry", "urdf", "meshes"),
+    "covering": ("mechanics", "shapes", "per_robot", "robot", "geometry"),
     "plant": (*("mechanics", "world", "truth", "robot", "settings", "signals", "runge_kutta", "errors"),),
     "servo": ("plant", "robot", "settings", "ranges", "signals"),
     "loading": (

@@ -108,7 +108,7 @@ def image_of(
     sizes = sizes_of(
         robot.n, settings.horizon, len(arena.f["K_p"]), len(tables), len(spans), len(arena.f["L"])
     )
-    loop, loop_where, f = laid_out(SHAPES, sizes, np.float64)
+    loop, loop_where, f = laid_out(SHAPES, sizes._asdict(), np.float64)
     f["setup"][[MOST, TOLERANCE]] = (
         (controller.max_iterations, controller.tolerance) if isinstance(controller, NHIMPC) else (1, np.inf)
     )
