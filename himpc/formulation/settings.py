@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
-from himpc.catalog import Route
 from himpc.limits import Limits
 from himpc.qp import Solver, is_installed
 from himpc.stack import Stack, check_names
@@ -29,9 +28,8 @@ class Settings:
         M_bar_adapt: himpc, hiqp, nhimpc and weighted fit M̄ to the payload that they estimate from the applied
             torques, see `himpc.controllers.adaptation`.
         limits: bounds to impose.
-        route: "compiled" (the kernel of `himpc.tick`) or "explicit" (a general solver on all bounds).
-        solver: the solver of the QPs of the explicit route and of hqp: "daqp", "proxqp" or, with CasADi
-            installed, "qpoases". If no QP solver is used, only "daqp" is accepted, see `check_solver`.
+        solver: the solver of the QPs of himpc_printed and of hqp: "daqp", "proxqp" or, with CasADi installed,
+            "qpoases". If no QP solver is used, only "daqp" is accepted, see `check_solver`.
         R_on: the quantity that R in (31) weighs: the "torque" increments Δτ as printed, or the "acceleration"
             M̄⁻¹Δτ (HQP uses M_n of its model in place of M̄).
         damping: whether the damping level is added if the enabled levels leave freedom.
@@ -45,7 +43,6 @@ class Settings:
     horizon: Horizon = 5
     T_s: Period = 1e-3
     limits: Limits = field(default_factory=Limits)
-    route: Route = "compiled"
     solver: Solver = "daqp"
     R_on: Literal["torque", "acceleration"] = "torque"
     damping: bool = True
@@ -64,6 +61,6 @@ def check_solver(settings: Settings, used: bool) -> None:
     """Raises InputError for a QP solver other than the default if the controller uses no QP solver."""
     if settings.solver != "daqp" and not used:
         raise InputError(
-            f"solver={settings.solver} changes nothing here: a QP solver is used by hqp, and by himpc, hiqp, "
-            "nhimpc and weighted with route=explicit; choose one of these, or solver=daqp"
+            f"solver={settings.solver} changes nothing here: a QP solver is used by hqp and himpc_printed; "
+            "choose one of these, or solver=daqp"
         )

@@ -9,7 +9,7 @@ from functools import lru_cache
 from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, Literal
 
-from himpc.catalog import CONTROLLERS, Route
+from himpc.catalog import CONTROLLERS
 from himpc.controllers import Settings as ControllerSettings
 from himpc.formulation.settings import Horizon, Period
 from himpc.limits import Limits
@@ -88,7 +88,6 @@ class TorqueSettings(SceneSettings):
     horizon: Horizon = 5
     T_s: Period = 1e-3
     R_on: Literal["torque", "acceleration"] = "torque"
-    route: Route = "compiled"
     solver: Solver = "daqp"
     damping: bool = True
     deadline_ms: Milliseconds = 0.0
@@ -116,7 +115,6 @@ class TorqueSettings(SceneSettings):
             horizon=self.horizon,
             T_s=self.T_s,
             limits=self.limits,
-            route=self.route,
             solver=self.solver,
             R_on=self.R_on,
             damping=self.damping,
@@ -159,8 +157,8 @@ class TorqueSettings(SceneSettings):
         return len(self.M_bar) if per_joint else 0
 
     def place(self, path: str) -> Place:
-        """As in `Settings`, and also "stack.add" and the other `CHANGES`, which change a part of the
-        stack."""
+        """As in `Settings`, and also "stack.add" and the other `CHANGES`, which change a part of the stack,
+        and "route", see `_with_route`."""
         return _CHANGE_PLACES.get(path) or super().place(path)
 
     def recomposed(self, wanted: TorqueSettings) -> list[tuple[str, Any]]:
@@ -175,9 +173,11 @@ _GAINS = ("K_p", "K_v")
 _PARTS = {"limits": Limits, "nominal": NominalSettings, "plant": PlantSettings}
 
 
-def _now(route: Any) -> Any:
-    """Codes and scripts of earlier versions may name a route that was replaced."""
-    return "compiled" if route == "structured" else route
+def _with_route(settings: TorqueSettings, route: str) -> TorqueSettings:
+    """Codes and scripts of earlier versions may name a route. `explicit` is now a controller. For controllers
+    other than himpc, both routes had the same torques."""
+    printed = route == "explicit" and settings.controller == "himpc"
+    return replace(settings, controller="himpc_printed") if printed else settings
 
 
 def _known(form: Form, path: str, name: Any) -> Any:
@@ -254,6 +254,12 @@ def _own(settings: TorqueSettings) -> Own:
 _CHANGE_PLACES = {
     **{path: _stack_place(lambda s, value, to=to: to(s.levels, value)) for path, to in CHANGES.items()},
     "stack.add": _stack_place(lambda s, value: add(s.levels, value, _own(s))),
+    "route": Place(
+        lambda settings: "explicit" if settings.controller == "himpc_printed" else "compiled",
+        lambda settings, route: _checked(_with_route(settings, route)),
+        Form(WORD, words=("compiled", "explicit", "structured")),
+        shorthand=True,
+    ),
 }
 
 
@@ -264,11 +270,10 @@ def _places(
     """`TorqueSettings.places` for the names of the levels and of their tasks."""
     without = ("levels", "options", "files", "own_tasks", *_PARTS)
     found = field_places(TorqueSettings, lambda s: s, lambda _, new: _checked(new), without=without)
-    form, route = Form(WORD, words=controllers), found["route"].form
+    form = Form(WORD, words=controllers)
     found["controller"] = replace(
         found["controller"], form=form, own_fit=lambda _, path, name: _known(form, path, name)
     )
-    found["route"] = replace(found["route"], own_fit=lambda _, path, value: route.fit(path, _now(value)))
     if options is not type(None):
         found |= field_places(options, _part("options"), _with("options"))
     order = _stack_place(lambda s, value: ordered(s.levels, value), lambda s: tuple(l.name for l in s.levels))

@@ -43,18 +43,19 @@ TORQUE_ENTRIES = (
               "distance; 0: (32e) as printed",
           "1/s", 0.0, 100.0, 1.0),
     Entry("limits.torque_rate", "Torque rate",
-          "Largest change of each joint's torque per second; in himpc, hiqp, nhimpc and weighted this "
-              "limit ranks above all levels. 0: not imposed",
+          "Largest change of each joint's torque per second; in himpc, hiqp, nhimpc, weighted and "
+              "himpc_printed this limit ranks above all levels. 0: not imposed",
           "N·m/s", 0.0, 2000.0, 10.0, name="torque rate limit"),
     Entry("limits.stall_guard", "Rest when blocked",
           "A robot whose torque rises without progress of its tasks comes to rest, also if no distances are "
               "kept. Without this guard, as printed, time-delay estimation increases the torque until it is "
-              "at its limit. himpc, hiqp, nhimpc and weighted have the guard, and always while they keep "
-              "distances",
+              "at its limit. himpc, hiqp, nhimpc, weighted and himpc_printed have the guard, and always "
+              "while they keep distances",
           tries=("false", "true"), name="guard of a blocked robot"),
     Entry("avoidance.on", "Keep distances",
-          "Keep distances between links, and between links and objects. himpc, hiqp, nhimpc and weighted "
-              "do this by bounds above all levels, himpc_filtered by a filter behind its levels",
+          "Keep distances between links, and between links and objects. himpc, hiqp, nhimpc, weighted and "
+              "himpc_printed do this by bounds above all levels, himpc_filtered by a filter behind its "
+              "levels",
           tries=("true", "false"), name="distances kept"),
     Entry("avoidance.d_safe", "d_safe", "Smallest distance that is allowed", "m", 0.0, 100.0, 1.0, shown="mm",
           factor=1e3, name="safe distance"),
@@ -74,10 +75,9 @@ TORQUE_ENTRIES = (
           "Share of the velocity limits that is not used while distances are kept, for the delay of "
               "time-delay estimation",
           "", 0.0, 0.5, 0.01, name="margin of velocities"),
-    Entry("route", "Route", "Method that computes the torque; both methods give the same torque"),
     Entry("solver", "QP solver",
-          "Solver of the QPs of hqp and of the explicit route. Controllers without QPs, and the "
-              "compiled route with its own method, accept daqp only. qpoases needs the extra 'bench'"),
+          "Solver of the QPs of hqp and himpc_printed. Other controllers accept daqp only. qpoases needs "
+              "the extra 'bench'"),
     Entry("R_on", "R weighs", "Quantity that R weighs: Δτ as printed, or M̄⁻¹Δτ"),
     Entry("damping", "Damp what no level controls",
           "R weighs changes of torque only, so a motion without a task keeps its torque and does not "

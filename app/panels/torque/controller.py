@@ -55,7 +55,7 @@ class ControllerPanel:
         with gui.add_folder("Distances", expand_by_default=False):
             controls.add(*(f"avoidance.{name}" for name in _DISTANCES))
         with gui.add_folder("Solver", expand_by_default=False):
-            controls.add("route", "solver", "R_on")
+            controls.add("solver", "R_on")
         with gui.add_folder("Why M̄ matters", expand_by_default=False):
             gui.add_html(
                 formula(r"\tau = \tau_0 + \bar M (\ddot q - \ddot q_0)")
