@@ -264,9 +264,7 @@ def test_a_robot_without_progress_becomes_slow(robot: Robot) -> None:
     for _ in range(1000):
         share = now.stall([0.3], False, 0.01)
     assert share == stalled
-    for _ in range(100):
-        share = now.stall([0.35], False, 0.01)
-    assert (share > 0.5).all()  # the robot was pushed away and may return
+    assert (now.stall([0.35], False, 0.01) > share + 0.01).all()  # it was pushed away and may return
     now = Guarded(robot, 1)
     for error in [*[0.3] * 300, *np.linspace(0.3, 0.2, 100), *[0.2] * 1000]:
         share = now.stall([error], False, 0.01)
