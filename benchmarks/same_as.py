@@ -116,7 +116,10 @@ def main() -> int:
             finally:
                 subprocess.run(["git", "worktree", "remove", "--force", tree], cwd=ROOT, check=True)
         _run(ROOT, now, kept, options.names)
-        names = sorted(file.name for file in now.glob("*.json"))
+        found = {file.name for file in now.glob("*.json")}
+        names = sorted(name for name in found if (kept / name).exists())
+        for name in sorted(found.difference(names)):
+            print(f"{name.removesuffix('.json')}: new, not compared")
         different = sum(_differs(name, kept, now, options.tolerance) for name in names)
     print(f"{len(names)} results compared, {different} differ")
     return 1 if different or not names else 0

@@ -88,7 +88,7 @@ def image_of(
     """Returns the memory of a controller before its first period.
 
     Args:
-        controller: HIMPC, HIQP, NHIMPC or Weighted on the compiled route.
+        controller: HIMPC, HIQP, NHIMPC or Weighted.
         robot: the robot of the controller.
         references: the references of all tasks by name, before the first period.
         budget: largest number of multiplications for changes of active rows in a period; None: `budget_of`.

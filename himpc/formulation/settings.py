@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
-from himpc.catalog import Route
 from himpc.limits import Limits
 from himpc.qp import Solver, is_installed
 from himpc.stack import Stack, check_names
@@ -24,9 +23,8 @@ class Settings:
         M_bar: diagonal of M̄, one per joint, kg·m².
         M_bar_adapt: himpc, hiqp, nhimpc and weighted fit M̄ to the payload that they estimate from the applied
             torques, see `himpc.controllers.adaptation`.
-        route: "compiled" (the kernel of `himpc.tick`) or "explicit" (a general solver on all bounds).
-        solver: the solver of the QPs of the explicit route and of hqp: "daqp", "proxqp" or, with CasADi
-            installed, "qpoases". If no QP solver is used, only "daqp" is accepted, see `check_solver`.
+        solver: the solver of the QPs of himpc_printed and of hqp: "daqp", "proxqp" or, with CasADi installed,
+            "qpoases". If no QP solver is used, only "daqp" is accepted, see `check_solver`.
         R_on: the quantity that R in (31) weighs: the "torque" increments Δτ as printed, or the "acceleration"
             M̄⁻¹Δτ (HQP uses M_n of its model in place of M̄).
         damping: whether the damping level is added if the enabled levels leave freedom.
@@ -50,13 +48,9 @@ class Settings:
         page_unit="ms", factor=1000.0, tries=("0.002", "0.004", "0.001"), name="control period T_s, s",
         group="Horizon")] = 1e-3
     limits: Limits = field(default_factory=Limits)
-    route: Annotated[Route, Shown(
-        "Route", "Method that computes the torque; both methods give the same torque", group="Solver",
-    )] = "compiled"
     solver: Annotated[Solver, Shown(
-        "QP solver", "Solver of the QPs of hqp and of the explicit route. Controllers without QPs, and the "
-        "compiled route with its own method, accept daqp only. qpoases needs the extra 'bench'",
-        group="Solver")] = "daqp"
+        "QP solver", "Solver of the QPs of hqp and himpc_printed. Other controllers accept daqp only. "
+        "qpoases needs the extra 'bench'", group="Solver")] = "daqp"
     R_on: Annotated[Literal["torque", "acceleration"], Shown(
         "R weighs", "Quantity that R weighs: Δτ as printed, or M̄⁻¹Δτ", group="Solver")] = "torque"
     damping: Annotated[bool, Shown(
@@ -79,6 +73,6 @@ def check_solver(settings: Settings, used: bool) -> None:
     """Raises InputError for a QP solver other than the default if the controller uses no QP solver."""
     if settings.solver != "daqp" and not used:
         raise InputError(
-            f"solver={settings.solver} changes nothing here: a QP solver is used by hqp, and by himpc, hiqp, "
-            "nhimpc and weighted with route=explicit; choose one of these, or solver=daqp"
+            f"solver={settings.solver} changes nothing here: a QP solver is used by hqp and himpc_printed; "
+            "choose one of these, or solver=daqp"
         )

@@ -25,8 +25,9 @@ class Avoidance:
 
     # fmt: off
     on: Annotated[bool, Shown(
-        "Keep distances", "Keep distances between links, and between links and objects. himpc, hiqp, nhimpc "
-        "and weighted do this by bounds above all levels, himpc_filtered by a filter behind its levels",
+        "Keep distances", "Keep distances between links, and between links and objects. himpc, hiqp, nhimpc, "
+        "weighted and himpc_printed do this by bounds above all levels, himpc_filtered by a filter behind "
+        "its levels",
         tries=("true", "false"), name="distances kept", group="Distances")] = False
     d_safe: Annotated[float, Range(0.0, 0.2), Shown(
         "d_safe", "Smallest distance that is allowed", "m", 0.0, 100.0, 1.0, page_unit="mm", factor=1000.0,

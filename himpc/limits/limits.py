@@ -48,14 +48,15 @@ class Limits:
         "Approach", "Largest rate at which a joint may approach its velocity bound, relative to the "
         "remaining distance; 0: (32e) as printed", "1/s", 0.0, 100.0, 1.0)] = 15.0
     torque_rate: Annotated[float, Range(0.0, 1e5), Shown(
-        "Torque rate", "Largest change of each joint's torque per second; in himpc, hiqp, nhimpc and "
-        "weighted this limit ranks above all levels. 0: not imposed", "N·m/s", 0.0, 2000.0, 10.0,
-        name="torque rate limit", group="Limits")] = 0.0
+        "Torque rate", "Largest change of each joint's torque per second; in himpc, hiqp, nhimpc, "
+        "weighted and himpc_printed this limit ranks above all levels. 0: not imposed", "N·m/s", 0.0, 2000.0,
+        10.0, name="torque rate limit", group="Limits")] = 0.0
     stall_guard: Annotated[bool, Shown(
         "Rest when blocked",
         "A robot whose torque rises without progress of its tasks comes to rest, also if no distances are "
         "kept. Without this guard, as printed, time-delay estimation increases the torque until it is at "
-        "its limit. himpc, hiqp, nhimpc and weighted have the guard, and always while they keep distances",
+        "its limit. himpc, hiqp, nhimpc, weighted and himpc_printed have the guard, and always "
+        "while they keep distances",
         tries=("false", "true"), name="guard of a blocked robot", group="Limits")] = False
     # fmt: on
     avoidance: Annotated[Avoidance, Folder("avoidance.")] = field(default_factory=Avoidance)

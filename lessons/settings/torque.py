@@ -125,10 +125,9 @@ class TorqueSettings(ControllerSettings, SceneSettings):
         levels (one number, or one per level); "levels.NAME.KEY" with the level's name or its place 1 … r, KEY
         one of Q, R, horizon, enabled, K_p, K_v (gains of all its tasks); "tasks.NAME.K_p|K_v". If a value has
         one number per joint, a place 1 … n after the path selects the number of that joint: "M_bar.3"."""
-        controller, route = table["controller"], table["route"]
+        controller = table["controller"]
         words = controller.form.words
         yield replace(controller, change=lambda s, name: controller.change(s, _known(words, name)))
-        yield replace(route, change=lambda s, value: route.change(s, _now(value)))
         yield _STACK
         yield _ORDER
         yield setting_of_all_levels("Q", ("stack",), _Q)
@@ -143,7 +142,7 @@ class TorqueSettings(ControllerSettings, SceneSettings):
 
     def setting(self, path: str) -> Setting:
         """As in `SceneSettings`, and also "stack.add" and the other `CHANGES`, which change a part of the
-        stack."""
+        stack, and "route", see `_with_route`."""
         return _CHANGES.get(path) or super().setting(path)
 
     def as_data(self) -> dict[str, Any]:
@@ -156,9 +155,11 @@ class TorqueSettings(ControllerSettings, SceneSettings):
         return [("stack", told(wanted.levels, dict(wanted.own_tasks)))]
 
 
-def _now(route: Any) -> Any:
-    """Codes and scripts of earlier versions may name a route that was replaced."""
-    return "compiled" if route == "structured" else route
+def _with_route(settings: TorqueSettings, route: str) -> TorqueSettings:
+    """Codes and scripts of earlier versions may name a route. `explicit` is now a controller. For controllers
+    other than himpc, both routes had the same torques."""
+    printed = route == "explicit" and settings.controller == "himpc"
+    return replace(settings, controller="himpc_printed") if printed else settings
 
 
 def _known(words: tuple[str, ...], name: Any) -> Any:
@@ -210,6 +211,16 @@ _CHANGES = {
         "stack.add": lambda s, value: add(s.levels, value, _own(s)),
     }.items()
 }
+_ROUTES = Form(WORD, words=("compiled", "explicit", "structured"))
+_CHANGES["route"] = Setting(
+    "route",
+    Shown("Route"),
+    _ROUTES,
+    lambda s: "explicit" if s.controller == "himpc_printed" else "compiled",
+    lambda s, value: _with_route(s, _ROUTES.fit("route", value)),
+    "route",
+    shorthand=True,
+)
 _Q = Shown("Q", "Weight of the residual; sets all levels at once", "", 1.0, 1000.0, 1.0)
 _R = Shown("R", "Weight of the changes of torque; sets all levels at once", "", 0.1, 100.0, 0.1)
 _OF_LEVELS = {

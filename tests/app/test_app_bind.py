@@ -202,7 +202,7 @@ def test_controls_open_on_whatever_is_set(viser_server: viser.ViserServer) -> No
     assert {0.04, 9.0, 0.01, 60, 1e-8} <= values
 
 
-@pytest.mark.parametrize("path", ["solver", "route", "R_on", "limits.position"])
+@pytest.mark.parametrize("path", ["solver", "R_on", "limits.position"])
 def test_menus_offer_every_word_a_setting_may_hold(
     viser_server: viser.ViserServer, path: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -32,7 +32,7 @@ def test_a_path_reaches_its_field_and_nothing_else(start: TorqueSettings) -> Non
         "M_bar_scale": (2.0, lambda s: s.M_bar_scale),
         "M_bar": ([0.1] * 7, lambda s: list(s.M_bar)),
         "solver": ("proxqp", lambda s: s.solver),
-        "route": ("explicit", lambda s: s.route),
+        "controller": ("himpc_printed", lambda s: s.controller),
         "R_on": ("acceleration", lambda s: s.R_on),
         "damping": (False, lambda s: s.damping),
         "limits.position": ("paper", lambda s: s.limits.position),
