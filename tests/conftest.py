@@ -37,8 +37,7 @@ _TOGETHER = (
     ("tests/app/browser/",),
     (
         "tests/lessons/test_lessons_course.py",
-        "tests/lessons/test_lessons_quoted.py",
-        "tests/lessons/test_lessons_interventions.py",
+        "tests/lessons/test_lessons_evidence.py",
     ),
     ("tests/test_site.py", "tests/test_site_live.py"),
 )
@@ -66,8 +65,7 @@ _LONG = (
     "tests/test_site.py",
     "tests/test_site_live.py",
     "tests/lessons/test_lessons_course.py",
-    "tests/lessons/test_lessons_quoted.py",
-    "tests/lessons/test_lessons_interventions.py",
+    "tests/lessons/test_lessons_evidence.py",
     "tests/commands/test_commands_reproduce.py",
     "tests/commands/test_commands_export.py",
     "tests/robots/test_robots_catalog.py",

@@ -1,5 +1,5 @@
-"""Slows joints down while a controller keeps distances: all joints of a stalled robot, joints with little
-torque left, and joints that accelerate. Without distances, it also stops a robot that presses."""
+"""The guards of a controller, which lower velocity limits: one for controllers that keep distances, and one
+for the others, which also stops a robot that presses."""
 
 from __future__ import annotations
 
@@ -9,30 +9,28 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.constants import BLOCKED, HEAVY_LOAD, PROGRESS
+from himpc.constants import PROGRESS
 from himpc.formulation.settings import Settings
 from himpc.limits import LimitsInForce
-from himpc.limits.load import loaded, spared
-from himpc.limits.overrun import anticipated, followed
-from himpc.limits.stall import going, slowed, stalled
 from himpc.limits.windup import Windup, free, largest_error, stopped, taken_back, wound_up
-from himpc.tick.compiled_stall_guard import CompiledStallGuard
 from himpc.tick.distances import Anywhere, Distances, carried
+from himpc.tick.kernel.slow_down import slow_down
 from robots import Robot
 
 Array = NDArray[np.float64]
 
 
+_NONE = np.empty(0)
+
+
 @final
 class StallGuard:
-    """Contains the degree to which the robot of a controller is stalled.
+    """Slows joints down while a controller keeps distances: all joints of a stalled robot, joints that are
+    carried by a motor with little torque left, and joints that accelerate, see `tick.kernel.slow_down`.
 
     Attributes:
         errors: (T,) the lengths of the tasks' errors at the last tick, m or rad; None before the first one.
         fastest: the largest velocity of a row of a reference at the last tick, m/s or rad/s.
-        stall: the degree to which the robot is stalled.
-        load: (n,) the mean load of each joint, as a share of its torque limit; None before the first tick.
-        mean: (n,) rad/s, the mean velocity of each joint.
         largest_error: the largest error on which tasks act, m or rad.
     """
 
@@ -40,15 +38,14 @@ class StallGuard:
         self._T_s, self.largest_error = T_s, largest_error
         self.errors: Array | None = None
         self.fastest = 0.0
-        self.stall = going(tasks)
-        self.load: Array | None = None
-        self.mean: Array | None = None
+        self._due, self._stall = np.full(tasks, np.inf), np.array((1.0, np.inf))
+        self._joints: Array | None = None
+        self._limits: tuple[LimitsInForce, Array, Array] | None = None
 
     def limits(
         self, limits: LimitsInForce, tau: Array, v: Array, distances: Distances | Anywhere | None
     ) -> LimitsInForce:
-        """Returns the limits in force at this tick. Velocity limits are lower while the robot is stalled, and
-        for joints that accelerate or have little torque left.
+        """Returns the limits in force at this tick, with lower velocity limits.
 
         Args:
             limits: the limits without these reductions.
@@ -57,16 +54,19 @@ class StallGuard:
             distances: the pairs of the last tick.
         """
         assert distances is not None
-        T_s = self._T_s
-        limits = limits.with_velocities((1.0 - distances.velocity_margin) * limits.v_limit)
-        self.load = loaded(np.zeros_like(tau) if self.load is None else self.load, tau, limits, T_s)
-        self.mean = followed(v if self.mean is None else self.mean, v, T_s)
-        limits = anticipated(spared(limits, self.load, distances.carried), v, self.mean)
-        if self.errors is not None:
-            moves = distances.moves or self.fastest > PROGRESS
-            room = min(distances.room, BLOCKED) if self.load.max() > HEAVY_LOAD else distances.room
-            self.stall = stalled(self.stall, self.errors, moves, room, T_s)
-        return slowed(limits, self.stall)
+        if self._joints is None:
+            self._joints = np.array((np.zeros_like(v), v))
+        if self._limits is None or self._limits[0] is not limits:
+            v_limit = (1.0 - distances.velocity_margin) * limits.v_limit
+            self._limits = limits, v_limit, limits.largest_torque
+        load, mean = self._joints
+        slower = np.empty(len(v))
+        slow_down(
+            *(*self._limits[1:], tau, v, distances.carried, distances.room),
+            *(distances.moves or self.fastest > PROGRESS, self._T_s),
+            *(_NONE if self.errors is None else self.errors, self._due, self._stall, load, mean, slower),
+        )
+        return limits.with_velocities(slower)
 
 
 @final
@@ -79,9 +79,7 @@ class WindupGuard:
         windup: the degree to which the torque is wound up; None before the first tick.
     """
 
-    def __init__(
-        self, stall: StallGuard | CompiledStallGuard, robot: Robot, M_bar: Array, margin: float, T_s: float
-    ) -> None:
+    def __init__(self, stall: StallGuard, robot: Robot, M_bar: Array, margin: float, T_s: float) -> None:
         """stall: the guard for an obstacle that is near. M_bar: (n,) kg·m². margin: see `Avoidance`."""
         self._stall, self._around, self._T_s = stall, Anywhere(carried(robot), margin), T_s
         self._v_limit, self._largest = robot.v_limit, taken_back(M_bar, robot.v_limit, T_s)
@@ -117,10 +115,8 @@ class WindupGuard:
         return min(self._stall.largest_error, pressing)
 
 
-def guard_of(
-    settings: Settings, tasks: int, robot: Robot
-) -> StallGuard | CompiledStallGuard | WindupGuard | None:
-    """Returns the guard for a controller on the route of its settings; None if the settings have no guard.
+def guard_of(settings: Settings, tasks: int, robot: Robot) -> StallGuard | WindupGuard | None:
+    """Returns the guard for a controller; None if the settings have no guard.
 
     Args:
         settings: the settings of the controller.
@@ -131,8 +127,7 @@ def guard_of(
     avoidance = limits.avoidance
     if not avoidance.on and not limits.stall_guard:
         return None
-    kind = CompiledStallGuard if settings.route == "compiled" else StallGuard
-    stall = kind(tasks, T_s, avoidance.pull or math.inf)
+    stall = StallGuard(tasks, T_s, avoidance.pull or math.inf)
     if avoidance.on:
         return stall
     return WindupGuard(stall, robot, np.array(settings.M_bar), avoidance.velocity_margin, T_s)
