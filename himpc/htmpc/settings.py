@@ -18,6 +18,7 @@ from robots.ranges import Range, check_fields
 Array = NDArray[np.float64]
 Formulation = Literal["proximal", "paper"]
 Lexicographic = Literal["per_coordinate", "cost"]
+FirstLevel = Literal["scaled", "hard", "soft"]
 
 FORMULATIONS: tuple[Formulation, ...] = ("proximal", "paper")
 LEXICOGRAPHIC: tuple[Lexicographic, ...] = ("per_coordinate", "cost")
@@ -76,9 +77,11 @@ class HTMPCSettings:
             samples the references at t + delay_s.
         hold: joints that stay at rest, by name.
         base: how the base moves; see `himpc.htmpc.base.G`.
-        gains: used by HTIDKC only, 1/s: ẋ = ṙ + gain · (r − x) at each enabled level. The last gain applies
-            to all further levels.
-        rho: used by HTIDKC only: ρ, the weight of ‖q̇‖² at every level.
+        gains: used by HTIDKC and placo only, 1/s: ẋ = ṙ + gain · (r − x) at each enabled level. The last gain
+            applies to all further levels.
+        rho: used by HTIDKC and placo only: ρ, the weight of ‖q̇‖², for HTIDKC at every level.
+        first_level: used by placo only: how it treats the first enabled level, see
+            `himpc.htmpc.placo_control.Placo`.
         solver: the QP solver, see himpc.qp.Solver. HTIDKC uses it for every QP. HTMPC and its variants use a
             compiled method, and "daqp" if that method finds no solution. Any other value of `solver` replaces
             both.
@@ -105,6 +108,7 @@ class HTMPCSettings:
     base: Base = "holonomic"
     gains: Annotated[tuple[float, ...], Range(0.0)] = (0.5, 0.3)
     rho: Annotated[float, Range(1e-8, 1e3)] = 0.01
+    first_level: FirstLevel = "scaled"
     solver: Solver = "daqp"
 
     def __post_init__(self) -> None:
