@@ -51,8 +51,8 @@ class Placo(DifferentialController):
     - "scaled": J_1 q̇ = s ẋ_1, where (1 − s)² is added to the sum and 0 ≤ s ≤ 1;
     - "soft": as the other levels.
 
-    It does not look ahead, and ignores obstacles. It gives no multipliers; `kkt_residual` is therefore only
-    the amount by which placo's velocity is outside the box.
+    It does not look ahead, and ignores obstacles. It gives no multipliers: `kkt_residual` is the amount by
+    which placo's velocity is outside the box.
     """
 
     def _fit(self, levels: Stack, settings: HTMPCSettings) -> None:

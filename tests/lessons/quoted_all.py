@@ -236,6 +236,25 @@ QUOTED = (
         1 / 50,
         1 / 33,
     ),
+    *(
+        Quoted("how-strict-is-strict/4", phrase, _of(EE), low, high, settings)
+        for phrase, low, high, settings in (
+            ("off by 2.5 mm instead of 5 mm", 4.9, 5.1, ()),
+            ("off by 2.5 mm instead of 5 mm", 2.4, 2.55, ("rate_hz=100",)),
+            ("and with two hundred by 1.2 mm", 1.15, 1.25, ("rate_hz=200",)),
+            ("a gain of 5 1/s instead of 0.5 1/s the hand is off by 1.2 mm", 1.15, 1.25, ("gains=[5,0.3]",)),
+            ("it is off by 5.2 mm", 5.1, 5.25, ("first_level=soft", "levels.ee.Q=1000")),
+            ("a hand that is weighed against the base is off by 10 cm", 95, 105, ("first_level=soft",)),
+        )
+    ),
+    Quoted(
+        "how-strict-is-strict/4",
+        "with a gain of 20 1/s the mean error of the hand is that of the ghost",
+        _ratio(EE, "mean"),
+        0.9,
+        1.1,
+        ("gains=[20,0.3]",),
+    ),
     Quoted(
         "seeing-ahead/0",
         "more than half a metre of the way back at 8 s",
