@@ -107,7 +107,11 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
     return True if collection_path.relative_to(_ROOT).as_posix() not in _QUICK else None
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--nightly", action="store_true", help="run the tests that are marked nightly, too")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     def rank(item: pytest.Item) -> int:
         return next((k for k, long in enumerate(_LONG) if item.nodeid.startswith(long)), len(_LONG))
 
@@ -115,9 +119,39 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if item.nodeid.startswith(_QUICK):
             item.add_marker(pytest.mark.quick)
+    left_out = [item for item in items if not _runs(item, config)]
+    if left_out:
+        items[:] = [item for item in items if item not in set(left_out)]
+        config.hook.pytest_deselected(items=left_out)
+
+
+def _runs(item: pytest.Item, config: pytest.Config) -> bool:
+    """Whether the test runs. A test that is marked `nightly` runs with `--nightly`, when the command line
+    names its file, and when a commit of the last day has changed its file or a path that the mark names."""
+    mark = item.get_closest_marker("nightly")
+    if mark is None or config.getoption("nightly") or _few_files(config):
+        return True
+    file = item.path.relative_to(_ROOT).as_posix()
+    return any(path.startswith((file, *mark.args)) for path in config.stash[_CHANGED])
+
+
+def _changed() -> list[str]:
+    """Returns the files that the commits of the last day before the newest one have changed: no nightly run
+    has seen them. Without a repository the list is empty."""
+
+    def git(*arguments: str) -> str:
+        command = ["git", "-C", str(_ROOT), "log", *arguments]
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+    try:
+        day_before = int(git("-1", "--format=%ct")) - 24 * 3600
+        return sorted(set(git(f"--since={day_before}", "--name-only", "--format=").split("\n")) - {""})
+    except (OSError, subprocess.CalledProcessError):
+        return []
 
 
 _ROOT = Path(__file__).parents[1]
+_CHANGED = pytest.StashKey[list[str]]()
 _COMPILE = "from himpc.compilation.compiling import compile_all; compile_all(lambda *_: None)"
 _COLD = pytest.StashKey[tuple[str, str]]()
 
@@ -126,7 +160,9 @@ def pytest_configure(config: pytest.Config) -> None:
     """Compiles all functions before the tests, because compilation takes a minute. In a fresh clone the first
     run of the command compiles them; its recording is stored for the test that compares it with the second
     run."""
-    if hasattr(config, "workerinput") or _few_files(config):
+    by_controller: dict[str, Any] | None = getattr(config, "workerinput", None)
+    config.stash[_CHANGED] = _changed() if by_controller is None else by_controller["changed"]
+    if by_controller is not None or _few_files(config):
         return
     if not any(_ROOT.glob("himpc/**/__pycache__/compiled/*.code")) and "NUMBA_CACHE_DIR" not in os.environ:
         file = Path(mkdtemp(), "first.npz")
@@ -143,8 +179,9 @@ def _few_files(config: pytest.Config) -> bool:
 
 
 def pytest_configure_node(node: Any) -> None:
-    """Passes the stored first run to a worker."""
+    """Passes the stored first run and the changed files to a worker."""
     node.workerinput["cold"] = node.config.stash.get(_COLD, None)
+    node.workerinput["changed"] = node.config.stash[_CHANGED]
 
 
 def _run(file: Path, **environment: str) -> str:

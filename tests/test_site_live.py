@@ -182,6 +182,10 @@ def test_a_live_step_is_the_step_of_the_lesson(simulated: Page, name: str) -> No
     assert seen
 
 
+FIREFOX = pytest.mark.nightly("docs/browser", "himpc/compilation", "himpc/export")
+
+
+@FIREFOX
 @pytest.mark.parametrize("name", [*front.TRIED, *STEPS])
 def test_firefox_computes_what_the_lab_computes(simulated_in_firefox: Tab, name: str) -> None:
     """The torques of two seconds of every live figure equal Python's."""
@@ -189,6 +193,7 @@ def test_firefox_computes_what_the_lab_computes(simulated_in_firefox: Tab, name:
     assert np.abs(found["tau"] - wanted(name)).max() < 1e-8
 
 
+@FIREFOX
 def test_firefox_draws_the_robot(site: Path, in_firefox: Tab) -> None:
     """The page simulates in Firefox and draws the ball of the first level, in orange, at its position."""
     in_firefox.goto((site / "try.html").as_uri() + "#planar3-hold")

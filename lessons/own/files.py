@@ -31,6 +31,19 @@ def is_lesson(name: str) -> bool:
     return name.endswith(LESSON_SUFFIX)
 
 
+Stamp = tuple[str, int, int]
+"""Path, time and size of a file. If the stamp changes, the file was saved."""
+
+
+def stamp(path: str) -> Stamp | None:
+    """Returns the stamp of a file; None while there is no file, as for a moment while it is saved."""
+    try:
+        status = os.stat(path)
+    except OSError:
+        return None
+    return path, status.st_mtime_ns, status.st_size
+
+
 @dataclass(frozen=True)
 class Source:
     """A file as it was read.

@@ -90,6 +90,7 @@ def ask(url: str, headers: Mapping[str, str]) -> tuple[int, str]:
         return refused.code, url
 
 
+@pytest.mark.nightly("app/jupyter")
 def test_only_the_user_of_the_jupyter_server_gets_in(jupyter: tuple[str, Path]) -> None:
     """Through Jupyter's path the page opens under its name, and from this address its web socket finds the
     same path. The account is the one that Jupyter sends, whatever the browser sends. All other requests are

@@ -43,6 +43,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "serving.md"
 NAME = "lab.example.org"
 PROTOCOL: Any = [f"viser-v{__version__}"]
 LONG = 60.0
+NGINX = pytest.mark.nightly("app/server", "docs/serving.md")
 
 
 def free_port() -> int:
@@ -154,6 +155,7 @@ def dial(port: int, certificate: Path, origin: str, cookie: str) -> Any:
     )
 
 
+@NGINX
 def test_the_printed_proxy_shows_the_page(proxied: tuple[PageServer, int, Path]) -> None:
     """The page opens with TLS, the token and web sockets; other origins and hosts are refused."""
     server, port, certificate = proxied
@@ -193,6 +195,7 @@ server {
 """
 
 
+@NGINX
 @pytest.mark.parametrize("host", ["$proxy_host", "127.0.0.1", "$http_host"])
 def test_strangers_that_a_forgotten_proxy_lets_through_run_nothing(
     host: str, nginx: str, tmp_path: Path
@@ -242,6 +245,7 @@ server {
 """
 
 
+@NGINX
 def test_the_page_works_below_any_path(nginx: str, tmp_path: Path) -> None:
     """The proxy removes a prefix. The token, but not the prefix, is removed from the address; the cookie
     belongs to the prefix; the question for the token leads back to it; a page gets a robot at its name."""
@@ -287,6 +291,7 @@ def test_the_page_works_below_any_path(nginx: str, tmp_path: Path) -> None:
         server.close()
 
 
+@NGINX
 def test_phones_need_no_password_and_get_no_account(nginx: str, tmp_path: Path) -> None:
     """With the printed locations of a class, only a correct password opens a robot's page, even if an address
     is written in an unusual way."""
@@ -378,6 +383,7 @@ def learners(servers: Sequence[PageServer]) -> list[SimulationClient]:
     return [each for server in servers for each in server.sessions.learners if each.attached]
 
 
+@NGINX
 def test_a_full_server_behind_the_printed_balancer_is_passed_over(nginx: str, tmp_path: Path) -> None:
     """There are two servers of one session each, with one token. The second learner gets the second robot;
     the third is asked to wait, and gets the place that becomes free."""
@@ -399,6 +405,7 @@ def test_a_full_server_behind_the_printed_balancer_is_passed_over(nginx: str, tm
                 assert eventually(lambda: len(learners(servers)) == 2, LONG)
 
 
+@NGINX
 def test_a_page_goes_on_with_another_server_where_it_was(nginx: str, tmp_path: Path) -> None:
     """A server that is going to stop admits nobody and informs its page. After it has ended, the page's
     browser brings the step of its lesson, or the settings of its scene, to the other server."""

@@ -9,6 +9,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
+pytestmark = pytest.mark.nightly("app/link", "app/server", "benchmarks/soak.py", "benchmarks/switches.py")
+
 ROOT = Path(__file__).parents[2]
 
 

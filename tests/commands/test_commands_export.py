@@ -230,6 +230,7 @@ def test_what_cannot_be_exported_is_told_in_one_sentence(
     assert not out.exists()
 
 
+@pytest.mark.nightly("himpc/compilation", "himpc/export")
 def test_aarch64_replays_the_same_torques(tmp_path: Path) -> None:
     """On another processor, whose sums are rounded differently, the torques are the same to 1e-9 N·m."""
     needed("aarch64-linux-gnu-gcc", "qemu-aarch64")

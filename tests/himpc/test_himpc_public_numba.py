@@ -66,6 +66,9 @@ def on_numba_alone(folder: Path, *arguments: str, **environment: str) -> None:
     assert done.stdout.split() == []
 
 
+pytestmark = pytest.mark.nightly("himpc/compilation", "himpc/tick/kernel", "himpc/htmpc/kernel")
+
+
 # LLVM's optimizations are switched off: with them, the cascade alone takes three minutes of a core here.
 @pytest.mark.parametrize(
     ("names", "environment"),

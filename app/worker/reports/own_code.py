@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import threading
 
 from app.link.own_code import OwnCode
-from lessons.own.files import is_file, read
+from lessons.own.files import Stamp, is_file, read, stamp
 from lessons.own.judge import judged
 from lessons.session.torque import TorqueSession
 from robots import InputError
-
-Stamp = tuple[str, int, int]
-"""The stamp of a file: its path, time and size. If the stamp changes, the file was saved."""
 
 
 class File:
@@ -33,17 +29,17 @@ class File:
         if not is_file(path):
             self._stamp = self._test = None
             return None
-        stamp, test = _stamp(path), self._test
+        saved, test = stamp(path), self._test
         if self._stamp is None or self._stamp[0] != path:
             # A test of the file before is not waited for: it says nothing about this file.
-            self._stamp, self._fault, self._test = stamp, None, None
-        elif stamp is not None and stamp != self._stamp and test is None:
-            self._test = _Test(stamp)
+            self._stamp, self._fault, self._test = saved, None, None
+        elif saved is not None and saved != self._stamp and test is None:
+            self._test = _Test(saved)
             self._test.start()
         elif test is not None and not test.is_alive():
             self._test = None
-            if stamp == test.stamp:  # otherwise the file was saved again, and is tested again
-                self._stamp = stamp
+            if saved == test.stamp:  # otherwise the file was saved again, and is tested again
+                self._stamp = saved
                 self._take(session, test.fault)
         return OwnCode(path, self._fault or session.failure, self._saves, self._taken_at)
 
@@ -72,13 +68,3 @@ class _Test(threading.Thread):
             self.fault = None
         except InputError as error:
             self.fault = str(error)
-
-
-def _stamp(path: str) -> Stamp | None:
-    """Returns the stamp of a file; None while the file does not exist. This happens for a moment while the
-    file is saved."""
-    try:
-        found = os.stat(path)
-    except OSError:
-        return None
-    return path, found.st_mtime_ns, found.st_size
