@@ -1,11 +1,12 @@
-"""Who keeps the first level at velocity level, and at what cost: HTMPC, HTIDKC and placo in turns, in one process.
+"""Who keeps the first level at velocity level, and at what cost: HTMPC, HTIDKC and placo in turns.
 
     python -m benchmarks.first_level [SCENE]
 
-All runs of `ridgeback-ur10-square` advance by one second of simulated time, one after the other, so that they are
-disturbed equally. Processor time is measured, so that other programs do not count. The program prints a table: the
-mean and the largest error of level 1, mm; the mean error of level 2 in the first and in the second half, m; the
-median and the 99th percentile of a step from state to motion command, and the median share of the QPs, µs.
+All runs of `ridgeback-ur10-square` advance by one second of simulated time, one after the other in one
+process, so that they are disturbed equally. Processor time is measured, so that other programs do not count.
+The program prints a table: the mean and the largest error of level 1, mm; the mean error of level 2 in the
+first and in the second half, m; the median and the 99th percentile of a step from state to motion command,
+and the median share of the QPs, µs.
 """
 
 from __future__ import annotations
@@ -14,10 +15,6 @@ import sys
 import time
 
 import numpy as np
-
-from lessons.scenes.run_spec import RunSpec
-from lessons.scenes.velocity_scene import VelocityScene
-from lessons.session.velocity import VelocitySession
 
 RUNS = {
     "HTMPC, δ = 1 cm": ("htmpc", ()),
@@ -34,7 +31,11 @@ RUNS = {
 
 def main(scene: str = "ridgeback-ur10-square") -> None:
     """Prints a row of a Markdown table for each run."""
-    time.perf_counter_ns = time.thread_time_ns
+    time.perf_counter_ns = time.thread_time_ns  # before the controllers are imported
+    from lessons.scenes.run_spec import RunSpec
+    from lessons.scenes.velocity_scene import VelocityScene
+    from lessons.session.velocity import VelocitySession
+
     sessions: dict[str, VelocitySession] = {}
     for name, (controller, changes) in RUNS.items():
         prepared = RunSpec(scene, controller=controller, set=changes).prepared()

@@ -189,8 +189,8 @@ def test_the_robot_feels_the_time_of_planning_if_asked_to(monkeypatch: pytest.Mo
 
 
 def test_the_learner_reads_once_what_placo_says() -> None:
-    """placo with a hard first level cannot follow a target that jumps far. The session says so once, until the
-    settings change; the level shows its fallback at every tick, and the robot does not move."""
+    """placo with a hard first level cannot follow a target that jumps far. The session says so once, until
+    the settings change; the level shows its fallback at every tick, and the robot does not move."""
     made = session("iiwa14-htmpc", "controller=placo", "first_level=hard")
     made.tick()
     assert made.notices == []
