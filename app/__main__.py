@@ -23,7 +23,7 @@ COMMANDS: dict[str, str] = {
     "lessons": "list the lessons, or check all their claims headless",
     "grade": "judge solutions of the exercises, one file or a folder of them",
     "new": "write a template of a controller, scene, lesson, task or exercise of your own",
-    "bench": "compare the control-step times of the routes and solvers",
+    "bench": "compare the control-step times of himpc and of himpc_printed with each solver",
     "reproduce": "compare our results with the papers' tables and figures",
     "sweep": "run a grid of settings and draw a map; a stopped sweep can be continued",
     "export": "export a controller as C or WebAssembly, with its numbers and a recorded run to replay",

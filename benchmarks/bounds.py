@@ -1,15 +1,15 @@
-"""Runs the compiled route with many active bounds: long horizons, low limits, dragged targets.
+"""Runs HIMPC with many active bounds: long horizons, low limits, dragged targets.
 
     python -m benchmarks.bounds [--quick] [--seconds 0.33] [--scenes NAME …] [--horizons N …]
-                                [--velocity SCALE …] [--torque SCALE …] [--explicit]
+                                [--velocity SCALE …] [--torque SCALE …] [--printed]
 
 Every torque scene runs with every horizon and every scale of its velocity and torque limits, while all its
 targets jump every 80 ms. For each run the program prints a line of a Markdown table: the number of QPs
 without a verified optimum, the largest joint velocity as a share of its limit, the processor time of the
 longest and of the median step, and the largest share of its budget that a tick used. --quick runs only the
-hardest cells; --explicit also runs the explicit route. The exit code is 1 if more than 1 % of the QPs of a
+hardest cells; --printed also runs himpc_printed. The exit code is 1 if more than 1 % of the QPs of a
 cell are unsolved, if a step takes more than 20 ms, or if a joint moves more than 2 % faster than its limit
-and than with the explicit route, where this was run.
+and than with himpc_printed, where this was run.
 """
 
 from __future__ import annotations
@@ -26,7 +26,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from himpc.catalog import Route
 from himpc.rotation import exp3, quaternion
 from lessons.events import MoveTarget
 from lessons.scenes.catalog import torque_scene
@@ -50,14 +49,14 @@ class Cell(NamedTuple):
 
 
 class Found(NamedTuple):
-    """The results of one route.
+    """The results of one controller.
 
     Attributes:
         unsolved, of: QPs without a verified optimum, and all QPs.
         speed: the largest joint velocity as a share of its limit.
         longest_ms, median_ms: processor time of the longest and the median step, ms. The first step is not
             counted.
-        spent: the largest share of its budget that a tick of the compiled route used.
+        spent: the largest share of its budget that a tick of the kernel used.
     """
 
     unsolved: int
@@ -78,11 +77,11 @@ QUICK = (
 )
 
 
-def session_of(cell: Cell, route: Route) -> TorqueSession:
+def session_of(cell: Cell, controller: str) -> TorqueSession:
     """Returns a session with the settings of a cell."""
     scene = torque_scene(cell.scene)
     limits = replace(scene.settings.limits, velocity_scale=cell.velocity, torque_scale=cell.torque)
-    settings = replace(scene.settings, horizon=cell.N, route=route, limits=limits)
+    settings = replace(scene.settings, horizon=cell.N, controller=controller, limits=limits)
     return TorqueSession(replace(scene, settings=settings))
 
 
@@ -103,9 +102,9 @@ def drag(session: TorqueSession, rng: np.random.Generator) -> None:
                 session.post(MoveTarget(task.name, tuple(value.tolist())))
 
 
-def run(cell: Cell, route: Route, seconds: float) -> Found:
-    """Returns the results of one cell with one route."""
-    session, rng = session_of(cell, route), np.random.default_rng(0)
+def run(cell: Cell, controller: str, seconds: float) -> Found:
+    """Returns the results of one cell with one controller."""
+    session, rng = session_of(cell, controller), np.random.default_rng(0)
     T_s = session.scene.settings.T_s
     first, every = round(_FIRST / T_s), max(round(_EVERY / T_s), 1)
     unsolved, of, speed, spent = 0, 0, 0.0, 0.0
@@ -144,7 +143,7 @@ def cells(given: argparse.Namespace) -> Iterable[Cell]:
 
 
 def faults(found: Found, reference: Found | None) -> list[str]:
-    """Returns a word for each limit that the compiled route exceeded."""
+    """Returns a word for each limit that HIMPC exceeded."""
     said = ["slow"] if found.longest_ms > LONGEST_MS else []
     said += ["unsolved"] if found.unsolved > MOST_UNSOLVED * found.of else []
     if reference is not None:
@@ -161,16 +160,14 @@ def main() -> int:
     parser.add_argument("--horizons", nargs="+", type=int, default=HORIZONS)
     parser.add_argument("--velocity", nargs="+", type=float, default=VELOCITY)
     parser.add_argument("--torque", nargs="+", type=float, default=TORQUE)
-    parser.add_argument("--explicit", action="store_true", help="also runs the explicit route")
+    parser.add_argument("--printed", action="store_true", help="also runs himpc_printed")
     given = parser.parse_args()
-    print(
-        "| scene | N | velocity | torque | unsolved | explicit | speed | explicit | ms | median | budget | |"
-    )
+    print("| scene | N | velocity | torque | unsolved | printed | speed | printed | ms | median | budget | |")
     print("|---|---|---|---|---|---|---|---|---|---|---|---|")
     ran = wrong = 0
     for cell in cells(given):
-        found = run(cell, "compiled", given.seconds)
-        reference = run(cell, "explicit", given.seconds) if given.explicit else None
+        found = run(cell, "himpc", given.seconds)
+        reference = run(cell, "himpc_printed", given.seconds) if given.printed else None
         said = faults(found, reference)
         ran, wrong = ran + 1, wrong + bool(said)
         other = ("", "") if reference is None else (str(reference.unsolved), f"{reference.speed:.3f}")

@@ -1,5 +1,5 @@
 """Computes the optimum of every level of a hierarchy to far more digits than a double has. The results are
-the reference for the compiled and the explicit route.
+the reference for the kernel and the printed equations.
 
 Only the problem's data come from `himpc`. For a set of active rows the optimality conditions of (32) or (34),
 with (33) as printed, are linear. They are solved in doubles. The solution is then corrected until its

@@ -1,12 +1,12 @@
-"""Compares the compiled and the explicit route with the exact optimum, for random stacks on every robot.
+"""Compares the kernel and the printed equations with the exact optimum, for random stacks on every robot.
 
     python -m benchmarks.oracle [--stacks 200] [--seed 0] [--longest 30] [--json -]
 
 A stack has one to four levels with random tasks, weights (Q over five decades, R on the torque or on the
-acceleration), horizons and limits, in a random state and with random targets. Each route solves the problem
-of the controller at that tick, and `benchmarks.exact` computes the optimum. The program prints a row per
-robot: how often a route returned no point although there is an optimum, and the distance of the route's
-points from the optimum, N·m.
+acceleration), horizons and limits, in a random state and with random targets. The kernel and
+the printed equations solve the problem of the controller at that tick, and `benchmarks.exact` computes the
+optimum. The program prints a row per robot: how often one of the two returned no point although there is an
+optimum, and the distance of its points from the optimum, N·m.
 """
 
 from __future__ import annotations
@@ -27,9 +27,8 @@ from numpy.typing import NDArray
 from benchmarks.every_task import entry, scene_of
 from benchmarks.exact import Exact, optimum
 from himpc import HIMPC
-from himpc.cascade.cascade import solve_cascade
 from himpc.cascade.level import NO_ROWS, LevelProblem, LevelSolution
-from himpc.catalog import Route
+from himpc.controllers.printed_tick import solve
 from himpc.limits import Rows, build_rows
 from himpc.limits.braking import least_slack
 from himpc.prediction.joint import JointState
@@ -42,7 +41,7 @@ from lessons.settings.assignments import assignment
 from robots import CATALOG
 
 Array = NDArray[np.float64]
-ROUTES: tuple[Route, ...] = ("compiled", "explicit")
+METHODS = ("compiled", "printed")
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,16 +53,16 @@ class Stack:
     problems: list[LevelProblem]
     rows: Rows
 
-    def solve(self, route: Route) -> list[LevelSolution]:
-        if route == "compiled":
+    def solve(self, by: str) -> list[LevelSolution]:
+        if by == "compiled":
             return solve_problems(self.problems, self.rows, {})
-        return solve_cascade(self.problems, self.rows, {}, "daqp")
+        return solve(self.problems, self.rows.matrix, self.rows, {})
 
 
 @dataclass(frozen=True)
 class Found:
-    """The result of a route at one level: the number of bounds that are active at the optimum, and the
-    distance of the route's point from the optimum, N·m. The distance is None if the route returned no
+    """The results at one level: the number of bounds that are active at the optimum, and the distances of the
+    points of the kernel and of the printed equations from the optimum, N·m. A distance is None if there is no
     point."""
 
     robot: str
@@ -72,7 +71,7 @@ class Found:
     horizon: int
     active: int
     compiled: float | None
-    explicit: float | None
+    printed: float | None
 
 
 def random_stack(robot: str, seed: int, longest: int) -> Stack | None:
@@ -117,20 +116,20 @@ def random_stack(robot: str, seed: int, longest: int) -> Stack | None:
 
 def judged(stack: Stack) -> list[Found] | None:
     """Returns one row per level; None if the exact optimum was not found."""
-    solutions = {route: stack.solve(route) for route in ROUTES}
+    solutions = {by: stack.solve(by) for by in METHODS}
     above: list[tuple[LevelProblem, Exact]] = []
     found = []
-    right = dict.fromkeys(ROUTES, True)
+    right = dict.fromkeys(METHODS, True)
     for place, problem in enumerate(stack.problems):
-        points = {route: solutions[route][place] for route in ROUTES}
+        points = {by: solutions[by][place] for by in METHODS}
         best = None
-        for guess in (points["explicit"].active, points["compiled"].active, NO_ROWS):
+        for guess in (points["printed"].active, points["compiled"].active, NO_ROWS):
             best = best or optimum(problem, stack.rows, above, guess)
         if best is None:
             return None
-        for route in ROUTES:  # after a level without a point, the next problem differs
-            right[route] = right[route] and points[route].fallback == "solve"
-        errors = [float(np.abs(points[route].U - best.U).max()) if right[route] else None for route in ROUTES]
+        for by in METHODS:  # after a level without a point, the next problem differs
+            right[by] = right[by] and points[by].fallback == "solve"
+        errors = [float(np.abs(points[by].U - best.U).max()) if right[by] else None for by in METHODS]
         found.append(
             Found(stack.robot, stack.seed, place + 1, len(problem.B), best.active, errors[0], errors[1])
         )
@@ -152,14 +151,14 @@ def stacks(count: int, seed: int, longest: int, robots: tuple[str, ...]) -> Iter
 def table(found: list[Found]) -> str:
     """Returns one row per robot, in Markdown."""
     lines = [
-        "| robot | levels, at a bound | compiled: no point, worst error | explicit: no point, worst error |",
+        "| robot | levels, at a bound | compiled: no point, worst error | printed: no point, worst error |",
         "|---|--:|--:|--:|",
     ]
     for robot in [*dict.fromkeys(each.robot for each in found), "all"]:
         rows = [each for each in found if robot in (each.robot, "all")]
         cells = []
-        for route in ROUTES:
-            errors = [error for each in rows if (error := getattr(each, route)) is not None]
+        for by in METHODS:
+            errors = [error for each in rows if (error := getattr(each, by)) is not None]
             cells.append(f"{len(rows) - len(errors)}, {max(errors, default=0.0):.1e}")
         held = sum(each.active > 0 for each in rows)
         lines.append(f"| {robot} | {len(rows)}, {held} | {cells[0]} | {cells[1]} |")
@@ -184,7 +183,7 @@ def main() -> int:
             continue
         found += rows
         for each in rows:
-            if any(error is None or error > 1e-6 for error in (each.compiled, each.explicit)):
+            if any(error is None or error > 1e-6 for error in (each.compiled, each.printed)):
                 print(each, file=sys.stderr, flush=True)
     print(table(found))
     print(f"{given.stacks} stacks, for {unknown} of them the optimum was not found", file=sys.stderr)

@@ -1,9 +1,7 @@
-"""Names, one-line descriptions and routes of the controllers, for lists and menus. No controller is
+"""Names and one-line descriptions of the controllers, for lists and menus. No controller is
 loaded."""
 
 from __future__ import annotations
-
-from typing import Literal
 
 CONTROLLERS: dict[str, str] = {
     "himpc": "hierarchical incremental MPC: torque level, strict priorities, no dynamic model",
@@ -16,6 +14,7 @@ CONTROLLERS: dict[str, str] = {
     "tdeosf_damped": "TDEOSF with damped least squares near singularities",
     "hqp": "one-step hierarchical QP on the nominal model, within the torque bounds",
     "himpc_filtered": "HIMPC without rows of distances; a further QP changes its torque to keep distances",
+    "himpc_printed": "HIMPC as it is printed, on one page of NumPy: the same torques, a hundred times slower",
 }
 """Torque-level controllers: name and description."""
 
@@ -28,19 +27,15 @@ VELOCITY_CONTROLLERS: dict[str, str] = {
 }
 """Velocity-level controllers: name and description."""
 
-Route = Literal["compiled", "explicit"]
-"""The implementation that computes a tick: the compiled kernel, or the equations with all rows as printed."""
-
 OWN_METHOD = "goldfarb-idnani"
 """The active-set method of the compiled code, which needs no QP solver."""
 
 
-def qp_method(controller: str, route: Route, solver: str) -> str | None:
+def qp_method(controller: str, solver: str) -> str | None:
     """Returns the method that solves the QPs of a torque-level controller: `OWN_METHOD`, the solver, or None
     if the controller solves no QP. If the method finds no optimum of a level, DAQP may be used in
     addition."""
-    if controller == "hqp":
+    if controller in ("hqp", "himpc_printed"):
         return solver
-    if controller not in ("himpc", "hiqp", "nhimpc", "weighted", "himpc_filtered"):
-        return None
-    return solver if route == "explicit" else OWN_METHOD
+    own = controller in ("himpc", "hiqp", "nhimpc", "weighted", "himpc_filtered")
+    return OWN_METHOD if own else None

@@ -13,7 +13,7 @@ from himpc.tasks import Damping, Task
 from himpc.tasks.axes import AXES, OnAxes
 from himpc.tasks.task import GAINS
 from robots import InputError, Robot
-from robots.ranges import Range, check_fields, check_numbers
+from robots.ranges import Range, Shown, check_fields, check_numbers
 
 Weight = float | tuple[float, ...]
 
@@ -27,14 +27,22 @@ class Level:
         Q: weight of the residual e (28), scalar or one per coordinate, > 0.
         R: weight of the increments Δτ, scalar or one per joint, > 0.
         horizon: number of knots that this level looks ahead, at most the controller's N (Remark 8); None: N.
-        enabled: whether the level takes part.
     """
 
     tasks: tuple[Task, ...]
-    Q: Annotated[Weight, Range(0.0, above=True)] = 200.0
-    R: Annotated[Weight, Range(0.0, above=True)] = 10.0
-    horizon: Annotated[int | None, Range(1)] = None
-    enabled: bool = True
+    # fmt: off
+    Q: Annotated[Weight, Range(0.0, above=True), Shown(
+        "Q", "Weight of the residual", "", 1.0, 1000.0, 1.0, tries=("20", "100", "200", "500", "2000"),
+        name="Q of *")] = 200.0
+    R: Annotated[Weight, Range(0.0, above=True), Shown(
+        "R", "Weight of the changes of torque", "", 0.1, 100.0, 0.1, tries=("1", "10", "100", "1000"),
+        name="R of *")] = 10.0
+    horizon: Annotated[int | None, Range(1), Shown(
+        "Own N", "Number of knots in this level's horizon, at most N (Remark 8); null: N", name="N of *",
+    )] = None
+    enabled: Annotated[bool, Shown(
+        "Enabled", "Whether the level takes part", tries=("false", "true"), name="level * on")] = True
+    # fmt: on
 
     @property
     def name(self) -> str:

@@ -10,12 +10,13 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from robots.inertia import mass_matrix
-from robots.ranges import Range, check_fields
+from robots.ranges import Range, Shown, check_fields
 from robots.robot import Robot
 from robots.settings import PerJoint, PlantSettings, per_joint
 from robots.truth import true_model
 
 Array = NDArray[np.float64]
+_BELIEVED = "Value in the nominal model, which model-based controllers use"
 
 
 @dataclass(frozen=True)
@@ -29,12 +30,19 @@ class NominalSettings:
     Raises InputError, which names the field, for values that are not allowed.
     """
 
-    payload_kg: Annotated[float, Range(0.0, 1e3)] = 0.0
-    damping: Annotated[PerJoint, Range(0.0, 1e4)] = 0.0
-    armature: Annotated[PerJoint, Range(0.0, 1e4)] = 0.0
-    mass_scale: Annotated[PerJoint, Range(1e-3, 1e3)] = 1.0
-    inertia_scale: Annotated[PerJoint, Range(1e-3, 1e3)] = 1.0
-    gravity: bool = True
+    # fmt: off
+    payload_kg: Annotated[float, Range(0.0, 1e3), Shown(
+        "Believed payload", _BELIEVED, "kg", 0.0, 10.0, 0.1)] = 0.0
+    damping: Annotated[PerJoint, Range(0.0, 1e4), Shown(
+        "Believed viscous friction", _BELIEVED, "N·m·s/rad", 0.0, 10.0, 0.1)] = 0.0
+    armature: Annotated[PerJoint, Range(0.0, 1e4), Shown(
+        "Believed armature", _BELIEVED, "kg·m²", 0.0, 1.0, 0.01)] = 0.0
+    mass_scale: Annotated[PerJoint, Range(1e-3, 1e3), Shown(
+        "Believed mass scale", _BELIEVED, "", 0.2, 3.0, 0.05)] = 1.0
+    inertia_scale: Annotated[PerJoint, Range(1e-3, 1e3), Shown(
+        "Believed inertia scale", _BELIEVED, "", 0.2, 3.0, 0.05)] = 1.0
+    gravity: Annotated[bool, Shown("Believed gravity", _BELIEVED)] = True
+    # fmt: on
 
     def __post_init__(self) -> None:
         check_fields(self, "nominal.")

@@ -1,12 +1,12 @@
-"""Allowed ranges of numbers in settings. A range is written once, in the type annotation of the field."""
+"""Allowed ranges and descriptions of settings. Both are written once, in the type annotation of the field."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from types import UnionType
-from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -45,12 +45,74 @@ class Range:
 ANY = Range()
 
 
+@dataclass(frozen=True)
+class Shown:
+    """The description of a setting for users: `delay_ms: Annotated[float, Range(0.0), Shown("Delay", …)]`. A
+    second `Shown` describes one element of a list.
+
+    Attributes:
+        label: a few words or a symbol; "*" stands for the name of a level or task, or for a place in a list.
+        help: one or two sentences; empty if the label is enough.
+        unit: of the value.
+        low, high, step: usual range and step of a slider, in `page_unit`; a value outside extends the range.
+            step 0: about a hundredth of the range.
+        log: whether the slider is logarithmic; then low > 0.
+        page_unit: the unit that the page shows instead; empty: `unit`.
+        factor: how many `page_unit` are equal to one `unit`.
+        tries: typical values for comparisons, as the user types them; the first is rarely a scene's own
+            value.
+        name: used if no heading names the group; empty: the label.
+        group: the folder of the page that contains the control; empty: a panel adds the control by its path,
+            or there is none.
+    """
+
+    label: str
+    help: str = ""
+    unit: str = ""
+    low: float = 0.0
+    high: float = 0.0
+    step: float = 0.0
+    log: bool = False
+    page_unit: str = ""
+    factor: float = 1.0
+    tries: tuple[str, ...] = ()
+    name: str = ""
+    group: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "name", self.name or self.label)
+
+    @property
+    def title(self) -> str:
+        """The label with the unit that the page shows."""
+        unit = self.page_unit or self.unit
+        return f"{self.label} [{unit}]" if unit else self.label
+
+    def of(self, what: str) -> Shown:
+        """Returns the description with a name, or a place, for "*"."""
+        return replace(self, label=self.label.replace("*", what), name=self.name.replace("*", what))
+
+
+@dataclass(frozen=True)
+class Folder:
+    """The beginning of the paths of a nested dataclass of settings, if it is not the name of the field."""
+
+    prefix: str
+
+
+M = TypeVar("M")
+
+
+def marks(hint: Any, kind: type[M]) -> list[M]:
+    """Returns the extras of a type annotation that belong to a class: `Range`, `Shown` or `Folder`."""
+    return [each for each in getattr(hint, "__metadata__", ()) if isinstance(each, kind)]
+
+
 def plain(hint: Any) -> tuple[Any, Range]:
     """Splits a type annotation into the type and the range."""
     if get_origin(hint) is not Annotated:
         return hint, ANY
-    inner, *extras = get_args(hint)
-    return inner, next((each for each in extras if isinstance(each, Range)), ANY)
+    return get_args(hint)[0], next(iter(marks(hint, Range)), ANY)
 
 
 def alternatives(hint: Any) -> tuple[Any, ...]:
@@ -65,8 +127,9 @@ def field_types(owner: type) -> dict[str, Any]:
 
 
 def check_fields(owner: Any, prefix: str = "") -> None:
-    """Raises InputError if a number of a dataclass is outside its range or a word is not in its Literal. The
-    message names the field and the allowed values. Fields without range and Literal are not checked.
+    """Raises InputError if a number of a dataclass is outside its range, a word is not in its Literal or a
+    switch is not true or false. The message names the field and the allowed values. Numbers without a range
+    are not checked.
 
     Args:
         owner: the dataclass.
@@ -78,6 +141,8 @@ def check_fields(owner: Any, prefix: str = "") -> None:
         if get_origin(inner) is Literal:
             if value not in get_args(inner):
                 raise unknown_name(prefix + name, str(value), get_args(inner))
+        elif inner is bool and not isinstance(value, (bool, np.bool_)):
+            raise InputError(f"{prefix}{name} is {value!r}; give true or false.")
         elif allowed is not ANY and not (value is None and type(None) in alternatives(inner)):
             check_numbers(prefix + name, value, allowed, whole=int in alternatives(inner))
 

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import numpy as np
 
 from robots.plant import Plant
-from robots.ranges import Range, check_fields
+from robots.ranges import Range, Shown, check_fields
 from robots.robot import Robot
 from robots.settings import PerJoint, PlantSettings
 from robots.signals import Motors, PlantState, as_vector
@@ -28,32 +28,49 @@ class VelocityPlantSettings:
         mode: "ideal": within each step, the velocity changes linearly from its present value to the command,
             so the plant is exactly a sampled double integrator; "servo": MuJoCo's mechanics under velocity
             servos τ = M(q) · bandwidth · (command − v) + C v + g, clipped at the torque limits.
-        bandwidth: bandwidth of the servos, 1/s.
-        lag_ms: time constant of a first-order lag between command and servo.
-        delay_ms: delay of the command.
         position_noise: standard deviation of white Gaussian noise on the measured q, rad (m).
         velocity_noise: standard deviation of white Gaussian noise on the measured v, rad/s (m/s).
         payload_kg, friction, damping: as in `PlantSettings`, in "servo" mode only. The servo's model does not
             contain them.
-        saturate: whether torques are clipped at the torque limits.
 
     Raises InputError, which names the field, for values that are not allowed.
     """
 
-    mode: Mode = "ideal"
-    bandwidth: Annotated[float, Range(1.0, 300.0)] = 100.0
-    lag_ms: Annotated[float, Range(0.0, 1e3)] = 0.0
-    delay_ms: Annotated[float, Range(0.0, 1e3)] = 0.0
-    position_noise: Annotated[float, Range(0.0, 1.0)] = 0.0
-    velocity_noise: Annotated[float, Range(0.0, 10.0)] = 0.0
-    payload_kg: Annotated[float, Range(0.0, 1e3)] = 0.0
-    friction: Annotated[PerJoint, Range(0.0, 1e4)] = 0.0
-    damping: Annotated[PerJoint, Range(0.0, 1e4)] = 0.0
-    saturate: bool = True
+    # fmt: off
+    mode: Annotated[Mode, Shown(
+        "Plant", "ideal: the joints follow the command exactly. servo: MuJoCo's mechanics under joint "
+        "velocity servos", group="Plant")] = "ideal"
+    bandwidth: Annotated[float, Range(1.0, 300.0), Shown(
+        "Bandwidth", "Bandwidth of the velocity servos (servo plant)", "1/s", 1, 300, 1, group="Plant",
+    )] = 100.0
+    lag_ms: Annotated[float, Range(0.0, 1e3), Shown(
+        "Lag", "Time constant of the first-order lag between command and servo", "ms", 0, 300, 5,
+        group="Plant")] = 0.0
+    delay_ms: Annotated[float, Range(0.0, 1e3), Shown(
+        "Delay", "Time after which a command acts", "ms", 0, 300, 5, tries=("1", "2", "0"),
+        name="delay of the command, ms", group="Plant")] = 0.0
+    position_noise: Annotated[float, Range(0.0, 1.0), Shown(
+        "Position noise", "Standard deviation, rad and m", "rad or m", 0, 10, 0.1, page_unit="10⁻³",
+        factor=1000.0, group="Plant")] = 0.0
+    velocity_noise: Annotated[float, Range(0.0, 10.0), Shown(
+        "Velocity noise", "Standard deviation, rad/s and m/s", "rad/s or m/s", 0, 100, 1, page_unit="10⁻³",
+        factor=1000.0, group="Plant")] = 0.0
+    payload_kg: Annotated[float, Range(0.0, 1e3), Shown(
+        "Payload", "A mass at the hand (servo plant)", "kg", 0, 10, 0.5, tries=("3", "1", "2", "5", "0"),
+        name="payload, kg", group="Plant")] = 0.0
+    friction: Annotated[PerJoint, Range(0.0, 1e4), Shown(
+        "Coulomb friction", "Coulomb friction of every joint (servo plant)", "N·m", 0, 20, 0.5, group="Plant",
+    )] = 0.0
+    damping: Annotated[PerJoint, Range(0.0, 1e4), Shown(
+        "Viscous friction", "Viscous friction of every joint (servo plant)", "N·m·s/rad", 0, 20, 0.5,
+        group="Plant")] = 0.0
+    saturate: Annotated[bool, Shown(
+        "Motors saturate", "Clip the torque of the servos at the limits of the data sheet",
+        tries=("false", "true"), name="torque bound of the motors", group="Plant")] = True
+    # fmt: on
 
     def __post_init__(self) -> None:
         check_fields(self, "plant.")
-        self.mechanics()  # checks saturate
 
     def mechanics(self) -> PlantSettings:
         """Returns the settings of the mechanics that the servos drive."""

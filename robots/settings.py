@@ -9,7 +9,7 @@ from typing import Annotated
 import numpy as np
 
 from robots.errors import InputError
-from robots.ranges import Range, check_fields
+from robots.ranges import Range, Shown, check_fields
 
 PerJoint = float | tuple[float, ...]
 """One number for all joints, or one per joint."""
@@ -23,9 +23,7 @@ class PlantSettings:
         payload_kg: kg, a point mass at the robot's tip frame.
         friction: N·m, Coulomb friction per joint (one number or one per joint; N for prismatic joints).
             MuJoCo models friction as a soft constraint: a joint that should stick moves very slowly.
-        damping: N·m·s/rad, viscous friction.
         armature: kg·m², reflected rotor inertia, added to M_ii.
-        mass_scale: factor on the mass of the body that each joint moves.
         inertia_scale: factor on the rotational inertia of this body about its centre of mass, whose position
             is not changed. If both factors are equal, the body has another density. The payload is not
             scaled.
@@ -36,39 +34,55 @@ class PlantSettings:
         encoder_resolution_deg: degrees. With a value above 0, the measured position of a revolute joint is
             rounded to multiples of the resolution, and the measured velocity is the backward difference of
             these positions.
-        torque_lag_ms: ms, time constant of a first-order lag of the motors.
         delay_ms: ms, delay of the command (rounded to the nearest internal step).
-        saturate: whether the command is clipped at the robot's torque limits.
-        gravity: whether gravity acts on the plant.
-        contacts: whether the robot touches itself and the objects of its world; otherwise they pass through
-            each other.
-        joint_stops: whether a joint stops at its limits; otherwise it continues to move.
 
     Raises InputError, which names the field, for values that are not finite, negative or extremely large.
     """
 
-    payload_kg: Annotated[float, Range(0.0, 1e3)] = 0.0
-    friction: Annotated[PerJoint, Range(0.0, 1e4)] = 0.0
-    damping: Annotated[PerJoint, Range(0.0, 1e4)] = 0.0
-    armature: Annotated[PerJoint, Range(0.0, 1e4)] = 0.0
+    # fmt: off
+    payload_kg: Annotated[float, Range(0.0, 1e3), Shown(
+        "Payload", "A mass at the hand that the controller does not know", "kg", 0.0, 10.0, 0.1,
+        tries=("3", "1", "2", "5", "0"), name="payload, kg", group="Plant")] = 0.0
+    friction: Annotated[PerJoint, Range(0.0, 1e4), Shown(
+        "Coulomb friction", "Coulomb friction of every joint", "N·m", 0.0, 10.0, 0.1, group="Plant")] = 0.0
+    damping: Annotated[PerJoint, Range(0.0, 1e4), Shown(
+        "Viscous friction", "Viscous friction of every joint", "N·m·s/rad", 0.0, 10.0, 0.1, group="Plant",
+    )] = 0.0
+    armature: Annotated[PerJoint, Range(0.0, 1e4), Shown(
+        "Armature", "Reflected inertia of the motors", "kg·m²", 0.0, 1.0, 0.01, group="Plant")] = 0.0
     # With smaller factors, a link has practically no mass or M(q) is almost certainly indefinite. The
     # simulation would then be meaningless.
-    mass_scale: Annotated[PerJoint, Range(1e-3, 1e3)] = 1.0
-    inertia_scale: Annotated[PerJoint, Range(1e-3, 1e3)] = 1.0
-    diagonal_scale: Annotated[PerJoint, Range(0.1, 10.0)] = 1.0
-    encoder_resolution_deg: Annotated[float, Range(0.0, 45.0)] = 0.0
-    torque_lag_ms: Annotated[float, Range(0.0, 1e3)] = 0.0
-    delay_ms: Annotated[float, Range(0.0, 1e3)] = 0.0
-    saturate: bool = True
-    gravity: bool = True
-    contacts: bool = False
-    joint_stops: bool = False
+    mass_scale: Annotated[PerJoint, Range(1e-3, 1e3), Shown(
+        "Mass scale", "Factor on the mass of every link", "", 0.2, 3.0, 0.05, group="Plant")] = 1.0
+    inertia_scale: Annotated[PerJoint, Range(1e-3, 1e3), Shown(
+        "Inertia scale", "Factor on the rotational inertia of every link", "", 0.2, 3.0, 0.05,
+        tries=("0.8", "1.2", "1"), name="true inertias ×", group="Plant")] = 1.0
+    diagonal_scale: Annotated[PerJoint, Range(0.1, 10.0), Shown(
+        "M(q) diagonal scale", "Factor on the diagonal of M(q) alone, as the text of the paper's Table V "
+        "says; no real arm has this property", "", 0.5, 2.0, 0.05, group="Plant")] = 1.0
+    encoder_resolution_deg: Annotated[float, Range(0.0, 45.0), Shown(
+        "Encoder", "Resolution of the joint sensors; 0: ideal sensors", "°", 0.0, 20.0, 0.25,
+        page_unit="10⁻³ °", factor=1000.0, tries=("0.005", "0.001", "0.01", "0"),
+        name="encoder resolution, °", group="Plant")] = 0.0
+    torque_lag_ms: Annotated[float, Range(0.0, 1e3), Shown(
+        "Torque lag", "First-order lag of the motors", "ms", 0.0, 20.0, 0.5, group="Plant")] = 0.0
+    delay_ms: Annotated[float, Range(0.0, 1e3), Shown(
+        "Delay", "Time from command to torque", "ms", 0.0, 10.0, 0.5, tries=("1", "2", "0"),
+        name="delay of the command, ms", group="Plant")] = 0.0
+    saturate: Annotated[bool, Shown(
+        "Motors saturate", "Clip the torque at the limits of the data sheet", tries=("false", "true"),
+        name="torque bound of the motors", group="Plant")] = True
+    gravity: Annotated[bool, Shown("Gravity", "Whether gravity acts on the plant", group="Plant")] = True
+    contacts: Annotated[bool, Shown(
+        "Contacts", "The robot touches itself and the objects around it. If switched off, it passes through "
+        "them", tries=("false", "true"), name="contacts", group="Plant")] = False
+    joint_stops: Annotated[bool, Shown(
+        "Joint stops", "A joint that is pushed to its limit stops there. If switched off, it moves on",
+        group="Plant")] = False
+    # fmt: on
 
     def __post_init__(self) -> None:
         check_fields(self, "plant.")
-        for name in ("saturate", "gravity", "contacts", "joint_stops"):
-            if not isinstance(getattr(self, name), (bool, np.bool_)):
-                raise InputError(f"plant.{name} is {getattr(self, name)!r}; give true or false.")
         # NumPy arrays and numbers become plain Python numbers: settings are compared and written as text.
         for field in fields(self):
             value = getattr(self, field.name)

@@ -9,7 +9,6 @@ import pytest
 from numpy.typing import NDArray
 
 from himpc import qp
-from himpc.cascade import explicit
 from himpc.tick import fallbacks
 from himpc.tick.kernel.arrays import AT, WHOLE_AT
 from himpc.tick.kernel.control_period import LEVELS, LINEARIZE, NOT_FINITE, ONE_LEVEL
@@ -25,24 +24,22 @@ NONSENSE = {
 
 
 def break_solver(monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
-    """Makes every QP solver return an invalid point with the status of a solution, and disables `descended`,
-    the method that starts from the feasible point x = 0."""
+    """Makes every QP solver return an invalid point with the status of a solution."""
 
     def nonsense(H: Array, f: Array, A: Array, *_: Any, **__: Any) -> tuple[Array, Array, str]:
         return NONSENSE[kind](f, A)
 
     monkeypatch.setattr(qp, "_ATTEMPTS", dict.fromkeys(get_args(qp.Solver), (nonsense,)))
-    monkeypatch.setattr(explicit, "descended", lambda *_: None)
 
 
 def break_kernel(monkeypatch: pytest.MonkeyPatch, place: int | None = None) -> None:
-    """Makes the kernel find no optimum, at one level or at all levels, and disables the printed QP."""
+    """Makes the kernel find no optimum, at one level or at all levels."""
     healthy = fallbacks.control_period
 
     def broken(*given: Any) -> int:
         *arena, parts, first, room = given
         data, where, whole, whole_where = arena
-        count = whole[whole_where[WHOLE_AT.sizes] + 4]
+        count = whole[whole_where[WHOLE_AT["sizes"]] + 4]
         if parts & ONE_LEVEL:
             return healthy(*given) if place is not None and first != place else first
         if not parts & LEVELS:
@@ -50,11 +47,10 @@ def break_kernel(monkeypatch: pytest.MonkeyPatch, place: int | None = None) -> N
         if parts & LINEARIZE and healthy(*arena, LINEARIZE, 0, 0.0) == NOT_FINITE:
             return NOT_FINITE
         for level in range(first, count):
-            data[where[AT.U] + level * whole[whole_where[WHOLE_AT.sizes] + 8]] = np.nan
+            data[where[AT["U"]] + level * whole[whole_where[WHOLE_AT["sizes"]] + 8]] = np.nan
             if place is None or level == place or healthy(*arena, ONE_LEVEL, level, 0.0) == level:
                 return level
-            data[where[AT.rung] + level] = 0.0
+            data[where[AT["rung"]] + level] = 0.0
         return healthy(*arena, parts & ~(LINEARIZE | LEVELS), 0, room)
 
     monkeypatch.setattr(fallbacks, "control_period", broken)
-    monkeypatch.setattr(fallbacks, "solve_explicit", lambda *_: None)

@@ -37,8 +37,7 @@ _TOGETHER = (
     ("tests/app/browser/",),
     (
         "tests/lessons/test_lessons_course.py",
-        "tests/lessons/test_lessons_quoted.py",
-        "tests/lessons/test_lessons_interventions.py",
+        "tests/lessons/test_lessons_evidence.py",
     ),
     ("tests/test_site.py", "tests/test_site_live.py"),
 )
@@ -66,8 +65,7 @@ _LONG = (
     "tests/test_site.py",
     "tests/test_site_live.py",
     "tests/lessons/test_lessons_course.py",
-    "tests/lessons/test_lessons_quoted.py",
-    "tests/lessons/test_lessons_interventions.py",
+    "tests/lessons/test_lessons_evidence.py",
     "tests/commands/test_commands_reproduce.py",
     "tests/commands/test_commands_export.py",
     "tests/robots/test_robots_catalog.py",
@@ -127,7 +125,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 def _runs(item: pytest.Item, config: pytest.Config) -> bool:
     """Whether the test runs. A test that is marked `nightly` runs with `--nightly`, when the command line
-    names its file, and when a commit of the last day has changed its file or a path that the mark names."""
+    names its file, and when one of the last commits has changed its file or a path that the mark names."""
     mark = item.get_closest_marker("nightly")
     if mark is None or config.getoption("nightly") or _few_files(config):
         return True
@@ -136,18 +134,14 @@ def _runs(item: pytest.Item, config: pytest.Config) -> bool:
 
 
 def _changed() -> list[str]:
-    """Returns the files that the commits of the last day before the newest one have changed: no nightly run
-    has seen them. Without a repository the list is empty."""
-
-    def git(*arguments: str) -> str:
-        command = ["git", "-C", str(_ROOT), "log", *arguments]
-        return subprocess.run(command, capture_output=True, text=True, check=True).stdout
-
+    """Returns the files that the last commits have changed, about as many as a push has. Without a repository
+    the list is empty."""
+    command = ["git", "-C", str(_ROOT), "log", "-n", "10", "--no-merges", "--name-only", "--format="]
     try:
-        day_before = int(git("-1", "--format=%ct")) - 24 * 3600
-        return sorted(set(git(f"--since={day_before}", "--name-only", "--format=").split("\n")) - {""})
+        found = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     except (OSError, subprocess.CalledProcessError):
         return []
+    return sorted(set(found.split("\n")) - {""})
 
 
 _ROOT = Path(__file__).parents[1]

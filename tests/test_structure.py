@@ -35,6 +35,7 @@ DOORS = {
     "IPython": ("app/jupyter/lab.py",),
     "jupyter_core": ("app/jupyter/frame.py",),
     "psutil": ("robots/processes/family.py",),
+    "yourdfpy": ("robots/shapes/read.py",),
     "pyseccomp": ("lessons/exercises/inside/confine.py",),
     "py_landlock": ("lessons/exercises/inside/confine.py",),
 }
@@ -261,10 +262,10 @@ ROBOTS = {
     "collision": ("spheres", "robot", "errors"),
     "world": ("collision", "ranges", "errors"),
     "cover_shapes": ("world", "collision", "robot", "geometry"),
-    "shapes": ("truth", "robot", "geometry", "urdf", "meshes"),
+    "shapes": ("truth", "per_robot", "robot", "geometry", "meshes"),
     "mechanics": ("world", "collision", "truth", "robot", "geometry", "inertia", "settings", "errors"),
     "floor": ("mechanics", "world", "collision", "robot"),
-    "covering": ("mechanics", "shapes", "per_robot", "robot", "geometry", "urdf", "meshes"),
+    "covering": ("mechanics", "shapes", "per_robot", "robot", "geometry"),
     "plant": (*("mechanics", "world", "truth", "robot", "settings", "signals", "runge_kutta", "errors"),),
     "servo": ("plant", "robot", "settings", "ranges", "signals"),
     "loading": (
@@ -306,7 +307,7 @@ def test_files_do_not_import_each_other(package: str) -> None:
     TopologicalSorter(below).prepare()  # raises CycleError
 
 
-HIMPC_ROOT = ("catalog", "constants", "qp", "rotation", "stack", "telemetry")
+HIMPC_ROOT = ("catalog", "constants", "printed", "qp", "rotation", "stack", "telemetry")
 """Files of himpc/ outside its folders; they have their place in the order as well."""
 THEORY = {
     "catalog": (),
@@ -320,6 +321,7 @@ THEORY = {
     "prediction": (),
     "limits": ("prediction", "qp", "constants"),
     "cascade": ("limits", "qp", "constants"),
+    "printed": ("cascade", "qp", "constants"),
     "formulation": (
         *("cascade", "limits", "prediction", "stack", "tasks", "kinematics", "references"),
         *("qp", "catalog", "constants"),
@@ -334,12 +336,12 @@ COMPILED = {
     "tick/kernel": ("compilation", "constants"),
     "htmpc/kernel": ("tick/kernel", "compilation", "constants"),
     "tick": (
-        *("tick/kernel", "plan", "telemetry", "formulation", "cascade", "limits", "prediction"),
+        *("tick/kernel", "plan", "telemetry", "formulation", "printed", "cascade", "limits", "prediction"),
         *("tasks", "kinematics", "references", "qp", "constants"),
     ),
     "controllers": (
-        *("tick", "plan", "formulation", "cascade", "limits", "prediction", "stack", "tasks"),
-        *("kinematics", "references", "qp", "catalog", "constants"),
+        *("tick", "tick/kernel", "plan", "formulation", "printed", "cascade", "limits", "prediction"),
+        *("stack", "tasks", "kinematics", "references", "qp", "catalog", "constants"),
     ),
     "export/kernel": ("tick/kernel", "tick", "controllers", "limits", "cascade", "compilation", "qp"),
     "export": (

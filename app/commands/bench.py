@@ -14,13 +14,13 @@ if TYPE_CHECKING:
 
 
 def bench(ticks: int = 300, json: str | None = None) -> int:
-    """Measure the time of the control step: compiled route, and explicit route with DAQP and with ProxQP.
+    """Measure the time of the control step: himpc, and himpc_printed with DAQP and with ProxQP.
 
-    Each time is the time of the whole step from state to torque, kinematics included. The routes run in
+    Each time is the time of the whole step from state to torque, kinematics included. The controllers run in
     turns.
 
     Args:
-        ticks: number of timed ticks per route.
+        ticks: number of timed ticks per controller.
         json: write the result as JSON to this file, or to standard output for "-".
     """
     from lessons.experiments.bench import SCENES, Timing, ratios
@@ -46,12 +46,12 @@ def bench(ticks: int = 300, json: str | None = None) -> int:
         ]
         write_json({**blocks[0], "dragged": blocks[1]}, json)
         return 0
-    columns = ("N", "route", "solver", "step ms, median", "p95", "p99", "QP solver alone, median")
+    columns = ("N", "controller", "solver", "step ms, median", "p95", "p99", "QP solver alone, median")
     for scene, timings in found.items():
         rows = [
             [
                 str(timing.horizon),
-                timing.route,
+                timing.controller,
                 timing.solver,
                 *(f"{timing.step_ms[key]:.2f}" for key in ("median", "p95", "p99")),
                 f"{timing.qp_ms:.3f}",

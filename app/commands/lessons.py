@@ -23,8 +23,9 @@ def lessons(
     """List the lessons, or run them headless and judge every claim.
 
     The check runs the script of each lesson. Every claim must hold, and must fail with the wrong setting that
-    it names. Every challenge must fail with its first settings and be passed with its solutions. If there are
-    faults, one sentence per fault is printed, and the exit code is 1.
+    it names. Every challenge must fail with its first settings and be passed with its solutions. The number
+    of every note beside a sentence must lie in its range. If there are faults, one sentence per fault is
+    printed, and the exit code is 1.
 
     Args:
         check: names of the lessons to check, or Markdown files of your own; --check without names: all

@@ -24,36 +24,42 @@ class LevelProblem(NamedTuple):
         B: (N, m, n), Ĵ^j M̄⁻¹ at every knot.
         C: (N, m, N), effect coefficients of `prediction.task.ResidualModel`.
         free: (N, m), the free response: e for U = 0.
-        weighted_free: (N, m), √Q free.
         root_Q: (m,), √Q.
-        weighted_C: (K, m, K), √Q C over the level's own knots.
         R: (n,), weight of the increments.
         knots: K ≤ N, the number of knots that this level looks ahead.
-        common_R: R if it is the same for all joints, else None.
     """
 
     name: str
     B: Array
     C: Array
     free: Array
-    weighted_free: Array
     root_Q: Array
-    weighted_C: Array
     R: Array
     knots: int
-    common_R: float | None
 
     def residual(self, U: Array) -> Array:
         """Returns e at knots 1 … N under U, (N, m)."""
         pushed = np.matmul(self.B, U[:, :, None])[:, :, 0]
         return self.free + np.matmul(self.C.transpose(1, 0, 2), pushed.T[:, :, None])[:, :, 0].T
 
-    def cost(self, U: Array, error: Array | None = None) -> float:
-        """Returns the value (32a) or (34a) of U over this level's knots. error: Q^½ e if it is known."""
-        e = self.root_Q * self.residual(U)[: self.knots] if error is None else error
-        used = U if self.knots == len(U) else U[: self.knots]
-        effort = self.R * used if self.common_R is None else self.common_R * used
-        return float(np.vdot(e, e) + np.vdot(effort, used))
+    @property
+    def G(self) -> Array:
+        """The change of e at knots 1 … K per increment at knots 0 … K−1, (K·m, K·n)."""
+        K, (_, m, n) = self.knots, self.B.shape
+        return (self.C[:K, :, :K, None] * self.B[:K].transpose(1, 0, 2)).reshape(K * m, K * n)
+
+    @property
+    def hessian(self) -> Array:
+        """The Hessian GᵀQG + R of half the cost over all N knots, (N·n, N·n)."""
+        weighted, N, n = np.tile(self.root_Q, self.knots)[:, None] * self.G, len(self.B), self.R.size
+        H = np.diag(np.tile(self.R, N))
+        H[: self.knots * n, : self.knots * n] += weighted.T @ weighted
+        return H
+
+    def cost(self, U: Array) -> float:
+        """Returns the value (32a) or (34a) of U over this level's knots."""
+        e, used = self.root_Q * self.residual(U)[: self.knots], U[: self.knots]
+        return float(np.vdot(e, e) + np.vdot(self.R * used, used))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,21 +121,3 @@ class LevelSolution(NamedTuple):
     time_us: float
     qp_us: float
     leak: float
-
-
-class Point(NamedTuple):
-    """Increments of one level with their verified residual.
-
-    Attributes:
-        error: Q^½ e over the level's knots, flattened, if the route has computed it.
-        qp_us: time spent in the QP solver, microseconds.
-        time_us: time spent on this level, if the route knows it, microseconds.
-    """
-
-    U: Array
-    active: ActiveRows
-    kkt_residual: float
-    status: str
-    error: Array | None = None
-    qp_us: float = 0.0
-    time_us: float = 0.0

@@ -64,7 +64,7 @@ class FilteredHIMPC(HIMPC):
         started = perf_counter_ns()
         found = self._filter(q, v, plan.tau_0, plan.tau, self._M_bar, plan.limits, observed_by(previews))
         self._tau_0 = found.tau
-        done = self._done(plan)
+        done = None if plan.at_once is None else plan.at_once()
         time_us = (perf_counter_ns() - started) / 1e3
         return replace(
             plan,
@@ -74,16 +74,6 @@ class FilteredHIMPC(HIMPC):
             at_once=None if done is None else lambda: _with_filter(done, found.tau - plan.tau_0),
             behind=Behind(self._evidence(found, plan, done, time_us), found.rows),
         )
-
-    def _done(self, plan: Plan) -> AtOnce | None:
-        """Returns the increments and Jacobians of the levels at this tick; None if no level was solved."""
-        if plan.at_once is not None:
-            return plan.at_once()
-        levels, problems = plan.levels, self._asked
-        if not levels or len(problems) != len(levels):
-            return None
-        increments = np.array([level.U[0] for level in levels])
-        return AtOnce(increments, [problem.B[0] * self._M_bar for problem in problems[:-1]])
 
     def _evidence(self, found: Filtered, plan: Plan, done: AtOnce | None, time_us: float) -> LevelSolution:
         increment, leak = found.tau - plan.tau_0, 0.0

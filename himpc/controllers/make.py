@@ -9,6 +9,7 @@ from himpc.catalog import CONTROLLERS
 from himpc.controllers.controller import Controller
 from himpc.controllers.himpc import HIMPC
 from himpc.controllers.himpc_filtered import FilteredHIMPC
+from himpc.controllers.himpc_printed import PrintedHIMPC
 from himpc.controllers.hiqp import HIQP
 from himpc.controllers.hqp import HQP
 from himpc.controllers.nhimpc import NHIMPC
@@ -31,6 +32,7 @@ _MAKERS: dict[str, Callable[[Robot, Settings], Controller]] = {
     "tdeosf_damped": partial(TDEOSF, damping=DAMPED),
     "hqp": HQP,
     "himpc_filtered": FilteredHIMPC,
+    "himpc_printed": PrintedHIMPC,
 }
 
 

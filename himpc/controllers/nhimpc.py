@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from himpc.cascade.level import LevelSolution
 from himpc.controllers.himpc import HIMPC
-from himpc.controllers.period import PeriodResult, PeriodState
 from himpc.formulation.forms import Prepared
 from himpc.formulation.settings import Settings
 from himpc.tick.tables import LevelTable
@@ -54,29 +50,3 @@ class NHIMPC(HIMPC):
         levels = [] if idle else [LevelTable.of(level) for level in form.levels]
         most = self.max_iterations if levels else 1
         return CompiledTick(self.robot, settings, form, off, levels, self.tolerance, most)
-
-    def _search(self, tick: PeriodState) -> PeriodResult | None:
-        fading = dict(self._weight)
-        found = super()._search(tick)
-        iterations = 1
-        while found is not None and _solved(found) and iterations < self.max_iterations:
-            # The share of a level that fades in grows once per tick, not once per iteration.
-            self._weight = dict(fading)
-            again = self._solve(tick, found.predicted_q[1:-1])
-            iterations += 1
-            if again is None:
-                break
-            change, found = _change(found.solutions, again.solutions), again
-            if change <= self.tolerance:
-                break
-        return None if found is None else found._replace(iterations=iterations)
-
-
-def _solved(found: PeriodResult) -> bool:
-    """Returns whether every level is at its optimum. If not, further iterations are useless."""
-    return bool(found.solutions) and all(solution.fallback == "solve" for solution in found.solutions)
-
-
-def _change(before: list[LevelSolution], after: list[LevelSolution]) -> float:
-    """Returns the largest change of an increment at any level, N·m."""
-    return max(float(np.abs(new.U - old.U).max()) for new, old in zip(after, before, strict=True))

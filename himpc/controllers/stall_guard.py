@@ -1,5 +1,5 @@
-"""Slows joints down while a controller keeps distances: all joints of a stalled robot, joints with little
-torque left, and joints that accelerate. Without distances, it stops a robot that presses."""
+"""The guards of a controller, which lower velocity limits: one for controllers that keep distances, and one
+for the others, which stops a robot that presses."""
 
 from __future__ import annotations
 
@@ -9,29 +9,27 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.constants import BLOCKED, HEAVY_LOAD, PROGRESS
+from himpc.constants import PROGRESS
 from himpc.formulation.settings import Settings
 from himpc.limits import LimitsInForce
-from himpc.limits.load import loaded, spared
-from himpc.limits.overrun import anticipated, followed
-from himpc.limits.stall import going, slowed, stalled
 from himpc.limits.windup import Windup, free, largest_error, stopped, wound_up
-from himpc.tick.compiled_stall_guard import CompiledStallGuard
 from himpc.tick.distances import Distances
+from himpc.tick.kernel.slow_down import slow_down
 
 Array = NDArray[np.float64]
 
 
+_NONE = np.empty(0)
+
+
 @final
 class StallGuard:
-    """Contains the degree to which the robot of a controller is stalled.
+    """Slows joints down while a controller keeps distances: all joints of a stalled robot, joints that are
+    carried by a motor with little torque left, and joints that accelerate, see `tick.kernel.slow_down`.
 
     Attributes:
         errors: (T,) the lengths of the tasks' errors at the last tick, m or rad; None before the first one.
         fastest: the largest velocity of a row of a reference at the last tick, m/s or rad/s.
-        stall: the degree to which the robot is stalled.
-        load: (n,) the mean load of each joint, as a share of its torque limit; None before the first tick.
-        mean: (n,) rad/s, the mean velocity of each joint.
         largest_error: the largest error on which tasks act, m or rad.
     """
 
@@ -39,15 +37,14 @@ class StallGuard:
         self._T_s, self.largest_error = T_s, largest_error
         self.errors: Array | None = None
         self.fastest = 0.0
-        self.stall = going(tasks)
-        self.load: Array | None = None
-        self.mean: Array | None = None
+        self._due, self._stall = np.full(tasks, np.inf), np.array((1.0, np.inf))
+        self._joints: Array | None = None
+        self._limits: tuple[LimitsInForce, Array, Array] | None = None
 
     def limits(
         self, limits: LimitsInForce, tau: Array, v: Array, distances: Distances | None
     ) -> LimitsInForce:
-        """Returns the limits in force at this tick. Velocity limits are lower while the robot is stalled, and
-        for joints that accelerate or have little torque left.
+        """Returns the limits in force at this tick, with lower velocity limits.
 
         Args:
             limits: the limits without these reductions.
@@ -56,16 +53,19 @@ class StallGuard:
             distances: the pairs of the last tick.
         """
         assert distances is not None
-        T_s = self._T_s
-        limits = limits.with_velocities((1.0 - distances.velocity_margin) * limits.v_limit)
-        self.load = loaded(np.zeros_like(tau) if self.load is None else self.load, tau, limits, T_s)
-        self.mean = followed(v if self.mean is None else self.mean, v, T_s)
-        limits = anticipated(spared(limits, self.load, distances.carried), v, self.mean)
-        if self.errors is not None:
-            moves = distances.moves or self.fastest > PROGRESS
-            room = min(distances.room, BLOCKED) if self.load.max() > HEAVY_LOAD else distances.room
-            self.stall = stalled(self.stall, self.errors, moves, room, T_s)
-        return slowed(limits, self.stall)
+        if self._joints is None:
+            self._joints = np.array((np.zeros_like(v), v))
+        if self._limits is None or self._limits[0] is not limits:
+            v_limit = (1.0 - distances.velocity_margin) * limits.v_limit
+            self._limits = limits, v_limit, limits.largest_torque
+        load, mean = self._joints
+        slower = np.empty(len(v))
+        slow_down(
+            *(*self._limits[1:], tau, v, distances.carried, distances.room),
+            *(distances.moves or self.fastest > PROGRESS, self._T_s),
+            *(_NONE if self.errors is None else self.errors, self._due, self._stall, load, mean, slower),
+        )
+        return limits.with_velocities(slower)
 
 
 @final
@@ -97,10 +97,8 @@ class WindupGuard:
         return math.inf if self.windup is None else largest_error(self.windup)
 
 
-def guard_of(
-    settings: Settings, tasks: int, largest_torque: Array
-) -> StallGuard | CompiledStallGuard | WindupGuard | None:
-    """Returns the guard for a controller on the route of its settings; None if the settings have no guard.
+def guard_of(settings: Settings, tasks: int, largest_torque: Array) -> StallGuard | WindupGuard | None:
+    """Returns the guard for a controller; None if the settings have no guard.
 
     Args:
         settings: the settings of the controller.
@@ -109,6 +107,5 @@ def guard_of(
     """
     limits, T_s = settings.limits, settings.T_s
     if limits.avoidance.on:
-        kind = CompiledStallGuard if settings.route == "compiled" else StallGuard
-        return kind(tasks, T_s, limits.avoidance.largest_error)
+        return StallGuard(tasks, T_s, limits.avoidance.largest_error)
     return WindupGuard(largest_torque, T_s) if limits.stall_guard else None

@@ -33,7 +33,9 @@ class LevelView:
         K_p, K_v: gains of (4), (m,).
         Q: weight of the residual (28), (m,).
         R: weight of the increments Δτ in (31), (n,).
-        jacobian: J at another configuration: (n,) → (m, n).
+        horizon: number of knots that the level looks ahead, at most N (Remark 8).
+        jacobian: J at another configuration, (n,) → (m, n), or at those of knots 0 … N−1, (N, n) → (N, m, n).
+            At later knots, targets that move have moved, too.
     """
 
     name: str
@@ -51,6 +53,7 @@ class LevelView:
     K_v: Array
     Q: Array
     R: Array
+    horizon: int
     jacobian: Callable[[Array], Array]
 
 
@@ -64,6 +67,7 @@ class Bounds:
             include the velocity from which a joint can still stop before its limit.
         q_lower, q_upper: (n,) rad.
         approach: 1/s, largest rate at which the distance to a velocity bound may shrink; 0: no such limit.
+        paper: whether the position limits are imposed by the rows (32d), as printed.
     """
 
     tau_lower: Array
@@ -73,6 +77,23 @@ class Bounds:
     q_lower: Array
     q_upper: Array
     approach: float
+    paper: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Further:
+    """A constraint besides (32d)–(32f): lower ≤ L U Dᵀ ≤ upper, see `himpc.limits.constraint`.
+
+    Attributes:
+        profile: L, (N, N).
+        directions: D, (n, n).
+        lower, upper: (N, n) N·m, ±inf where there is no bound.
+    """
+
+    profile: Array
+    directions: Array
+    lower: Array
+    upper: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +135,7 @@ class View:
         levels: highest priority first.
         bounds: the bounds of this tick.
         near: the distances to keep.
+        further: the constraints besides (32d)–(32f) that are imposed, such as distances.
         nominal: the nominal dynamic model, for model-based controllers.
     """
 
@@ -127,6 +149,7 @@ class View:
     levels: tuple[LevelView, ...]
     bounds: Bounds
     near: NearView
+    further: tuple[Further, ...]
     nominal: NominalModel
 
     @property

@@ -88,7 +88,7 @@ def image_of(
     """Returns the memory of a controller before its first period.
 
     Args:
-        controller: HIMPC, HIQP, NHIMPC or Weighted on the compiled route.
+        controller: HIMPC, HIQP, NHIMPC or Weighted.
         robot: the robot of the controller.
         references: the references of all tasks by name, before the first period.
         budget: largest number of multiplications for changes of active rows in a period; None: `budget_of`.
@@ -108,7 +108,7 @@ def image_of(
     sizes = sizes_of(
         robot.n, settings.horizon, len(arena.f["K_p"]), len(tables), len(spans), len(arena.f["L"])
     )
-    loop, loop_where, f = laid_out(SHAPES, sizes, np.float64)
+    loop, loop_where, f = laid_out(SHAPES, sizes._asdict(), np.float64)
     f["setup"][[MOST, TOLERANCE]] = (
         (controller.max_iterations, controller.tolerance) if isinstance(controller, NHIMPC) else (1, np.inf)
     )

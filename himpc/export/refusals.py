@@ -21,8 +21,6 @@ def check(controller: Controller, settings: Settings) -> None:
             f"the controller {type(controller).__name__} is not compiled: export supports himpc, hiqp, "
             "nhimpc and weighted"
         )
-    if settings.route != "compiled":
-        raise InputError("route=explicit is not compiled: export supports route=compiled")
     if settings.M_bar_adapt:
         raise InputError(
             "M_bar_adapt needs the robot's dynamic model, which is not exported: set it to false"

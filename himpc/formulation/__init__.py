@@ -1,2 +1,2 @@
 """From settings to the optimisation problems of a control period: the settings, the levels prepared for them,
-and the memory of the previous period. The printed route and the compiled one share this package."""
+and the memory of the previous period. The printed page and the kernel share this package."""

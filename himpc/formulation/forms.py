@@ -38,7 +38,6 @@ class LevelForm:
         root_Q: (m,), √Q.
         weighted_C: (K, m, K), √Q C over the level's own knots.
         R: (n,), in the weight's unit.
-        common_R: R if it is the same for all joints, else None.
         knots: the level's own horizon K ≤ N.
         sizes: number of rows of each of its tasks.
     """
@@ -50,33 +49,15 @@ class LevelForm:
     root_Q: Array
     weighted_C: Array
     R: Array
-    common_R: float | None
     knots: int
     sizes: tuple[int, ...]
 
-    def problem(self, B: Array, free: Array, weighted_free: Array, share: float | Array) -> LevelProblem:
+    def problem(self, B: Array, free: Array, share: float | Array = 1.0) -> LevelProblem:
         """Returns the level's QP data. share: factor on its √Q while it fades in, one number or one per
         row."""
-        rows, root_Q, weighted_C, weighted = (
-            self.rows,
-            self.root_Q,
-            self.weighted_C,
-            weighted_free[:, self.rows],
-        )
-        if np.any(np.less(share, 1.0)):
-            by_row = np.broadcast_to(share, root_Q.shape)
-            root_Q, weighted_C, weighted = by_row * root_Q, by_row[:, None] * weighted_C, by_row * weighted
+        rows = self.rows
         return LevelProblem(
-            self.name,
-            B[:, rows],
-            self.C,
-            free[:, rows],
-            weighted,
-            root_Q,
-            weighted_C,
-            self.R,
-            self.knots,
-            self.common_R,
+            self.name, B[:, rows], self.C, free[:, rows], share * self.root_Q, self.R, self.knots
         )
 
 
@@ -220,7 +201,6 @@ def stack_form(robot: Robot, levels: Sequence[Level], settings: Settings) -> Sta
                 root_Q=root_Q,
                 weighted_C=np.ascontiguousarray(root_Q[:, None] * C[:K, :, :K]),
                 R=R,
-                common_R=float(R[0]) if (R[0] == R).all() else None,
                 knots=K,
                 sizes=tuple(len(gain) for gain in K_p[first:]),
             )

@@ -40,18 +40,3 @@ class Memory(NamedTuple):
         """Returns the memory of a robot that has moved with constant velocity so far. q̈ and ẍ are then
         zero."""
         return cls(q, v, T_s)
-
-    def knots(self, q: Array, v: Array, N: int, T_s: float) -> Array:
-        """Returns q*_{k+j|k−1}, j = 1 … N−1, shifted to begin at the measured q: (N−1, n), see (30).
-
-        If the last prediction is too short for the horizon, it is continued at constant velocity.
-        """
-        if self.predicted_q is None:
-            return q + T_s * np.arange(1.0, N)[:, None] * v
-        path = self.predicted_q[1:]
-        path = path + (q - path[0])
-        missing = N - len(path)
-        if missing > 0:
-            step = path[-1] - path[-2] if len(path) > 1 else T_s * v
-            path = np.vstack([path, path[-1] + np.arange(1.0, missing + 1)[:, None] * step])
-        return path[1:N]

@@ -5,16 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
-from himpc.catalog import Route
 from himpc.limits import Limits
 from himpc.qp import Solver, is_installed
 from himpc.stack import Stack, check_names
 from robots import InputError, NominalSettings
-from robots.ranges import Range, check_fields
+from robots.ranges import Range, Shown, check_fields
 
 MAX_HORIZON = 60
-Horizon = Annotated[int, Range(1, MAX_HORIZON)]
-Period = Annotated[float, Range(1e-4, 0.02)]
 
 
 @dataclass(frozen=True)
@@ -23,15 +20,11 @@ class Settings:
 
     Attributes:
         stack: levels, highest priority first.
-        horizon: N ≥ 1 knots; 1 is HIQP.
-        T_s: control period, s.
         M_bar: diagonal of M̄, one per joint, kg·m².
         M_bar_adapt: himpc, hiqp, nhimpc and weighted fit M̄ to the payload that they estimate from the applied
             torques, see `himpc.controllers.adaptation`.
-        limits: bounds to impose.
-        route: "compiled" (the kernel of `himpc.tick`) or "explicit" (a general solver on all bounds).
-        solver: the solver of the QPs of the explicit route and of hqp: "daqp", "proxqp" or, with CasADi
-            installed, "qpoases". If no QP solver is used, only "daqp" is accepted, see `check_solver`.
+        solver: the solver of the QPs of himpc_printed and of hqp: "daqp", "proxqp" or, with CasADi installed,
+            "qpoases". If no QP solver is used, only "daqp" is accepted, see `check_solver`.
         R_on: the quantity that R in (31) weighs: the "torque" increments Δτ as printed, or the "acceleration"
             M̄⁻¹Δτ (HQP uses M_n of its model in place of M̄).
         damping: whether the damping level is added if the enabled levels leave freedom.
@@ -40,15 +33,31 @@ class Settings:
     """
 
     stack: Stack
-    M_bar: Annotated[tuple[float, ...], Range(0.0, above=True)]
-    M_bar_adapt: bool = False
-    horizon: Horizon = 5
-    T_s: Period = 1e-3
+    # fmt: off
+    M_bar: Annotated[tuple[float, ...], Range(0.0, above=True), Shown(
+        "M̄", "The diagonal of M̄, one number per joint, before scaling", "kg·m²")]
+    M_bar_adapt: Annotated[bool, Shown(
+        "M̄ adapts to the payload", "The controller estimates the payload from the torque against gravity, "
+        "and sets M̄ as large as the nominal model with that payload allows", tries=("true", "false"),
+        name="M̄ adapts", group="Inertia estimate M̄")] = False
+    horizon: Annotated[int, Range(1, MAX_HORIZON), Shown(
+        "N", "Number of knots of the prediction horizon; 1 is the inverse dynamics hierarchy", low=1, high=30,
+        tries=("1", "2", "5", "10", "20"), name="horizon N", group="Horizon")] = 5
+    T_s: Annotated[float, Range(1e-4, 0.02), Shown(
+        "T_s", "Control period; also the time allowed for each control step", "s", 0.5, 5.0, 0.5,
+        page_unit="ms", factor=1000.0, tries=("0.002", "0.004", "0.001"), name="control period T_s, s",
+        group="Horizon")] = 1e-3
     limits: Limits = field(default_factory=Limits)
-    route: Route = "compiled"
-    solver: Solver = "daqp"
-    R_on: Literal["torque", "acceleration"] = "torque"
-    damping: bool = True
+    solver: Annotated[Solver, Shown(
+        "QP solver", "Solver of the QPs of hqp and himpc_printed. Other controllers accept daqp only. "
+        "qpoases needs the extra 'bench'", group="Solver")] = "daqp"
+    R_on: Annotated[Literal["torque", "acceleration"], Shown(
+        "R weighs", "Quantity that R weighs: Δτ as printed, or M̄⁻¹Δτ", group="Solver")] = "torque"
+    damping: Annotated[bool, Shown(
+        "Damp what no level controls", "R weighs changes of torque only, so a motion without a task keeps "
+        "its torque and does not stop after a push. The last level brings this motion to rest. To see the "
+        "effect, switch it off and push the robot.", tries=("false", "true"), name="damping level")] = True
+    # fmt: on
     nominal: NominalSettings = field(default_factory=NominalSettings)
 
     def __post_init__(self) -> None:
@@ -64,6 +73,6 @@ def check_solver(settings: Settings, used: bool) -> None:
     """Raises InputError for a QP solver other than the default if the controller uses no QP solver."""
     if settings.solver != "daqp" and not used:
         raise InputError(
-            f"solver={settings.solver} changes nothing here: a QP solver is used by hqp, and by himpc, hiqp, "
-            "nhimpc and weighted with route=explicit; choose one of these, or solver=daqp"
+            f"solver={settings.solver} changes nothing here: a QP solver is used by hqp and himpc_printed; "
+            "choose one of these, or solver=daqp"
         )

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from himpc.limits.avoidance import Avoidance
 from robots import InputError, Robot
-from robots.ranges import Range, check_fields
+from robots.ranges import Folder, Range, Shown, check_fields
 
 Array = NDArray[np.float64]
 PositionMode = Literal["viability", "paper", "off"]
@@ -22,31 +22,44 @@ class Limits:
     """Which bounds are imposed, and factors on the robot's own limits.
 
     Attributes:
-        torque: whether (32f) is imposed.
-        velocity: whether (32e) is imposed.
         position: "viability" (the velocity bound from which the joint can still stop), "paper" (the rows
             (32d) as printed) or "off".
-        torque_scale, velocity_scale: factors on the robot's limits, > 0.
         velocity_approach: 1/s; the rate at which a velocity bound may be approached, relative to the
             remaining distance (a barrier: q̈ ≤ rate·(q̇_max − q̇)). Time-delay estimation needs tens of ticks
             to stop an acceleration (M̄ < M). A bound that is reached at full acceleration is overrun: on the
             iiwa's circle by 17 % with rate 0, which is (32e) as printed, and by 0.2 % with 15 (`himpc-lab
             reproduce himpc-limits`).
-        torque_rate: N·m/s; largest change of each joint's torque per second; 0: not imposed.
-        stall_guard: whether a robot that presses without progress comes to rest, also if no distances are
-            kept. Without this guard, as printed, time-delay estimation increases the torque without end.
-        avoidance: the distances that are kept.
     """
 
-    torque: bool = True
-    velocity: bool = True
-    position: PositionMode = "viability"
-    torque_scale: Annotated[float, Range(0.0, above=True)] = 1.0
-    velocity_scale: Annotated[float, Range(0.0, above=True)] = 1.0
-    velocity_approach: Annotated[float, Range(0.0, 1e4)] = 15.0
-    torque_rate: Annotated[float, Range(0.0, 1e5)] = 0.0
-    stall_guard: bool = False
-    avoidance: Avoidance = field(default_factory=Avoidance)
+    # fmt: off
+    torque: Annotated[bool, Shown("Torque", "Impose the torque limits, (32f)", name="torque limits")] = True
+    velocity: Annotated[bool, Shown(
+        "Velocity", "Impose the velocity limits, (32e)", name="velocity limits")] = True
+    position: Annotated[PositionMode, Shown(
+        "Position", "viability: limits the speed to one from which the joint can still stop. paper: the rows "
+        "as printed, which a horizon of a few milliseconds cannot keep, as the list of fallbacks shows",
+        tries=("paper", "off", "viability"), name="position limits", group="Limits")] = "viability"
+    torque_scale: Annotated[float, Range(0.0, above=True), Shown(
+        "Torque scale", "One factor on the robot's torque limits", "", 0.05, 2.0, 0.01, group="Limits")] = 1.0
+    velocity_scale: Annotated[float, Range(0.0, above=True), Shown(
+        "Velocity scale", "One factor on the robot's velocity limits", "", 0.05, 2.0, 0.01, group="Limits",
+    )] = 1.0
+    velocity_approach: Annotated[float, Range(0.0, 1e4), Shown(
+        "Approach", "Largest rate at which a joint may approach its velocity bound, relative to the "
+        "remaining distance; 0: (32e) as printed", "1/s", 0.0, 100.0, 1.0)] = 15.0
+    torque_rate: Annotated[float, Range(0.0, 1e5), Shown(
+        "Torque rate", "Largest change of each joint's torque per second; in himpc, hiqp, nhimpc, "
+        "weighted and himpc_printed this limit ranks above all levels. 0: not imposed", "N·m/s", 0.0, 2000.0,
+        10.0, name="torque rate limit", group="Limits")] = 0.0
+    stall_guard: Annotated[bool, Shown(
+        "Rest when blocked",
+        "A robot whose torque rises without progress of its tasks comes to rest, also if no distances are "
+        "kept. Without this guard, as printed, time-delay estimation increases the torque until it is at "
+        "its limit. himpc, hiqp, nhimpc, weighted and himpc_printed have the guard, and always "
+        "while they keep distances",
+        tries=("false", "true"), name="guard of a blocked robot", group="Limits")] = False
+    # fmt: on
+    avoidance: Annotated[Avoidance, Folder("avoidance.")] = field(default_factory=Avoidance)
 
     def __post_init__(self) -> None:
         check_fields(self, "limits.")

@@ -66,6 +66,18 @@ class Rows(NamedTuple):
         return value
 
     @property
+    def matrix(self) -> Array:
+        """The matrix A (r·n, N·n) for which A U, with U ordered by knot and then by joint, are the values of
+        the rows."""
+        N, n = self.L.shape[1], self.lower.shape[1]
+        A = np.kron(self.L, np.eye(n))
+        for place, directions in enumerate(self.directions):
+            if directions is not None:
+                block = slice(place * N, (place + 1) * N)
+                A[block.start * n : block.stop * n] = np.kron(self.L[block], directions.D)
+        return np.asarray(A, np.float64)
+
+    @property
     def bits(self) -> NDArray[np.intp]:
         """The bit of each row in `at_bound`, (r,)."""
         return np.repeat([bit_of(each) for each in self.constraints], self.L.shape[1])

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from himpc.references.filter import roll
 from himpc.references.preview import Array, Preview
 
 
@@ -29,7 +28,7 @@ _ROOM = 200
 
 
 Roll = Callable[[Array, int, Array, Array, float, Array], None]
-"""A function with the arguments of `himpc.references.filter.roll`."""
+"""A function with the arguments of `himpc.tick.kernel.target.roll`."""
 
 
 class Target:
@@ -45,9 +44,9 @@ class Target:
         caps: caps on speed, acceleration and jerk of the filtered motion.
     """
 
-    def __init__(self, value: Array, caps: Caps = POSITION_CAPS, roll: Roll = roll) -> None:
-        """The target starts at rest at `value`. `roll` computes the filter; for a compiled one see
-        `himpc.controllers.dragged_target`."""
+    def __init__(self, value: Array, caps: Caps, roll: Roll) -> None:
+        """The target starts at rest at `value`. `roll` computes the filter. A target with the lab's filter,
+        which is compiled, is `himpc.controllers.dragged_target(value, caps)`."""
         value = np.array(value, float)
         self.raw = value
         self.caps = caps
@@ -55,8 +54,8 @@ class Target:
         self._filter = roll
         self._m = 3 if self._rotation else value.size
         self._caps = np.array([caps.speed, caps.acceleration, caps.jerk, *np.zeros(3 * self._m)])
-        # See `references.filter.roll`; the first `_known` samples are computed, and sample 0 is the present
-        # one.
+        # See `himpc.tick.kernel.target.roll`; the first `_known` samples are computed, and sample 0 is the
+        # present one.
         self._samples = np.zeros((2, value.size + 3 * self._m + 1))
         self._samples[0, : value.size], self._samples[0, -1], self._known = value.ravel(), 1.0, 1
         self._time: float | None = None

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.ranges import Range
+from robots.ranges import Range, Shown
 
 if TYPE_CHECKING:
     from himpc.kinematics.configuration import Configuration
@@ -34,8 +34,8 @@ class Task(ABC):
     """
 
     name: str
-    K_p: Gain = 200.0
-    K_v: Gain = 10.0
+    K_p: Annotated[Gain, Shown("K_P", "Stiffness", "1/s²", 0.0, 1000.0, 1.0, name="K_P of *")] = 200.0
+    K_v: Annotated[Gain, Shown("K_V", "Damping", "1/s", 0.0, 100.0, 0.5, name="K_V of *")] = 10.0
 
     unit: ClassVar[Literal["m", "rad"]] = "m"
 

@@ -30,12 +30,12 @@ def gathered(arena: Arena, layout: Layout, spans: Sequence[Span], levels: Sequen
     Returns:
         (size,), or None if the row has a task whose reference is not in the arena.
     """
-    found = np.full(layout.size, arena.where[AT.nothing])
+    found = np.full(layout.size, arena.where[AT["nothing"]])
     n, fields, knots = len(layout.joints), layout.fields, arena.f["motion"][0].size
 
     def put(field: str, name: str, skipped: int = 0) -> None:
         where = fields[field]
-        start = arena.where[getattr(AT, name)] + skipped
+        start = arena.where[AT[name]] + skipped
         found[where] = np.arange(start, start + where.stop - where.start)
 
     for name in ("delta_tau", "at_bound", "priority_leak", "tau_0"):

@@ -8,7 +8,7 @@ import numpy as np
 
 from himpc.cascade.level import FALLBACKS, NO_ROWS, ActiveRows, Fallback, LevelProblem, LevelSolution
 from himpc.limits.rows import Rows
-from himpc.tick.fallbacks import FallbackBudget, perform, solve_level
+from himpc.tick.fallbacks import perform, solve_level
 from himpc.tick.kernel.arena import Arena, Snapshot
 from himpc.tick.kernel.arrays import PULL, Array
 from himpc.tick.kernel.control_period import FINISH, LEVELS
@@ -20,9 +20,9 @@ def solve_problems(
     rows: Rows,
     previous: Mapping[str, LevelSolution],
 ) -> list[LevelSolution]:
-    """Solves a cascade by the kernel, with the arguments of `himpc.cascade.cascade.solve_cascade`."""
+    """Solves a cascade by the kernel. previous: the solutions of the last tick by the name of the level."""
     arena = arena_of(problems, rows, previous)
-    perform(arena, LEVELS + FINISH, rows, FallbackBudget())
+    perform(arena, LEVELS + FINISH, rows)
     return solutions([problem.name for problem in problems], arena.snapshot())
 
 
@@ -37,7 +37,9 @@ def arena_of(problems: Sequence[LevelProblem], rows: Rows, previous: Mapping[str
     for place, problem in enumerate(problems):
         span = slice(int(ends[place]), int(ends[place + 1]))
         f["B"][:, span], f["free"][:, span] = problem.B, problem.free
-        write_effects(arena, span, problem.root_Q, problem.weighted_C)
+        K = problem.knots
+        weighted_C = problem.root_Q[:, None] * problem.C[:K, :, :K]
+        write_effects(arena, span, problem.root_Q, weighted_C)
         tables.append(LevelTable(span, problem.knots, problem.R, span, problem.knots, problem.R))
         before = previous.get(problem.name)
         if before is not None:

@@ -12,7 +12,7 @@ from himpc.limits import POSITION, TORQUE, VELOCITY
 from himpc.limits.constraint import Constraint
 from himpc.qp import KKT_TOLERANCE
 from himpc.tick.kernel.arena import Arena
-from himpc.tick.kernel.arrays import Array
+from himpc.tick.kernel.arrays import Array, sizes_of
 
 if TYPE_CHECKING:
     from himpc.formulation.forms import LevelForm
@@ -124,21 +124,7 @@ def sizes(
         given: number of rows of tasks that are not built into the kernel, at least 1.
         directed: number of constraints that are not built into the kernel.
     """
-    arena = Arena(
-        n=n,
-        N=N,
-        N1=N + 1,
-        M=rows,
-        r=max(levels, 1),
-        T=tasks,
-        F=frames,
-        G=given,
-        J=n + 1,
-        b=bounds,
-        g=max(directed, 1),
-        w=N * n,
-        k=N * n + 1,
-    )
-    arena.i["sizes"][:9] = n, N, rows, solved, levels, tasks, frames, bounds, N * n
-    arena.i["sizes"][10:] = given, directed
+    numbers = [n, N, rows, solved, levels, tasks, frames, bounds, N * n, 0, given, directed]
+    arena = Arena(sizes_of(numbers))
+    arena.i["sizes"][:] = numbers
     return arena

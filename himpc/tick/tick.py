@@ -15,13 +15,14 @@ from himpc.formulation.settings import Settings
 from himpc.limits import LimitsInForce, Rows
 from himpc.limits.constraints import imposed
 from himpc.plan import AtOnce, Evidence, Plan
+from himpc.printed import knots
 from himpc.references import Preview
 from himpc.references.outlook import observed_by
 from himpc.tasks import Task
 from himpc.telemetry import Layout
 from himpc.tick.configure import arena_for, write_limits, write_velocity_limits
 from himpc.tick.distances import Distances
-from himpc.tick.fallbacks import FallbackBudget, perform
+from himpc.tick.fallbacks import perform
 from himpc.tick.gather import gathered
 from himpc.tick.given import GivenRows
 from himpc.tick.given_bounds import GivenBounds
@@ -95,7 +96,7 @@ class CompiledTick:
         if memory.predicted_q is not None and len(memory.predicted_q) == N + 1:
             f["path"][:] = memory.predicted_q  # unchanged numbers stay bitwise the same
         else:
-            f["path"][1], f["path"][2 : N + 1] = q, memory.knots(q, v, N, T_s)
+            f["path"][1], f["path"][2 : N + 1] = q, knots(memory.predicted_q, q, v, N, T_s)[1:]
         for place, level in enumerate(self._form.levels if self._levels else ()):
             before = memory.solutions.get(level.name)
             if before is not None:
@@ -160,10 +161,7 @@ class CompiledTick:
         f, form = self.arena.f, self._form
         rows = sum(form.sizes)
         B, free = f["B"][:, :rows].copy(), f["free"][:, :rows].copy()
-        return [
-            level.problem(B, free, form.root_Q * free, share)
-            for level, share in zip(form.levels, self._shares, strict=True)
-        ]
+        return [level.problem(B, free, share) for level, share in zip(form.levels, self._shares, strict=True)]
 
     def step(
         self,
@@ -185,7 +183,7 @@ class CompiledTick:
         """
         self._take(q, v, previews, tau_0, limits)
         arena = self.arena
-        change, iterations, unsolved, budget = math.inf, 0, 0, FallbackBudget()
+        change, iterations, unsolved = math.inf, 0, 0
         parts = ALL_PARTS if self._most == 1 else ITERATION
         arena.f["budget"][:] = self.budget
         while iterations == 0 or (change > self._tolerance and iterations < self._most):
@@ -198,15 +196,15 @@ class CompiledTick:
                 before = None
             self._given.write(previews)
             self._rows = self._given_bounds.write(self._rows, limits, observed_by(previews))
-            unsolved = perform(arena, parts, self._rows, budget)
+            unsolved = perform(arena, parts, self._rows)
             if unsolved == NOT_FINITE:
                 return None
             self._looked = True
             iterations += 1
             if before is not None:
                 change = float(np.abs(arena.f["U"] - before).max())
-            if unsolved or not budget.spared:
-                break  # another iteration needs optima at all levels and some budget
+            if unsolved:
+                break  # another iteration needs optima at all levels
         if self._most > 1:
             control_period(*arena.arguments, FINISH + REMEMBER, 0, 0.0)
         return self._plan(unsolved, tau_0, limits, iterations, started)

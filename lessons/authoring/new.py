@@ -60,7 +60,8 @@ def text_of(kind: Kind, start: str | None, file: str) -> str:
     if kind == "controller" and start in EXERCISES:
         text = start_of(start)
     elif kind == "controller":
-        text = _read("lessons.examples", start or EXAMPLES[0])
+        package, name = ("himpc", "printed") if start == "himpc_one_page" else ("lessons.examples", start)
+        text = _read(package, name or EXAMPLES[0])
     elif kind == "lesson" and start is not None:
         text = lesson_file(start).read_text(encoding="utf-8")
     elif kind == "scene" and start is not None:

@@ -166,7 +166,8 @@ class Apart:
             raise OwnFault(f"{self._source.path}: its process has ended")
         self._asked = True
         message, arrays = b"", numbers_of(now)
-        marks = [now.T_s, now.N, now.bounds.approach, *(level.name for level in now.levels)]
+        marks = [now.T_s, now.N, now.bounds.approach, now.bounds.paper, len(now.further)]
+        marks += [mark for level in now.levels for mark in (level.name, level.horizon)]
         marks += [now.near.names, now.near.reaction, now.near.deceleration]
         marks += [each.shape for each in arrays]
         if marks != self._marks:
@@ -194,7 +195,9 @@ class Apart:
         """Calls a function of the model for the submission, and returns the message with the result."""
         try:
             name, level, arguments = json.loads(data)
-            given = [np.array(each, float).reshape(now.n) for each in arguments]
+            given = [np.array(each, float) for each in arguments]
+            knots = name == "jacobian" and given[0].shape == (now.N, now.n)  # at all knots at once
+            given = given if knots else [each.reshape(now.n) for each in given]
             functions: Mapping[str, Any] = {
                 "jacobian": now.levels[int(level)].jacobian,
                 "mass_matrix": now.nominal.mass_matrix,

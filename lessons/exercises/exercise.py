@@ -10,8 +10,8 @@ import numpy as np
 from lessons.events import Push
 from lessons.exercises.mistakes import Law, Mistake
 from lessons.scenes.run_spec import RunSpec
-from lessons.settings.entry import entry_at
-from lessons.settings.torque_entries import TORQUE_ENTRIES
+from lessons.settings.schema import settings_of
+from lessons.settings.torque import TorqueSettings
 from lessons.teaching.claim import Relation, condition, holds
 from lessons.teaching.control import Script
 from lessons.teaching.lesson import Card
@@ -98,7 +98,8 @@ class Exercise:
     def before(self) -> str:
         """The sentence that says what to set on the page before a solution is watched; "" if nothing."""
         pairs = [each.split("=", 1) for each in self.live]
-        said = [f"“{entry_at(TORQUE_ENTRIES, path).label}” to {value}" for path, value in pairs]
+        labels = {each.path: each.shown.label for each in settings_of(TorqueSettings)}
+        said = [f"“{labels[path]}” to {value}" for path, value in pairs]
         return f"On the page, first set {', '.join(said)}." if said else ""
 
     @property

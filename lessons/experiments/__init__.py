@@ -1,1 +1,1 @@
-"""Many runs: jobs, sweeps, tuning and the comparison of routes and solvers."""
+"""Many runs: jobs, sweeps, tuning and the comparison of solvers."""

@@ -1,4 +1,4 @@
-"""Control-step times of the routes and solvers, taken side by side in one run."""
+"""Control-step times of HIMPC, compiled and as printed with each solver, taken side by side in one run."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from himpc.catalog import Route
 from himpc.qp import Solver, is_installed
 from lessons.events import MoveTarget
 from lessons.scenes.catalog import as_torque_scene
@@ -18,15 +17,15 @@ from lessons.session.torque import TorqueSession
 HORIZONS = (5, 10, 20, 30)
 SCENES = ("iiwa14-circle", "iiwa14-hold")
 """A scene whose motion is known beforehand, and scenes with dragged targets."""
-CONTENDERS: tuple[tuple[Route, Solver], ...] = (
-    ("compiled", "daqp"),
-    ("explicit", "daqp"),
-    ("explicit", "proxqp"),
-    ("explicit", "qpoases"),
+CONTENDERS: tuple[tuple[str, Solver], ...] = (
+    ("himpc", "daqp"),
+    ("himpc_printed", "daqp"),
+    ("himpc_printed", "proxqp"),
+    ("himpc_printed", "qpoases"),
 )
 """The last contender takes part only if CasADi is installed."""
-_LONGEST_EXPLICIT = 20
-"""Longest horizon for which the explicit route takes part; a longer one takes seconds per step."""
+_LONGEST_PRINTED = 20
+"""Longest horizon for which himpc_printed takes part; a longer one takes seconds per step."""
 _TURN = 10
 """Number of timed ticks of a contender before the next contender runs. The contenders take turns, and the
 noise of the machine affects all of them equally. An untimed tick precedes each turn: at that tick the caches
@@ -43,7 +42,7 @@ class Timing:
     """Times of one contender, ms: the whole step (state in, torque out) and the QP solver's share."""
 
     horizon: int
-    route: str
+    controller: str
     solver: str
     ticks: int
     step_ms: dict[str, float]
@@ -68,10 +67,10 @@ def bench(
     timings = []
     for place, N in enumerate(horizons):
         sessions = {}
-        contenders = CONTENDERS if N <= _LONGEST_EXPLICIT else CONTENDERS[:1]
-        for route, solver in (each for each in contenders if is_installed(each[1])):
-            settings = replace(loaded.settings, horizon=N, route=route, solver=solver)
-            sessions[route, solver] = TorqueSession(replace(loaded, settings=settings))
+        contenders = CONTENDERS if N <= _LONGEST_PRINTED else CONTENDERS[:1]
+        for controller, solver in (each for each in contenders if is_installed(each[1])):
+            settings = replace(loaded.settings, horizon=N, controller=controller, solver=solver)
+            sessions[controller, solver] = TorqueSession(replace(loaded, settings=settings))
         steps: dict[tuple[str, str], list[float]] = {key: [] for key in sessions}
         solves: dict[tuple[str, str], list[float]] = {key: [] for key in sessions}
         for turn in range(-(-ticks // _TURN)):
@@ -83,11 +82,11 @@ def bench(
                         steps[key].append(session.plan.step_us / 1e3)
                         # The kernel uses no external solver. The collection of its evidence is not part of a
                         # step.
-                        levels = () if key[0] == "compiled" else session.plan.levels
+                        levels = () if key[0] == "himpc" else session.plan.levels
                         solves[key].append(sum(level.qp_us for level in levels) / 1e3)
         timings += [
-            Timing(N, route, solver, len(times), _spread(times), float(np.median(solves[route, solver])))
-            for (route, solver), times in steps.items()
+            Timing(N, name, solver, len(times), _spread(times), float(np.median(solves[name, solver])))
+            for (name, solver), times in steps.items()
         ]
         if progress is not None:
             progress((place + 1) / len(horizons))
@@ -111,21 +110,21 @@ def _spread(times: list[float]) -> dict[str, float]:
 
 
 def ratios(timings: Sequence[Timing]) -> dict[str, Any]:
-    """Returns, for each horizon, the ratio of each route's step time to that of the compiled route, and the
-    ratio of ProxQP's QP time to DAQP's."""
-    found = {(t.horizon, t.route, t.solver): t for t in timings}
+    """Returns, for each horizon, the ratio of the step time of himpc_printed to that of himpc, and the ratio
+    of ProxQP's QP time to DAQP's."""
+    found = {(t.horizon, t.controller, t.solver): t for t in timings}
     result = {}
     for N in sorted({t.horizon for t in timings}):
-        compiled = found[N, "compiled", "daqp"].step_ms["median"]
-        if (N, "explicit", "daqp") not in found:
+        compiled = found[N, "himpc", "daqp"].step_ms["median"]
+        if (N, "himpc_printed", "daqp") not in found:
             continue
-        daqp, proxqp = found[N, "explicit", "daqp"], found[N, "explicit", "proxqp"]
+        daqp, proxqp = found[N, "himpc_printed", "daqp"], found[N, "himpc_printed", "proxqp"]
         result[str(N)] = {
-            "explicit_daqp_over_compiled": daqp.step_ms["median"] / compiled,
-            "explicit_proxqp_over_compiled": proxqp.step_ms["median"] / compiled,
+            "printed_daqp_over_compiled": daqp.step_ms["median"] / compiled,
+            "printed_proxqp_over_compiled": proxqp.step_ms["median"] / compiled,
             "proxqp_qp_over_daqp_qp": proxqp.qp_ms / daqp.qp_ms if daqp.qp_ms else None,
         }
-        qpoases = found.get((N, "explicit", "qpoases"))
+        qpoases = found.get((N, "himpc_printed", "qpoases"))
         if qpoases is not None and daqp.qp_ms:
             result[str(N)]["qpoases_qp_over_daqp_qp"] = qpoases.qp_ms / daqp.qp_ms
     return result

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.cascade.explicit import quadratic
 from himpc.cascade.level import LevelProblem, LevelSolution
 from himpc.limits import Rows
 
@@ -58,7 +57,7 @@ class Matrix:
 def matrix(problem: LevelProblem, rows: Rows, solution: LevelSolution) -> Matrix:
     """Returns the picture of one level."""
     N, n = solution.U.shape
-    H = quadratic(problem, n)[0]
+    H = problem.hessian
     shown = max(1, min(N, LARGEST // n))
     part = H[: shown * n, : shown * n]
     largest = float(np.abs(H).max())

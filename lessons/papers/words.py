@@ -10,6 +10,7 @@ import numpy as np
 
 from lessons.experiments.jobs import JobResult
 from lessons.papers.item import Row, Verdict
+from lessons.papers.printed import printed
 from lessons.scenes.catalog import load_scene
 
 
@@ -33,6 +34,21 @@ def trouble(run: JobResult) -> str:
     if run.error is not None:
         return f"could not be run: {run.error}"
     return "" if run.lost_at is None else f"lost control at {run.lost_at:.2f} s"
+
+
+def unprinted(
+    quantity: str, unit: str, ours: float, why: str = "the paper prints no number", **more: Any
+) -> Row:
+    """Returns a row with a number that the paper does not print. more: further fields of the row."""
+    return Row(quantity, unit, None, ours, why, **more)
+
+
+def stated(quantity: str, ours: float, key: str, words: str, topic: str = "") -> Row:
+    """Returns a row with a ratio that HIMPC's paper states in words: `words`, and the side of 1 that the
+    values of the text contain under `key`."""
+    says = printed("himpc_text")[key]
+    why = f"the paper says: {words.format(says=says)}"
+    return unprinted(quantity, "1", ours, why, turns_at=1.0, says=says, topic=topic)
 
 
 def gain_rows(scene: str, table: dict[str, Any]) -> tuple[Row, ...]:

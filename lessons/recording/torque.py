@@ -28,8 +28,8 @@ def block(recording: Recording) -> dict[str, Any]:
         "average_cost": [_average_cost(recording, level.name) for level in settings.levels if level.enabled],
         "limits": _limits(recording),
         "solver": {
-            "backend": qp_method(settings.controller, settings.route, settings.solver),
-            "route": settings.route,
+            "backend": qp_method(settings.controller, settings.solver),
+            "route": "printed" if settings.controller == "himpc_printed" else "compiled",
             **qp_figures(recording, FALLBACKS),
             "iterations": {"mean": float(iterations.mean()), "max": float(iterations.max())},
         },

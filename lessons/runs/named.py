@@ -81,7 +81,7 @@ def with_task(scene: Scene, name: str) -> TorqueScene:
     called(source, lambda: check_task(task, scene.robot, name))
     first, *others = scene.settings.levels
     levels = (first, Level((task,)), *others)
-    return replace(scene, settings=replace(scene.settings, levels=levels, own_tasks=((name, task),)))
+    return replace(scene, settings=replace(scene.settings, stack=levels, own_tasks=((name, task),)))
 
 
 def with_tasks(scene: Scene, files: Iterable[str]) -> Scene:

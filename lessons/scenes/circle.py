@@ -40,7 +40,7 @@ def iiwa14_circle() -> TorqueScene:
         name="iiwa14-circle",
         title="KUKA iiwa 14 on RT4 of the HIMPC paper",
         robot=robot,
-        settings=TorqueSettings(levels=levels, M_bar=tuple(robot.M_bar)),
+        settings=TorqueSettings(stack=levels, M_bar=tuple(robot.M_bar)),
         references=rt4,
         q_0=np.deg2rad([0.0, 60.0, 0.0, 60.0, 0.0, 0.0, 0.0]),
         v_0=np.zeros(robot.n),

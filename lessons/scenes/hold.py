@@ -65,7 +65,7 @@ def _hold(robot: Robot, plant: PlantSettings) -> TorqueScene:
         name="hold",
         title=f"{robot.name}: drag the target; position, then orientation, then posture",
         robot=robot,
-        settings=TorqueSettings(levels=tuple(levels), M_bar=tuple(robot.M_bar), limits=DRAGGED, plant=plant),
+        settings=TorqueSettings(stack=tuple(levels), M_bar=tuple(robot.M_bar), limits=DRAGGED, plant=plant),
         references=lambda robot, stack: {},
         q_0=robot.home,
         v_0=np.zeros(robot.n),

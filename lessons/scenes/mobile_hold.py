@@ -29,7 +29,7 @@ def ridgeback_hold() -> TorqueScene:
         title="Ridgeback and UR10 under HIMPC: drag the targets of hand and base; the hand comes first",
         robot=robot,
         settings=TorqueSettings(
-            levels=levels, M_bar=tuple(robot.M_bar), R_on="acceleration", limits=DRAGGED, plant=TOUCHING
+            stack=levels, M_bar=tuple(robot.M_bar), R_on="acceleration", limits=DRAGGED, plant=TOUCHING
         ),
         references=lambda robot, stack: {},
         q_0=robot.home,

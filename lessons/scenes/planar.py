@@ -17,7 +17,7 @@ from himpc.tasks import FramePosition, Joints
 from lessons.scenes.torque_scene import TorqueScene
 from lessons.settings.torque import SceneOptions, TorqueSettings
 from robots import NominalSettings, PlantSettings, Robot, load_robot
-from robots.ranges import Range, check_fields
+from robots.ranges import Range, Shown, check_fields
 
 OMEGA = 2 * math.pi / 8
 """Angular frequency, rad/s; every circle takes 8 s."""
@@ -40,13 +40,12 @@ himpc-table-3` measures this error with 0, 8 and 15 1/s."""
 
 @dataclass(frozen=True)
 class CircleOptions(SceneOptions):
-    """RT1 and RT2: the EE follows a circle, and q₁ swings once meanwhile.
+    """RT1 and RT2: the EE follows a circle, and q₁ swings once meanwhile."""
 
-    Attributes:
-        q1_amplitude_deg: angle by which q₁ swings before it returns, degrees.
-    """
-
-    q1_amplitude_deg: Annotated[float, Range(-360.0, 360.0)]
+    # fmt: off
+    q1_amplitude_deg: Annotated[float, Range(-360.0, 360.0), Shown(
+        "Swing of q₁", "Angle by which joint 1 swings before it returns", "°", -180.0, 180.0, 5.0)]
+    # fmt: on
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -63,13 +62,12 @@ class CircleOptions(SceneOptions):
 
 @dataclass(frozen=True)
 class SingularOptions(SceneOptions):
-    """RT3: two circles through the point that only the straight arm reaches.
+    """RT3: two circles through the point that only the straight arm reaches."""
 
-    Attributes:
-        smooth: whether the phase is ωt − sin ωt, with rest at the singular point, instead of ωt.
-    """
-
-    smooth: bool = False
+    # fmt: off
+    smooth: Annotated[bool, Shown(
+        "Smooth", "Use the phase ωt − sin ωt, which is at rest in the singular point, instead of ωt")] = False
+    # fmt: on
 
     def references(self, robot: Robot, stack: Stack) -> Mapping[str, Reference]:
         """Returns circles of r = 0.1 and 0.2 m, internally tangent at (0.9, 0), 8 s each, and q₁ = 0."""
@@ -117,7 +115,7 @@ def planar3_circle() -> TorqueScene:
         title="planar arm on RT1 of the HIMPC paper",
         robot=robot,
         settings=TorqueSettings(
-            levels=levels, M_bar=tuple(robot.M_bar), nominal=NOMINAL, plant=PLANT, options=options
+            stack=levels, M_bar=tuple(robot.M_bar), nominal=NOMINAL, plant=PLANT, options=options
         ),
         references=options.references,
         q_0=np.radians([0.0, 90.0, -90.0]),

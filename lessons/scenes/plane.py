@@ -32,7 +32,7 @@ def planar3_plane() -> TorqueScene:
         name="planar3-plane",
         title="planar arm, one knot: level 1 pulls the wrist along x, level 2 keeps two joints",
         robot=robot,
-        settings=TorqueSettings(levels=levels, M_bar=tuple(robot.M_bar), horizon=1, plant=PLANAR3_PLANT),
+        settings=TorqueSettings(stack=levels, M_bar=tuple(robot.M_bar), horizon=1, plant=PLANAR3_PLANT),
         references=lambda robot, stack: {},
         q_0=np.radians([20.0, 80.0, -60.0]),
         v_0=np.zeros(3),

@@ -139,7 +139,7 @@ def _scene(
         title=title,
         robot=robot,
         settings=TorqueSettings(
-            levels=levels, M_bar=tuple(robot.M_bar), limits=DRAGGED, nominal=NOMINAL, plant=PLANT
+            stack=levels, M_bar=tuple(robot.M_bar), limits=DRAGGED, nominal=NOMINAL, plant=PLANT
         ),
         references=lambda robot, stack: {},
         q_0=robot.home,

@@ -114,8 +114,8 @@ def swapped(settings: SceneSettings, own: Sequence[str]) -> tuple[tuple[str, ...
         InputError: an assignment sets more than one value, or has an unknown path.
     """
     given = [parse_assignment(text) for text in own]
-    places = settings.places()
-    if any(path not in places or places[path].shorthand for path, _ in given):
+    table = settings.table()
+    if any(path not in table or table[path].shorthand for path, _ in given):
         raise InputError(
             f"{', '.join(own)} cannot be swapped between robot and ghost: name a level or a task, "
             "e.g. levels.position.Q=50"

@@ -96,7 +96,7 @@ def differences(own: SceneSettings, settings: SceneSettings) -> tuple[str, ...]:
         tell("controller", settings.controller)
     for path, value in own.recomposed(settings):
         tell(path, value)
-    for path in sorted(path for path, place in now.places().items() if not place.shorthand):
+    for path in sorted(path for path, each in now.table().items() if not each.shorthand):
         value = settings.value_at(path)
         if value != now.value_at(path):
             tell(path, value)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from lessons.settings.assignments import assignment
+from lessons.settings.schema import Setting
 from lessons.settings.settings import SceneSettings
 
 _BY_PLACE = re.compile(r"levels\.\d+\.\w+")
@@ -34,11 +35,7 @@ class SettingLine:
 def lines(settings: SceneSettings) -> list[SettingLine]:
     """Returns every setting of a scene in the order of the page. Levels are listed by their names only,
     although a path may also contain a level's place."""
-    paths = [path for path in settings.paths() if not _BY_PLACE.fullmatch(path)]
-    order = [entry.path for entry in settings.entries]
-    told = {path: _pattern(settings, path) for path in paths}
-    paths.sort(key=lambda path: order.index(told[path]) if told[path] in order else len(order))
-    return [_line(settings, path, path) for path in paths]
+    return [_line(settings, each, each.path) for each in _listed(settings)]
 
 
 def reference(scenes: Sequence[SceneSettings]) -> list[SettingLine]:
@@ -46,20 +43,17 @@ def reference(scenes: Sequence[SceneSettings]) -> list[SettingLine]:
     scene that has it."""
     found: dict[str, SettingLine] = {}
     for settings in scenes:
-        for path in settings.paths():
-            pattern = _pattern(settings, path)
-            if pattern not in found and not _BY_PLACE.fullmatch(path):
-                found[pattern] = _line(settings, path, pattern)
-    order = [entry.path for settings in scenes for entry in settings.entries]
-    return sorted(found.values(), key=lambda line: order.index(line.path))
+        for each in _listed(settings):
+            if each.pattern not in found:
+                found[each.pattern] = _line(settings, each, each.pattern)
+    return sorted(found.values(), key=lambda line: scenes[0].rank(line.path))
 
 
-def _pattern(settings: SceneSettings, path: str) -> str:
-    return next((entry.path for entry in settings.entries if entry.at(path)), path)
+def _listed(settings: SceneSettings) -> list[Setting]:
+    return [each for each in settings.table().values() if not _BY_PLACE.fullmatch(each.path)]
 
 
-def _line(settings: SceneSettings, path: str, shown: str) -> SettingLine:
-    entry, place = settings.entry(path), settings.place(path)
-    now = assignment(path, place.read(settings)).partition("=")[2]
-    words = entry.label if not entry.help else entry.help
-    return SettingLine(shown, now, str(place.form), entry.unit, words)
+def _line(settings: SceneSettings, setting: Setting, path: str) -> SettingLine:
+    now = assignment(setting.path, setting.read(settings)).partition("=")[2]
+    shown = setting.shown
+    return SettingLine(path, now, str(setting.form), shown.unit, shown.help or shown.label)

@@ -15,7 +15,7 @@ from himpc.missions import Follow, Go, Mission, MissionTask
 from himpc.references import Hold, SquareWave
 from robots import InputError
 from robots.collision import Obstacle
-from robots.ranges import Range, check_fields
+from robots.ranges import Range, Shown, check_fields
 
 Array = NDArray[np.float64]
 Home = Mapping[str, Array]
@@ -77,14 +77,22 @@ class ArchitectureOptions(MissionOptions):
     counts as completed, so this is an option, whose value applies to all architectures.
 
     Attributes:
-        architecture: see `Architecture`.
-        base_tolerance: a task of the base is completed within this distance of its goal, m.
         base_at_rest: whether the base must also be slower than REST.
     """
 
-    architecture: Architecture = "hierarchical"
-    base_tolerance: Annotated[float, Range(0.0, above=True)] = 0.8
-    base_at_rest: bool = False
+    # fmt: off
+    architecture: Annotated[Architecture, Shown(
+        "Architecture", "hierarchical: the robot carries out two tasks at a time. single_task: one task at a "
+        "time, with the whole body. decoupled: one task at a time, with the base or the arm",
+    )] = "hierarchical"
+    base_tolerance: Annotated[float, Range(0.0, above=True), Shown(
+        "Base is there within", "The task of the base is completed within this distance of its goal, for "
+        "every architecture; takes effect at the next start. decoupled needs 0.05 m and a base at rest", "m",
+        0.02, 1.0, 0.01, tries=("0.05", "0.25", "0.5"), name="base is there within, m")] = 0.8
+    base_at_rest: Annotated[bool, Shown(
+        "and at rest", "The task of the base is completed only if the base is slower than 0.02 m/s",
+        tries=("true",), name="base must come to rest")] = False
+    # fmt: on
 
     def __post_init__(self) -> None:
         """Raises InputError for invalid options."""
@@ -112,7 +120,10 @@ class OrderOptions(MissionOptions):
         order: the roles, highest priority first; empty: the scene's own order.
     """
 
-    order: tuple[str, ...] = ()
+    # fmt: off
+    order: Annotated[tuple[str, ...], Shown(
+        "Order", "The roles, highest priority first: ee,base; takes effect when a run starts")] = ()
+    # fmt: on
 
     def in_order(self, tasks: Mission) -> Mission:
         """Returns the tasks by the priorities of their roles. Raises InputError if a role is missing or
@@ -147,11 +158,14 @@ class SquareOptions(OrderOptions):
 
     Attributes:
         peak: m, world; the default lies 2.2 m from the EE's home.
-        half_period: s, length of each part.
     """
 
-    peak: tuple[float, ...] = (0.4, -1.75)
-    half_period: Annotated[float, Range(0.0, above=True)] = 8.0
+    # fmt: off
+    peak: Annotated[tuple[float, ...], Shown(
+        "Peak", "Goal of the base, x and y in the world frame", "m")] = (0.4, -1.75)
+    half_period: Annotated[float, Range(0.0, above=True), Shown(
+        "Half period", "Duration of each of the two parts", "s", 1.0, 20.0, 0.5)] = 8.0
+    # fmt: on
 
     parts: ClassVar[tuple[str, ...]] = ("peak", "valley")
 
@@ -202,14 +216,15 @@ class WaypointOptions(ArchitectureOptions):
 
     The hierarchical architecture sends the base straight to its place for the second waypoint. The
     single-task architecture first sends the base to a place at a predefined distance from the first waypoint.
-
-    Attributes:
-        height: m, of the first EE waypoint.
-        hold_s: time at each EE waypoint, s.
     """
 
-    height: float = 0.8
-    hold_s: float = 1.0
+    # fmt: off
+    height: Annotated[float, Shown(
+        "Height", "Height of the first waypoint of the hand", "m", 0.3, 1.5, 0.05)] = 0.8
+    hold_s: Annotated[float, Shown(
+        "Hold", "Time that the hand stays at each goal; null: until it is released", "s", 0.0, 5.0, 0.25,
+    )] = 1.0
+    # fmt: on
 
     def mission(self, home: Home) -> Mission:
         first, second = (2.4, 2.2, self.height), (6.0, 0.5, 0.8)
@@ -244,16 +259,21 @@ class DeliveryOptions(ArchitectureOptions):
 
     Attributes:
         seats: indices in SEATS of the people's places, in the order of the visits.
-        rounds: number of visits to each person.
         hold_s: time that the EE stays at a person's hand, s; null: until the person takes the ball (event
             Release).
-        cruise: speed along the planned base paths, m/s.
     """
 
-    seats: tuple[float, ...] = (0, 2, 5)
-    rounds: Annotated[int, Range(1, MAX_VISITS)] = 4
-    hold_s: float | None = 1.0
-    cruise: float = CRUISE
+    # fmt: off
+    hold_s: Annotated[float | None, Shown(
+        "Hold", "Time that the hand stays at each goal; null: until it is released", "s", 0.0, 5.0, 0.25,
+    )] = 1.0
+    seats: Annotated[tuple[float, ...], Shown(
+        "Seats", "Numbers of the people's seats, 0 to 5, in the order of the visits")] = (0, 2, 5)
+    rounds: Annotated[int, Range(1, MAX_VISITS), Shown(
+        "Rounds", "Number of visits to each person", low=1, high=10)] = 4
+    cruise: Annotated[float, Shown(
+        "Cruise", "Speed along the planned paths of the base", "m/s", 0.1, 1.0, 0.05)] = CRUISE
+    # fmt: on
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -13,7 +13,7 @@ from himpc.references import Path
 from lessons.settings.missions import CRUISE, Home, MissionOptions, OrderOptions
 from robots import InputError
 from robots.collision import Ball, Box, Floor, Obstacle
-from robots.ranges import Range, check_fields
+from robots.ranges import Range, Shown, check_fields
 
 CLUTTER: tuple[Obstacle, ...] = (
     Floor(),
@@ -26,13 +26,9 @@ CLUTTER: tuple[Obstacle, ...] = (
 
 @dataclass(frozen=True)
 class ClutteredOptions(MissionOptions):
-    """The base is sent past obstacles; the EE goes first to a place beside the way.
+    """The base is sent past obstacles; the EE goes first to a place beside the way."""
 
-    Attributes:
-        goal: goal of the base, m.
-    """
-
-    goal: tuple[float, ...] = (4.0, 0.0)
+    goal: Annotated[tuple[float, ...], Shown("Goal", "Goal of the base, x and y", "m")] = (4.0, 0.0)
 
     def mission(self, home: Home) -> Mission:
         return (
@@ -57,17 +53,25 @@ class PerceptionOptions(OrderOptions):
     place.
 
     Attributes:
-        false_report: whether the report is ever wrong.
         report_offset: the reported position minus the true one while the report is wrong, m.
         report_start, report_end: times from which the report is wrong, and from which it is right again, s.
-        cruise: speed along both paths, m/s.
     """
 
-    false_report: bool = True
-    report_offset: Annotated[tuple[float, ...], Range(-10.0, 10.0)] = (0.0, -1.1, 0.0)
-    report_start: Annotated[float, Range(0.0)] = 1.0
-    report_end: Annotated[float, Range(0.0)] = 7.0
-    cruise: Annotated[float, Range(0.0, above=True)] = CRUISE
+    # fmt: off
+    cruise: Annotated[float, Range(0.0, above=True), Shown(
+        "Cruise", "Speed along the planned paths of the base", "m/s", 0.1, 1.0, 0.05)] = CRUISE
+    false_report: Annotated[bool, Shown(
+        "Reported wrongly", "Whether a wrong position of the crate is reported to the controller for a while",
+        tries=("false", "true"), name="false report")] = True
+    report_offset: Annotated[tuple[float, ...], Range(-10.0, 10.0), Shown(
+        "Reported minus true position", "Position of the crate as it is reported, minus its true position, "
+        "while the report is wrong", "m", -3.0, 3.0, 0.05)] = (0.0, -1.1, 0.0)
+    report_start: Annotated[float, Range(0.0), Shown(
+        "Wrong from", "Time from which the report is wrong", "s", 0.0, 12.0, 0.5)] = 1.0
+    report_end: Annotated[float, Range(0.0), Shown(
+        "Right again from", "Time from which the report is right again", "s", 0.0, 12.0, 0.5,
+        tries=("5", "6", "7", "8", "9"), name="report right again from, s")] = 7.0
+    # fmt: on
 
     def __post_init__(self) -> None:
         """Raises InputError for invalid options."""

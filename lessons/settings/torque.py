@@ -3,41 +3,26 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
-from functools import lru_cache
-from types import MappingProxyType
-from typing import Annotated, Any, ClassVar, Literal
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import Annotated, Any, ClassVar
 
-from himpc.catalog import CONTROLLERS, Route
+from himpc.catalog import CONTROLLERS
 from himpc.controllers import Settings as ControllerSettings
-from himpc.formulation.settings import Horizon, Period
-from himpc.limits import Limits
-from himpc.limits.avoidance import Avoidance
-from himpc.qp import Solver
 from himpc.references import Reference
-from himpc.stack import Level, Stack
+from himpc.stack import Stack
 from himpc.tasks import Task
 from lessons.events import Event, MoveLevel
 from lessons.own.files import by_name, is_file, with_fingerprint
-from lessons.settings.entry import Entry
 from lessons.settings.levels import moved, ordered
-from lessons.settings.settings import (
-    LevelKey,
-    Place,
-    SceneSettings,
-    every_level,
-    field_places,
-    level_key,
-    level_places,
-)
+from lessons.settings.schema import Setting, Shape, setting_of_all_levels, settings_of_levels
+from lessons.settings.settings import SceneSettings
 from lessons.settings.stack import Own, read_stack, same_tasks, told
 from lessons.settings.stack_changes import CHANGES, add
-from lessons.settings.torque_entries import TORQUE_ENTRIES
-from lessons.settings.values import WORD, Form, form_of
-from robots import InputError, NominalSettings, PlantSettings, Robot
+from lessons.settings.values import WORD, Form
+from robots import InputError, PlantSettings, Robot
 from robots.errors import shortened, unknown_name
-from robots.ranges import Range, check_fields, field_types
+from robots.ranges import Range, Shown
 
 
 @dataclass(frozen=True)
@@ -52,25 +37,17 @@ class SceneOptions(ABC):
         """Returns a fresh reference per task name, like `TorqueScene.references`."""
 
 
-Milliseconds = Annotated[float, Range(0.0, 1e3)]
-
-
 @dataclass(frozen=True)
-class TorqueSettings(SceneSettings):
-    """Settings of a run; see `himpc.controllers.Settings` for the controller's own.
+class TorqueSettings(ControllerSettings, SceneSettings):
+    """Settings of a run: those of the controller (`himpc.controllers.Settings`), the plant and the scene.
 
     Attributes:
-        levels: the stack.
-        M_bar: diagonal of M̄ before scaling.
-        M_bar_scale: factor on the whole diagonal.
-        M_bar_adapt: whether the controller adapts M̄ to the payload, see `himpc.controllers.adaptation`.
-        nominal: the plant as the nominal model of model-based controllers describes it.
+        M_bar: diagonal of M̄ before scaling, unlike that of the controller.
         deadline_ms: a torque that is ready later than this after the beginning of its tick acts one tick
             later; see `lessons.session.deadline`. 0: lockstep, simulated time waits while the controller
             computes.
         solve_ms_per_knot: assumed computing time for each of the N knots, so that runs are the same
             everywhere. 0: the measured computing time, and then no two runs are the same.
-        plant: the parameters of the simulated plant.
         options: the scene's own choices, if it has any.
         files: users' Python files that can be selected as the controller. No setting's path changes them:
             data from elsewhere (a code, a page) must not choose which files are executed.
@@ -78,50 +55,49 @@ class TorqueSettings(SceneSettings):
             setting's path changes them.
     """
 
-    entries: ClassVar[tuple[Entry, ...]] = TORQUE_ENTRIES
+    page_order: ClassVar[tuple[str, ...]] = (
+        "controller", "horizon", "T_s", "deadline_ms", "solve_ms_per_knot", "M_bar_scale", "M_bar_adapt",
+        "M_bar", "limits.position", "limits", "avoidance", "", "order", "stack", "Q", "R", "levels", "tasks",
+        "plant", "nominal",
+    )  # fmt: skip
 
-    levels: Stack
-    M_bar: Annotated[tuple[float, ...], Range(0.0, above=True)]
-    controller: str = "himpc"
-    M_bar_scale: Annotated[float, Range(0.0, above=True)] = 1.0
-    M_bar_adapt: bool = False
-    horizon: Horizon = 5
-    T_s: Period = 1e-3
-    R_on: Literal["torque", "acceleration"] = "torque"
-    route: Route = "compiled"
-    solver: Solver = "daqp"
-    damping: bool = True
-    deadline_ms: Milliseconds = 0.0
-    solve_ms_per_knot: Milliseconds = 0.1
-    limits: Limits = field(default_factory=Limits)
-    nominal: NominalSettings = field(default_factory=NominalSettings)
+    # fmt: off
+    controller: Annotated[str, Shown(
+        "Controller", "You can switch the controller while the robot moves; within a few tenths of a second, "
+        "the torque becomes that of the new controller")] = "himpc"
+    M_bar_scale: Annotated[float, Range(0.0, above=True), Shown(
+        "M̄ scale", "One factor on the whole diagonal of M̄", "", 0.1, 5.0, 0.05,
+        tries=("4", "2", "1", "0.5"), group="Inertia estimate M̄")] = 1.0
+    deadline_ms: Annotated[float, Range(0.0, 1e3), Shown(
+        "Due after", "A torque that is computed later than this acts one tick later; until then the previous "
+        "torque is held. 0: simulated time waits while the controller computes", "ms", 0.0, 5.0, 0.1,
+        group="Deadline")] = 0.0
+    solve_ms_per_knot: Annotated[float, Range(0.0, 1e3), Shown(
+        "Per knot", "Assumed computing time per knot of the horizon. 0: the measured computing time of this "
+        "computer", "ms", 0.0, 0.5, 0.01, group="Deadline")] = 0.1
+    # fmt: on
     plant: PlantSettings = field(default_factory=PlantSettings)
     options: SceneOptions | None = None
     files: tuple[str, ...] = field(default=(), compare=False)
     own_tasks: tuple[tuple[str, Task], ...] = field(default=(), compare=False)
 
     @property
+    def levels(self) -> Stack:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """The levels, highest priority first."""
+        return self.stack
+
+    @property
     def controllers(self) -> Mapping[str, str]:
         return CONTROLLERS | dict.fromkeys(self.files, "a controller of your own, in a file of this machine")
 
     def for_controller(self) -> ControllerSettings:
-        """Returns the part of the settings for the controller. Raises InputError for invalid values."""
+        """Returns the part of the settings for the controller. Raises InputError for an unknown
+        controller."""
         if self.controller not in self.controllers:
             raise unknown_name("controller", self.controller, by_name(self.controllers))
-        check_fields(self)
-        return ControllerSettings(
-            stack=self.levels,
-            M_bar=tuple(float(value) * self.M_bar_scale for value in self.M_bar),
-            M_bar_adapt=self.M_bar_adapt,
-            horizon=self.horizon,
-            T_s=self.T_s,
-            limits=self.limits,
-            route=self.route,
-            solver=self.solver,
-            R_on=self.R_on,
-            damping=self.damping,
-            nominal=self.nominal,
-        )
+        own = {each.name: getattr(self, each.name) for each in fields(ControllerSettings)}
+        own["M_bar"] = tuple(float(value) * self.M_bar_scale for value in self.M_bar)
+        return ControllerSettings(**own)
 
     def is_late(self, measured_ms: float) -> bool:
         """Returns whether a torque with this computing time misses its deadline."""
@@ -139,148 +115,115 @@ class TorqueSettings(SceneSettings):
 
     def after(self, event: Event) -> TorqueSettings:
         if isinstance(event, MoveLevel):
-            return replace(self, levels=moved(self.levels, event.level, event.to))
+            return replace(self, stack=moved(self.levels, event.level, event.to))
         return super().after(event)
 
-    def places(self) -> Mapping[str, Place]:
-        """Fields ("horizon", "M_bar", …) and those of the scene's options; "stack", a list of levels as
-        `lessons.settings.stack.read_stack` reads it; "order", the names of all levels,
-        highest priority first ("a,b,c" or a list); "Q" or "R" for all levels (one number, or one per level);
-        "levels.NAME.KEY" with the level's name or its place 1 … r, KEY one of Q, R, horizon, enabled, K_p,
-        K_v (gains of all its tasks); "tasks.NAME.K_p|K_v"; "limits.KEY"; "avoidance.KEY"; "nominal.KEY";
-        "plant.KEY". If a value has one number per joint, a place 1 … n after the path selects the number of
-        that joint: "M_bar.3"."""
-        levels = tuple((level.name, tuple(task.name for task in level.tasks)) for level in self.levels)
-        return _places(levels, type(self.options), tuple(self.controllers))
+    @classmethod
+    def special(cls, table: Mapping[str, Setting], shape: Shape) -> Iterable[Setting]:
+        """Besides the fields there are "stack", a list of levels as `lessons.settings.stack.read_stack` reads
+        it; "order", the names of all levels, highest priority first ("a,b,c" or a list); "Q" or "R" for all
+        levels (one number, or one per level); "levels.NAME.KEY" with the level's name or its place 1 … r, KEY
+        one of Q, R, horizon, enabled, K_p, K_v (gains of all its tasks); "tasks.NAME.K_p|K_v". If a value has
+        one number per joint, a place 1 … n after the path selects the number of that joint: "M_bar.3"."""
+        controller = table["controller"]
+        words = controller.form.words
+        yield replace(controller, change=lambda s, name: controller.change(s, _known(words, name)))
+        yield _STACK
+        yield _ORDER
+        yield setting_of_all_levels("Q", ("stack",), _Q)
+        yield setting_of_all_levels("R", ("stack",), _R)
+        names, gains = ("enabled", "Q", "R", "horizon"), ("K_p", "K_v")
+        yield from settings_of_levels(shape, ("stack",), names, gains, _OF_LEVELS)
 
     def elements(self, path: str) -> int:
-        form = self.places()[path].form
+        form = self.table()[path].form
         per_joint = path.startswith(("M_bar", "nominal.", "plant.")) and form.elements is not None
         return len(self.M_bar) if per_joint else 0
 
-    def place(self, path: str) -> Place:
-        """As in `Settings`, and also "stack.add" and the other `CHANGES`, which change a part of the
-        stack."""
-        return _CHANGE_PLACES.get(path) or super().place(path)
+    def setting(self, path: str) -> Setting:
+        """As in `SceneSettings`, and also "stack.add" and the other `CHANGES`, which change a part of the
+        stack, and "route", see `_with_route`."""
+        return _CHANGES.get(path) or super().setting(path)
+
+    def as_data(self) -> dict[str, Any]:
+        data = super().as_data()
+        return {"levels": data.pop("stack"), **data}
 
     def recomposed(self, wanted: TorqueSettings) -> list[tuple[str, Any]]:
-        return (
-            []
-            if same_tasks(self.levels, wanted.levels)
-            else [("stack", told(wanted.levels, dict(wanted.own_tasks)))]
-        )
+        if same_tasks(self.levels, wanted.levels):
+            return []
+        return [("stack", told(wanted.levels, dict(wanted.own_tasks)))]
 
 
-_GAINS = ("K_p", "K_v")
-_PARTS = {"limits": Limits, "nominal": NominalSettings, "plant": PlantSettings}
+def _with_route(settings: TorqueSettings, route: str) -> TorqueSettings:
+    """Codes and scripts of earlier versions may name a route. `explicit` is now a controller. For controllers
+    other than himpc, both routes had the same torques."""
+    printed = route == "explicit" and settings.controller == "himpc"
+    return replace(settings, controller="himpc_printed") if printed else settings
 
 
-def _now(route: Any) -> Any:
-    """Codes and scripts of earlier versions may name a route that was replaced."""
-    return "compiled" if route == "structured" else route
-
-
-def _known(form: Form, path: str, name: Any) -> Any:
+def _known(words: tuple[str, ...], name: Any) -> Any:
     if isinstance(name, str) and ".py@" in name:
-        return with_fingerprint(name, form.words, "controller")
-    if isinstance(name, str) and is_file(name) and name not in form.words:
+        return with_fingerprint(name, words, "controller")
+    if isinstance(name, str) and is_file(name) and name not in words:
         raise InputError(
-            f"{path} is {shortened(name, 100)}: to use a file of your own, start himpc-lab with "
+            f"controller is {shortened(name, 100)}: to use a file of your own, start himpc-lab with "
             "--controller FILE.py"
         )
-    return form.fit(path, name)
-
-
-def _checked(settings: TorqueSettings) -> TorqueSettings:
-    settings.for_controller()
-    return settings
-
-
-def _part(name: str) -> Callable[[TorqueSettings], Any]:
-    return lambda settings: getattr(settings, name)
-
-
-def _with(name: str) -> Callable[[TorqueSettings, Any], TorqueSettings]:
-    return lambda settings, part: replace(settings, **{name: part})
-
-
-def _with_avoidance(settings: TorqueSettings, avoidance: Avoidance) -> TorqueSettings:
-    return replace(settings, limits=replace(settings.limits, avoidance=avoidance))
-
-
-def _levels(settings: TorqueSettings) -> Stack:
-    return settings.levels
-
-
-def _level_gain(key: str) -> LevelKey:
-    def put(level: Level, value: Any) -> Level:
-        return replace(level, tasks=tuple(replace(task, **{key: value}) for task in level.tasks))
-
-    return LevelKey(lambda level: getattr(level.tasks[0], key), put, _GAIN_FORMS[key], shorthand=True)
-
-
-_GAIN_FORMS = {key: form_of(field_types(Task)[key]) for key in _GAINS}
-_LEVEL_KEYS = {
-    **{key: level_key(key) for key in ("Q", "R", "horizon", "enabled")},
-    **{key: _level_gain(key) for key in _GAINS},
-}
-
-
-def _gain(name: str, key: str) -> Place:
-    def task(settings: TorqueSettings) -> Task:
-        return next(task for level in settings.levels for task in level.tasks if task.name == name)
-
-    def write(settings: TorqueSettings, value: Any) -> TorqueSettings:
-        def put(task: Task) -> Task:
-            return replace(task, **{key: value}) if task.name == name else task
-
-        levels = (replace(level, tasks=tuple(map(put, level.tasks))) for level in settings.levels)
-        return replace(settings, levels=tuple(levels))
-
-    return Place(lambda settings: getattr(task(settings), key), write, _GAIN_FORMS[key])
-
-
-def _stack_place(change: Callable[[TorqueSettings, Any], Stack], read: Callable[..., Any] = _levels) -> Place:
-    """Returns a place at which a written value changes the stack."""
-    return Place(
-        read, _with("levels"), Form(None, WORD), lambda s, _, value: change(s, value), shorthand=True
-    )
+    return name
 
 
 def _own(settings: TorqueSettings) -> Own:
     return dict(settings.own_tasks)
 
 
-_CHANGE_PLACES = {
-    **{path: _stack_place(lambda s, value, to=to: to(s.levels, value)) for path, to in CHANGES.items()},
-    "stack.add": _stack_place(lambda s, value: add(s.levels, value, _own(s))),
+def _of_stack(
+    path: str,
+    shown: Shown,
+    change: Callable[[TorqueSettings, Any], Stack],
+    read: Callable[[TorqueSettings], Any] = lambda settings: settings.levels,
+    shorthand: bool = True,
+) -> Setting:
+    """Returns a setting whose change gives a stack."""
+    form = Form(None, WORD)
+    return Setting(
+        path, shown, form, read, lambda s, value: replace(s, stack=change(s, value)), path, shorthand
+    )
+
+
+_STACK = _of_stack(
+    "stack",
+    Shown("Stack", "The levels with their tasks, highest priority first, as a list; see himpc.tasks.KINDS"),
+    lambda s, value: read_stack(value, s.levels, _own(s)),
+    lambda s: told(s.levels, _own(s)),
+)
+_ORDER = _of_stack(
+    "order",
+    Shown("Order", "The levels, highest priority first: a,b,c or a list"),
+    lambda s, value: ordered(s.levels, value),
+    lambda s: tuple(level.name for level in s.levels),
+    shorthand=False,
+)
+_CHANGES = {
+    path: _of_stack(path, Shown(path.removeprefix("stack."), name=path), change)
+    for path, change in {
+        **{path: lambda s, value, to=to: to(s.levels, value) for path, to in CHANGES.items()},
+        "stack.add": lambda s, value: add(s.levels, value, _own(s)),
+    }.items()
 }
-
-
-@lru_cache(maxsize=64)
-def _places(
-    levels: tuple[tuple[str, tuple[str, ...]], ...], options: type[Any], controllers: tuple[str, ...]
-) -> Mapping[str, Place]:
-    """`TorqueSettings.places` for the names of the levels and of their tasks."""
-    without = ("levels", "options", "files", "own_tasks", *_PARTS)
-    found = field_places(TorqueSettings, lambda s: s, lambda _, new: _checked(new), without=without)
-    form, route = Form(WORD, words=controllers), found["route"].form
-    found["controller"] = replace(
-        found["controller"], form=form, own_fit=lambda _, path, name: _known(form, path, name)
-    )
-    found["route"] = replace(found["route"], own_fit=lambda _, path, value: route.fit(path, _now(value)))
-    if options is not type(None):
-        found |= field_places(options, _part("options"), _with("options"))
-    order = _stack_place(lambda s, value: ordered(s.levels, value), lambda s: tuple(l.name for l in s.levels))
-    found["order"] = replace(order, shorthand=False)
-    found["stack"] = _stack_place(
-        lambda s, value: read_stack(value, s.levels, _own(s)), lambda s: told(s.levels, _own(s))
-    )
-    found |= {key: every_level(key, _levels, _with("levels")) for key in ("Q", "R")}
-    found |= level_places([name for name, _ in levels], _LEVEL_KEYS, _levels, _with("levels"))
-    for task in (task for _, tasks in levels for task in tasks):
-        found |= {f"tasks.{task}.{key}": _gain(task, key) for key in _GAINS}
-    for part, of in _PARTS.items():
-        found |= field_places(of, _part(part), _with(part), f"{part}.", without=("avoidance",))
-    found |= field_places(Avoidance, lambda s: s.limits.avoidance, _with_avoidance, "avoidance.")
-    return MappingProxyType(found)
+_ROUTES = Form(WORD, words=("compiled", "explicit", "structured"))
+_CHANGES["route"] = Setting(
+    "route",
+    Shown("Route"),
+    _ROUTES,
+    lambda s: "explicit" if s.controller == "himpc_printed" else "compiled",
+    lambda s, value: _with_route(s, _ROUTES.fit("route", value)),
+    "route",
+    shorthand=True,
+)
+_Q = Shown("Q", "Weight of the residual; sets all levels at once", "", 1.0, 1000.0, 1.0)
+_R = Shown("R", "Weight of the changes of torque; sets all levels at once", "", 0.1, 100.0, 0.1)
+_OF_LEVELS = {
+    "levels.*.K_p": Shown("K_P", "Stiffness of all tasks of the level", "1/s²", 0.0, 1000.0, 1.0),
+    "levels.*.K_v": Shown("K_V", "Damping of all tasks of the level", "1/s", 0.0, 100.0, 0.5),
+}

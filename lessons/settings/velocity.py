@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
-from types import MappingProxyType
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 from himpc.catalog import VELOCITY_CONTROLLERS
-from himpc.htmpc import HTMPCSettings, MotionLimits
+from himpc.htmpc import HTMPCSettings
 from himpc.stack import Stack
 from lessons.events import Appear, Event
-from lessons.settings.entry import Entry
 from lessons.settings.levels import ordered
 from lessons.settings.missions import MissionOptions, Stay
-from lessons.settings.settings import Place, SceneSettings, every_level, field_places, level_key, level_places
-from lessons.settings.values import NUMBER, WORD, Form
-from lessons.settings.velocity_entries import VELOCITY_ENTRIES
+from lessons.settings.schema import Setting, Shape, setting_of_all_levels, settings_of_levels, written
+from lessons.settings.settings import SceneSettings
+from lessons.settings.values import NUMBER, Form
 from robots import InputError, VelocityPlantSettings
 from robots.collision import Ball, Box, Floor, Obstacle
 from robots.errors import unknown_name
+from robots.ranges import Folder, Shown
 
 STAGE_WEIGHT: dict[str, float] = {"proximal": 10.0, "paper": 1.0}
 """Q of (8) with which each formulation was tuned; the choice of a formulation sets this Q."""
@@ -37,20 +35,27 @@ class VelocitySettings(SceneSettings):
         htmpc: the controller's settings. Their stack has one level per role; the mission's window orders the
             levels.
         controller: one of VELOCITY_CONTROLLERS.
-        compensate_delay: whether the measured state is predicted forward by the plant's lag before planning.
         delay_measured: whether the commands of a plan are delayed by the plan's measured computing time in
             addition to `plant.delay_ms`, as on a real robot, which does not wait; then no two runs are the
             same.
-        plant: the parameters of the simulated plant.
         options: the scene's own choices.
     """
 
-    entries: ClassVar[tuple[Entry, ...]] = VELOCITY_ENTRIES
+    page_order: ClassVar[tuple[str, ...]] = (
+        "controller", "", "Q", "levels", "plant", "order", "architecture", "base_tolerance", "base_at_rest"
+    )  # fmt: skip
 
-    htmpc: HTMPCSettings
-    controller: str = "htmpc"
-    compensate_delay: bool = True
-    delay_measured: bool = False
+    htmpc: Annotated[HTMPCSettings, Folder("")]
+    # fmt: off
+    controller: Annotated[str, Shown(
+        "Controller", "You can switch the controller while the robot moves")] = "htmpc"
+    compensate_delay: Annotated[bool, Shown(
+        "Compensate delay", "Predict the measured state forward by the plant's lag before planning",
+        tries=("false", "true"), name="delay compensated", group="Delay")] = True
+    delay_measured: Annotated[bool, Shown(
+        "Delay as measured", "Delay each command by its computing time, as on a real robot, which does not "
+        "wait", group="Delay")] = False
+    # fmt: on
     plant: VelocityPlantSettings = field(default_factory=VelocityPlantSettings)
     options: MissionOptions = field(default_factory=Stay)
 
@@ -101,33 +106,40 @@ class VelocitySettings(SceneSettings):
     def after(self, event: Event) -> VelocitySettings:
         return self.with_obstacle(event.ball()) if isinstance(event, Appear) else super().after(event)
 
-    def places(self) -> Mapping[str, Place]:
-        """Returns the place of every path. The paths are those of HTMPCSettings ("horizon", "delta_m",
-        "formulation", …), "controller", "compensate_delay", "delay_measured", those of the scene's options
-        ("peak", "seats", …; "order" takes effect when a run starts), "limits.KEY", "plant.KEY", "Q" for all
-        levels (a new formulation sets its own), "levels.NAME.Q|enabled" with the level's name or its place
+    @classmethod
+    def special(cls, table: Mapping[str, Setting], shape: Shape) -> Iterable[Setting]:
+        """Besides the fields, also those of HTMPCSettings ("horizon", "delta_m", "formulation", …) and of the
+        scene's options ("peak", "seats", …; "order" takes effect when a run starts), there are "Q" for all
+        levels (a new formulation sets its own) and "levels.NAME.Q|enabled" with the level's name or its place
         1 … r."""
-        return _places(tuple(level.name for level in self.levels), type(self.options))
+        formulation, controller = table["formulation"], table["controller"]
+        yield replace(controller, change=lambda s, value: _at_its_rate(controller.change(s, value)))
+        yield replace(formulation, change=lambda s, value: _with_its_weight(formulation.change(s, value)))
+        if "order" in table:
+            order = table["order"]
+            yield replace(order, change=lambda s, value: order.change(s, _roles(s, value)))
+        yield setting_of_all_levels("Q", _STACK, _OF_LEVELS["Q"])
+        yield from settings_of_levels(shape, _STACK, ("enabled", "Q"), (), _OF_LEVELS)
 
     def elements(self, path: str) -> int:
         if path == "report_offset":
             return 3
         return max(len(self.htmpc.gains), len(self.levels)) if path == "gains" else 0
 
-    def place(self, path: str) -> Place:
+    def setting(self, path: str) -> Setting:
         """As in `SceneSettings`, and also "obstacles.NAME": [x, y, z, radius] adds a ball or replaces the
         obstacle of that name, [x, y, z] moves it, and None removes it."""
         head, _, name = path.partition(".")
         if head != "obstacles" or not name:
-            return super().place(path)
-
-        def fit(settings: VelocitySettings, path: str, value: Any) -> Obstacle | None:
-            known = {each.name: each for each in settings.htmpc.obstacles if not isinstance(each, Floor)}
-            if value is None and name not in known:
-                raise unknown_name("obstacle", name, known)
-            return None if value is None else _obstacle(known, path, name, value)
-
-        return Place(lambda settings: _seen(settings, name), _put(name), _BALL, fit)
+            return super().setting(path)
+        return Setting(
+            path,
+            Shown(name.rpartition(".")[2], name=path),
+            _BALL,
+            lambda settings: _seen(settings, name),
+            lambda settings, value: _with_obstacle(settings, name, value),
+            path,
+        )
 
     def special_differences(self, wanted: VelocitySettings) -> list[tuple[str, Any]]:
         """Obstacles that were removed, added or moved; added and moved ones come last, in the order of these
@@ -136,7 +148,8 @@ class VelocitySettings(SceneSettings):
         told = [(f"obstacles.{each.name}", None) for each in self.htmpc.obstacles if each.name not in left]
         rest = tuple(each for each in self.htmpc.obstacles if each.name in left)
         for count in range(len(wanted.htmpc.obstacles) + 1):
-            kept, last = _split(wanted.htmpc.obstacles, count)
+            at = len(wanted.htmpc.obstacles) - count
+            kept, last = wanted.htmpc.obstacles[:at], wanted.htmpc.obstacles[at:]
             if tuple(each for each in rest if each.name not in {moved.name for moved in last}) == kept:
                 return told + [_as_setting(each) for each in last if not isinstance(each, Floor)]
         return told
@@ -144,75 +157,37 @@ class VelocitySettings(SceneSettings):
     def with_obstacle(self, obstacle: Obstacle) -> VelocitySettings:
         """Returns the settings with an obstacle added, or with the obstacle of this name replaced."""
         obstacles = (*_without(self.htmpc.obstacles, obstacle.name), obstacle)
-        return _with_htmpc(self, replace(self.htmpc, obstacles=obstacles))
+        return written(self, _OBSTACLES, obstacles)
 
 
 LONGEST_DELAY = 1e3
 """Largest delay of a command, ms."""
 
 
-def _htmpc(settings: VelocitySettings) -> HTMPCSettings:
-    return settings.htmpc
+def _at_its_rate(settings: VelocitySettings) -> VelocitySettings:
+    return written(settings, ("htmpc", "rate_hz"), _RATE_HZ.get(settings.controller, 10.0))
 
 
-def _with_htmpc(settings: VelocitySettings, htmpc: HTMPCSettings) -> VelocitySettings:
-    return replace(settings, htmpc=htmpc)
+def _with_its_weight(settings: VelocitySettings) -> VelocitySettings:
+    return written(settings, (*_STACK, None, "Q"), STAGE_WEIGHT[settings.htmpc.formulation])
 
 
-def _stack(settings: VelocitySettings) -> Stack:
-    return settings.htmpc.stack
+def _roles(settings: VelocitySettings, names: Any) -> tuple[str, ...]:
+    return tuple(level.name for level in ordered(settings.levels, names))
 
 
-def _with_stack(settings: VelocitySettings, stack: Stack) -> VelocitySettings:
-    return _with_htmpc(settings, replace(settings.htmpc, stack=stack))
-
-
-def _with_controller(settings: VelocitySettings, name: str) -> VelocitySettings:
-    htmpc = replace(settings.htmpc, rate_hz=_RATE_HZ.get(name, 10.0))
-    return replace(settings, controller=name, htmpc=htmpc)
-
-
-def _with_formulation(settings: VelocitySettings, name: Any) -> VelocitySettings:
-    htmpc = replace(settings.htmpc, formulation=name)
-    stack = (replace(level, Q=STAGE_WEIGHT[htmpc.formulation]) for level in htmpc.stack)
-    return _with_htmpc(settings, replace(htmpc, stack=tuple(stack)))
-
-
-_LEVEL_KEYS = {key: level_key(key) for key in ("Q", "enabled")}
+_STACK = ("htmpc", "stack")
+_OBSTACLES = ("htmpc", "obstacles")
 _BALL = Form(None, NUMBER, null=True)
-
-
-@lru_cache(maxsize=64)
-def _places(levels: tuple[str, ...], options: type[MissionOptions]) -> Mapping[str, Place]:
-    """`VelocitySettings.places` for the names of the levels."""
-    found = {
-        **field_places(
-            VelocitySettings, lambda s: s, lambda _, new: new, without=("htmpc", "plant", "options")
-        ),
-        **field_places(options, lambda s: s.options, lambda s, new: replace(s, options=new)),
-        **field_places(
-            HTMPCSettings, _htmpc, _with_htmpc, without=("stack", "limits", "obstacles", "delay_s")
-        ),
-        **field_places(
-            MotionLimits,
-            lambda s: s.htmpc.limits,
-            lambda s, new: _with_htmpc(s, replace(s.htmpc, limits=new)),
-            "limits.",
-        ),
-        **field_places(
-            VelocityPlantSettings, lambda s: s.plant, lambda s, new: replace(s, plant=new), "plant."
-        ),
-        "Q": every_level("Q", _stack, _with_stack),
-        **level_places(levels, _LEVEL_KEYS, _stack, _with_stack),
-    }
-    words = Form(WORD, words=tuple(VELOCITY_CONTROLLERS))
-    found["controller"] = replace(found["controller"], write=_with_controller, form=words)
-    found["formulation"] = replace(found["formulation"], write=_with_formulation)
-    if "order" in found:
-        found["order"] = replace(
-            found["order"], own_fit=lambda s, _, value: tuple(l.name for l in ordered(_stack(s), value))
-        )
-    return MappingProxyType(found)
+_OF_LEVELS = {
+    "Q": Shown(
+        "Q", "Weight of the errors relative to the effort; sets all levels at once", "", 0.1, 100.0, 0.1,
+    ),
+    "levels.*.Q": Shown(
+        "Q", "Weight of this level's errors relative to its effort", "", 0.1, 100.0, 0.1,
+        tries=("20", "100", "200", "500", "2000"), name="Q of *",
+    ),
+}  # fmt: skip
 
 
 def _seen(settings: VelocitySettings, name: str) -> Any:
@@ -220,20 +195,13 @@ def _seen(settings: VelocitySettings, name: str) -> Any:
     return _as_setting(found[0])[1] if found else None
 
 
-def _put(name: str) -> Callable[[VelocitySettings, Obstacle | None], VelocitySettings]:
-    def write(settings: VelocitySettings, obstacle: Obstacle | None) -> VelocitySettings:
-        if obstacle is not None:
-            return settings.with_obstacle(obstacle)
-        return _with_htmpc(
-            settings, replace(settings.htmpc, obstacles=_without(settings.htmpc.obstacles, name))
-        )
-
-    return write
-
-
-def _split(obstacles: tuple[Obstacle, ...], last: int) -> tuple[tuple[Obstacle, ...], tuple[Obstacle, ...]]:
-    at = len(obstacles) - last
-    return obstacles[:at], obstacles[at:]
+def _with_obstacle(settings: VelocitySettings, name: str, value: Any) -> VelocitySettings:
+    known = {each.name: each for each in settings.htmpc.obstacles if not isinstance(each, Floor)}
+    if value is not None:
+        return settings.with_obstacle(_obstacle(known, f"obstacles.{name}", name, value))
+    if name not in known:
+        raise unknown_name("obstacle", name, known)
+    return written(settings, _OBSTACLES, _without(settings.htmpc.obstacles, name))
 
 
 def _as_setting(obstacle: Ball | Box) -> tuple[str, Any]:

@@ -1,11 +1,11 @@
-"""Runs lessons headless and checks three things: claims hold, claims can fail, and challenges can be
-solved."""
+"""Runs lessons headless and checks four things: claims hold, claims can fail, challenges can be solved, and
+the numbers and causes in the texts are those of the runs that their notes name."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 
 from lessons.parallel import FailedJob, Spread, on_cores
 from lessons.recording.run import run
@@ -15,6 +15,7 @@ from lessons.teaching.challenge import Challenge
 from lessons.teaching.claim import Claim
 from lessons.teaching.lesson import Lesson, Step
 from lessons.teaching.measure import Measure
+from lessons.teaching.note import Note, Range
 from lessons.teaching.prediction import Choice, Prediction
 
 
@@ -26,11 +27,14 @@ class Outcome:
         values: the measured values, without comparison with a ghost.
         refused: number of events of the script that were not accepted.
         error: one sentence if the run failed; None if it did not fail.
+        noted: the values for notes, of the whole duration: a run for claims ends with its mission, or when
+            control is lost, and a sentence can be about a later moment.
     """
 
     values: Mapping[Measure, float]
     refused: int = 0
     error: str | None = None
+    noted: Mapping[Measure, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -40,10 +44,11 @@ class Verdict:
     Attributes:
         lesson: name of the lesson.
         where: the step's title, or "challenge".
-        what: the claim, prediction, script or solution.
+        what: the claim, prediction, script, solution or note.
         value, unit: the measured value; NaN if there is nothing to measure.
         condition: the required condition.
-        wrong: the setting under which a claim must fail; "" for other checks.
+        wrong: the setting under which a claim must fail, or which removes the cause of a note; "" for other
+            checks.
         wrong_value: the value measured under that setting.
         fault: one sentence; "" if the check is passed.
     """
@@ -60,15 +65,20 @@ class Verdict:
 
 
 Outcomes = Mapping[RunSpec, Outcome]
+Piece = tuple[RunSpec, tuple[Measure, ...], tuple[Measure, ...]]
+"""A run, the measures that claims need of it, and those that notes need."""
 
 
-def measured(piece: tuple[RunSpec, tuple[Measure, ...]]) -> Outcome:
+def measured(piece: Piece) -> Outcome:
     """Performs a run and returns its measured values. Raises InputError if the run is not possible."""
-    what, measures = piece
+    what, measures, noted = piece
     recording = run(what.prepared())
     values = {measure: measure.value(recording) for measure in measures}
     due = sum(t < recording.duration - 1e-9 for t, _ in what.events or ())
-    return Outcome(values, max(0, due - len(recording.session.log)))
+    refused = max(0, due - len(recording.session.log))
+    if noted and (recording.session.over or recording.session.diverged_at is not None):
+        recording = run(what.prepared(), to_the_end=True)
+    return Outcome(values, refused, noted={measure: measure.value(recording) for measure in noted})
 
 
 def check(
@@ -84,42 +94,60 @@ def check(
         progress: called after each run with the completed share.
 
     Returns:
-        one verdict per claim, prediction, script and challenge, in the order of the lessons.
+        one verdict per claim, prediction, script, challenge and measured note, in the order of the lessons.
     """
-    wanted = _wanted(lessons)
-    # Long runs start first, to keep all cores busy until the end.
-    pieces = sorted(wanted.items(), key=lambda item: -(item[0].duration or 0.0))
-    outcomes: dict[RunSpec, Outcome] = {}
-    work = [(run, tuple(measures)) for run, measures in pieces]
-    for place, outcome in spread(measured, work):
-        run = work[place][0]
-        outcomes[run] = Outcome({}, 0, outcome.reason) if isinstance(outcome, FailedJob) else outcome
-        if progress is not None:
-            progress(len(outcomes) / len(work))
+    outcomes = perform(needed(lessons), spread, progress)
     return [verdict for lesson in lessons for verdict in judge(lesson, outcomes)]
 
 
-def _wanted(lessons: Sequence[Lesson]) -> dict[RunSpec, dict[Measure, None]]:
-    """Returns all runs with the measures that are needed of each run."""
-    wanted: dict[RunSpec, dict[Measure, None]] = {}
+def perform(
+    pieces: Iterable[Piece], spread: Spread = on_cores, progress: Callable[[float], None] | None = None
+) -> Outcomes:
+    """Performs runs, the long ones first, to keep all cores busy until the end."""
+    work = sorted(pieces, key=lambda piece: -(piece[0].duration or 0.0))
+    outcomes: dict[RunSpec, Outcome] = {}
+    for place, outcome in spread(measured, work):
+        done = Outcome({}, 0, outcome.reason) if isinstance(outcome, FailedJob) else outcome
+        outcomes[work[place][0]] = done
+        if progress is not None:
+            progress(len(outcomes) / len(work))
+    return outcomes
 
-    def want(run: RunSpec, measures: Sequence[Measure]) -> None:
-        wanted.setdefault(run, {}).update(dict.fromkeys(measure.alone for measure in measures))
+
+def needed(lessons: Sequence[Lesson], notes: Iterable[tuple[Note, Sequence[RunSpec]]] = ()) -> list[Piece]:
+    """Returns all runs with the measures that are needed of each run.
+
+    notes: notes of other texts than the lessons, with their runs.
+    """
+    wanted: dict[RunSpec, dict[Measure, None]] = {}
+    noted: dict[RunSpec, dict[Measure, None]] = {}
+
+    def want(run: RunSpec, measures: Iterable[Measure], into: dict[RunSpec, dict[Measure, None]]) -> None:
+        into.setdefault(run, {}).update(dict.fromkeys(measure.alone for measure in measures))
 
     for lesson in lessons:
         for step in lesson.steps:
             run = lesson.run_of(step)
             measures = _measures(step)
-            want(run, measures)
+            want(run, measures, wanted)
             if step.ghost is not None:
-                want(run.but(*step.ghost.set), [each for each in measures if each.over_ghost])
+                want(run.but(*step.ghost.set), [each for each in measures if each.over_ghost], wanted)
             for claim in step.claims:
-                want(run.but(*claim.fails_with), [claim.measure])
+                want(run.but(*claim.fails_with), [claim.measure], wanted)
         if lesson.challenge is not None:
             start = lesson.run_of(lesson.challenge)
             for assignments in ((), *lesson.challenge.solutions):
-                want(start.but(*assignments), lesson.challenge.measures)
-    return wanted
+                want(start.but(*assignments), lesson.challenge.measures, wanted)
+        notes = (*notes, *((note, _runs(lesson, step, note)) for step in lesson.steps for note in step.notes))
+    for note, runs in notes:
+        if note.measure is not None:
+            for run in runs:
+                want(run, [note.measure], noted)
+    return [(run, tuple(wanted.get(run, ())), tuple(noted.get(run, ()))) for run in {**wanted, **noted}]
+
+
+def _runs(lesson: Lesson, step: Step, note: Note) -> tuple[RunSpec, ...]:
+    return note.runs(lesson.run_of(step), step.ghost.set if step.ghost else ())
 
 
 def _measures(step: Step) -> list[Measure]:
@@ -140,6 +168,9 @@ def judge(lesson: Lesson, outcomes: Outcomes) -> list[Verdict]:
         found += [_claim(lesson, step, claim, outcomes) for claim in step.claims]
         if step.prediction is not None:
             found.append(_prediction(lesson, step, step.prediction, outcomes))
+        for note in step.notes:
+            if note.measure is not None:
+                found.append(judge_note(lesson.name, step.title, note, _runs(lesson, step, note), outcomes))
     if lesson.challenge is not None:
         found += _challenge(lesson, lesson.challenge, outcomes)
     return found
@@ -237,6 +268,34 @@ def _challenge(lesson: Lesson, challenge: Challenge, outcomes: Outcomes) -> list
             )
         )
     return found
+
+
+def judge_note(lesson: str, where: str, note: Note, runs: Sequence[RunSpec], outcomes: Outcomes) -> Verdict:
+    """Returns the verdict on a note with a measure; lesson and where: the place of its sentence."""
+    assert note.measure is not None
+    unit, what = note.measure.unit, f"[^{note.label}] {note.says}"
+    errors = [outcomes[run].error for run in runs if outcomes[run].error is not None]
+    if errors:
+        return Verdict(lesson, where, what, fault=f"it cannot be run: {errors[0]}")
+    values = [outcomes[run].noted.get(note.measure.alone, math.nan) for run in runs]
+    if note.measure.over_ghost:
+        *values, ghost = values
+        values = [value / ghost if ghost else math.nan for value in values]
+    told = [_between(each, unit) for each in (note.inside, note.outside)]
+    missed = [
+        f"{_figure(value, unit)}, not {condition}"
+        for value, condition, (low, high) in zip(values, told, (note.inside, note.outside), strict=False)
+        if not low <= value <= high
+    ]
+    other = values[1] if note.without else math.nan
+    wrong = ", ".join(note.without)
+    fault = "; ".join(missed)
+    return Verdict(lesson, where, what, values[0], unit, told[0], wrong, other, fault)
+
+
+def _between(limits: Range, unit: str) -> str:
+    low, high = limits
+    return (f"≥ {low:g}" if math.isinf(high) else f"from {low:g} to {high:g}") + f" {unit}".rstrip()
 
 
 def _allowed(challenge: Challenge, assignment: str) -> bool:

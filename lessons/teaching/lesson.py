@@ -12,6 +12,7 @@ from lessons.teaching.challenge import Challenge
 from lessons.teaching.claim import Claim
 from lessons.teaching.control import Control, Script
 from lessons.teaching.measure import Signal
+from lessons.teaching.note import Note
 from lessons.teaching.prediction import Prediction
 
 
@@ -85,6 +86,7 @@ class Step:
         ghost: a second robot to compare with.
         controls: the few settings that the learner can change.
         plots: the signals that are plotted.
+        notes: what allows the sentences, for the check; learners do not see them.
     """
 
     title: str
@@ -99,6 +101,7 @@ class Step:
     ghost: Ghost | None = None
     controls: tuple[Control, ...] = ()
     plots: tuple[Signal, ...] = ()
+    notes: tuple[Note, ...] = ()
 
     def __post_init__(self) -> None:
         for field in ("text", "do", "why"):

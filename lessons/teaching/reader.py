@@ -1,8 +1,9 @@
 """Reads a lesson from Markdown, and names file, line and column of what it cannot use.
 
 A line `- key: value` is an item. Items indented below it belong to it, and an indented line without a dash
-continues its value. All other lines are texts. Nothing in a lesson is executed: events are a closed list of
-words. docs/authoring.md describes the format.
+continues its value. All other lines are texts. A mark `[^label]` in a text belongs to a note `[^label]: …` of
+the same step, which says what allows the words before the mark. Nothing in a lesson is executed: events and
+notes are closed lists of words. docs/authoring.md describes the format.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from lessons.teaching.claim import Claim
 from lessons.teaching.control import Control
 from lessons.teaching.lesson import Card, Ghost, Lesson, Step
 from lessons.teaching.measure import Measure, Signal, Statistic
+from lessons.teaching.note import Note
 from lessons.teaching.prediction import Choice, Option, Prediction, Sketch, Value
 from robots import InputError
 from robots.errors import shortened, unknown_name
@@ -59,6 +61,7 @@ _MEASURE = (
     rf"(?:(?P<statistic>{'|'.join(get_args(Statistic))}) of )?{_SIGNAL}"
     r"(?: after (?P<after>#) s)?(?: until (?P<until>#) s)?(?P<over_ghost> over ghost)?"
 )
+_SETTINGS = "`[^`]+`(?:, `[^`]+`)*"
 _FORMS: dict[str, tuple[str, str]] = {
     "minutes": ("(?P<minutes>#)", "8"),
     "run": ("(?P<duration>#) s", "2.2 s"),
@@ -82,6 +85,14 @@ _FORMS: dict[str, tuple[str, str]] = {
     "vector": (r"\((?P<numbers>#(?:, *#)*)\)", "(1, 2, 3)"),
     "integer": (r"(?P<integer>-?\d+)", "1"),
     "real": ("(?P<real>#)", "1.5"),
+    "note": (
+        rf"(?P<told>given: .+|tested by \S+::\w+)|{_MEASURE} from (?P<low>#)(?: to (?P<high>#))?"
+        r"(?: in (?P<on>[\w-]+))?(?: for (?P<seconds>#) s)?"
+        rf"(?: with (?:(?P<ghost>the ghost's settings)|(?P<set>{_SETTINGS})))?"
+        rf"(?:; (?P<effect>but|and) with (?P<without>{_SETTINGS})"
+        r" from (?P<outside_low>#)(?: to (?P<outside_high>#))?)?",
+        "range of q[2] (deg) from 28 to 30; but with `horizon=1` from 0 to 5",
+    ),
 }
 """The form of a value by its key (# is a number), and an example."""
 
@@ -96,14 +107,24 @@ _TEXT_GROUPS = {
     "choices",
     "numbers",
     "log",
+    "told",
+    "on",
+    "ghost",
+    "set",
+    "effect",
+    "without",
 }
+_MARK = re.compile(r"\[\^([\w-]+)\]")
+_NOTE = re.compile(r"(\[\^[\w-]+\]): +(.*)")
+_WITH_MARKS = ("predict", "option", "tempting", "claim", "because", "goal")
+"""The keys of items whose values are texts, in which marks of notes may stand."""
 _ITEM = re.compile(r"(?P<indent> *)- (?P<key>[a-z][a-z ]*?)(?P<more> [\d(][^:]*)?:(?: +(?P<value>.*))?")
 
 
 @dataclass
 class _Part:
     """A heading or an item: its place, key and value, what stands between key and colon, the items below it,
-    and the texts of a heading by their own headings."""
+    and the texts of a heading by their own headings, with the marks of notes in them."""
 
     path: str
     line: int
@@ -113,6 +134,7 @@ class _Part:
     more: str = ""
     items: list[_Part] = field(default_factory=list)
     texts: dict[str, list[str]] = field(default_factory=dict)
+    marks: list[_Part] = field(default_factory=list)
 
     @contextmanager
     def named(self) -> Iterator[None]:
@@ -126,6 +148,20 @@ class _Part:
 
     def text(self, heading: str = "") -> str:
         return "\n".join(self.texts.get(heading, [])).strip("\n")
+
+    def with_marks(self) -> Iterator[str]:
+        """Yields the texts in which marks of notes may stand, each in one line."""
+        for item in self.items:
+            yield from (item.value, *item.with_marks()) if item.key in _WITH_MARKS else ()
+        for lines in self.texts.values():
+            yield " ".join(" ".join(lines).split())
+
+    def remove_marks(self) -> None:
+        for item in self.items:
+            if item.key in _WITH_MARKS:
+                item.value = _MARK.sub("", item.value)
+                item.remove_marks()
+        self.texts = {name: [_MARK.sub("", line) for line in lines] for name, lines in self.texts.items()}
 
     def all(self, *keys: str) -> list[_Part]:
         return [item for item in self.items if item.key in keys]
@@ -158,16 +194,25 @@ class _Part:
         return {name: value if name in _TEXT_GROUPS else float(value) for name, value in found.items()}
 
 
-def read_lesson(name: str, path: str, text: str) -> Lesson:
-    """Returns the lesson with this name from the text of a Markdown file. The path is for messages, and for
-    the robot or scene that the lesson names by a file in its own folder.
+def read_lesson(name: str, path: str, text: str, marks: bool = False) -> Lesson:
+    """Returns the lesson with this name from the text of a Markdown file.
+
+    Args:
+        name: name of the lesson.
+        path: its file, for messages, and for a robot or scene that is a file in the folder of the lesson.
+        text: the text of the file.
+        marks: whether the texts keep the marks of notes, which a learner does not see.
 
     Raises:
         InputError: with file, line and column.
     """
     head, *parts = _parts(path, text)
+    noted = {part.line: _notes(part) for part in (head, *parts)}
+    if not marks:
+        for part in (head, *parts):
+            part.remove_marks()
     question = " ".join(head.text().split())
-    steps = tuple(_step(part) for part in parts if part.key == "step")
+    steps = tuple(_step(part, noted[part.line]) for part in parts if part.key == "step")
     challenges = [_challenge(part) for part in parts if part.key == "challenge"]
     robot, scene = head.one("robot"), head.needed("scene").value
     with head.named():
@@ -200,8 +245,9 @@ def _parts(path: str, text: str) -> list[_Part]:
     parts: list[_Part] = []
     lines: list[str] = []
     item: _Part | None = None
+    labels: set[str] = set()
     for number, line in enumerate(text.split("\n"), start=1):
-        match = _ITEM.fullmatch(line.rstrip())
+        match, note = _ITEM.fullmatch(line.rstrip()), _NOTE.fullmatch(line.rstrip())
         heading = re.fullmatch("(#+) +(.*)", line.rstrip())
         here = _Part(path, number, 1, "", line)
         if (heading and len(heading[1]) < 3) or (not parts and line.strip()):
@@ -219,6 +265,19 @@ def _parts(path: str, text: str) -> list[_Part]:
                         f"'{line.strip()}' is no heading of a step: choose '### Now you' or '### Why'"
                     )
             lines, item = parts[-1].texts.setdefault(heading[2], []), None
+        elif note:
+            item = _Part(path, number, 1, "note", note[2], note[1])
+            with item.named():
+                if parts[-1].key != "step":
+                    raise InputError(
+                        f"the note '{note[1]}' stands in no step: put it into the step of its mark"
+                    )
+                if note[1] in labels:
+                    raise InputError(
+                        f"the note '{note[1]}' stands twice: choose another label for one of them"
+                    )
+            labels.add(note[1])
+            parts[-1].items.append(item)
         elif match and (item or not match["indent"]):
             above = parts[-1] if not match["indent"] else parts[-1].items[-1]
             more, value = (match["more"] or "").strip(), match["value"] or ""
@@ -232,12 +291,82 @@ def _parts(path: str, text: str) -> list[_Part]:
         elif parts:
             lines.append(line.rstrip())
             item = None
+        for mark in () if note else _MARK.finditer(line):
+            parts[-1].marks.append(_Part(path, number, mark.start() + 1, "mark", mark[0]))
     if not parts:
         raise InputError(f"{path}, line 1, column 1: a lesson begins with '# Title'")
     return parts
 
 
-def _step(part: _Part) -> Step:
+def _notes(part: _Part) -> tuple[Note, ...]:
+    """Returns the notes of a step, each with the words before its first mark."""
+    says: dict[str, str] = {}
+    for text in part.with_marks():
+        for mark in _MARK.finditer(text):
+            says.setdefault(mark[0], re.split(r"(?<=[.!?…]) ", _MARK.sub("", text[: mark.start()]))[-1])
+    items = part.all("note")
+    for mark in part.marks:
+        with mark.named():
+            if mark.value not in [item.more for item in items]:
+                raise InputError(f"a line '{mark.value}: …' is missing in this step")
+    for item in items:
+        with item.named():
+            if item.more not in says:
+                raise InputError(f"no text of this step has the mark '{item.more}'")
+    return tuple(_note(part, item, says[item.more]) for item in items)
+
+
+def _note(part: _Part, item: _Part, says: str) -> Note:
+    found = item.groups()
+    label = item.more[2:-1]
+    with item.named():
+        if "told" in found:
+            return Note(label, says, told=found["told"])
+        measure = _measure(item)
+        inside = found["low"], found.get("high", math.inf)
+        outside = found.get("outside_low", 0.0), found.get("outside_high", math.inf)
+        if ("ghost" in found or measure.over_ghost) and part.one("ghost") is None:
+            raise InputError(
+                "there is no ghost in this step: write a line '- ghost: …' with settings below it"
+            )
+        if inside[0] > inside[1] or outside[0] > outside[1]:
+            raise InputError("a range begins with its smaller number")
+        if "effect" in found:
+            apart = inside[1] < outside[0] or outside[1] < inside[0]
+            if apart != (found["effect"] == "but"):
+                raise InputError(
+                    "after 'but with' stands a range that does not overlap the first one, and after 'and "
+                    "with' one that does"
+                )
+        named = (found.get("on", ""), found.get("seconds"))
+        without = _settings(found.get("without", ""))
+        return Note(
+            label,
+            says,
+            measure,
+            inside,
+            _settings(found.get("set", "")),
+            "ghost" in found,
+            *named,
+            without,
+            outside if without else (0.0, 0.0),
+        )
+
+
+def _settings(text: str) -> tuple[str, ...]:
+    """Returns the assignments in backticks."""
+    found = tuple(re.findall("`([^`]+)`", text))
+    for each in found:
+        parse_assignment(each)
+    return found
+
+
+def read_note(path: str, line: int, text: str) -> Note:
+    """Returns a note that is beside a sentence of another text than a lesson. Raises InputError."""
+    return _note(_Part(path, line, 1, "text", ""), _Part(path, line, 1, "note", text, "[^]"), "")
+
+
+def _step(part: _Part, notes: tuple[Note, ...]) -> Step:
     duration, script = _run(part)
     ghost, asked = part.one("ghost"), part.one("predict")
     with part.named():
@@ -254,6 +383,7 @@ def _step(part: _Part) -> Step:
             Ghost(ghost.value, _set(ghost)) if ghost else None,
             tuple(_control(item) for item in part.all("control")),
             tuple(_signal(item) for item in part.all("plot")),
+            notes,
         )
 
 

@@ -7,14 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from lxml import etree
-from lxml.etree import _Element as Element
 from numpy.typing import NDArray
 
 from robots.geometry.collision_model import Solid
 from robots.robot import Robot
 from robots.shapes.collision_shapes import FARTHEST, SHAPES_PER_LINK, primitive
-from robots.urdf.read import Refusal, placement
+from robots.shapes.read import described_shapes, mesh_surfaces
 
 Array = NDArray[np.float64]
 _SECTIONS = 24  # number of sides of the polygon that replaces a circle
@@ -46,40 +44,16 @@ def patches(robot: Robot, meshes: bool = True) -> Iterator[Patch]:
 
 
 def _visuals(robot: Robot, meshes: bool) -> Iterator[Patch]:
-    root = etree.fromstring(robot.urdf_text.encode())
-    files = _read(root) if meshes else {}
-    for link in root.findall("link"):
-        name = link.get("name", "")
-        frame = robot.model.frames[robot.frame_id(name)]
-        for visual in link.findall("visual")[:SHAPES_PER_LINK]:
-            geometry = visual.find("geometry")
-            if geometry is None or len(geometry) == 0:
-                continue
-            try:
-                at = frame.placement * placement(visual)
-                solid = primitive(geometry[0], frame.parentJoint, name, "hull", at)
-                if solid is not None:
-                    yield _of_solid(solid)
-                    continue
-                scale = np.broadcast_to(
-                    [float(word) for word in geometry[0].get("scale", "1 1 1").split()], 3
-                )
-            except (ValueError, Refusal):
-                continue
-            for corners in files.get(geometry[0].get("filename", ""), ()):
-                yield Patch(frame.parentJoint, name, _placed(corners * scale, at))
-
-
-def _read(root: Element) -> dict[str, list[Array]]:
-    """Returns the triangles of the visual meshes by their URI."""
-    uris = [mesh.get("filename", "") for mesh in root.iterfind("link/visual/geometry/mesh")]
-    if not uris:
-        return {}
-    from robots.meshes.surfaces import mesh_pieces  # it loads trimesh, which most descriptions do not need
-
-    return {
-        uri: [vertices[faces] for _, vertices, faces in pieces] for uri, pieces in mesh_pieces(uris).items()
-    }
+    links = described_shapes(robot, "visuals").values()
+    visuals = [visual for shapes in links for visual in shapes[:SHAPES_PER_LINK]]
+    surfaces = mesh_surfaces(visuals) if meshes else {}
+    for visual in visuals:
+        solid = primitive(visual, "hull")
+        if solid is not None:
+            yield _of_solid(solid)
+        for _, vertices, faces in surfaces.get(visual.mesh, ()):
+            corners = _placed(vertices[faces] * visual.size, visual.at)
+            yield Patch(visual.joint, visual.link, corners)
 
 
 def _of_solid(solid: Solid) -> Patch:

@@ -3,11 +3,9 @@ contact is left out."""
 
 from __future__ import annotations
 
-import json
 from collections import Counter
-from dataclasses import asdict, dataclass
-from pathlib import Path
-from typing import Any, Literal
+from dataclasses import dataclass
+from typing import Literal
 
 Point = tuple[float, float, float]
 SolidKind = Literal["box", "sphere", "cylinder", "capsule", "hull"]
@@ -102,23 +100,3 @@ def excluded_pairs(excluded: tuple[Excluded, ...]) -> str:
         shown = ", ".join(pairs[:_SHOWN]) + (f" and {len(pairs) - _SHOWN} more" if pairs[_SHOWN:] else "")
         text += f", and {shown}, which {said}" if pairs else ""
     return text
-
-
-def stored(path: Path) -> CollisionModel:
-    """Reads the collision geometry of a robot of the catalog."""
-    data = json.loads(path.read_text())
-    return CollisionModel(
-        tuple(Solid(**{key: frozen(value) for key, value in solid.items()}) for solid in data["solids"]),
-        tuple(Excluded(**{key: frozen(value) for key, value in pair.items()}) for pair in data["excluded"]),
-    )
-
-
-def as_json(model: CollisionModel) -> str:
-    """Returns the text of the file that `stored` reads, with one line per solid and per pair."""
-    solids, pairs = ([json.dumps(asdict(each)) for each in some] for some in (model.solids, model.excluded))
-    between = ",\n  "
-    return f'{{"solids": [\n  {between.join(solids)}],\n"excluded": [\n  {between.join(pairs)}]}}\n'
-
-
-def frozen(value: Any) -> Any:
-    return tuple(map(frozen, value)) if isinstance(value, list) else value

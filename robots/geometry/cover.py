@@ -3,11 +3,9 @@ collision avoidance are distances between capsules."""
 
 from __future__ import annotations
 
-import json
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from dataclasses import dataclass
 
-from robots.geometry.collision_model import Excluded, Point, excluded_pairs, frozen
+from robots.geometry.collision_model import Excluded, Point, excluded_pairs
 
 
 @dataclass(frozen=True)
@@ -43,21 +41,3 @@ class Cover:
         near = sum(pair.why == "neighbours" for pair in self.excluded)
         text = f"distances use {len(self.capsules)} capsules that contain the links"
         return f"{text}; left out are {near} pair(s) of neighbours{excluded_pairs(self.excluded)}"
-
-
-def stored_cover(path: Path) -> Cover:
-    """Reads the cover of a robot of the catalog."""
-    data = json.loads(path.read_text())
-    return Cover(
-        tuple(Capsule(**{key: frozen(value) for key, value in each.items()}) for each in data["capsules"]),
-        tuple(Excluded(**{key: frozen(value) for key, value in each.items()}) for each in data["excluded"]),
-    )
-
-
-def cover_as_json(cover: Cover) -> str:
-    """Returns the text of the file that `stored_cover` reads, with one line per capsule and per pair."""
-    capsules, pairs = (
-        [json.dumps(asdict(each)) for each in some] for some in (cover.capsules, cover.excluded)
-    )
-    between = ",\n  "
-    return f'{{"capsules": [\n  {between.join(capsules)}],\n"excluded": [\n  {between.join(pairs)}]}}\n'

@@ -11,8 +11,9 @@ import numpy as np
 
 from robots.catalog import CATALOG, CatalogEntry
 from robots.errors import InputError, shortened, unknown_name
-from robots.geometry.collision_model import stored
-from robots.geometry.cover import stored_cover
+from robots.geometry.collision_model import CollisionModel
+from robots.geometry.cover import Cover
+from robots.geometry.files import stored
 from robots.loading.imported import with_cover, with_geometry
 from robots.loading.importing import Import, bounds, import_robot
 from robots.meshes.files import has_meshes
@@ -122,8 +123,8 @@ def _catalog_robot(entry: CatalogEntry) -> Robot:
         M_bar=np.array(entry.M_bar),
         urdf_text=canonical.text,
         report=replace(report, tip=entry.tip),
-        collision=stored(entry.collision_path),
-        cover=stored_cover(entry.cover_path),
+        collision=stored(CollisionModel, entry.collision_path),
+        cover=stored(Cover, entry.cover_path),
     )
 
 

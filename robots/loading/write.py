@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from robots.catalog import CATALOG, CatalogEntry
 from robots.covering.covers import made_cover
-from robots.geometry.collision_model import CollisionModel, as_json
-from robots.geometry.cover import cover_as_json
+from robots.geometry.collision_model import CollisionModel
+from robots.geometry.files import as_json
 from robots.loading.load import load_robot
 from robots.mechanics.exclusions import collision_model
 from robots.shapes.collision_shapes import collision_solids
@@ -24,4 +24,4 @@ def made(entry: CatalogEntry) -> CollisionModel:
 if __name__ == "__main__":
     for each in CATALOG.values():
         each.collision_path.write_text(as_json(made(each)))
-        each.cover_path.write_text(cover_as_json(made_cover(load_robot(each.name), tries=2)))
+        each.cover_path.write_text(as_json(made_cover(load_robot(each.name), tries=2)))

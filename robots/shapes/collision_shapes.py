@@ -3,25 +3,24 @@ without collision shapes, and capsules along the kinematics for bodies without a
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from itertools import groupby, product
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
 
 import numpy as np
 import pinocchio as pin
-from lxml import etree
-from lxml.etree import _Element as Element
 
 from robots.geometry.collision_model import Point, Solid, SolidKind, Source
 from robots.robot import Robot
 from robots.shapes.limbs import limbs
+from robots.shapes.read import DescribedShape, described_shapes, mesh_surfaces
 from robots.truth import pose
-from robots.urdf.read import Refusal, placement
 
 CORNERS = 96
 """Largest number of corners of a hull."""
 _SPREAD = 40  # number of directions; a link's farthest points in these directions are corners of its hull
 _NEAR = 1e-3  # largest distance by which a link may stand out of its hull, m
-_TAGS: tuple[tuple[str, Source], ...] = (("collision", "collision"), ("visual", "hull"))
+_HALVED = {"box": 0.5, "cylinder": (1.0, 0.5), "sphere": 1.0}
+"""Factors that turn the size of a shape into the size of a solid."""
 SHAPES_PER_LINK = 500  # largest number of shapes of a link that are read
 _PER_LINK = 8
 _PER_ROBOT = 120
@@ -39,64 +38,46 @@ def collision_solids(robot: Robot, meshes: bool = True) -> tuple[Solid, ...]:
     A link with more than eight shapes gets one hull around all of them. Shapes whose numbers or files cannot
     be used are left out. No content of the description or of a mesh file raises an error.
     """
-    root = etree.fromstring(robot.urdf_text.encode())
-    chosen: list[tuple[Element, Source]] = []
-    for link in root.findall("link"):
-        tag, source = next((each for each in _TAGS if link.find(each[0]) is not None), _TAGS[1])
-        chosen.extend((shape, source) for shape in link.findall(tag)[:SHAPES_PER_LINK])
-    files = (shape.find("geometry/mesh") for shape, _ in chosen)
-    surfaces = _surfaces([mesh.get("filename", "") for mesh in files if mesh is not None] if meshes else [])
-    solids: list[Solid] = []
-    for name, shapes in groupby(chosen, lambda each: str(each[0].getparent().get("name"))):
-        solids += _of_link(robot, name, list(shapes), surfaces)
+    visuals, collisions = described_shapes(robot, "visuals"), described_shapes(robot, "collisions")
+    chosen: list[tuple[list[DescribedShape], Source]] = [
+        (collisions[link][:SHAPES_PER_LINK], "collision")
+        if collisions[link]
+        else (visuals[link][:SHAPES_PER_LINK], "hull")
+        for link in visuals
+    ]
+    surfaces = mesh_surfaces(shape for shapes, _ in chosen for shape in shapes) if meshes else {}
+    points = {
+        mesh: np.concatenate([vertices for _, vertices, _ in pieces])
+        for mesh, pieces in surfaces.items()
+        if pieces
+    }
+    solids = [solid for shapes, source in chosen for solid in _of_link(shapes, source, points)]
     bare = set(range(robot.n + 1)) - {solid.joint for solid in solids}
     solids = [*solids[:_PER_ROBOT], *_capsules(robot, bare)]
     return tuple(sorted(solids[:_PER_ROBOT], key=lambda solid: (solid.joint == 0, solid.joint)))
 
 
 def _of_link(
-    robot: Robot, name: str, shapes: list[tuple[Element, Source]], meshes: Mapping[str, np.ndarray]
+    shapes: Sequence[DescribedShape], source: Source, points: Mapping[str, np.ndarray]
 ) -> list[Solid]:
-    frame = robot.model.frames[robot.frame_id(name)]
+    """Returns the solids of a link. points: those of each mesh file, (V, 3) m."""
     found: list[Solid] = []
     clouds: list[np.ndarray] = []
-    for shape, source in shapes:
-        geometry = shape.find("geometry")
-        if geometry is None or len(geometry) == 0:
+    for shape in shapes:
+        solid = primitive(shape, source)
+        if solid is not None:
+            cloud = _corners(solid)
+        elif shape.mesh in points:
+            cloud = points[shape.mesh] * shape.size
+        else:
             continue
-        try:
-            at = frame.placement * placement(shape)
-            solid = primitive(geometry[0], frame.parentJoint, name, source, at)
-            cloud = _scaled(geometry[0], meshes) if solid is None else _corners(solid)
-        except (ValueError, Refusal):
-            continue
-        clouds.append(cloud @ at.rotation.T + at.translation)
-        solid = solid or _hull(frame.parentJoint, name, source, clouds[-1:])
+        clouds.append(cloud @ shape.at.rotation.T + shape.at.translation)
+        solid = solid or _hull(shape, source, clouds[-1:])
         found += [] if solid is None else [solid]
     if len(found) > _PER_LINK:
-        whole = _hull(frame.parentJoint, name, shapes[0][1], clouds)
+        whole = _hull(shapes[0], source, clouds)
         return [] if whole is None else [whole]
     return found
-
-
-def _surfaces(uris: list[str]) -> dict[str, np.ndarray]:
-    """Returns the points of mesh files, (V, 3) m."""
-    if not uris:
-        return {}
-    from robots.meshes.surfaces import mesh_pieces  # it loads trimesh, which most descriptions do not need
-
-    return {
-        uri: np.concatenate([vertices for _, vertices, _ in pieces])
-        for uri, pieces in mesh_pieces(uris).items()
-        if pieces
-    }
-
-
-def _scaled(shape: Element, meshes: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Returns the points of the mesh that an element names, (V, 3) m. Raises ValueError for a scale that is
-    not a number."""
-    scale = np.broadcast_to([float(word) for word in shape.get("scale", "1 1 1").split()], 3)
-    return meshes.get(shape.get("filename", ""), np.zeros((0, 3))) * scale
 
 
 def _corners(solid: Solid) -> np.ndarray:
@@ -110,26 +91,15 @@ def _corners(solid: Solid) -> np.ndarray:
     return np.array([(radius * np.cos(t), radius * np.sin(t), z) for t in turns for z in (-half, half)])
 
 
-def primitive(shape: Element, joint: int, link: str, source: Source, at: pin.SE3) -> Solid | None:
-    """Returns a box, cylinder or sphere; None for a mesh. Raises ValueError for a size that is not a
-    number."""
-    sizes = {
-        name: [float(word) for word in shape.get(name, "").split()] for name in ("size", "radius", "length")
-    }
-    kind: SolidKind
-    if shape.tag == "box":
-        kind, size = "box", [0.5 * each for each in np.broadcast_to(sizes["size"], 3)]
-    elif shape.tag == "sphere":
-        (radius,) = sizes["radius"]
-        kind, size = "sphere", [radius]
-    elif shape.tag == "cylinder":
-        (radius,), (length,) = sizes["radius"], sizes["length"]
-        kind, size = "cylinder", [radius, 0.5 * length]
-    else:
+def primitive(shape: DescribedShape, source: Source) -> Solid | None:
+    """Returns a box, cylinder or sphere as a solid; None for a mesh or if a number is out of range."""
+    if shape.kind == "mesh":
         return None
-    if not all(1e-5 < each < FARTHEST for each in size) or np.abs(at.translation).max() > FARTHEST:
-        raise ValueError("a size is out of range")
-    return _placed(joint, link, kind, source, size, at)
+    size = (shape.size * _HALVED[shape.kind]).tolist()
+    far = np.abs(shape.at.translation).max() > FARTHEST
+    if far or not all(1e-5 < each < FARTHEST for each in size):
+        return None
+    return _placed(shape.joint, shape.link, shape.kind, source, size, shape.at)
 
 
 def _placed(joint: int, link: str, kind: SolidKind, source: Source, size: list[float], at: pin.SE3) -> Solid:
@@ -139,9 +109,9 @@ def _placed(joint: int, link: str, kind: SolidKind, source: Source, size: list[f
     return Solid(joint, link, kind, source, tuple(map(float, size)), (x, y, z), (w, i, j, k))
 
 
-def _hull(joint: int, link: str, source: Source, clouds: list[np.ndarray]) -> Solid | None:
-    """Returns the convex hull of points in the joint's axes, or None without points. A flat hull gets a
-    thickness of 2 mm."""
+def _hull(shape: DescribedShape, source: Source, clouds: list[np.ndarray]) -> Solid | None:
+    """Returns the convex hull of points in the axes of a shape's joint, or None without points. A flat hull
+    gets a thickness of 2 mm."""
     cloud = np.concatenate([np.zeros((0, 3)), *clouds])
     cloud = cloud[(np.abs(cloud) < FARTHEST).all(axis=1)]
     if not len(cloud):
@@ -169,7 +139,7 @@ def _hull(joint: int, link: str, source: Source, clouds: list[np.ndarray]) -> So
     except QhullError:
         return None
     points: list[Point] = [(float(x), float(y), float(z)) for x, y, z in corners]
-    return Solid(joint, link, "hull", source, points=tuple(points))
+    return Solid(shape.joint, shape.link, "hull", source, points=tuple(points))
 
 
 def _directions() -> np.ndarray:

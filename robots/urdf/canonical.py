@@ -19,6 +19,7 @@ from robots.urdf.inertials import repair_inertials
 from robots.urdf.joints import normalise_joints
 from robots.urdf.limits import fill_efforts, fill_speeds
 from robots.urdf.read import Refusal, parse, without_shapes
+from robots.urdf.shapes import remove_unusable_shapes
 from robots.urdf.structure import check_structure, movable_joints
 
 MAX_JOINTS = 20
@@ -57,6 +58,7 @@ def canonicalise(
         lambda tree: _check_freedom(tree, source),
         repair_inertials,
         fill_speeds,
+        remove_unusable_shapes,
     )
     for each in passes:
         findings.extend(each(root))
@@ -69,6 +71,7 @@ def canonicalise(
     except Refusal as refusal:
         return None, _report(source, [*findings, refusal.finding])
     name = shortened(root.get("name", "").strip()) or "robot"
+    root.set("name", root.get("name", name))  # not every reader accepts a robot without a name
     report = replace(_report(source, findings), name=name, joints=tuple(model.names)[1:])
     text = etree.tostring(root, encoding="unicode", pretty_print=True)
     return Canonical(name, text, model, report), report

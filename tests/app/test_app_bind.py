@@ -17,12 +17,16 @@ from viser import _messages
 
 from app.client.pending_edit import PendingEdit
 from app.panels.torque.controller import ControllerPanel
+from app.panels.torque.plant import add_plant
+from app.panels.velocity.controller import HtmpcPanel
+from app.panels.velocity.plant import add_servo_plant
 from app.panels.widgets import mirror as bind
 from app.panels.widgets.mirror import Bindings
 from app.panels.widgets.window import PopupWindow
 from lessons.events import Event, Set
-from lessons.scenes.catalog import torque_scene
+from lessons.scenes.catalog import load_scene, torque_scene
 from lessons.settings.torque import TorqueSettings
+from lessons.settings.velocity import VelocitySettings
 
 
 @pytest.fixture(scope="module")
@@ -198,7 +202,7 @@ def test_controls_open_on_whatever_is_set(viser_server: viser.ViserServer) -> No
     assert {0.04, 9.0, 0.01, 60, 1e-8} <= values
 
 
-@pytest.mark.parametrize("path", ["solver", "route", "R_on", "limits.position"])
+@pytest.mark.parametrize("path", ["solver", "R_on", "limits.position"])
 def test_menus_offer_every_word_a_setting_may_hold(
     viser_server: viser.ViserServer, path: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -207,7 +211,7 @@ def test_menus_offer_every_word_a_setting_may_hold(
     # CasADi is an optional package
     monkeypatch.setattr("himpc.formulation.settings.is_installed", lambda _: True)
     scene, bindings = torque_scene("planar3-hold"), Bindings(lambda _: None, viser_server.get_event_loop())
-    words = scene.settings.place(path).form.words
+    words = scene.settings.setting(path).form.words
     assert len(words) > 1
     for word in words:
         viser_server.gui.reset()
@@ -216,3 +220,19 @@ def test_menus_offer_every_word_a_setting_may_hold(
         handles = viser_server.gui._gui_input_handle_from_uuid.values()
         menus = [each for each in handles if isinstance(each, viser.GuiDropdownHandle)]
         assert any(menu.options == words and menu.value == word for menu in menus)
+
+
+@pytest.mark.parametrize("name", ["planar3-hold", "ridgeback-ur10-square"])
+def test_a_setting_that_names_a_group_has_a_control(name: str) -> None:
+    """A setting is added to the page by the name of a folder, which must be one of the page's folders."""
+    scene, bound = load_scene(name), MagicMock()
+    settings, robot = scene.settings, scene.robot
+    if isinstance(settings, VelocitySettings):
+        HtmpcPanel(MagicMock(), bound, settings, robot, lambda: settings)
+        add_servo_plant(MagicMock(), bound, settings)
+    else:
+        assert isinstance(settings, TorqueSettings)
+        ControllerPanel(MagicMock(), MagicMock(), bound, settings, robot)
+        add_plant(MagicMock(), bound, settings, robot)
+    paths = {call.args[2](1).path for call in bound.bind.call_args_list}
+    assert {each.path for each in settings.table().values() if each.shown.group} <= paths

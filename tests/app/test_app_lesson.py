@@ -80,8 +80,8 @@ def test_a_run_in_the_page_measures_what_the_headless_one_does(learn: Start) -> 
     run = lesson.run_of(step)
     assert step.ghost is not None and step.claims[0].measure.over_ghost
     alone = [claim.measure.alone for claim in step.claims]
-    own = measured((run, tuple(alone))).values
-    ghost = measured((run.but(*step.ghost.set), tuple(alone))).values
+    own = measured((run, tuple(alone), ())).values
+    ghost = measured((run.but(*step.ghost.set), tuple(alone), ())).values
     assert lecture.values == (own[alone[0]] / ghost[alone[0]], own[alone[1]])
     assert lecture.holds == (True, True) and lecture.changed == "" and lecture.attempt == 1
     assert lecture.t == pytest.approx(step.duration) and len(lecture.curves) == len(step.plots)
@@ -137,7 +137,7 @@ def test_a_robot_that_is_lost_ends_the_run_as_headless(learn: Start) -> None:
     step = lesson.steps[0]
     lecture = learner.runs(Predict(0), RunStep(fast=True))
     measures = tuple(claim.measure for claim in step.claims)
-    values = measured((lesson.run_of(step), measures)).values
+    values = measured((lesson.run_of(step), measures, ())).values
     assert lecture.values == tuple(values[each] for each in measures)
     assert lecture.lost_at is not None and 1.0 < lecture.lost_at < step.duration
     assert lecture.phase == "done" and lecture.t < step.duration
@@ -230,7 +230,7 @@ def test_a_challenge_is_graded_and_cannot_be_cheated(learn: Start) -> None:
     good = learner.runs(*knobs, RunStep(fast=True))
     assert good.result is not None and good.result.passed and good.result.score > 0 and not good.changed
     run = lesson.run_of(challenge).but(*challenge.solutions[0])
-    assert good.points_for == measured((run, (challenge.score.measure,))).values[challenge.score.measure]
+    assert good.points_for == measured((run, (challenge.score.measure,), ())).values[challenge.score.measure]
     cheat = learner.runs(Post(Set("plant.payload_kg", 0.1)), RunStep(fast=True))
     assert cheat.result is not None and "does not belong to this challenge" in cheat.changed
 

@@ -13,7 +13,8 @@ import pytest
 from app.__main__ import main
 from himpc.export.image import MULTIPLE
 from himpc.export.native import NativeController
-from lessons.settings.torque_entries import TORQUE_ENTRIES
+from lessons.settings.schema import settings_of
+from lessons.settings.torque import TorqueSettings
 from robots import load_robot
 from tests.commands.exported import controller_in, exported, needed, replayed
 
@@ -79,7 +80,7 @@ def test_none_of_a_thousand_images_with_one_wrong_bit_is_accepted(folders: dict[
 def test_limits_beyond_the_robots_own_are_refused(folders: dict[str, Path]) -> None:
     """The largest limits are those of the page's sliders. A refused call changes nothing."""
     one, robot = controller_in(folders["iiwa14-hold"]), load_robot("iiwa14")
-    ends = {entry.path: entry.high for entry in TORQUE_ENTRIES}
+    ends = {each.path: each.shown.high for each in settings_of(TorqueSettings)}
     assert ends["limits.torque_scale"] == ends["limits.velocity_scale"] == MULTIPLE
     own = np.array([robot.tau_limit, robot.v_limit, robot.q_lower, robot.q_upper])
     most = own * np.array([MULTIPLE, MULTIPLE, 1.0, 1.0])[:, None]

@@ -132,6 +132,35 @@ LESSONS = {
     "a range that is none": (changed(LESSON, "(below 1)", "(under 1)"), "'(under 1)' does not have the form"),
     "a control without an end": (changed(LESSON, "from 0 to 5", "from 0"), "line 16, column 3"),
     "another heading": (changed(LESSON, "### Why", "### Because"), "line 33, column 1"),
+    "a mark without a note": (
+        changed(LESSON, "the hand.", "the hand[^2]."),
+        "line 31, column 58: a line '[^2]: …' is missing in this step",
+    ),
+    "a note without a mark": (
+        changed(LESSON, "millimetre[^1].", "millimetre."),
+        "line 37, column 1: no text of this step has the mark '[^1]'",
+    ),
+    "two notes of one name": (
+        LESSON + "[^1]: given: a setting\n",
+        "line 38, column 1: the note '[^1]' stands twice",
+    ),
+    "a note that is code": (
+        changed(LESSON, "[^1]: error/position (mm) from", "[^1]: __import__('os') from"),
+        "line 37, column 1: '__import__('os') from 0",
+    ),
+    "a note with a wrong setting": (changed(LESSON, "`controller=osf`", "`controller`"), "line 37, column 1"),
+    "a note without an effect": (
+        changed(LESSON, "from 10 to 200", "from 0.1 to 200"),
+        "line 37, column 1: after 'but with' stands a range that does not overlap",
+    ),
+    "a note of another's ghost": (
+        changed(LESSON, "(mm) from 0 to 0.1;", "(mm) over ghost from 0 to 0.1;"),
+        "line 37, column 1: there is no ghost in this step",
+    ),
+    "a range that ends before it begins": (
+        changed(LESSON, "from 0 to 0.1;", "from 1 to 0.1;"),
+        "line 37, column 1",
+    ),
     "no wrong setting": (
         changed(LESSON, "  - fails with: controller=osf\n", ""),
         "line 24, column 3: a line '- fails with: …' is missing",

@@ -68,9 +68,9 @@ def off(solutions: list[LevelSolution], exact: list[Array]) -> float:
 
 
 def second_opinion(hierarchy: Hierarchy, compiled: list[LevelSolution]) -> list[Array]:
-    """Returns the optima of the explicit route. If it has no verified optimum at some level, returns those of
-    `exact_increments` instead."""
-    explicit = hierarchy.solve("explicit")
-    if all(solution.fallback == "solve" for solution in explicit):
-        return [solution.U for solution in explicit]
-    return exact_increments(hierarchy, compiled, explicit)
+    """Returns the optima by the printed equations. If there is no verified optimum at some level, returns
+    those of `exact_increments` instead."""
+    printed = hierarchy.solve("printed")
+    if all(solution.fallback == "solve" for solution in printed):
+        return [solution.U for solution in printed]
+    return exact_increments(hierarchy, compiled, printed)

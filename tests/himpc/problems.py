@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.cascade.cascade import solve_cascade
 from himpc.cascade.level import LevelProblem, LevelSolution
-from himpc.catalog import Route
+from himpc.controllers.printed_tick import solve
 from himpc.limits import POSITION, TORQUE, VELOCITY, Rows
 from himpc.limits.constraint import Constraint
 from himpc.prediction.task import residual_model
@@ -24,25 +24,20 @@ def level_problem(
     name: str, B: Array, C: Array, free: Array, Q: Array, R: Array, knots: int | None = None
 ) -> LevelProblem:
     """Returns the data of a level, computed from its weights as the paper prints them."""
-    K = len(B) if knots is None else knots
     return LevelProblem(
         name=name,
         B=B,
         C=C,
         free=free,
-        weighted_free=np.sqrt(Q) * free,
         root_Q=np.sqrt(Q),
-        weighted_C=np.sqrt(Q)[:, None] * C[:K, :, :K],
         R=R,
-        knots=K,
-        common_R=float(R[0]) if (R[0] == R).all() else None,
+        knots=len(B) if knots is None else knots,
     )
 
 
 def shifted(problem: LevelProblem, change: Array) -> LevelProblem:
     """Returns the same level with a different free residual."""
-    free = problem.free + change
-    return problem._replace(free=free, weighted_free=problem.root_Q * free)
+    return problem._replace(free=problem.free + change)
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,13 +49,14 @@ class Hierarchy:
 
     def solve(
         self,
-        route: Route = "compiled",
+        by: Literal["compiled", "printed"] = "compiled",
         solver: Solver = "daqp",
         previous: dict[str, LevelSolution] | None = None,
     ) -> list[LevelSolution]:
-        if route == "compiled":
+        """Solves the levels by the kernel, or by the equations of the controller himpc_printed."""
+        if by == "compiled":
             return solve_problems(self.problems, self.rows, previous or {})
-        return solve_cascade(self.problems, self.rows, previous or {}, solver)
+        return solve(self.problems, self.rows.matrix, self.rows, previous or {}, solver)
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -1,4 +1,5 @@
-"""Two routes of the cascade give the same optimum, priorities are strict, and every point is verified."""
+"""The kernel and the printed equations give the same optimum, priorities are strict, and every point is
+verified."""
 
 from __future__ import annotations
 
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 from problems import Hierarchy, level_problem, quadratic, random_hierarchy, shifted, singular_hierarchy
 
 from himpc.cascade.level import LevelProblem, LevelSolution
-from himpc.cascade.null_space import RANK_TOLERANCE
+from himpc.constants import RANK_TOLERANCE
 from himpc.limits import Rows
 from himpc.qp import is_installed
 from himpc.tick.fallbacks import solve_level
@@ -36,8 +37,10 @@ depths = st.integers(1, 4)
 
 @given(seeds, joints, horizons, depths, st.booleans(), st.sampled_from([1.0, 5.0, 30.0]))
 @settings(max_examples=250)
-def test_routes_agree(seed: int, n: int, N: int, levels: int, position_rows: bool, room: float) -> None:
-    """The compiled route solves every feasible hierarchy, and an independent solution is within 1e-6 N·m."""
+def test_kernel_and_printed_equations_agree(
+    seed: int, n: int, N: int, levels: int, position_rows: bool, room: float
+) -> None:
+    """The kernel solves every feasible hierarchy, and an independent solution is within 1e-6 N·m."""
     hierarchy = random_hierarchy(seed, n, N, levels, position_rows, room)
     compiled = hierarchy.solve("compiled")
     assert_sound(hierarchy, compiled)
@@ -53,13 +56,13 @@ def test_the_random_hierarchies_bind() -> None:
 
 
 def test_proxqp_agrees_where_it_solves() -> None:
-    """ProxQP finds the same increments on the explicit QPs if its point is accurate, which is the case for
+    """ProxQP finds the same increments on the printed QPs if its point is accurate, which is the case for
     about one in eight of these stacks."""
     compared = 0
     for seed in range(200):
         n, N, levels = np.random.default_rng(seed).integers((2, 1, 1), (8, 6, 4)).tolist()
         hierarchy = random_hierarchy(seed, n, N, levels)
-        proxqp = hierarchy.solve("explicit", "proxqp")
+        proxqp = hierarchy.solve("printed", "proxqp")
         if all(accurate(problem, found) for problem, found in zip(hierarchy.problems, proxqp, strict=True)):
             compared += 1
             assert_agree(hierarchy.solve("compiled"), proxqp)
@@ -77,9 +80,9 @@ def accurate(problem: LevelProblem, solution: LevelSolution) -> bool:
 @pytest.mark.skipif(not is_installed("qpoases"), reason="CasADi, which brings qpOASES, is not installed")
 @pytest.mark.parametrize("seed", range(8))
 def test_qpoases_agrees(seed: int) -> None:
-    """qpOASES, the paper's own solver, finds the same increments on the explicit QPs."""
+    """qpOASES, the paper's own solver, finds the same increments on the printed QPs."""
     hierarchy = random_hierarchy(seed, 5, 4, 3)
-    qpoases = hierarchy.solve("explicit", "qpoases")
+    qpoases = hierarchy.solve("printed", "qpoases")
     assert all(solution.fallback == "solve" for solution in qpoases)
     assert_agree(hierarchy.solve("compiled"), qpoases)
 
@@ -111,21 +114,21 @@ decades = st.floats(-15, -12.001) | st.floats(-7.999, -2) | st.none()
 
 @given(seeds, st.integers(2, 8), st.integers(1, 6), decades)
 @settings(max_examples=120)
-def test_routes_agree_on_rank_deficient_stacks(seed: int, n: int, N: int, decade: float | None) -> None:
-    """If a level repeats another, exactly or nearly, both routes are equal, except near the rank tolerance.
+def test_both_agree_on_rank_deficient_stacks(seed: int, n: int, N: int, decade: float | None) -> None:
+    """If a level repeats another, exactly or nearly, both are equal, except near the rank tolerance.
 
     A direction of relative size s is known with an accuracy of rounding divided by s, and this limits the
-    accuracy of lower levels. With s = 1.3e-8 the explicit route was 2.8e-6 N·m and the compiled one 8e-8 N·m
+    accuracy of lower levels. With s = 1.3e-8 an earlier printed solver was 2.8e-6 N·m and the kernel 8e-8 N·m
     from the optimum that was computed with 300 bits.
     """
     size = 0.0 if decade is None else 10**decade
     assert size < 0.01 * RANK_TOLERANCE or size > 100 * RANK_TOLERANCE
     hierarchy = singular_hierarchy(seed, n, N, size)
-    compiled, explicit = hierarchy.solve("compiled"), hierarchy.solve("explicit")
+    compiled, printed = hierarchy.solve("compiled"), hierarchy.solve("printed")
     assert_sound(hierarchy, compiled)
-    assert all(solution.fallback == "solve" for solution in explicit)
+    assert all(solution.fallback == "solve" for solution in printed)
     rounding = 1e3 * np.finfo(float).eps / size if size > RANK_TOLERANCE else 0.0
-    assert largest_difference(compiled, explicit) <= max(1e-6, rounding)
+    assert largest_difference(compiled, printed) <= max(1e-6, rounding)
 
 
 @given(seeds, st.integers(2, 8), st.integers(1, 6), st.floats(-12, -8))
@@ -146,8 +149,8 @@ def test_no_freedom_left_keeps_the_upper_levels() -> None:
     everything = random_hierarchy(4, 4, 5, 1).problems[0]
     full = replace_rows(everything, np.random.default_rng(0).normal(0, 1, (5, 4, 4)))
     stack = Hierarchy([full, hierarchy.problems[0]._replace(name="last")], hierarchy.rows)
-    for route in ("compiled", "explicit"):
-        first, last = stack.solve(route)
+    for by in ("compiled", "printed"):
+        first, last = stack.solve(by)
         np.testing.assert_array_equal(first.U, last.U)
         assert (last.fallback, last.status) == ("solve", "empty")
 
@@ -181,10 +184,10 @@ def test_corners_that_many_bounds_make_are_found(seed: int, n: int, N: int, leve
     found = hierarchy.solve()
     assert_sound(hierarchy, found)
     assert max(len(solution.active) for solution in found) >= 25
-    explicit = hierarchy.solve("explicit")
-    exact = exact_increments(hierarchy, found, explicit)
+    printed = hierarchy.solve("printed")
+    exact = exact_increments(hierarchy, found, printed)
     assert off(found, exact) <= 1e-6
-    assert off(explicit, exact) <= 1e-6
+    assert off(printed, exact) <= 1e-6
 
 
 @pytest.mark.parametrize("seed", range(20))

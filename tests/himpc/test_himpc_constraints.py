@@ -1,5 +1,5 @@
-"""Both routes solve constraints whose directions combine several joints, and report which of them are
-active."""
+"""The kernel and the printed equations solve constraints whose directions combine several joints, and report
+which of them are active."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from cascade_checks import largest_difference
 from numpy.typing import NDArray
 from problems import Hierarchy, equalities, quadratic, random_hierarchy
 
-from himpc.cascade.explicit import every_row
 from himpc.cascade.level import LevelSolution
 from himpc.limits import CONSTRAINTS, Rows
 from himpc.limits.constraint import Block, Constraint, Directions, Moment
@@ -39,7 +38,7 @@ def coupled(seed: int, n: int, N: int, levels: int, room: float = 0.3) -> Hierar
     D[:2] = rng.normal(0, 1, (2, n))
     D[:2] /= np.linalg.norm(D[:2], axis=1, keepdims=True)
     inside = inside_of(rows)
-    wanted = hierarchy.solve("explicit")[-1].U
+    wanted = hierarchy.solve("printed")[-1].U
     at, reach = (summed_twice(N) @ U @ D.T for U in (inside, wanted))
     margin = room * np.abs(reach - at) + 1e-3
     lower, upper = np.full((N, n), -np.inf), np.full((N, n), np.inf)
@@ -60,7 +59,7 @@ def coupled(seed: int, n: int, N: int, levels: int, room: float = 0.3) -> Hierar
 def inside_of(rows: Rows) -> Array:
     """Returns the increments of least norm that satisfy all rows, (N, n)."""
     N, n = rows.L.shape[1], rows.lower.shape[1]
-    A, lower, upper = every_row(rows, n), rows.lower.ravel(), rows.upper.ravel()
+    A, lower, upper = rows.matrix, rows.lower.ravel(), rows.upper.ravel()
     found = solve_qp(np.eye(N * n), np.zeros(N * n), A, lower, upper)
     assert found.solved
     return found.x.reshape(N, n)
@@ -72,17 +71,17 @@ def active(level: LevelSolution) -> set[tuple[int, int]]:
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_both_routes_and_a_plain_qp_agree_on_coupled_rows(seed: int) -> None:
+def test_both_and_a_plain_qp_agree_on_coupled_rows(seed: int) -> None:
     """The optimum of each level is that of the complete QP, with (33) as equalities and all rows one by one.
     Some coupled row is active; without one, the increments would not depend on the coupled rows."""
     n, N, levels = 3 + seed % 4, 1 + seed % 5, 1 + seed % 3
     hierarchy = coupled(seed, n, N, levels)
-    compiled, explicit = hierarchy.solve("compiled"), hierarchy.solve("explicit")
-    assert {each.fallback for each in (*compiled, *explicit)} == {"solve"}
-    assert largest_difference(compiled, explicit) <= 1e-8
+    compiled, printed = hierarchy.solve("compiled"), hierarchy.solve("printed")
+    assert {each.fallback for each in (*compiled, *printed)} == {"solve"}
+    assert largest_difference(compiled, printed) <= 1e-8
     rows, own = hierarchy.rows, (len(hierarchy.rows.constraints) - 1) * N
     assert any((level.active.row >= own).any() for level in compiled)
-    assert active(compiled[0]) == active(explicit[0])
+    assert active(compiled[0]) == active(printed[0])
     A = np.array([rows.values(unit.reshape(N, n)).ravel() for unit in np.eye(N * n)]).T
     above = np.zeros(N * n)
     for level, problem in enumerate(hierarchy.problems):

@@ -69,27 +69,27 @@ kinds = st.sampled_from(["fine", "fine", "huge", "nan", "inf", "tiny"])
     seed=st.integers(0, 2**32 - 1),
     states=st.lists(st.tuples(kinds, kinds, kinds, kinds), min_size=1, max_size=4),
     N=st.integers(1, 8),
-    route=st.sampled_from(["compiled", "explicit"]),
+    name=st.sampled_from(["himpc", "himpc_printed"]),
     solver=st.sampled_from(["daqp", "daqp", "daqp", "proxqp"]),
     position=st.sampled_from(["viability", "paper", "off"]),
 )
 @settings(max_examples=40)
 def test_whatever_comes_in_the_torque_is_finite_and_in_bounds(
-    iiwa: Robot, seed: int, states: list[tuple[str, ...]], N: int, route: Any, solver: Any, position: Any
+    iiwa: Robot, seed: int, states: list[tuple[str, ...]], N: int, name: str, solver: Any, position: Any
 ) -> None:
     """Random, huge or non-finite states, references and torques raise no exception."""
     rng = np.random.default_rng(seed)
     torque_scale, velocity_scale = 10 ** rng.uniform([-2, -3], [1, 2])
     limits = Limits(position=position, velocity_scale=velocity_scale, torque_scale=torque_scale)
     T_s = 10 ** rng.uniform(-4, -1.7)
-    controller = HIMPC(
+    controller = make_controller(
+        name,
         iiwa,
         iiwa_settings(
             iiwa,
             horizon=N,
             T_s=T_s,
-            route=route,
-            solver=solver if route == "explicit" else "daqp",
+            solver=solver if name == "himpc_printed" else "daqp",
             limits=limits,
             M_bar=tuple(10 ** rng.uniform(-5, 3, 7)),
             R_on=rng.choice(["torque", "acceleration"]),
@@ -196,6 +196,8 @@ def test_a_change_that_is_refused_at_its_last_part_changes_nothing(iiwa: Robot, 
 def test_a_message_about_the_nominal_model_names_it(iiwa: Robot) -> None:
     with pytest.raises(InputError, match=r"^nominal\.damping has 2 values"):
         make_controller("osf", iiwa, iiwa_settings(iiwa, nominal=NominalSettings(damping=(0.1, 0.2))))
+    with pytest.raises(InputError, match=r"^nominal\.gravity is 'no'; give true or false"):
+        make_controller("osf", iiwa, iiwa_settings(iiwa, nominal=NominalSettings(gravity="no")))  # pyright: ignore
 
 
 # ------------------------------------------------------------------ evidence

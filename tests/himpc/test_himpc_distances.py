@@ -6,21 +6,23 @@ required distances."""
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
+
 import coal
 import numpy as np
 import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from himpc.constants import SLOWEST
+from himpc.controllers.stall_guard import StallGuard
 from himpc.limits import Limits, in_force
 from himpc.limits.avoidance import Avoidance
 from himpc.limits.distance import least_rates
-from himpc.limits.load import loaded, spared
 from himpc.limits.near import Near
-from himpc.limits.overrun import anticipated, followed
-from himpc.limits.stall import going, slowed, stalled
 from himpc.references.observed import Observed
 from himpc.tick.distances import Distances
 from robots import Robot, load_robot
@@ -28,6 +30,8 @@ from robots.collision import Ball, Box, Floor
 from robots.covering.cover_of import cover_of
 from robots.geometry.cover import Capsule
 from robots.world import Post
+
+Array = NDArray[np.float64]
 
 WORLD = (
     Floor(),
@@ -169,37 +173,64 @@ def test_from_the_least_rate_a_stop_is_possible() -> None:
     assert least_rates(pairs(0.025), kept) == [0.0]
 
 
+@dataclass
+class Pairs:
+    """The fields of `Distances` that a guard reads."""
+
+    carried: np.ndarray
+    room: float = math.inf
+    moves: bool = False
+    velocity_margin: float = 0.0
+
+
+class Guarded:
+    """A guard of a robot with two tasks, and the velocity limits that it leaves, as shares of the limits."""
+
+    def __init__(self, robot: Robot, tasks: int = 2) -> None:
+        self.limits = in_force(robot, Limits())
+        self.guard = StallGuard(tasks, 1e-3)
+        self.pairs = Pairs(Distances(robot, Avoidance(on=True)).carried)
+        self.still = np.zeros(robot.n)
+
+    def share(self, tau: Array | None = None, v: Array | None = None) -> Array:
+        tau, v = (self.still if each is None else each for each in (tau, v))
+        slower = self.guard.limits(self.limits, tau, v, self.pairs)  # pyright: ignore[reportArgumentType]
+        return slower.v_limit / self.limits.v_limit
+
+    def stall(self, errors: list[float], moves: bool, room: float) -> Array:
+        self.pairs.moves, self.pairs.room, self.guard.errors = moves, room, np.array(errors)
+        return self.share()
+
+
 def test_joints_that_a_motor_with_little_torque_left_carries_become_slow(robot: Robot) -> None:
     """Only a motor with a large mean torque lowers the velocity limits of the joints that it carries; a short
     peak of torque does not."""
-    limits = in_force(robot, Limits())
-    tau, load = 0.4 * limits.tau_upper, np.zeros(robot.n)
+    now = Guarded(robot)
+    tau, share = 0.4 * now.limits.tau_upper, np.ones(robot.n)
     for tick in range(1000):
-        tau[1] = -0.75 * limits.tau_upper[1]
-        tau[2] = limits.tau_upper[2] if tick == 990 else 0.0
-        load = loaded(load, tau, limits, 1e-3)
-    carried = Distances(robot, Avoidance(on=True)).carried
-    share = spared(limits, load, carried).v_limit / limits.v_limit
+        tau[1] = -0.75 * now.limits.tau_upper[1]
+        tau[2] = now.limits.tau_upper[2] if tick == 990 else 0.0
+        share = now.share(tau)
+        assert tick or (share == 1.0).all()
     assert share[0] == 1.0
     assert share[1:] == pytest.approx(0.2 / 0.4, rel=1e-3)
-    assert spared(limits, np.zeros(robot.n), carried) is limits
 
 
 def test_a_joint_that_accelerates_towards_its_limit_gets_a_lower_one(robot: Robot) -> None:
     """Only a joint that becomes faster gets a lower limit, at least half of its own limit. A joint that
     brakes keeps its limit."""
-    limits = in_force(robot, Limits())
-    assert anticipated(limits, 0.4 * limits.v_limit, 0.4 * limits.v_limit) is limits
-    v = 0.8 * limits.v_limit
+    now = Guarded(robot)
+    v_limit = now.limits.v_limit
+    assert (now.share(v=0.4 * v_limit) == 1.0).all()
+    v = 0.8 * v_limit
     v[2] = -v[2]
-    mean = v.copy()
-    acceleration = np.zeros(robot.n)
+    now = Guarded(robot)
+    share, acceleration = now.share(v=v), np.zeros(robot.n)
     acceleration[:4] = 2.0, -2.0, -2.0, 100.0
     for _ in range(200):
         v = v + 1e-3 * acceleration / 5.0
-        mean = followed(mean, v, 1e-3)
-    share = anticipated(limits, v, mean).v_limit / limits.v_limit
-    lower = 1.0 - 0.1 * 0.4 / limits.v_limit
+        share = now.share(v=v)
+    lower = 1.0 - 0.1 * 0.4 / v_limit
     assert share[[0, 2]] == pytest.approx(lower[[0, 2]], abs=0.01)
     assert share[3] == pytest.approx(0.5)
     assert share[[1, 4, 5, 6]] == pytest.approx(1.0)
@@ -216,27 +247,26 @@ def test_a_robot_without_progress_becomes_slow(robot: Robot) -> None:
         "a target moves": (0.3, True, 0.01),
         "there": (0.005, False, 0.01),
     }
+    stalled = pytest.approx(SLOWEST / in_force(robot, Limits()).v_limit, abs=0.01)
     shares = {}
     for name, (error, moves, room) in cases.items():
-        stall = going(2)
-        for _ in range(2000):
-            stall = stalled(stall, np.array([error, 0.0]), moves, room, 1e-3)
-        shares[name] = stall.share
-    assert shares.pop("stalled") < 0.01
-    assert shares.pop("a little inside") < 0.01
-    assert set(shares.values()) == {1.0}
-    stall, error = going(1), 0.5
+        now = Guarded(robot)
+        shares[name] = [now.stall([error, 0.0], moves, room) for _ in range(2000)][-1]
+    assert shares.pop("stalled") == stalled
+    assert shares.pop("a little inside") == stalled
+    assert all((share == 1.0).all() for share in shares.values())
+    now, error, share = Guarded(robot, 1), 0.5, np.zeros(robot.n)
     for _ in range(2000):
         error -= 2e-4
-        stall = stalled(stall, np.array([error]), False, 0.01, 1e-3)
-    assert stall.share == 1.0
-    stall = going(1)
-    for error in [*[0.3] * 1000, 0.35]:
-        stall = stalled(stall, np.array([error]), False, 0.01, 1e-3)
-    assert stall.due == [0.35]  # the robot was pushed away and may return
-    stall = going(1)
+        share = now.stall([error], False, 0.01)
+    assert (share == 1.0).all()
+    now = Guarded(robot, 1)
+    for _ in range(1000):
+        share = now.stall([0.3], False, 0.01)
+    assert share == stalled
+    assert (now.stall([0.35], False, 0.01) > share + 0.01).all()  # it was pushed away and may return
+    now = Guarded(robot, 1)
     for error in [*[0.3] * 300, *np.linspace(0.3, 0.2, 100), *[0.2] * 1000]:
-        stall = stalled(stall, np.array([error]), False, 0.01, 1e-3)
-    assert stall.share < 0.01  # an error that decreases while the robot brakes does not make it faster again
-    slow = slowed(in_force(robot, Limits()), stall._replace(share=0.0))
-    assert slow.v_limit == pytest.approx(SLOWEST)
+        share = now.stall([error], False, 0.01)
+    # an error that decreases while the robot brakes does not make it faster again
+    assert share == stalled

@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from himpc.controllers import dragged_target
 from himpc.references import (
     JOINT_CAPS,
     POSITION_CAPS,
@@ -104,7 +105,7 @@ def test_a_target_shows_the_kernel_what_it_previews(seed: int, turns: bool, N: i
     after a new target."""
     rng = np.random.default_rng(seed)
     start = np.eye(3) if turns else np.zeros(3)
-    one, other = Target(start), Target(start)
+    one, other = dragged_target(start), dragged_target(start)
     room = np.full((3, N + 1, 5), np.nan)
     motion, seen, value = room[:, :, 1:4], None, start.ravel()
     shown = 0
@@ -171,7 +172,7 @@ def test_a_dragged_position_keeps_its_caps_and_its_promises(seed: int, caps: Cap
     """For all motions of the hand, speed, acceleration and jerk stay within their caps, and derivatives are
     consistent."""
     rng = np.random.default_rng(seed)
-    target = Target(rng.normal(0, 1, 3), caps)
+    target = dragged_target(rng.normal(0, 1, 3), caps)
     moves = {int(k): rng.normal(0, 10 ** rng.uniform(-3, 0.3), 3) for k in rng.integers(0, 400, 5)}
     previews = drive(target, 500, lambda k: moves.get(k))
     assert_consistent(previews, caps, set(moves))
@@ -188,7 +189,7 @@ def test_a_dragged_rotation_keeps_its_caps_and_its_promises(seed: int, angle: fl
     axis = rng.normal(0, 1, 3)
     start = exp3(rng.normal(0, 1, 3))
     caps = Caps(1.2, 6.0, 120.0)
-    target = Target(start, caps)
+    target = dragged_target(start, caps)
     goal = exp3(angle * axis / np.linalg.norm(axis)) @ start
     previews = drive(target, 600, lambda k: goal if k == 0 else None)
     assert_consistent(previews, caps, {0})
@@ -201,7 +202,7 @@ def test_a_dragged_rotation_keeps_its_caps_and_its_promises(seed: int, angle: fl
 @pytest.mark.parametrize("distance", [1e-10, 1e-3, 0.1, 1.0])
 def test_it_arrives_and_rests_exactly(distance: float) -> None:
     """The filtered target ends bitwise at the raw target, at rest, and does not drift afterwards."""
-    target = Target(np.zeros(3))
+    target = dragged_target(np.zeros(3))
     goal = distance * np.array([0.6, 0.0, 0.8])
     last = drive(target, 8000, lambda k: goal if k == 3 else None)[-1]
     np.testing.assert_array_equal(last.value, goal)
@@ -214,7 +215,7 @@ def test_it_arrives_and_rests_exactly(distance: float) -> None:
 def test_a_rotation_arrives_and_rests_exactly(angle: float) -> None:
     """For a rotation of 180° there are two shortest paths; the target follows one of them to the end."""
     goal = exp3(np.array([0.0, angle, 0.0]))
-    target = Target(np.eye(3))
+    target = dragged_target(np.eye(3))
     previews = drive(target, 9000, lambda k: goal if k == 0 else None)
     np.testing.assert_array_equal(previews[-1].value, goal)
     assert not previews[-1].velocity.any()
@@ -224,7 +225,7 @@ def test_a_rotation_arrives_and_rests_exactly(angle: float) -> None:
 
 def test_a_hand_moved_in_mid_motion_leaves_no_jump() -> None:
     """A new raw target changes the acceleration; value and velocity are continuous."""
-    target = Target(np.zeros(3))
+    target = dragged_target(np.zeros(3))
     hand = {0: np.array([0.4, 0, 0]), 350: np.array([-0.3, 0.5, 0.1]), 700: np.array([0.0, 0.0, 1.0])}
     previews = drive(target, 1000, lambda k: hand.get(k))
     velocity = np.array([p.velocity[0] for p in previews])
@@ -238,7 +239,7 @@ def test_a_hand_moved_in_mid_motion_leaves_no_jump() -> None:
 
 def test_changed_horizon_and_period_go_on_smoothly() -> None:
     """N and T_s may change while the target moves."""
-    target = Target(np.zeros(2))
+    target = dragged_target(np.zeros(2))
     target.move(np.array([0.5, 0.0]))
     t, values, velocities = 0.0, [], []
     for k in range(600):
@@ -254,7 +255,7 @@ def test_changed_horizon_and_period_go_on_smoothly() -> None:
 
 def test_asking_twice_at_one_time_changes_nothing() -> None:
     """A second call of `preview` at the same tick, for instance by the page, gives the same result."""
-    target = Target(np.zeros(2))
+    target = dragged_target(np.zeros(2))
     target.move(np.array([0.5, 0.2]))
     for k in range(50):
         first = target.preview(k * T_S, T_S, 4)
@@ -264,7 +265,7 @@ def test_asking_twice_at_one_time_changes_nothing() -> None:
 
 
 def test_jump_rests_at_the_new_value() -> None:
-    target = Target(np.zeros(2))
+    target = dragged_target(np.zeros(2))
     target.move(np.ones(2))
     drive(target, 100, lambda k: None)
     target.jump(np.array([2.0, 3.0]))
@@ -276,7 +277,7 @@ def test_jump_rests_at_the_new_value() -> None:
 def test_a_rotation_turns_about_all_axes() -> None:
     """The preview of a rotation has all components of ω_d, also for a task on fewer axes. The preview of a
     target at rest may have only the components of the task."""
-    target = Target(np.eye(3))
+    target = dragged_target(np.eye(3))
     target.move(exp3(np.array([0.0, 0.0, 0.5])))
     preview = drive(target, 50, lambda k: None)[-1]
     assert preview.velocity.shape == (6, 3)

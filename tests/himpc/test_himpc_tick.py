@@ -1,5 +1,4 @@
-"""The kinematics of the compiled tick agree with Pinocchio's, and its torques with those of the printed
-route."""
+"""The kinematics of the compiled tick agree with Pinocchio's, and its torques with the printed equations."""
 
 from __future__ import annotations
 
@@ -17,6 +16,7 @@ from problems import Hierarchy, random_hierarchy, shifted
 
 from himpc import HIMPC, FrameOrientation, FramePosition, Level, Posture, Settings
 from himpc.references import Circle, FigureEight, Hold, Outlook, Phase, Reference, Sinusoid
+from himpc.tick.tick import CompiledTick
 from robots import Robot, load_robot
 from robots.loading.importing import import_robot
 
@@ -85,7 +85,7 @@ def test_kinematics_are_pinocchio_s(seed: int) -> None:
     place = pin.updateFramePlacement(robot.model, data, tip)
     np.testing.assert_allclose(plan.values["position"], place.translation, atol=1e-12)
     np.testing.assert_allclose(plan.values["orientation"], place.rotation, atol=1e-12)
-    assert controller.kernel is not None
+    assert isinstance(controller.kernel, CompiledTick)
     np.testing.assert_allclose(controller.kernel.arena.f["B"][0, :6], J, atol=1e-12)
     away = pin.log3(place.rotation @ turn.T)
     if np.linalg.norm(away) < np.pi - 0.02:  # Pinocchio's own formula is inaccurate near π
@@ -107,7 +107,7 @@ def a_tick_later(hierarchy: Hierarchy, seed: int) -> Hierarchy:
 @settings(max_examples=150)
 def test_the_next_tick_has_the_printed_optimum(seed: int, n: int, N: int, levels: int, room: float) -> None:
     """Started with the active rows of the previous tick, the optimum satisfies the literal KKT conditions and
-    agrees with the explicit route."""
+    agrees with the printed equations."""
     hierarchy = random_hierarchy(seed, n, N, levels, room=room, even=True)
     before = {solution.name: solution for solution in hierarchy.solve()}
     later = a_tick_later(hierarchy, seed)
@@ -148,7 +148,7 @@ def test_the_kernel_s_references_are_the_printed_ones(law: Literal["uniform", "e
     }
     N = int(rng.integers(1, 12))
     controller = HIMPC(robot, Settings(stack, (1.0, 1.0, 1.0), horizon=N, T_s=0.002))
-    assert controller.kernel is not None
+    assert isinstance(controller.kernel, CompiledTick)
     outlook = Outlook(given_, float(rng.uniform(0, 20)), 0.002, N)
     controller.step(robot.home, np.zeros(3), outlook)
     f = controller.kernel.arena.f

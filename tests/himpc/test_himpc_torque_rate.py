@@ -1,5 +1,5 @@
-"""In closed loop, both routes keep and report the bound on the torque rate and a constraint that only this
-test defines."""
+"""In closed loop, the kernel and the printed equations keep and report the bound on the torque rate and a
+constraint that only this test defines."""
 
 from __future__ import annotations
 
@@ -10,14 +10,13 @@ import pytest
 from broken_solver import break_kernel
 from closed_loop import Loop, holding
 from numpy.typing import NDArray
+from printed_levels import off_printed
 
-from himpc.cascade.cascade import solve_cascade
-from himpc.catalog import Route
 from himpc.limits import CONSTRAINTS, TORQUE, TORQUE_RATE, constraints
 from himpc.limits.constraint import Block, Constraint, Directions, Moment
 from himpc.limits.constraints import bit_of
 from himpc.limits.velocity import summed_twice
-from himpc.plan import Plan, write_plan
+from himpc.plan import write_plan
 from himpc.references import Outlook
 from himpc.telemetry import layout_of
 
@@ -29,13 +28,11 @@ FASTEST = 0.02
 """Largest sum of the first two velocities, rad/s."""
 
 
-def pulled(name: str, route: Route = "compiled", rate: float = 0.0, controller: str = "himpc") -> Loop:
+def pulled(name: str, controller: str = "himpc", rate: float = 0.0) -> Loop:
     """Returns a loop in which the target of the hand jumps by 5 cm."""
     loop = holding(name, controller)
     settings = loop.controller.settings
-    loop.controller.configure(
-        replace(settings, route=route, limits=replace(settings.limits, torque_rate=rate))
-    )
+    loop.controller.configure(replace(settings, limits=replace(settings.limits, torque_rate=rate)))
     target = loop.references["position"]
     target.move(target.preview(0.0, 1e-3, 1).value + 0.05)  # pyright: ignore[reportAttributeAccessIssue]
     return loop
@@ -79,20 +76,13 @@ def test_who_binds_and_telemetry_tell_of_it() -> None:
 
 
 @pytest.mark.parametrize("rate", [0.0, RATE])
-def test_both_routes_agree_in_the_loop(rate: float) -> None:
-    """At every tick both routes agree on the same problems and rows, and the explicit controller gives the
-    same torques."""
-    loop, other = pulled("planar3", rate=rate), pulled("planar3", "explicit", rate)
+def test_kernel_and_printed_equations_agree_in_the_loop(rate: float) -> None:
+    """At every tick both agree on the same problems and rows, and himpc_printed gives the same torques."""
+    loop, other = pulled("planar3", rate=rate), pulled("planar3", "himpc_printed", rate)
     for _ in range(25):
-        plan, explicit = loop.tick().freeze(), other.tick()
-        assert_same(loop, plan)
-        assert np.abs(plan.tau - explicit.tau).max() <= 1e-7
-
-
-def assert_same(loop: Loop, plan: Plan) -> None:
-    problems = loop.controller.problems  # pyright: ignore[reportAttributeAccessIssue]
-    for one, level in zip(solve_cascade(problems, plan.rows, {}, "daqp"), plan.levels, strict=True):
-        assert np.abs(one.U - level.U).max() <= 1e-8
+        plan, printed = loop.tick().freeze(), other.tick()
+        assert off_printed(loop.controller, plan) <= 1e-8
+        assert np.abs(plan.tau - printed.tau).max() <= 1e-7
 
 
 def test_without_any_optimum_the_arm_brakes_within_torque_and_rate(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -128,9 +118,9 @@ def _bounds(now: Moment) -> Block:
 SUM = Constraint("sum of velocities", summed_twice, 1, hard=False, is_on=lambda _: True, bounds=_bounds)
 
 
-@pytest.mark.parametrize("route", ["compiled", "explicit"])
+@pytest.mark.parametrize("controller", ["himpc", "himpc_printed"])
 def test_a_constraint_that_couples_joints_is_one_entry_of_the_list(
-    monkeypatch: pytest.MonkeyPatch, route: Route
+    monkeypatch: pytest.MonkeyPatch, controller: str
 ) -> None:
     """In the list, the constraint is kept by the controller, reported by its name and marked at both joints;
     outside the list, it is violated. Time-delay estimation overruns a velocity bound by some percent, see
@@ -142,13 +132,12 @@ def test_a_constraint_that_couples_joints_is_one_entry_of_the_list(
             plan = loop.tick().freeze()
             told += [each.joint for each in plan.binding(names(loop)) if each.kind == "sum of velocities"]
             found = max(found, abs(float(loop.plant.v[:2].sum())))
-            if route == "compiled":
-                assert_same(loop, plan)
+            assert off_printed(loop.controller, plan) <= 1e-8
         return found, told
 
-    free, nothing = fastest(pulled("planar3", route))
+    free, nothing = fastest(pulled("planar3", controller))
     monkeypatch.setattr(constraints, "CONSTRAINTS", (*CONSTRAINTS, SUM))
-    bound, told = fastest(pulled("planar3", route))
+    bound, told = fastest(pulled("planar3", controller))
     assert free > 2 * FASTEST and not nothing
     assert bound <= 1.2 * FASTEST and set(told) == {"both"}
     assert bit_of(SUM) == 1 << len(CONSTRAINTS) and bit_of(TORQUE) == 1

@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from himpc.cascade.explicit import every_row
 from himpc.limits import TORQUE, TORQUE_RATE, VELOCITY, Rows
 from himpc.limits.braking import braking, least_slack
 from himpc.limits.constraint import Constraint, Directions
@@ -81,7 +80,7 @@ def test_hard_rows_hold_and_the_others_give_way_by_least_squares(
     U = braking(rows)
     short = excess(rows, U)
     assert short[rows.is_hard].max() <= 2e-7
-    A, value = every_row(rows, n), rows.values(U).ravel()
+    A, value = rows.matrix, rows.values(U).ravel()
     over, under = value - rows.upper.ravel(), rows.lower.ravel() - value
     soft = np.repeat(~rows.is_hard, n)
     slope = A.T @ (soft * (np.maximum(over, 0.0) - np.maximum(under, 0.0)))

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Generator, Hashable, Iterable, Sequence
+from collections.abc import Callable, Generator, Hashable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from interventions_all import ROWS
-from quoted import specs
-from quoted_all import QUOTED
+from evidence import Told, documents
 
 from lessons.course import COURSE, load_lesson
 from lessons.parallel import FailedJob, guarded
@@ -17,54 +15,42 @@ from lessons.recording.recording import Recording
 from lessons.recording.run import record
 from lessons.scenes.run_spec import RunSpec
 from lessons.session.start import begin
-from lessons.teaching.check import Outcome, Verdict, check
-from lessons.teaching.measure import Measure
+from lessons.teaching.check import Outcome, Piece, Verdict, judge, judge_note, needed, perform
 from robots import InputError
 
 
 class CourseRuns(NamedTuple):
-    """The verdicts of the check on all lessons, and, by run, the values of `QUOTED` and of the
-    interventions."""
+    """The verdicts of the check on all lessons, and those on the notes of documents."""
 
     verdicts: list[Verdict]
-    values: dict[RunSpec, dict[Measure, float]]
+    documents: Mapping[Told, Verdict]
 
 
 def course_runs() -> CourseRuns:
-    """Computes every run once. A run that is the beginning of a longer run is taken from the longer one. Runs
-    that end early are computed again to their full duration, because the check stops at their end and
-    sentences quote later values."""
-    wanted: dict[RunSpec, dict[Measure, None]] = {}
-    for each in QUOTED:
-        for spec in specs(each):
-            if spec is not None:
-                wanted.setdefault(spec, {})[each.measure.alone] = None
-    for row in ROWS:
-        for spec in row.runs:
-            wanted.setdefault(spec, {})[row.measure] = None
-    values: dict[RunSpec, dict[Measure, float]] = {}
+    """Computes every run once. A run that is the beginning of a longer run is taken from the longer one."""
+    lessons = [load_lesson(name) for name in COURSE]
+    told = {each: each.note.runs(each.run) for each in documents() if each.note.measure is not None}
+    outcomes = perform(needed(lessons, [(each.note, runs) for each, runs in told.items()]), spread)
+    return CourseRuns(
+        [verdict for lesson in lessons for verdict in judge(lesson, outcomes)],
+        {each: judge_note(each.at, each.says, each.note, runs, outcomes) for each, runs in told.items()},
+    )
 
-    def take(found: dict[RunSpec, Recording]) -> None:
-        for spec in found.keys() & wanted.keys():
-            values[spec] = {measure: measure.value(found[spec]) for measure in wanted[spec]}
 
-    def spread(
-        function: Callable[[Any], Any], items: Sequence[Any]
-    ) -> Generator[tuple[int, Any], None, None]:
-        asked = {spec: (place, measures) for place, (spec, measures) in enumerate(items)}
-        for group in alike(dict.fromkeys((*asked, *wanted))):
-            found = guarded(recorded, group)
-            if not isinstance(found, FailedJob):
-                take({spec: each for spec, each in found.items() if whole(spec, each)})
-            for spec in group:
-                if spec in asked:
-                    place, own = asked[spec]
-                    yield place, found if isinstance(found, FailedJob) else judged(spec, own, found[spec])
-
-    verdicts = check([load_lesson(name) for name in COURSE], spread)
-    for group in alike(spec for spec in wanted if spec not in values):
-        take(recorded(group, to_the_end=True))
-    return CourseRuns(verdicts, values)
+def spread(function: Callable[[Any], Any], items: Sequence[Any]) -> Generator[tuple[int, Any], None, None]:
+    """Performs the runs of `check.perform` in groups of `alike` ones. Runs that end early are computed again
+    to their full duration, because the check stops at their end and sentences quote later values."""
+    asked = {piece[0]: (place, piece) for place, piece in enumerate(items)}
+    for group in alike(asked):
+        found = guarded(recorded, group)
+        if isinstance(found, FailedJob):
+            yield from ((asked[spec][0], found) for spec in group)
+            continue
+        early = [spec for spec in group if asked[spec][1][2] and not whole(spec, found[spec])]
+        late = {**found, **(recorded(early, to_the_end=True) if early else {})}
+        for spec in group:
+            place, piece = asked[spec]
+            yield place, judged(piece, found[spec], late[spec])
 
 
 def alike(all_of_them: Iterable[RunSpec]) -> list[list[RunSpec]]:
@@ -111,10 +97,12 @@ def whole(spec: RunSpec, recording: Recording) -> bool:
     return float(recording["t"][-1, 0]) > scene.duration - 1.5 * scene.settings.T_s
 
 
-def judged(spec: RunSpec, measures: Iterable[Measure], recording: Recording) -> Outcome:
+def judged(piece: Piece, recording: Recording, to_the_end: Recording) -> Outcome:
     """Returns what the check measures in a run, and the number of events that were not accepted."""
+    spec, measures, noted = piece
     until = recording.duration - 1e-9
     due = sum(t < until for t, _ in spec.events or ())
     accepted = sum(t < until for t, _ in recording.session.log)
     values = {measure: measure.value(recording) for measure in measures}
-    return Outcome(values, max(0, due - accepted))
+    late = {measure: measure.value(to_the_end) for measure in noted}
+    return Outcome(values, max(0, due - accepted), noted=late)

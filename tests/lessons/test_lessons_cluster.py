@@ -23,6 +23,7 @@ from robots import InputError
 
 distributed = pytest.importorskip("distributed", reason="dask.distributed is not installed")
 
+pytestmark = pytest.mark.nightly("lessons/cluster.py", "lessons/parallel.py")
 ROOT = Path(__file__).parents[2]
 CELLS = 8
 

@@ -19,7 +19,7 @@ def test_no_setting_compiles_in_the_middle_of_a_run() -> None:
         *(Set("horizon", 8), Set("levels.1.Q", (100.0, 200.0, 300.0)), Set("R", 3.0)),
         *(Set(f"levels.{level}.enabled", on) for level, on in ((2, False), (1, False), (2, True), (1, True))),
         *(Set("controller", name) for name in CONTROLLERS),
-        *(Set("controller", "himpc"), Set("route", "explicit")),
+        Set("controller", "himpc"),
     ]
     with on_compiled(late.append):
         for change in changes:

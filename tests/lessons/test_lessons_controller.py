@@ -21,9 +21,9 @@ def test_six_joints_under_a_full_stack(example_urdf: Callable[[str], str]) -> No
     scene = torque_scene("hold", example_urdf("ur_description/urdf/ur10_robot.urdf"))
     assert scene.robot.n == 6
     third = Level((Joints(name="q1", joints=scene.robot.joint_names[:1]),))
-    settings = replace(scene.settings, levels=(*scene.settings.levels[:2], third))
-    for route in ("compiled", "explicit"):
-        session = TorqueSession(replace(scene, settings=replace(settings, route=route)))
+    settings = replace(scene.settings, stack=(*scene.settings.levels[:2], third))
+    for controller in ("himpc", "himpc_printed"):
+        session = TorqueSession(replace(scene, settings=replace(settings, controller=controller)))
         start = session.robot.home
         session.post(Set("levels.q1.K_p", 400))
         rows = rows_of(session, 300)

@@ -15,18 +15,20 @@ from latex2mathml.converter import convert
 
 from himpc.telemetry import layout_of
 from lessons.course import COURSE, load_lesson
-from lessons.events import MoveTarget, Set
+from lessons.events import MoveTarget, Push, Set
 from lessons.parallel import one_by_one
+from lessons.scenes.run_spec import RunSpec
 from lessons.scenes.scene import Scene
 from lessons.scenes.torque_scene import TorqueScene
 from lessons.session.velocity_rows import layout_of as mobile_layout_of
 from lessons.settings.assignments import parse_assignment
 from lessons.teaching.challenge import Challenge, Score
-from lessons.teaching.check import check
+from lessons.teaching.check import check, measured
 from lessons.teaching.claim import Claim
 from lessons.teaching.control import Control
 from lessons.teaching.lesson import Card, Ghost, Lesson, Step, card_of
 from lessons.teaching.measure import DERIVED, Measure, Signal
+from lessons.teaching.note import Note
 from lessons.teaching.prediction import Choice, Option, Sketch, Value
 from robots import InputError
 
@@ -35,10 +37,14 @@ HAND = Signal("error/position", "mm")
 
 @pytest.mark.parametrize("name", COURSE)
 def test_everything_a_lesson_states_is_so(name: str, course_runs: CourseRuns) -> None:
-    """Claims hold, and fail with their wrong setting; answers are measured; challenges can be solved."""
+    """Claims hold, and fail with their wrong setting; answers are measured; challenges can be solved; the
+    number of each note lies in its range, and without its cause in the other range."""
     own = [verdict for verdict in course_runs.verdicts if verdict.lesson == name]
-    assert sum(bool(verdict.wrong) for verdict in own) == sum(
-        len(step.claims) for step in load_lesson(name).steps
+    steps = load_lesson(name).steps
+    notes = [note for step in steps for note in step.notes if note.measure is not None]
+    assert sum(verdict.what.startswith("[^") for verdict in own) == len(notes)
+    assert sum(bool(verdict.wrong) for verdict in own) == sum(len(step.claims) for step in steps) + sum(
+        bool(note.without) for note in notes
     )
     assert not [f"{verdict.where}: {verdict.what}: {verdict.fault}" for verdict in own if verdict.fault]
 
@@ -157,12 +163,31 @@ OFF = ("levels.position.enabled=false",)
 SMALL = Claim("The hand follows.", Measure(HAND), "at most", 2.0, OFF, "nobody asks")
 
 
+FAR = Note("a", "The hand follows", Measure(HAND), (0.5, 1.0), without=OFF, outside=(30.0, 31.0))
+
+
 def faults(lesson: Lesson) -> list[str]:
     return [verdict.fault for verdict in check([lesson], one_by_one) if verdict.fault]
 
 
 def test_a_sound_lesson_has_no_faults() -> None:
-    assert not faults(lesson_with(aside(SMALL)))
+    over = replace(FAR, measure=Measure(HAND, over_ghost=True), inside=(0.02, 0.03), without=())
+    told = Note("b", told="given: a setting")
+    assert not faults(lesson_with(aside(SMALL, notes=(FAR, over, told), ghost=Ghost("g", OFF))))
+
+
+def test_notes_are_measured_until_the_end_and_claims_until_control_is_lost() -> None:
+    time = Measure(Signal("t", "s"))
+    wild = (
+        "M_bar_scale=20",
+        "R=0.01",
+        "limits.velocity=false",
+        "limits.torque=false",
+        "plant.saturate=false",
+    )
+    push = (0.01, Push("link_4", (0.0, 20.0, 0.0)))
+    outcome = measured((RunSpec("iiwa14-hold", set=wild, events=(push,), duration=1.0), (time,), (time,)))
+    assert outcome.values[time] < 0.9 < outcome.noted[time]
 
 
 @pytest.mark.parametrize(
@@ -187,6 +212,10 @@ def test_a_sound_lesson_has_no_faults() -> None:
         ),
         (aside(SMALL, prediction=Value("?", Measure(HAND), 50.0, 60.0)), "is off its scale"),
         (aside(SMALL, prediction=Sketch("?", HAND, 0.0, 0.1, 0.2)), "is off its scale"),
+        (aside(SMALL, notes=(Note("a", "so far", Measure(HAND), (50.0, 60.0)),)), "mm, not from 50 to 60 mm"),
+        (aside(SMALL, notes=(replace(FAR, outside=(5.0, 6.0)),)), "30.65 mm, not from 5 to 6 mm"),
+        (aside(SMALL, notes=(replace(FAR, set=("levels.nothing.Q=1",)),)), "it cannot be run"),
+        (aside(SMALL, notes=(replace(FAR, measure=Measure(HAND, after=5.0)),)), "nothing to measure"),
     ],
     ids=[
         "false",
@@ -198,6 +227,10 @@ def test_a_sound_lesson_has_no_faults() -> None:
         "no option",
         "off scale",
         "off the drawing",
+        "number of a note",
+        "cause of a note",
+        "run of a note",
+        "no data for a note",
     ],
 )
 def test_the_check_finds(step: Step, fault: str) -> None:

@@ -1,10 +1,12 @@
-"""In scenes that keep distances, a robot that is dragged towards an object stops before it, and both routes
-agree."""
+"""In scenes that keep distances, a robot that is dragged towards an object stops before it, and
+the kernel and the printed equations agree."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -42,16 +44,31 @@ def test_an_arm_that_is_dragged_into_the_floor_stops_before_it_and_comes_to_rest
     assert blind["contact_depth"].max() > 0.0
 
 
-def by_theory(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Makes controllers use `StallGuard` on the compiled route as well; a test can replace parts of it."""
-    monkeypatch.setattr(stall_guard, "CompiledStallGuard", stall_guard.StallGuard)
+def guarded(monkeypatch: pytest.MonkeyPatch, change: Callable[..., None]) -> None:
+    """Calls a function with the velocities and with the guard's numbers before the guard uses them: v, stall
+    and mean of `slow_down`."""
+    slow_down = stall_guard.slow_down
+
+    def changed(*given: Any) -> None:
+        v, stall, mean = given[3], given[10], given[12]
+        change(v, stall, mean)
+        slow_down(*given)
+
+    monkeypatch.setattr(stall_guard, "slow_down", changed)
+
+
+def never_stalled(_: np.ndarray, stall: np.ndarray, __: np.ndarray) -> None:
+    stall[:] = 1.0, np.inf
+
+
+def never_faster(v: np.ndarray, _: np.ndarray, mean: np.ndarray) -> None:
+    mean[:] = v
 
 
 def test_without_the_stall_the_arm_would_not_come_to_rest(monkeypatch: pytest.MonkeyPatch) -> None:
     """The arm is dragged in the same way, but its joints may be as fast as their limits permit. They continue
     to move above the floor."""
-    by_theory(monkeypatch)
-    monkeypatch.setattr(stall_guard, "slowed", lambda limits, _: limits)
+    guarded(monkeypatch, never_stalled)
     found = run(replace(scene("iiwa14-hold", "avoidance.on=true"), events=DOWN), 4.0)
     assert float(np.abs(found["v"][-500:]).max()) > 0.2
     assert found["contact_depth"].max() == 0.0
@@ -78,13 +95,12 @@ def test_a_joint_that_others_accelerate_stays_within_its_velocity_limit(
         return float(np.abs(found["v"] / quick.robot.v_limit).max())
 
     assert fastest(0.08) < 1.0
-    by_theory(monkeypatch)
-    monkeypatch.setattr(stall_guard, "anticipated", lambda limits, *_: limits)
+    guarded(monkeypatch, never_faster)
     assert fastest(0.0) > 1.2
 
 
-def test_both_routes_keep_the_same_distances() -> None:
-    """Near the floor, active rows of distances limit a level; both routes have the torques and bounds of the
+def test_kernel_and_printed_equations_keep_the_same_distances() -> None:
+    """Near the floor, active rows of distances limit a level; both have the torques and bounds of the
     same problem."""
     quick = replace(scene("iiwa14-hold", "avoidance.on=true"), events=DOWN)
     leader = TorqueSession(quick)
@@ -98,8 +114,8 @@ def test_both_routes_keep_the_same_distances() -> None:
     given = leader.given
     assert given is not None
     plans = []
-    for route in ("compiled", "explicit"):
-        controller = TorqueSession(scene("iiwa14-hold", "avoidance.on=true", f"route={route}")).controller
+    for name in ("himpc", "himpc_printed"):
+        controller = TorqueSession(scene("iiwa14-hold", "avoidance.on=true", f"controller={name}")).controller
         controller.reset(leader.plant.tau)
         plans.append(controller.step(*given, leader.plant.tau).freeze())
     one, other = plans
@@ -120,32 +136,30 @@ def test_both_routes_keep_the_same_distances() -> None:
 
 def test_a_filter_behind_the_levels_is_listed_and_recorded() -> None:
     """When the filter is active, its pair has a name, and the row contains its leak into the levels and the
-    bits of its bounds. The recorded distance is the nearest one of that pair, and both routes write the same
-    row."""
-    for route in ("compiled", "explicit"):
-        session = TorqueSession(
-            replace(
-                scene("iiwa14-table", "avoidance.on=true", "controller=himpc_filtered", f"route={route}"),
-                events=((0.0, MoveTarget("position", (0.4, -0.4, 0.4))),),
-            )
+    bits of its bounds. The recorded distance is the nearest one of that pair."""
+    session = TorqueSession(
+        replace(
+            scene("iiwa14-table", "avoidance.on=true", "controller=himpc_filtered"),
+            events=((0.0, MoveTarget("position", (0.4, -0.4, 0.4))),),
         )
+    )
+    row = session.tick()
+    fields = session.layout.fields
+    assert np.isfinite(row[fields["distance"]]) and session.clearance.found.pair
+    while not (found := [each for each in session.binding() if each.level == "filter"]):
         row = session.tick()
-        fields = session.layout.fields
-        assert np.isfinite(row[fields["distance"]]) and session.clearance.found.pair
-        while not (found := [each for each in session.binding() if each.level == "filter"]):
-            row = session.tick()
-            assert session.t < 1.5
-        assert [each.joint for each in found if each.kind == "distance"] == ["link_5 – post"]
-        plan = session.plan
-        assert plan is not None and plan.behind is not None
-        bits = row[fields["at_bound"]].astype(int)
-        assert (bits & 1 << CONSTRAINTS.index(DISTANCE)).any()
-        assert row[fields["priority_leak"].start] == pytest.approx(plan.behind.solution.leak) != 0.0
-        assert row[fields["tau_demand"]] == pytest.approx(plan.tau)
-        assert row[fields["delta_tau"]] == pytest.approx(plan.tau - plan.tau_0)
-        near = session.clearance.found
-        assert near.kept == pytest.approx(0.02)
-        assert near.kept < near.distance < 0.25
+        assert session.t < 1.5
+    assert [each.joint for each in found if each.kind == "distance"] == ["link_5 – post"]
+    plan = session.plan
+    assert plan is not None and plan.behind is not None
+    bits = row[fields["at_bound"]].astype(int)
+    assert (bits & 1 << CONSTRAINTS.index(DISTANCE)).any()
+    assert row[fields["priority_leak"].start] == pytest.approx(plan.behind.solution.leak) != 0.0
+    assert row[fields["tau_demand"]] == pytest.approx(plan.tau)
+    assert row[fields["delta_tau"]] == pytest.approx(plan.tau - plan.tau_0)
+    near = session.clearance.found
+    assert near.kept == pytest.approx(0.02)
+    assert near.kept < near.distance < 0.25
 
 
 def test_distances_are_measured_where_there_is_something_to_measure() -> None:

@@ -1,4 +1,4 @@
-"""The page, lists and messages are made from one table of settings."""
+"""The page, lists and messages are made from the descriptions of the settings at their fields."""
 
 from __future__ import annotations
 
@@ -14,10 +14,9 @@ from lessons.settings.assignments import parse_assignment
 from lessons.settings.listing import lines
 from lessons.settings.presets import usual_settings
 from lessons.settings.settings import SceneSettings
-from lessons.settings.torque_entries import TORQUE_ENTRIES
 from lessons.settings.values import NUMBER, WHOLE
-from lessons.settings.velocity_entries import VELOCITY_ENTRIES
 from robots import InputError
+from robots.ranges import Shown
 
 
 @cache
@@ -29,38 +28,36 @@ SCENES = sorted(ALL_SCENES)
 
 
 @pytest.mark.parametrize("scene", SCENES)
-def test_every_setting_stands_in_the_table_and_its_ends_are_allowed(scene: str) -> None:
+def test_every_setting_is_described_and_its_ends_are_allowed(scene: str) -> None:
     settings = settings_of(scene)
     for path in settings.paths():
         if re.fullmatch(r"levels\.\d+\..*", path):
             continue  # the path with the place of a level is equivalent to the path with its name
-        assert any(entry.at(path) for entry in settings.entries), f"no entry for {path}"
-        entry, form = settings.entry(path), settings.place(path).form
-        assert entry.label and entry.name, path
-        if entry.low < entry.high and form.kind in (NUMBER, WHOLE):
-            for end in (entry.low, entry.high):
-                value = end / entry.factor
+        shown, form = settings.setting(path).shown, settings.setting(path).form
+        assert shown != Shown(path.rpartition(".")[2], name=path), f"no description of {path}"
+        if shown.low < shown.high and form.kind in (NUMBER, WHOLE):
+            for end in (shown.low, shown.high):
+                value = end / shown.factor
                 settings.changed(path, int(value) if form.kind == WHOLE else value)
 
 
-def test_the_tables_hold_nothing_else() -> None:
-    """An entry that no scene has is a typing error, or belongs to a setting that was removed."""
-    known = {path for scene in SCENES for path in settings_of(scene).paths()} | {"gains.1"}
-    for entry in (*TORQUE_ENTRIES, *VELOCITY_ENTRIES):
-        assert any(entry.at(path) for path in known), entry.path
-    for entries in (TORQUE_ENTRIES, VELOCITY_ENTRIES):
-        paths = [entry.path for entry in entries]
-        assert len(set(paths)) == len(paths)
+@pytest.mark.parametrize("scene", SCENES)
+def test_the_order_of_lists_names_settings_only(scene: str) -> None:
+    """A path that no scene of the kind has is a typing error, or belongs to a setting that was removed."""
+    of = type(settings_of(scene))
+    known = {path for each in SCENES if type(settings_of(each)) is of for path in settings_of(each).paths()}
+    for head in of.page_order:
+        assert not head or any(path == head or path.startswith(f"{head}.") for path in known), head
 
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_what_is_worth_trying_is_allowed(scene: str) -> None:
     settings = settings_of(scene)
     usual = usual_settings(settings)
-    assert len({entry.name for entry in usual}) == len(usual) > 5
-    for entry in usual:
-        for value in entry.tries:
-            settings.changed(*parse_assignment(f"{entry.path}={value}"))
+    assert len({each.shown.name for each in usual}) == len(usual) > 5
+    for each in usual:
+        for value in each.shown.tries:
+            settings.changed(*parse_assignment(f"{each.path}={value}"))
 
 
 @pytest.mark.parametrize(
@@ -96,13 +93,13 @@ def test_one_gain_of_several() -> None:
 def test_a_level_is_read_by_its_name_wherever_it_stands() -> None:
     """A control of the page keeps its path when the order of the levels changes."""
     settings = settings_of("planar3-hold")
-    read = settings.place("levels.position.Q").read
+    read = settings.setting("levels.position.Q").read
     names = settings.value_at("order")
     turned = settings.changed("levels.position.Q", 7.0).changed("order", list(reversed(names)))
     assert read(turned) == 7.0 == turned.value_at("levels.position.Q")
 
 
-def test_the_reference_is_what_the_tables_say() -> None:
+def test_the_reference_is_what_the_fields_say() -> None:
     assert FILE.read_text() == text(), "python -m docs.settings writes it anew"
 
 

@@ -36,7 +36,7 @@ def test_a_large_free_rotation_does_not_undo_the_orientation(turn: OrientationTa
     second. If its components were those of log₃, it would have grown to 14° (real part 1.6 1/s)."""
     scene = torque_scene("iiwa14-hold")
     levels = (Level((FramePosition(name="position"),)), Level((turn,)), Level((Posture(name="posture"),)))
-    session = TorqueSession(replace(scene, settings=replace(scene.settings, levels=levels)))
+    session = TorqueSession(replace(scene, settings=replace(scene.settings, stack=levels)))
     target = session.target("turn")
     assert target is not None
     z, x = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
@@ -56,7 +56,7 @@ def test_an_axis_follows_a_point_that_moves() -> None:
     here = Configuration(scene.robot, scene.robot.model.createData(), scene.q_0, scene.v_0)
     c, R = look.target(here), 0.15 * here.placement().rotation
     moving = {"look": Circle(c, R[:, 0], R[:, 1], Phase(3.0))}
-    settings = replace(scene.settings, levels=levels, controller="hqp")
+    settings = replace(scene.settings, stack=levels, controller="hqp")
     session = TorqueSession(replace(scene, settings=settings, references=lambda robot, stack: moving))
     worst = 0.0
     for k in range(1500):

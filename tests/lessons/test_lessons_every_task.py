@@ -11,7 +11,13 @@ ROBOTS = {"planar3": 2.0, "iiwa14": 1.3, "panda": 1.5, "baxter": 1.5, "ridgeback
 """s within which a dragged target is reached. HQP's model does not contain the motors of the planar arm."""
 
 
-@pytest.mark.parametrize("first", range(len(ROBOTS)), ids=list(ROBOTS))
+@pytest.mark.parametrize(
+    "first",
+    [
+        pytest.param(place, id=name, marks=() if place < 2 else pytest.mark.nightly("himpc/tasks"))
+        for place, name in enumerate(ROBOTS)
+    ],
+)
 def test_every_kind_of_task_settles(first: int) -> None:
     """Errors are within 1 mm or 0.1°, and each kind of task runs with each controller on some robot. `python
     -m benchmarks.every_task` tests all combinations."""

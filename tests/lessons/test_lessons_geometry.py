@@ -43,7 +43,7 @@ def points(plane: Plane) -> list[np.ndarray]:
     return [level.solved for level in plane.levels]
 
 
-@pytest.mark.parametrize("assignments", [(), ("limits.torque_scale=0.02",), ("route=explicit",)])
+@pytest.mark.parametrize("assignments", [(), ("limits.torque_scale=0.02",), ("controller=himpc_printed",)])
 def test_geometry_and_solver_find_the_same_points(assignments: tuple[str, ...]) -> None:
     session = running(*assignments, ticks=60)
     for _ in range(100):

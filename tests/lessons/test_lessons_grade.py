@@ -113,6 +113,12 @@ def test_right_solution_gets_every_grade_point(exercise: str, thirty: Graded) ->
     assert sum(line.of for line in lines) == 10
 
 
+CONTROL_LAWS = pytest.mark.nightly(
+    "himpc/controllers/own", "himpc/controllers/view", "lessons/exercises", "tests/lessons/right_laws"
+)
+
+
+@CONTROL_LAWS
 @pytest.mark.parametrize("exercise", EXERCISES)
 def test_a_right_solution_in_any_style_gets_every_grade_point(exercise: str) -> None:
     """Each exercise has at least three styles of solutions; `thirty` contains the first of them."""
@@ -123,6 +129,7 @@ def test_a_right_solution_in_any_style_gets_every_grade_point(exercise: str) -> 
         assert [line.check for line in here(text, exercise) if line.why] == []
 
 
+@CONTROL_LAWS
 @pytest.mark.parametrize(("exercise", "name"), CASES)
 def test_a_known_mistake_costs_grade_points_and_is_named(exercise: str, name: str) -> None:
     known = MISTAKES[exercise][name]

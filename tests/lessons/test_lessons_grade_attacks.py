@@ -16,7 +16,7 @@ from right_laws import PD
 
 from himpc.controllers.answers import OwnFault
 from himpc.controllers.own import OwnController
-from himpc.controllers.view import Bounds, LevelView, NearView, View
+from himpc.controllers.view import Bounds, Further, LevelView, NearView, View
 from lessons.exercises.apart import Apart, Exhausted, Refused
 from lessons.exercises.cells import cell, of_cell
 from lessons.exercises.folder import grade_folder
@@ -73,15 +73,22 @@ def said(text: str, now: View, kernel: bool = True, **limits) -> str:
 
 def test_a_grade_is_made_of_the_same_numbers_on_both_sides(now: View) -> None:
     names = {each.name for each in dataclasses.fields(View)} | {"M", "bias", "gravity"}
-    assert names == {*told.OF_TICK, "T_s", "N", "levels", "bounds", "near", "nominal"}
-    assert {each.name for each in dataclasses.fields(Bounds)} == {*told.OF_BOUNDS, "approach"}
+    assert names == {
+        *told.OF_TICK,
+        *("T_s", "N", "levels", "bounds", "near", "further", "nominal"),
+    }
+    assert {each.name for each in dataclasses.fields(Bounds)} == {
+        *told.OF_BOUNDS,
+        *("approach", "paper"),
+    }
+    assert {each.name for each in dataclasses.fields(Further)} == {*told.OF_FURTHER}
     assert {each.name for each in dataclasses.fields(NearView)} == {
         *told.OF_NEAR,
         *("names", "reaction", "deceleration"),
     }
     assert {each.name for each in dataclasses.fields(LevelView)} == {
         *told.OF_LEVEL,
-        *("name", "tasks", "x", "jacobian"),
+        *("name", "tasks", "x", "horizon", "jacobian"),
     }
     data = b"".join(each.tobytes() for each in told.numbers_of(now))
     again = rebuilt(shape_of(now), data, lambda *_: now.M)

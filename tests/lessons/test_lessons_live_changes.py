@@ -37,13 +37,13 @@ def change_events(scene: TorqueScene) -> dict[str, list[Event]]:
         "position=off": Set("limits.position", "off"),
         "no velocity limits": Set("limits.velocity", False),
         "no torque limits": Set("limits.torque", False),
-        "explicit": Set("route", "explicit"),
+        "printed": Set("controller", "himpc_printed"),
         "R_on": Set("R_on", "acceleration"),
         "no damping": Set("damping", False),
         "level horizon": Set("levels.2.horizon", 1),
     }
     changes: dict[str, list[Event]] = {name: [event] for name, event in singles.items()}
-    changes["proxqp"] = [Set("route", "explicit"), Set("solver", "proxqp")]
+    changes["proxqp"] = [Set("controller", "himpc_printed"), Set("solver", "proxqp")]
     for name in names:
         changes[f"{name} off and on"] = [Set(f"levels.{name}.enabled", on) for on in (False, True)]
     changes["last level first"] = [MoveLevel(names[-1], 0)]

@@ -10,7 +10,6 @@ import pytest
 from broken_solver import break_kernel, break_solver
 from numpy.typing import NDArray
 
-from himpc.catalog import Route
 from himpc.limits import Rows
 from himpc.limits.braking import least_slack
 from himpc.tick import tick
@@ -25,7 +24,7 @@ BOUND = {"0.3 of the speed": (30, 0.3, 110), "0.2": (30, 0.2, 50), "0.1": (20, 0
 
 @pytest.mark.parametrize("case", BOUND)
 def test_a_long_horizon_with_low_velocity_bounds_is_solved(case: str) -> None:
-    """With more than a hundred active rows, the compiled route solves all but 1 % of the levels. (An
+    """With more than a hundred active rows, the kernel solves all but 1 % of the levels. (An
     earlier version found no optimum from tick 97, or 40, on. All levels below inherited the solution, and the
     arm reached up to 19 times its velocity limit.)"""
     N, scale, ticks = BOUND[case]
@@ -76,11 +75,11 @@ def test_a_larger_budget_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
     assert found[1e9] == 0
 
 
-@pytest.mark.parametrize("route", ["compiled", "explicit"])
-def test_an_arm_whose_solver_always_fails_is_braked(monkeypatch: pytest.MonkeyPatch, route: Route) -> None:
+@pytest.mark.parametrize("controller", ["himpc", "himpc_printed"])
+def test_an_arm_whose_solver_always_fails_is_braked(monkeypatch: pytest.MonkeyPatch, controller: str) -> None:
     """If no QP is solved from one tick on, all rows hold and the joints come to rest."""
     scene = torque_scene("iiwa14-circle")
-    session = TorqueSession(replace(scene, settings=replace(scene.settings, route=route)))
+    session = TorqueSession(replace(scene, settings=replace(scene.settings, controller=controller)))
     for _ in range(150):
         session.tick()
     fast = float(np.abs(session.plant.v).max())

@@ -32,7 +32,7 @@ def test_a_path_reaches_its_field_and_nothing_else(start: TorqueSettings) -> Non
         "M_bar_scale": (2.0, lambda s: s.M_bar_scale),
         "M_bar": ([0.1] * 7, lambda s: list(s.M_bar)),
         "solver": ("proxqp", lambda s: s.solver),
-        "route": ("explicit", lambda s: s.route),
+        "controller": ("himpc_printed", lambda s: s.controller),
         "R_on": ("acceleration", lambda s: s.R_on),
         "damping": (False, lambda s: s.damping),
         "limits.position": ("paper", lambda s: s.limits.position),
@@ -55,7 +55,8 @@ def test_a_path_reaches_its_field_and_nothing_else(start: TorqueSettings) -> Non
         new = start.changed(path, value)
         assert read(new) == value != read(start)
         touched = [f.name for f in fields(TorqueSettings) if getattr(new, f.name) != getattr(start, f.name)]
-        assert touched == [path.split(".")[0].replace("tasks", "levels")]
+        head = path.split(".")[0]
+        assert touched == ["stack" if head in ("levels", "tasks") else head]
 
 
 @pytest.mark.parametrize("scene", ["iiwa14-circle", "ridgeback-ur10-delivery"])
@@ -64,8 +65,8 @@ def test_one_table_of_paths_serves_all_values(scene: str) -> None:
     table."""
     settings = load_scene(scene).settings
     changed = with_assignments(settings, ["horizon=7", "levels.1.Q=3"])
-    assert changed.places() is settings.places()
-    assert torque_scene("planar3-hold").settings.places() is not settings.places()
+    assert changed.table() is settings.table()
+    assert torque_scene("planar3-hold").settings.table() is not settings.table()
 
 
 def test_one_joint_of_many(start: TorqueSettings) -> None:

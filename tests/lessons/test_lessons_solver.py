@@ -38,8 +38,8 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> set[str]:
     ("scene", "controller", "settings", "told"),
     [
         *(("planar3-circle", each, (), OWN_METHOD) for each in QPS),
-        *(("planar3-circle", each, ("route=explicit",), "daqp") for each in QPS),
-        ("planar3-circle", "himpc", ("solver=proxqp", "route=explicit"), "proxqp"),
+        ("planar3-circle", "himpc_printed", (), "daqp"),
+        ("planar3-circle", "himpc_printed", ("solver=proxqp",), "proxqp"),
         ("planar3-circle", "hqp", (), "daqp"),
         ("planar3-circle", "hqp", ("solver=proxqp",), "proxqp"),
         ("planar3-circle", "osf", (), None),
@@ -63,8 +63,8 @@ def test_the_reported_solver_is_the_one_that_ran(
 @pytest.mark.parametrize("controller", CONTROLLERS)
 def test_a_solver_that_changes_nothing_is_refused(controller: str) -> None:
     spec = RunSpec("planar3-circle", controller=controller, set=("solver=proxqp",), duration=0.003)
-    if controller == "hqp":
+    if controller in ("hqp", "himpc_printed"):
         run(spec.prepared())
         return
-    with pytest.raises(InputError, match=r"solver=proxqp changes nothing here.*route=explicit.*solver=daqp"):
+    with pytest.raises(InputError, match=r"solver=proxqp changes nothing here.*himpc_printed.*solver=daqp"):
         run(spec.prepared())

@@ -41,7 +41,7 @@ NUMBERS = st.one_of(
     st.sampled_from([0.1, 1.0, 1e-3, 0.3]),
 )
 WORDS = st.sampled_from(
-    ["himpc", "hiqp", "hqp", "htmpc", "htidkc", "paper", "proximal", "cost", "explicit", "proxqp", "off"]
+    ["himpc", "hiqp", "hqp", "htmpc", "htidkc", "paper", "proximal", "cost", "himpc_printed", "proxqp", "off"]
 ) | st.sampled_from(["acceleration", "viability", "servo", "single_task", "decoupled", "yes"])
 
 
@@ -248,7 +248,7 @@ def test_what_a_code_cannot_carry_is_said() -> None:
     assert isinstance(hold, TorqueScene)
     first, *others = hold.settings.levels
     own = replace(first, tasks=(OwnKind(name="position"),))
-    other = replace(hold.settings, levels=(own, *others))
+    other = replace(hold.settings, stack=(own, *others))
     with pytest.raises(InputError, match="cannot be written"):
         state_of(RunSpec("planar3-hold"), other)
 
@@ -282,8 +282,22 @@ def test_priorities_of_now_are_part_of_a_state() -> None:
     assert torque.settings_now is torque.settings
 
 
-def test_a_code_of_before_may_name_a_route_that_is_gone() -> None:
-    """The route "structured" of older codes is now "compiled"; the torques are equal."""
-    state = decode(encode(State(RunSpec("planar3-hold", set=("route=structured",)))))
+@pytest.mark.parametrize(
+    ("before", "controller", "solver"),
+    [
+        (("route=structured",), "himpc", "daqp"),
+        (("route=compiled",), "himpc", "daqp"),
+        (("route=explicit",), "himpc_printed", "daqp"),
+        (("route=explicit", "solver=proxqp"), "himpc_printed", "proxqp"),
+        (("controller=weighted", "route=explicit", "solver=proxqp"), "weighted", "daqp"),
+        (("controller=hqp", "route=explicit", "solver=proxqp"), "hqp", "proxqp"),
+    ],
+)
+def test_a_code_of_before_may_name_a_route(before: tuple[str, ...], controller: str, solver: str) -> None:
+    """The route "explicit" of older codes is now the controller himpc_printed; for other controllers, both
+    routes had the same torques."""
+    state = decode(encode(State(RunSpec("planar3-hold", set=before))))
     found = state.run.prepared().settings
-    assert isinstance(found, TorqueSettings) and found.route == "compiled"
+    assert isinstance(found, TorqueSettings)
+    assert (found.controller, found.solver) == (controller, solver)
+    TorqueSession(state.run.prepared()).tick()  # pyright: ignore[reportArgumentType]

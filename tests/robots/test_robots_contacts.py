@@ -15,7 +15,8 @@ from scipy.spatial import ConvexHull
 
 from robots import CATALOG, Ball, Box, Floor, InputError, Plant, PlantSettings, Robot, load_robot
 from robots.floor import standing_floor
-from robots.geometry.collision_model import as_json, stored
+from robots.geometry.collision_model import CollisionModel
+from robots.geometry.files import as_json, stored
 from robots.loading.importing import import_robot
 from robots.loading.write import made
 from robots.mechanics.exclusions import touching
@@ -272,5 +273,5 @@ def test_stored_geometry_survives_its_file(tmp_path: Path) -> None:
     robot = load_robot("panda")
     path = tmp_path / "collision.json"
     path.write_text(as_json(robot.collision))
-    assert stored(path) == robot.collision
+    assert stored(CollisionModel, path) == robot.collision
     assert json.loads(path.read_text())["solids"]

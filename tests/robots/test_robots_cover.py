@@ -19,7 +19,8 @@ from robots import CATALOG, Robot, load_robot, load_urdf_text
 from robots.covering.cover_of import cover_of
 from robots.covering.covered import patches
 from robots.covering.covers import as_solid, made_cover
-from robots.geometry.cover import Cover, cover_as_json, stored_cover
+from robots.geometry.cover import Cover
+from robots.geometry.files import as_json, stored
 from robots.mechanics.exclusions import touching
 from robots.shapes.link_shapes import link_shapes
 
@@ -58,7 +59,7 @@ def test_the_stored_cover_contains_the_robot(name: str) -> None:
     solids."""
     robot = load_robot(name)
     cover = cover_of(robot)
-    for patch in patches(replace(robot, urdf_text="<robot/>")):
+    for patch in patches(replace(robot, urdf_text='<robot name="bare"/>')):
         assert outside(cover, patch.joint, on(patch.corners)) + patch.swell <= ROUNDING, patch.link
     shapes = link_shapes(robot)
     if any(shape.name.startswith("body") for shape in shapes):
@@ -107,8 +108,8 @@ def test_the_stored_cover_is_the_generated_one() -> None:
 def test_a_stored_cover_survives_its_file(tmp_path: Path) -> None:
     cover = cover_of(load_robot("panda"))
     path = tmp_path / "cover.json"
-    path.write_text(cover_as_json(cover))
-    assert stored_cover(path) == cover
+    path.write_text(as_json(cover))
+    assert stored(Cover, path) == cover
     assert json.loads(path.read_text())["capsules"]
 
 

@@ -13,6 +13,7 @@ from robots import InputError, Robot, check_urdf, load_robot
 from robots.loading.importing import import_robot
 from robots.meshes.files import installed_shares
 from robots.report import Kind
+from robots.shapes.read import described_shapes
 
 
 def texts(loaded: Robot, kind: Kind) -> str:
@@ -218,6 +219,39 @@ def test_a_missing_mesh_is_a_note() -> None:
     loaded = load(two_joint_arm(l2=link("l2", INERTIAL + visual)))
     assert "nowhere" in texts(loaded, "note")
     assert "nowhere" not in loaded.urdf_text
+
+
+BOX = '<visual><geometry><box size="0.1 0.1 0.1"/></geometry></visual>'
+
+
+@pytest.mark.parametrize(
+    ("shape", "why"),
+    [
+        ('<visual><geometry><sphere radius="big"/></geometry></visual>', "radius is 'big'"),
+        ('<collision><geometry><box size="1 2"/></geometry></collision>', "size is '1 2'"),
+        ("<visual><geometry><cone/></geometry></visual>", "one of box, cylinder, sphere, mesh"),
+        ("<visual/>", "one of box"),
+        ('<visual><origin xyz="0 0 nan"/><geometry><sphere radius="1"/></geometry></visual>', "xyz is"),
+    ],
+)
+def test_a_shape_without_valid_numbers_is_left_out_with_a_note(shape: str, why: str) -> None:
+    """The other shapes of the link stay."""
+    loaded = load(two_joint_arm(l2=link("l2", INERTIAL + shape + BOX)))
+    (note,) = (finding for finding in loaded.report.of_kind("note") if finding.where == "link 'l2'")
+    assert "left out" in note.text and why in note.text
+    assert [each.kind for each in described_shapes(loaded, "visuals")["l2"]] == ["box"]
+    assert not described_shapes(loaded, "collisions")["l2"]
+
+
+def test_a_shape_has_the_colour_of_the_material_that_it_names() -> None:
+    named = BOX.replace("</visual>", '<material name="red"/></visual>')
+    wrong = '<material name="blue"><color rgba="0 0 much 1"/></material>'
+    text = two_joint_arm(l2=link("l2", INERTIAL + named + named.replace("red", "blue") + BOX))
+    red = '<material name="red"><color rgba="1 0 0 1"/></material>'
+    loaded = load(text.replace("</robot>", red + wrong + "</robot>"))
+    colours = [each.colour for each in described_shapes(loaded, "visuals")["l2"]]
+    assert colours[0] is not None and colours[0].tolist() == [1.0, 0.0, 0.0]
+    assert colours[1:] == [None, None]
 
 
 def test_canonical_text_is_a_fixed_point() -> None:

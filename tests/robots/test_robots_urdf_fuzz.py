@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from robots import InputError, Plant
 from robots.loading.importing import import_robot
+from robots.shapes.read import described_shapes
 from robots.urdf.inertials import nearest_physical
 
 
@@ -71,6 +72,7 @@ def test_no_mutation_of_a_urdf_raises_anything_but_an_input_error(data: st.DataO
         assert loaded.model.nq == loaded.model.nv
         assert np.all(np.isfinite(loaded.home))
         assert np.all(loaded.M_bar > 0)
+        assert set(described_shapes(loaded, "visuals")) == set(loaded.frames)
         plant = Plant(loaded)
         plant.step(plant.holding_torque(), 1e-3)
 

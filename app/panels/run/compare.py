@@ -36,7 +36,7 @@ class ComparePanel:
         colours: dict[str, RGB],
     ) -> None:
         self._learner, self._colours = learner, colours
-        self._choices = {choice.name: choice for choice in usual_settings(settings)}
+        self._choices = {each.shown.name: each for each in usual_settings(settings)}
         self._intro = gui.add_html(_INTRO)
         self._controller = gui.add_dropdown(
             "Ghost's controller", (_SAME, *settings.controllers), initial_value=_SAME
@@ -73,8 +73,8 @@ class ComparePanel:
             choice = self._choices.get(str(path.value))
             value.visible = choice is not None
             if choice is not None and event.client is not None:
-                value.value = choice.tries[0]
-                value.hint = f"for example {', '.join(choice.tries)}"
+                value.value = choice.shown.tries[0]
+                value.hint = f"for example {', '.join(choice.shown.tries)}"
             if choice is not None and place < _ROWS:
                 self._folders[place].visible = True
 
@@ -91,7 +91,7 @@ class ComparePanel:
             choice = self._choices.get(str(path.value))
             if choice is not None:
                 own.append(f"{choice.path}={value.value}")
-                words.append(f"{choice.name} = {value.value}")
+                words.append(f"{choice.shown.name} = {value.value}")
         if not own:
             if client is not None:
                 client.add_notification(

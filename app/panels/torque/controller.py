@@ -16,8 +16,6 @@ from app.panels.widgets.snapshot import SessionSnapshot
 from lessons.settings.torque import TorqueSettings
 from robots import Robot
 
-_DISTANCES = ("on", "d_safe", "margin", "reaction", "deceleration", "pull", "velocity_margin")
-_LIMITS = ("torque", "velocity", "position", "torque_scale", "velocity_scale", "torque_rate", "stall_guard")
 _LOOKS = 9
 """Number of updates over which the share of late ticks is computed: about two seconds."""
 
@@ -43,19 +41,20 @@ class ControllerPanel:
             self._what = gui.add_html(block(esc(settings.controllers[settings.controller]), lines=2))
         self._shown = settings.controller
         with gui.add_folder("Horizon"):
-            controls.add("horizon", "T_s")
+            controls.add_group("Horizon")
         self._deadline = DeadlineFolder(gui, controls)
         with gui.add_folder("Inertia estimate M̄"):
             self._gauge = gui.add_html("")
-            controls.add("M_bar_scale", "M_bar_adapt")
+            controls.add_group("Inertia estimate M̄")
             self.spectrum = SpectrumPicture(client, in_view)
             controls.add_elements("M_bar", robot.joint_names, "Per joint, kg·m²")
         with gui.add_folder("Limits"):
-            controls.add(*(f"limits.{name}" for name in _LIMITS))
+            controls.add("limits.torque", "limits.velocity")
+            controls.add_group("Limits")
         with gui.add_folder("Distances", expand_by_default=False):
-            controls.add(*(f"avoidance.{name}" for name in _DISTANCES))
+            controls.add_group("Distances")
         with gui.add_folder("Solver", expand_by_default=False):
-            controls.add("route", "solver", "R_on")
+            controls.add_group("Solver")
         with gui.add_folder("Why M̄ matters", expand_by_default=False):
             gui.add_html(
                 formula(r"\tau = \tau_0 + \bar M (\ddot q - \ddot q_0)")
@@ -90,7 +89,7 @@ class DeadlineFolder:
 
     def __init__(self, gui: viser.GuiApi, controls: Controls[TorqueSettings]) -> None:
         with gui.add_folder("Deadline"):
-            controls.add("deadline_ms", "solve_ms_per_knot")
+            controls.add_group("Deadline")
             self._line = gui.add_html("")
         self._counts: deque[tuple[int, int]] = deque(maxlen=_LOOKS)
 

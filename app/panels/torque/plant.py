@@ -18,12 +18,6 @@ def add_plant(
     gui.add_html(
         block("These are the true values of the simulated robot. The controller does not know them.")
     )
-    controls = Controls(gui, bindings, settings)
-    controls.add("plant.payload_kg", "plant.friction", "plant.damping", "plant.armature")
     # One factor per link, named by the joint that moves the link.
-    for path, title in (("mass_scale", "Mass of each link"), ("inertia_scale", "Inertia of each link")):
-        controls.add(f"plant.{path}")
-        controls.add_elements(f"plant.{path}", robot.joint_names, title)
-    controls.add("plant.diagonal_scale", "plant.encoder_resolution_deg", "plant.torque_lag_ms")
-    controls.add("plant.delay_ms", "plant.saturate", "plant.gravity")
-    controls.add("plant.contacts", "plant.joint_stops")
+    links = {"plant.mass_scale": "Mass of each link", "plant.inertia_scale": "Inertia of each link"}
+    Controls(gui, bindings, settings).add_group("Plant", links, robot.joint_names)

@@ -18,9 +18,6 @@ from himpc.htmpc.settings import efforts
 from lessons.settings.velocity import VelocitySettings
 from robots import Robot
 
-_LIMITS = (
-    "position", "velocity", "acceleration", "jerk", "velocity_scale", "acceleration_scale", "jerk_scale",
-)  # fmt: skip
 _COST = r"J_l = \tfrac12 \sum_{k<N} \lVert e_k \rVert_Q^2 + \tfrac12 \lVert e_N \rVert_P^2"
 
 
@@ -44,9 +41,9 @@ class HtmpcPanel:
         self._shown = settings.controller
         with gui.add_folder("Horizon"):
             self._ahead = gui.add_html("")
-            controls.add("horizon", "dt", "rate_hz")
+            controls.add_group("Horizon")
         with gui.add_folder("How strict"):
-            controls.add("delta_m", "formulation", "lexicographic", "max_iter")
+            controls.add_group("How strict")
             with gui.add_folder("What a level minimises", expand_by_default=False):
                 gui.add_html(formula(_COST))
                 gui.add_html(
@@ -57,10 +54,10 @@ class HtmpcPanel:
                 )
         self._weights()
         with gui.add_folder("Limits"):
-            controls.add(*(f"limits.{name}" for name in _LIMITS), "margin_m", "self_collision")
+            controls.add_group("Limits")
         with gui.add_folder("Delay"):
             self._lag = gui.add_html(block("", lines=3))
-            controls.add("compensate_delay", "delay_measured")
+            controls.add_group("Delay")
 
     def _weights(self) -> None:
         gui = self._gui
@@ -88,10 +85,10 @@ class HtmpcPanel:
             weights[joints] = value
             return weights.tolist()
 
-        entry = self._settings.entry(path)
+        setting = self._settings.setting(path)
         if part != "all":
-            entry = replace(entry, label=f"{entry.label}, {part}")
-        self._controls.add_as(entry, lambda settings: now(settings)[joints].tolist(), made)
+            setting = replace(setting, shown=replace(setting.shown, label=f"{setting.shown.label}, {part}"))
+        self._controls.add_as(setting, lambda settings: now(settings)[joints].tolist(), made)
 
     def update(self, now: SessionSnapshot[VelocitySettings]) -> None:
         settings = now.settings

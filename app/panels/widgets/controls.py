@@ -1,10 +1,11 @@
-"""Controls for settings, generated from the table of settings: a slider, switch or menu for each setting."""
+"""Controls for settings, made from their descriptions: a slider, switch or menu for each setting."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
 import viser
@@ -14,11 +15,13 @@ from app.adapter.private import dom_id
 from app.html.text import figure
 from app.panels.widgets.mirror import Bindings, scalar
 from lessons.events import Set
-from lessons.settings.entry import Entry
+from lessons.settings.schema import Setting
 from lessons.settings.settings import SceneSettings
 from lessons.settings.values import SWITCH, WHOLE, WORD
 from lessons.teaching.control import Control, chosen
+from robots.ranges import Shown
 
+NONE: Mapping[str, str] = MappingProxyType({})
 STEPS = 200
 """Number of steps of a logarithmic slider."""
 S = TypeVar("S", bound=SceneSettings)
@@ -56,81 +59,103 @@ class Controls(Generic[S]):
     def add(self, *paths: str) -> None:
         """Adds a control for each path."""
         for path in paths:
-            self.add_as(self._settings.entry(path))
+            self.add_as(self._settings.setting(path))
+
+    def add_group(self, name: str, lists: Mapping[str, str] = NONE, elements: Sequence[str] = ()) -> None:
+        """Adds a control for each setting whose description names this group.
+
+        Args:
+            name: the group.
+            lists: titles, by path, of folders with the elements of lists.
+            elements: the labels of the elements.
+        """
+        for setting in self._settings.table().values():
+            if setting.shown.group == name:
+                self.add_as(setting)
+                if setting.path in lists:
+                    self.add_elements(setting.path, elements, lists[setting.path])
 
     def add_as(
         self,
-        entry: Entry,
+        setting: Setting,
         read: Callable[[S], Any] | None = None,
         make: Callable[[float], Any] | None = None,
     ) -> None:
-        """Adds a control that an entry describes. The entry may differ from the setting's entry in the table.
+        """Adds a control of a setting. Its description may differ from the setting's own.
 
         Args:
-            entry: its path must be the path of a setting.
+            setting: its path must be the path of a setting.
             read: returns the value to show; None: the setting's value is shown.
             make: converts a slider's number to the setting's value; None: the number is the value.
         """
-        place = self._settings.place(entry.path)
-        read = place.read if read is None else read
+        read = setting.read if read is None else read
         with self._gui.add_folder(None):
-            if place.form.kind == SWITCH:
-                self._switch(entry, read)
-            elif place.form.kind == WORD:
-                self._menu(entry, place.form.words, read)
+            if setting.form.kind == SWITCH:
+                self._switch(setting, read)
+            elif setting.form.kind == WORD:
+                self._menu(setting, read)
             else:
-                self._slider(entry, read, whole=place.form.kind == WHOLE, make=make)
+                self._slider(setting, read, make)
 
     def add_elements(self, path: str, names: Sequence[str], title: str) -> None:
-        """Adds a folder with a number input for each element of a list; `names` are their labels."""
-        entry = self._settings.entry(path)
+        """Adds a folder with a number input for each element of a list; `names` are their labels. The inputs
+        have the range of the list."""
+        shown = self._settings.setting(path).shown
         with self._gui.add_folder(title, expand_by_default=False):
             for at, name in enumerate(names, start=1):
-                self._number(replace(entry, path=f"{path}.{at}", label=name))
+                self._number(
+                    replace(self._settings.setting(f"{path}.{at}"), shown=replace(shown, label=name))
+                )
 
     # ---------------------------------------------------------------- kinds of controls
 
-    def _switch(self, entry: Entry, read: Callable[[S], Any]) -> None:
-        box = self._gui.add_checkbox(entry.title, bool(read(self._settings)), hint=entry.help or None)
-        self._bindings.bind(box, lambda s: bool(read(s)), lambda on: Set(entry.path, bool(on)))
+    def _switch(self, setting: Setting, read: Callable[[S], Any]) -> None:
+        shown = setting.shown
+        box = self._gui.add_checkbox(shown.title, bool(read(self._settings)), hint=shown.help or None)
+        self._bindings.bind(box, lambda s: bool(read(s)), lambda on: Set(setting.path, bool(on)))
 
-    def _menu(self, entry: Entry, words: tuple[str, ...], read: Callable[[S], Any]) -> None:
-        now = str(read(self._settings))
-        menu = self._gui.add_dropdown(entry.title, words, initial_value=now, hint=entry.help or None)
-        self._bindings.bind(menu, lambda s: str(read(s)), lambda word: Set(entry.path, str(word)))
+    def _menu(self, setting: Setting, read: Callable[[S], Any]) -> None:
+        shown, now = setting.shown, str(read(self._settings))
+        menu = self._gui.add_dropdown(
+            shown.title, setting.form.words, initial_value=now, hint=shown.help or None
+        )
+        self._bindings.bind(menu, lambda s: str(read(s)), lambda word: Set(setting.path, str(word)))
 
     def _slider(
-        self, entry: Entry, read: Callable[[S], Any], whole: bool, make: Callable[[float], Any] | None
+        self, setting: Setting, read: Callable[[S], Any], make: Callable[[float], Any] | None
     ) -> None:
-        if entry.log:
-            self._logarithmic(entry, read)
+        usual = setting.shown
+        if usual.log:
+            self._logarithmic(setting, read)
             return
-        kind, step = (int, 1) if whole else (float, entry.step or _step(entry.low, entry.high))
+        whole = setting.form.kind == WHOLE
+        kind, step = (int, 1) if whole else (float, usual.step or _step(usual.low, usual.high))
 
         def shown(settings: S) -> Any:
-            return kind(round(scalar(read(settings)) * entry.factor, 9))
+            return kind(round(scalar(read(settings)) * usual.factor, 9))
 
         now = shown(self._settings)
         slider = self._gui.add_slider(
-            entry.title,
-            min=min(kind(entry.low), now),
-            max=max(kind(entry.high), now),
+            usual.title,
+            min=min(kind(usual.low), now),
+            max=max(kind(usual.high), now),
             step=step,
             initial_value=now,
-            hint=entry.help or None,
+            hint=usual.help or None,
         )
 
         def event(value: float) -> Set:
-            number = kind(value) if entry.factor == 1.0 else float(f"{value / entry.factor:.12g}")
-            return Set(entry.path, number if make is None else make(number))
+            number = kind(value) if usual.factor == 1.0 else float(f"{value / usual.factor:.12g}")
+            return Set(setting.path, number if make is None else make(number))
 
         self._bindings.bind(slider, lambda s: min(max(shown(s), slider.min), slider.max), event)
 
-    def _logarithmic(self, entry: Entry, read: Callable[[S], Any]) -> None:
-        low, high = entry.low, entry.high
+    def _logarithmic(self, setting: Setting, read: Callable[[S], Any]) -> None:
+        shown = setting.shown
+        low, high = shown.low, shown.high
 
         def label(value: float) -> str:
-            return f"{entry.label}: {figure(value)}{' ' * bool(entry.unit)}{entry.unit}"
+            return f"{shown.label}: {figure(value)}{' ' * bool(shown.unit)}{shown.unit}"
 
         now = scalar(read(self._settings))
         slider = self._gui.add_slider(
@@ -140,7 +165,7 @@ class Controls(Generic[S]):
             step=1,
             initial_value=place_of(now, low, high),
             marks=((0, figure(low)), (STEPS, figure(high))),
-            hint=entry.help or "Logarithmic",
+            hint=shown.help or "Logarithmic",
         )
         self._gui.add_html(only_track(slider))
 
@@ -150,21 +175,21 @@ class Controls(Generic[S]):
                 slider.label = label(value)
             return place_of(value, low, high)
 
-        self._bindings.bind(slider, follow, lambda place: Set(entry.path, value_at(place, low, high)))
+        self._bindings.bind(slider, follow, lambda place: Set(setting.path, value_at(place, low, high)))
 
-    def _number(self, entry: Entry) -> None:
-        read = self._settings.place(entry.path).read
+    def _number(self, setting: Setting) -> None:
+        shown, read = setting.shown, setting.read
         value = float(read(self._settings))
-        ranged = entry.low < entry.high
+        ranged = shown.low < shown.high
         with self._gui.add_folder(None):
             number = self._gui.add_number(
-                entry.label,
+                shown.label,
                 value,
-                min=min(entry.low if ranged else 1e-6, value),
-                max=max(entry.high, value) if ranged else None,
-                step=entry.step or _tenth(value),
+                min=min(shown.low if ranged else 1e-6, value),
+                max=max(shown.high, value) if ranged else None,
+                step=shown.step or _tenth(value),
             )
-        self._bindings.bind(number, lambda s: float(read(s)), lambda given: Set(entry.path, float(given)))
+        self._bindings.bind(number, lambda s: float(read(s)), lambda given: Set(setting.path, float(given)))
 
 
 def add_control(
@@ -175,13 +200,14 @@ def add_control(
     if control.choices and control.choices != (False, True):
         _add_choices(gui, bindings, control, settings)
         return
-    entry = Entry(control.path, control.words, low=control.low, high=control.high, log=control.log)
-    read = settings.place(control.path).read
+    shown = Shown(control.words, low=control.low, high=control.high, log=control.log)
+    setting = replace(settings.setting(control.path), shown=shown)
+    read = setting.read
 
     def inside(settings: SceneSettings) -> float:
         return min(max(scalar(read(settings)), control.low), control.high)
 
-    Controls(gui, bindings, settings).add_as(entry, read if control.choices or control.log else inside)
+    Controls(gui, bindings, settings).add_as(setting, read if control.choices or control.log else inside)
 
 
 def _add_choices(

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections import namedtuple
+from collections.abc import Callable
 from typing import Annotated, NamedTuple, get_type_hints
 
 from himpc.compilation.compiled import always_inline_kernel
-from himpc.compilation.views import matrices, matrix, vector
+from himpc.compilation.views import as_function, view
 from himpc.tick.kernel.arrays import Array, TickArrays, Whole
 
 
@@ -70,64 +72,31 @@ STARTED, TICKS, FADING = range(3)
 fade in."""
 DRAGGABLE, ROWS, WIDTH, KNOWN = range(4)
 """Columns of `target`. KNOWN is 0 for a target at rest."""
+LoopSizes = namedtuple("LoopSizes", "n N N1 M r T b D V W K")
+"""The values of the letters in the shapes, see `LoopArrays`."""
 
 
-def sizes_of(n: int, N: int, M: int, r: int, T: int, b: int) -> dict[str, int]:
-    """Returns the value of each letter in the shapes."""
+def sizes_of(n: int, N: int, M: int, r: int, T: int, b: int) -> LoopSizes:
+    """Returns the values of the letters."""
     widest = max(n, 3)
-    return {
-        "n": n,
-        "N": N,
-        "N1": N + 1,
-        "M": M,
-        "r": r,
-        "T": T,
-        "b": b,
-        "D": 2**r,
-        "V": max(9, widest),
-        "W": max(19, 4 * widest + 1),
-        "K": 3 + 3 * widest,
-    }
+    return LoopSizes(n, N, N + 1, M, r, T, b, 1 << r, max(9, widest), max(19, 4 * widest + 1), 3 + 3 * widest)
 
 
-@always_inline_kernel
-def loop_arrays_of(loop: Array, where: Whole, t: TickArrays) -> LoopArrays:
-    """Returns all arrays as views.
-
-    Args:
-        loop: the numbers of all arrays.
-        where: index in `loop` at which each array begins, in the order of `SHAPES`.
-        t: determines the sizes.
-    """
+_VIEWS = (view("loop", f"where[{index}]", shape) for index, shape in enumerate(SHAPES.values()))
+loop_arrays_of: Callable[[Array, Whole, TickArrays], LoopArrays] = always_inline_kernel(
+    as_function(
+        "loop_arrays_of",
+        __name__,
+        f"""
+def loop_arrays_of(loop, where, t):
     N, n = t.fixed.shape
-    M, T, b, r = t.sizes[2], len(t.task), len(t.L), int(loop[where[0] + LEVELS])
-    widest = max(n, 3)
-    return LoopArrays(
-        vector(loop, where[0], 8),
-        vector(loop, where[1], 4),
-        matrix(loop, where[2], 8, n),
-        vector(loop, where[3], n),
-        vector(loop, where[4], M),
-        matrix(loop, where[5], r, n),
-        vector(loop, where[6], r),
-        vector(loop, where[7], 1 << r),
-        matrix(loop, where[8], r, 8),
-        vector(loop, where[9], r),
-        vector(loop, where[10], r),
-        vector(loop, where[11], M),
-        matrix(loop, where[12], T, 4),
-        matrix(loop, where[13], T, max(9, widest)),
-        matrix(loop, where[14], T, 3 + 3 * widest),
-        matrices(loop, where[15], T, N + 1, max(19, 4 * widest + 1)),
-        matrix(loop, where[16], b, n),
-        matrix(loop, where[17], b, n),
-        matrix(loop, where[18], b, n),
-        matrix(loop, where[19], N, n),
-        matrix(loop, where[20], N, n),
-        matrix(loop, where[21], N, n),
-        matrix(loop, where[22], N, n),
-        matrix(loop, where[23], N, n),
-        matrices(loop, where[24], r, N, n),
-        vector(loop, where[25], n),
-        matrix(loop, where[26], 4, n),
+    s = sizes_of(n, N, t.sizes[2], int(loop[where[0] + LEVELS]), len(t.task), len(t.L))
+    return LoopArrays({", ".join(_VIEWS)})
+""",
+        LoopArrays=LoopArrays,
+        LEVELS=LEVELS,
+        sizes_of=always_inline_kernel(sizes_of),
     )
+)
+"""(loop, where, t): returns all arrays as views. `loop` contains the numbers of all arrays, `where` the index
+at which each array begins, in the order of `SHAPES`; the arrays of a tick determine the sizes."""

@@ -19,8 +19,7 @@ from himpc.export.kernel.loop_arrays import (
     LoopArrays,
     loop_arrays_of,
 )
-from himpc.tick.kernel.arrays import NOW, PERIOD, T_S, Array, TickArrays, Whole
-from himpc.tick.kernel.arrays_of import arrays_of
+from himpc.tick.kernel.arrays import NOW, PERIOD, T_S, Array, TickArrays, Whole, arrays_of
 from himpc.tick.kernel.cascade import finite
 from himpc.tick.kernel.control_period import ALL_PARTS, ITERATION
 from himpc.tick.kernel.finish_tick import finish_tick

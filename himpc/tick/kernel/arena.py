@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from himpc.tick.kernel.arrays import AT, NUMBERS, WHOLE_AT, WHOLES, Array, Whole
+from himpc.tick.kernel.arrays import AT, NUMBERS, WHOLE_AT, WHOLES, Array, Sizes, Whole
 
 _LINE = 8
 """Arrays begin at multiples of this number of elements: a line of the processor's cache."""
@@ -25,13 +25,12 @@ class Arena:
         arguments: the four arrays that compiled functions receive: data, where, whole and whole_where.
     """
 
-    def __init__(self, **sizes: int) -> None:
-        """sizes: the value of each letter in the shapes."""
-        self.data, self.where, self.f = laid_out(NUMBERS, sizes, np.float64)
-        self.whole, self.whole_where, self.i = laid_out(WHOLES, sizes, np.intp)
+    def __init__(self, sizes: Sizes) -> None:
+        self.data, self.where, self.f = laid_out(NUMBERS, sizes._asdict(), np.float64)
+        self.whole, self.whole_where, self.i = laid_out(WHOLES, sizes._asdict(), np.intp)
         self.arguments = (self.data, self.where, self.whole, self.whole_where)
-        begin, end = self.where[[AT.tau, AT.placed]].tolist()
-        whole_begin, whole_end = self.whole_where[[WHOLE_AT.active_row, WHOLE_AT.end]].tolist()
+        begin, end = self.where[[AT["tau"], AT["placed"]]].tolist()
+        whole_begin, whole_end = self.whole_where[[WHOLE_AT["active_row"], WHOLE_AT["end"]]].tolist()
         self._found = slice(begin, end), slice(whole_begin, whole_end)
 
     def snapshot(self) -> Snapshot:
@@ -43,7 +42,7 @@ class Arena:
         """Returns an array of a snapshot."""
         whole = name in WHOLES
         at, view = (WHOLE_AT, self.i) if whole else (AT, self.f)
-        start = (self.whole_where if whole else self.where)[getattr(at, name)] - self._found[whole].start
+        start = (self.whole_where if whole else self.where)[at[name]] - self._found[whole].start
         shape = view[name].shape
         return (snapshot.whole if whole else snapshot.data)[start : start + prod(shape)].reshape(shape)
 

@@ -1,12 +1,17 @@
-"""Every array of a tick: its name, shape and unit, and which files write and read it."""
+"""Every array of a tick: its name, shape and unit, and which files write and read it. The views that compiled
+functions use follow from this table."""
 
 from __future__ import annotations
 
-from types import ModuleType
+from collections import namedtuple
+from collections.abc import Callable
 from typing import Annotated, Any, NamedTuple, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
+
+from himpc.compilation.compiled import always_inline_kernel
+from himpc.compilation.views import as_function, view
 
 Array = NDArray[np.float64]
 Whole = Any
@@ -211,18 +216,39 @@ def _shapes(kind: Any) -> dict[str, str]:
     return {name: hint.__metadata__[0] for name, hint in hints.items() if hint.__origin__ == kind}
 
 
-def _numbered(name: str, shapes: dict[str, str]) -> Any:
-    """Returns a module with the index of every array. The compiler treats a module's numbers as constants. If
-    the indices were in a tuple, it would write out the whole tuple wherever one index is used."""
-    places = ModuleType(name)
-    vars(places).update({each: place for place, each in enumerate(shapes)})
-    return places
-
-
 NUMBERS, WHOLES = _shapes(Array), _shapes(Whole)
 """The shape of every array, by name: arrays of real numbers, and arrays of whole numbers."""
-AT, WHOLE_AT = _numbered("AT", NUMBERS), _numbered("WHOLE_AT", WHOLES)
-"""The index of each array in `Arena.where` and in `Arena.whole_where`."""
+AT, WHOLE_AT = ({name: index for index, name in enumerate(shapes)} for shapes in (NUMBERS, WHOLES))
+"""The index of each array in `Arena.where` and in `Arena.whole_where`, by name."""
+Sizes = namedtuple("Sizes", "n N N1 M r T F G J b g w k")
+"""The values of the letters in the shapes, see `TickArrays`."""
+
+
+def sizes_of(s: Whole) -> Sizes:
+    """Returns the values of the letters for the numbers in the array `sizes`."""
+    n, N, M, r, T, F, b, w, G = s[0], s[1], s[2], max(s[4], 1), s[5], s[6], s[7], s[8], s[10]
+    return Sizes(n, N, N + 1, M, r, T, F, G, n + 1, b, max(s[11], 1), w, w + 1)
+
+
+_VIEWS = (
+    *(view("data", f"where[{AT[name]}]", shape) for name, shape in NUMBERS.items()),
+    *(view("whole", f"whole_where[{WHOLE_AT[name]}]", shape) for name, shape in WHOLES.items()),
+)
+arrays_of: Callable[[Array, Whole, Whole, Whole], TickArrays] = always_inline_kernel(
+    as_function(
+        "arrays_of",
+        __name__,
+        f"""
+def arrays_of(data, where, whole, whole_where):
+    s = sizes_of({view("whole", f"whole_where[{WHOLE_AT['sizes']}]", WHOLES["sizes"])})
+    return TickArrays({", ".join(_VIEWS)})
+""",
+        TickArrays=TickArrays,
+        sizes_of=always_inline_kernel(sizes_of),
+    )
+)
+"""(data, where, whole, whole_where): returns all arrays of an arena as views. Views that a compiled function
+does not use cost no time."""
 
 PERIOD, T_S, REACTION, NOW, PULL = range(5)
 """Indices of `scalars`: duration of the previous period (s), duration of this period (s), the reaction of

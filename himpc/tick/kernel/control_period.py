@@ -16,8 +16,7 @@ from himpc.compilation.compiled import (
     inline_kernel,
     kernel,
 )
-from himpc.tick.kernel.arrays import Whole
-from himpc.tick.kernel.arrays_of import arrays_of
+from himpc.tick.kernel.arrays import Whole, arrays_of
 from himpc.tick.kernel.finish_tick import finish_tick
 from himpc.tick.kernel.linearize import linearize
 from himpc.tick.kernel.solve_level import solve_level

@@ -8,8 +8,7 @@ from typing import Any
 from himpc.compilation.compiled import INDICES, MATRIX, NUMBER, VECTOR, WHOLE, inline_kernel, kernel
 from himpc.compilation.views import borrowed
 from himpc.constants import FADE, RETREAT, RETURN_RATE, WITHIN
-from himpc.tick.kernel.arrays import DIRECTED, PERIOD, T_S, Array, Whole
-from himpc.tick.kernel.arrays_of import arrays_of
+from himpc.tick.kernel.arrays import DIRECTED, PERIOD, T_S, Array, Whole, arrays_of
 from himpc.tick.kernel.kinematics import forward_kinematics
 
 

@@ -6,8 +6,7 @@ import math
 from typing import Any
 
 from himpc.compilation.compiled import always_inline_kernel, inline_kernel
-from himpc.tick.kernel.arrays import DIRECTED, PERIOD, T_S, TickArrays, Whole
-from himpc.tick.kernel.arrays_of import arrays_of
+from himpc.tick.kernel.arrays import DIRECTED, PERIOD, T_S, TickArrays, Whole, arrays_of
 from himpc.tick.kernel.cascade import (
     ALONE,
     OWN_FIRST,

@@ -6,8 +6,7 @@ import math
 from typing import Any
 
 from himpc.compilation.compiled import always_inline_kernel, inline_kernel
-from himpc.tick.kernel.arrays import NOW, PERIOD, PULL, REACTION, T_S, Array, TickArrays, Whole
-from himpc.tick.kernel.arrays_of import arrays_of
+from himpc.tick.kernel.arrays import NOW, PERIOD, PULL, REACTION, T_S, Array, TickArrays, Whole, arrays_of
 from himpc.tick.kernel.bounds import bounds
 from himpc.tick.kernel.kinematics import (
     DAMPING,

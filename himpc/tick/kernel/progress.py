@@ -7,8 +7,7 @@ import math
 from typing import Any
 
 from himpc.compilation.compiled import INDICES, VECTOR, kernel
-from himpc.tick.kernel.arrays import Array, Whole
-from himpc.tick.kernel.arrays_of import arrays_of
+from himpc.tick.kernel.arrays import Array, Whole, arrays_of
 
 
 @kernel(VECTOR, INDICES, INDICES, INDICES, INDICES, VECTOR)

@@ -1,5 +1,20 @@
-"""Entry point: computes the velocity limits of a controller that keeps distances, see `limits.load`,
-`limits.overrun` and `limits.stall`."""
+"""Entry point: computes the velocity limits of a controller that keeps distances. They are lower in three
+cases.
+
+*Load.* The torque that a motor needs to hold the robot depends on the posture. The less torque a motor has
+left, the more slowly the joints that it carries approach a posture that it cannot hold.
+
+*Overrun.* The rows of velocity assume that a joint's acceleration follows its torque at once. With time-delay
+estimation the acceleration follows with a time constant of T_s times the ratio of true to assumed inertia,
+0.07 s for the third joint of a panda. All rows are then satisfied, but a joint that is accelerated by the
+motion of other joints overruns its limit by 36 %. The limit of such a joint is lowered until its speed no
+longer increases.
+
+*Stall.* An arm that is dragged into the floor stops above the floor, but its joints would continue to move
+near their limits. They become slower while an obstacle is near, no reference moves, and no task that is away
+from its target makes progress. A robot that has become slow stays slow until a reference moves, no obstacle
+is near, or its first task is disturbed.
+"""
 
 from __future__ import annotations
 
@@ -31,12 +46,13 @@ from himpc.constants import (
 from himpc.tick.kernel.arrays import Array
 
 STALL_SHARE, STALL_LEAST = range(2)
-"""Indices of the numbers about the stall, see `limits.stall.Stall`."""
+"""Indices of the numbers about the stall: 1 if the robot is not stalled and 0 if it is completely stalled;
+the smallest error of the first task after the robot was last free to move."""
 
 
 @inline_kernel
 def update_stall(errors: Array, moves: bool, room: float, T_s: float, due: Array, stall: Array) -> None:
-    """Computes the stall one period later, see `limits.stall.stalled`."""
+    """Computes the stall one period later; for the arguments see `slow_down`."""
     far, free = False, moves or not INSIDE <= room <= BLOCKED
     for p in range(len(errors)):
         far = far or errors[p] > CLOSE_ENOUGH
@@ -81,10 +97,13 @@ def slow_down(
         v_limit: (n,) rad/s, the limits without reductions. largest_torque: (n,) N·m.
         tau: torque that acts, (n,) N·m. v: measured, (n,) rad/s.
         carried: (n, n), entry [k, j]: whether the motor of joint j carries joint k.
-        room, moves, T_s, errors: see `limits.stall.stalled`. The stall is not updated if `errors` is empty.
-        due: (T,), see `Stall`; updated. stall: numbers about the stall, see STALL_SHARE; updated.
-        load: (n,), see `limits.load.loaded`; updated.
-        mean: (n,) rad/s, see `limits.overrun.followed`; updated.
+        room: the amount by which the nearest distance exceeds d_safe, m; infinite without a near pair.
+        moves: whether a reference or the obstacle moves. T_s: control period, s.
+        errors: the length of each task's error, (T,) m or rad. If it is empty, the stall is not updated.
+        due: (T,) the errors that the tasks should have reached by now; updated.
+        stall: numbers about the stall, see STALL_SHARE; updated.
+        load: (n,) the mean load of each joint, as a share of its torque limit; updated.
+        mean: (n,) rad/s, the mean velocity of each joint; updated.
         slower: (n,) rad/s; the result.
     """
     n = len(v_limit)

@@ -7,8 +7,7 @@ from typing import Any
 
 from himpc.compilation.compiled import always_inline_kernel, inline_kernel
 from himpc.tick.kernel.active_set import ActiveSet, Quadratic
-from himpc.tick.kernel.arrays import DIRECTED, TickArrays, Whole
-from himpc.tick.kernel.arrays_of import arrays_of
+from himpc.tick.kernel.arrays import DIRECTED, TickArrays, Whole, arrays_of
 from himpc.tick.kernel.bounds import LevelBounds
 from himpc.tick.kernel.cascade import (
     ALONE,

@@ -1,5 +1,4 @@
-"""Entry point: the filter of a dragged target, see `references.target`. `references.filter` contains the same
-formulas in Python."""
+"""Entry point: the filter of a dragged target, see `references.target`."""
 
 from __future__ import annotations
 

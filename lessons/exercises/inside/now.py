@@ -21,6 +21,7 @@ OF_BOUNDS = ("tau_lower", "tau_upper", "v_lower", "v_upper", "q_lower", "q_upper
 OF_NEAR = ("d", "gradient", "d_safe", "moving")
 OF_LEVEL = ("error", "x_dot", "x_ddot", "J", "J_dot_q_dot", "displacement_d", "x_dot_d", "x_ddot_d",
             "K_p", "K_v", "Q", "R")  # fmt: skip
+OF_FURTHER = ("profile", "directions", "lower", "upper")
 """The names of the arrays of `himpc.controllers.view`, in the order in which they are sent."""
 
 
@@ -33,6 +34,8 @@ def numbers_of(now: Any) -> list[Array]:
     for level in now.levels:
         found += [getattr(level, name) for name in OF_LEVEL]
         found += level.x.values()
+    for further in now.further:
+        found += [getattr(further, name) for name in OF_FURTHER]
     return found
 
 
@@ -41,9 +44,10 @@ def shape_of(now: Any) -> dict[str, Any]:
     return {
         "T_s": now.T_s,
         "N": now.N,
-        "approach": now.bounds.approach,
+        "bounds": [now.bounds.approach, now.bounds.paper],
         "near": [now.near.names, now.near.reaction, now.near.deceleration],
-        "levels": [[level.name, level.tasks, list(level.x)] for level in now.levels],
+        "levels": [[level.name, level.tasks, list(level.x), level.horizon] for level in now.levels],
+        "further": len(now.further),
         "shapes": [each.shape for each in numbers_of(now)],
     }
 
@@ -95,7 +99,8 @@ def rebuilt(shape: dict[str, Any], data: bytes, ask: Ask) -> Now:
         at = end
     following = iter(arrays)
     tick = {name: next(following) for name in OF_TICK}
-    bounds = Part(**{name: next(following) for name in OF_BOUNDS}, approach=shape["approach"])
+    approach, paper = shape["bounds"]
+    bounds = Part(**{name: next(following) for name in OF_BOUNDS}, approach=approach, paper=paper)
     names, reaction, deceleration = shape["near"]
     near = Part(
         **{name: next(following) for name in OF_NEAR},
@@ -104,11 +109,12 @@ def rebuilt(shape: dict[str, Any], data: bytes, ask: Ask) -> Now:
         deceleration=deceleration,
     )
     levels = []
-    for place, (name, tasks, values) in enumerate(shape["levels"]):
+    for place, (name, tasks, values, horizon) in enumerate(shape["levels"]):
         parts: dict[str, Any] = {each: next(following) for each in OF_LEVEL}
         parts["x"] = {each: next(following) for each in values}
         parts["jacobian"] = partial(_asked, ask, "jacobian", place)
-        levels.append(Part(name=name, tasks=tuple(tasks), **parts))
+        levels.append(Part(name=name, tasks=tuple(tasks), horizon=horizon, **parts))
+    further = [Part(**{each: next(following) for each in OF_FURTHER}) for _ in range(shape["further"])]
     nominal = Part(mass_matrix=partial(_asked, ask, "mass_matrix", 0), bias=partial(_asked, ask, "bias", 0))
     return Now(
         **tick,
@@ -117,6 +123,7 @@ def rebuilt(shape: dict[str, Any], data: bytes, ask: Ask) -> Now:
         levels=tuple(levels),
         bounds=bounds,
         near=near,
+        further=tuple(further),
         nominal=nominal,
     )
 

@@ -125,7 +125,7 @@ def _span(text: str) -> _Span:
 
 def _axis(span: _Span, settings: SceneSettings) -> Axis:
     text, path, low, high, count = span.text, span.path, span.low, span.high, span.count
-    whole = settings.place(path).form.kind == WHOLE
+    whole = settings.setting(path).form.kind == WHOLE
     log = span.kind == "log" if span.kind else low > 0 and high >= _DECADE * low and not whole
     if log and low <= 0:
         raise InputError(f"--over {text}: equal ratios need lo above 0; use …:lin for equal steps")

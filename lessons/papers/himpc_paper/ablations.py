@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -13,9 +14,8 @@ from lessons.papers.himpc_paper.effort import EffortJob
 from lessons.papers.himpc_paper.iiwa import RT4, RT4_DATA_SHEET
 from lessons.papers.himpc_paper.planar import RT1
 from lessons.papers.himpc_paper.table_7 import step_seconds
-from lessons.papers.item import Item, PaperCheck, Row, Section, Table
-from lessons.papers.printed import printed
-from lessons.papers.words import number, trouble
+from lessons.papers.item import Item, PaperCheck, Section, Table
+from lessons.papers.words import number, stated, trouble
 from lessons.plots.panels import Panel, Picture, PlotCurve
 from lessons.scenes.run_spec import RunSpec
 
@@ -130,16 +130,9 @@ def _remark_6(results: Results, quick: bool) -> Section:
     note = "**Remark 6, sampling period.** T_s is also the delay of time-delay estimation; M̄ is fixed."
     section = _over("Remark 6", "sampling period (ms)", _PERIODS, runs, note, log=True)
     ratio = _level_1(runs[RT1][4.0]) / _level_1(runs[RT1][0.5])
-    row = Row(
-        f"{RT1}: level-1 RMSE at 4 ms over that at 0.5 ms",
-        "1",
-        None,
-        ratio,
-        "the paper says: the longer the period, the larger the estimation error",
-        turns_at=1.0,
-        says=printed("himpc_text")["period_matters"],
-    )
-    return Section(section.notes, (row,), tables=section.tables, pictures=section.pictures)
+    words = "the longer the period, the larger the estimation error"
+    row = stated(f"{RT1}: level-1 RMSE at 4 ms over that at 0.5 ms", ratio, "period_matters", words)
+    return replace(section, rows=(row,))
 
 
 def _remark_5(results: Results, quick: bool) -> Section:

@@ -9,8 +9,8 @@ from typing import NamedTuple
 from lessons.experiments.eigenvalues import EigenvalueJob
 from lessons.experiments.jobs import Results
 from lessons.papers.himpc_paper.iiwa import RT4_DATA_SHEET
-from lessons.papers.item import Item, Row, Section
-from lessons.papers.words import trouble
+from lessons.papers.item import Item, Section
+from lessons.papers.words import trouble, unprinted
 from lessons.scenes.run_spec import RunSpec
 
 _ADAPTED = "M_bar_adapt=true"
@@ -86,7 +86,7 @@ def _section(results: Results, quick: bool) -> Section:
             run = results[_job(case, extra)]
             why = trouble(run) or "not in the paper"
             for what, (key, unit) in FIGURES.items():
-                rows.append(Row(quantity(case, words, what), unit, None, run.figure(key), why))
+                rows.append(unprinted(quantity(case, words, what), unit, run.figure(key), why))
     return Section(rows=tuple(rows))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import starmap
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from lessons.papers.himpc_paper.planar import ENCODER, RT1, level_1, roughness, 
 from lessons.papers.himpc_paper.planar import SOURCE as SECTION_V
 from lessons.papers.item import Item, Row, Section
 from lessons.papers.printed import printed
-from lessons.papers.words import number, trouble
+from lessons.papers.words import number, trouble, unprinted
 from lessons.plots.style import name
 from lessons.scenes.catalog import prepared, torque_scene
 from robots import Plant, convergence_gauge
@@ -32,10 +33,6 @@ _THIRD = "M_bar_scale=0.3"
 _OTHERS = {"M̄ × 0.3": (_THIRD,), "the paper's encoder": ENCODER}
 _EARLY = 1.2
 """Time at the start of RT4, s, in which no joint is near a limit."""
-
-
-def _own(quantity: str, unit: str, ours: float, why: str = "the paper prints no number") -> Row:
-    return Row(quantity, unit, None, ours, why)
 
 
 def _lost(run: JobResult) -> float:
@@ -71,20 +68,18 @@ def _conflict(results: Results, quick: bool) -> Section:
         for word, place in (("from", 0), ("until", -1))
     ]
     swing, turns = _swing(run, 2.0, 6.0)
-    rows += [
-        _own("RT2, 2 to 6 s: largest speed of joint 3", "deg/s", swing),
-        _own("RT2, 2 to 6 s: how often joint 3 swings", "Hz", turns),
-    ]
-    rows += [
-        _own(f"{name(each)} on RT2: control is lost at", "s", _lost(results[rt2(each)])) for each in _LOST
+    own = [
+        ("RT2, 2 to 6 s: largest speed of joint 3", "deg/s", swing),
+        ("RT2, 2 to 6 s: how often joint 3 swings", "Hz", turns),
+        *((f"{name(each)} on RT2: control is lost at", "s", _lost(results[rt2(each)])) for each in _LOST),
     ]
     if not quick:
         half = level_1(results[rt2("himpc", _HALF_SWING)]) / level_1(results[rt1("himpc")])
-        rows.append(_own("HIMPC, q₁ swings by −60°: level-1 RMSE in RT2 over RT1", "1", half))
+        own.append(("HIMPC, q₁ swings by −60°: level-1 RMSE in RT2 over RT1", "1", half))
         for words, extra in _OTHERS.items():
             ratio = level_1(results[rt2("himpc", *extra)]) / level_1(results[rt1("himpc", *extra)])
-            rows.append(_own(f"HIMPC, {words}: level-1 RMSE in RT2 over RT1", "1", ratio))
-    return Section(rows=tuple(rows))
+            own.append((f"HIMPC, {words}: level-1 RMSE in RT2 over RT1", "1", ratio))
+    return Section(rows=(*rows, *starmap(unprinted, own)))
 
 
 def _swing(run: JobResult, start: float, end: float) -> tuple[float, float]:
@@ -123,17 +118,13 @@ def _radius(scene: str) -> float:
 
 def _weights(results: Results, quick: bool) -> Section:
     scenes = (("RT1", RT1), ("RT4", RT4))
+    ratio, radius = "Q over R for level 1's weakest direction", "spectral radius of I − M⁻¹M̄"
     return Section(
         notes=("Computed from the scenes' settings, without a run.",),
-        rows=(
-            *(
-                _own(f"{words}: Q over R for level 1's weakest direction at the start", "1", weakest(scene))
-                for words, scene in scenes
-            ),
-            *(
-                _own(f"{words}: spectral radius of I − M⁻¹M̄ at the start", "1", _radius(scene))
-                for words, scene in scenes
-            ),
+        rows=tuple(
+            unprinted(f"{words}: {what} at the start", "1", of(scene))
+            for what, of in ((ratio, weakest), (radius, _radius))
+            for words, scene in scenes
         ),
     )
 
@@ -168,36 +159,36 @@ def _settings(results: Results, quick: bool) -> Section:
     one, twenty = (results[rt4("himpc", f"horizon={N}", seconds=_EARLY)] for N in (1, 20))
     rows = [
         *(
-            _own(
+            (
                 f"RT1, R = 1e5: RMSE of {label} over that with R = 10",
                 "1",
                 results[rt1("himpc", _SOFT)].error_of(task) / own.error_of(task),
             )
             for label, task in (("x", "position"), ("q1", "q1"))
         ),
-        _own(
+        (
             "RT1, encoder, R on M̄⁻¹Δτ: RMS of Δτ over that with R on Δτ",
             "1",
             roughness(soft) / roughness(noisy),
         ),
-        _own(
+        (
             "RT1, encoder, R on M̄⁻¹Δτ: level-1 RMSE over that with R on Δτ",
             "1",
             level_1(soft) / level_1(noisy),
         ),
         *(
-            _own(
+            (
                 f"RT1: average cost of level {k + 1} with the encoder over that without",
                 "1",
                 noisy.figure("average_cost", k) / own.figure("average_cost", k),
             )
             for k in (0, 1)
         ),
-        *(_own(f"RT1, encoder, HIMPC: {label}", "m", noisy.error_of("position", k)) for k, label in _AXES),
-        *(_own(f"RT1, M̄ × 0.3, HIMPC: {label}", "m", third.error_of("position", k)) for k, label in _AXES),
-        _own("RT1, M̄ × 0.3, HIMPC: q1", "deg", third.error_of("q1")),
+        *((f"RT1, encoder, HIMPC: {label}", "m", noisy.error_of("position", k)) for k, label in _AXES),
+        *((f"RT1, M̄ × 0.3, HIMPC: {label}", "m", third.error_of("position", k)) for k, label in _AXES),
+        ("RT1, M̄ × 0.3, HIMPC: q1", "deg", third.error_of("q1")),
         *(
-            _own(f"RT1, OSF, {words}: {label}", unit, results[rt1("osf", *extra)].error_of(task, k))
+            (f"RT1, OSF, {words}: {label}", unit, results[rt1("osf", *extra)].error_of(task, k))
             for words, extra in (("no dry friction", (_BARE,)), ("no friction at all", _UNDAMPED))
             for label, task, k, unit in (
                 ("x", "position", 0, "m"),
@@ -205,17 +196,15 @@ def _settings(results: Results, quick: bool) -> Section:
                 ("q1", "q1", 0, "deg"),
             )
         ),
-        _own("RT3, HQP: largest error of the EE", "m", _farthest(straight)),
-        _own(
-            "RT3, HQP: largest torque over its bound", "1", straight.figure("limits", "torque", "max_ratio")
-        ),
-        _own(
+        ("RT3, HQP: largest error of the EE", "m", _farthest(straight)),
+        ("RT3, HQP: largest torque over its bound", "1", straight.figure("limits", "torque", "max_ratio")),
+        (
             f"RT4, first {_EARLY:g} s: RMSE of x, N = 20 over N = 1",
             "1",
             twenty.error_of("position", 0, "rmse") / one.error_of("position", 0, "rmse"),
         ),
     ]
-    return Section(rows=tuple(rows))
+    return Section(rows=tuple(starmap(unprinted, rows)))
 
 
 _AXES = ((0, "x"), (1, "y"))
@@ -248,15 +237,15 @@ def _rivals(results: Results, quick: bool) -> Section:
             )
         )
     run = results[rt4("tdeosf")]
-    rows += [
-        _own("TDEOSF on RT4: largest error of the TCP", "m", _farthest(run)),
-        _own("TDEOSF on RT4: position over its limit", "1", run.figure("limits", "position", "max_ratio")),
-        _own("HQP on RT4: control is lost at", "s", _lost(results[rt4("hqp")])),
-        _own("OSF on RT4: control is lost at", "s", _lost(results[rt4("osf")])),
-    ]
+    own = (
+        ("TDEOSF on RT4: largest error of the TCP", "m", _farthest(run)),
+        ("TDEOSF on RT4: position over its limit", "1", run.figure("limits", "position", "max_ratio")),
+        ("HQP on RT4: control is lost at", "s", _lost(results[rt4("hqp")])),
+        ("OSF on RT4: control is lost at", "s", _lost(results[rt4("osf")])),
+    )
     return Section(
         notes=("Unstable: the run loses control (a speed of more than 20 times its limit).",),
-        rows=tuple(rows),
+        rows=(*rows, *starmap(unprinted, own)),
     )
 
 

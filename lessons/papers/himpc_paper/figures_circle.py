@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,15 +12,15 @@ from lessons.papers.curves import (
     PLANAR_ERRORS,
     banded,
     curve,
+    drawn,
     error_panels,
     excerpt,
     joint_panels,
     log_error_panels,
 )
 from lessons.papers.himpc_paper.planar import COMPARED, ENCODER, SOURCE, roughness, rt1, rt2, rt3
-from lessons.papers.item import Item, Row, Section, Table
-from lessons.papers.printed import printed
-from lessons.papers.words import number, trouble
+from lessons.papers.item import Section, Table, figures
+from lessons.papers.words import number, stated, trouble
 from lessons.plots.panels import Bars, Panel, Picture, PlotCurve
 from lessons.plots.style import name
 
@@ -35,10 +36,6 @@ def encoder_runs(controllers: Sequence[str]) -> tuple[Job, ...]:
 
 def _runs(results: Results, jobs: Sequence[Job]) -> list[JobResult]:
     return [results[job] for job in jobs]
-
-
-def _picture(name: str, caption: str, panels: Sequence[Panel | Bars], columns: int = 1) -> Section:
-    return Section(pictures=(Picture(name, caption, tuple(panels), columns),))
 
 
 # ------------------------------------------------------------------------ Figs. 3 and 9: references
@@ -76,8 +73,8 @@ def _fig_3(results: Results, quick: bool) -> Section:
         ),
     )
     note = "The paper's axes have no readable scale: centre, radius, time law and swings of q₁ are ours."
-    found = _picture("himpc-fig-3", "RT1 and RT2: the EE's circle and the two references of q₁.", panels, 3)
-    return Section(notes=(note,), pictures=found.pictures)
+    caption = "RT1 and RT2: the EE's circle and the two references of q₁."
+    return replace(drawn("himpc-fig-3", caption, panels, 3), notes=(note,))
 
 
 def _fig_9(results: Results, quick: bool) -> Section:
@@ -85,7 +82,7 @@ def _fig_9(results: Results, quick: bool) -> Section:
     axes = (_reference(run, "position", 0, "$x_d$", "0"), _reference(run, "position", 1, "$y_d$", "1"))
     panels = (_path(run), Panel("position (m)", axes))
     caption = "RT3: two tangent circles; the arm is straight at 0 s, 8 s and 16 s."
-    return _picture("himpc-fig-9", caption, panels, 2)
+    return drawn("himpc-fig-9", caption, panels, 2)
 
 
 # ------------------------------------------------------------------------ Figs. 4 to 8: scenario 1
@@ -97,13 +94,13 @@ def _fig_4(results: Results, quick: bool) -> Section:
         "Size of the tracking errors on RT1 with the paper's encoder, the largest in every 50 ms. OSF and "
         "HQP coincide, and so do TDEOSF and HIMPC. Curves are cut off below 1e-4."
     )
-    return _picture("himpc-fig-4", caption, log_error_panels(runs, PLANAR_ERRORS))
+    return drawn("himpc-fig-4", caption, log_error_panels(runs, PLANAR_ERRORS))
 
 
 def _fig_5(results: Results, quick: bool) -> Section:
     runs = _runs(results, encoder_runs(INCREMENTAL))
     caption = "Tracking errors of the methods with time-delay estimation on RT1, paper's encoder."
-    return _picture("himpc-fig-5", caption, error_panels(runs, PLANAR_ERRORS))
+    return drawn("himpc-fig-5", caption, error_panels(runs, PLANAR_ERRORS))
 
 
 def _torques(results: Results, number: int, controllers: tuple[str, str]) -> Section:
@@ -115,19 +112,14 @@ def _torques(results: Results, number: int, controllers: tuple[str, str]) -> Sec
     )
     whole = joint_panels(runs, "tau", r"\tau", "N·m")
     panels = tuple(each for panel in whole for each in (banded(panel), excerpt(panel, 2.5, 2.55)))
-    picture = Picture(f"himpc-fig-{number}", caption, panels, 2)
-    says = printed("himpc_text")[f"smoother_than_{controllers[0]}"]
-    row = Row(
+    row = stated(
         f"RMS of Δτ, {second}'s over {first}'s",
-        "1",
-        None,
         roughness(runs[1]) / roughness(runs[0]),
-        f"the paper says: {says} 1 (smoother)",
-        turns_at=1.0,
-        says=says,
-        topic="smoothness",
+        f"smoother_than_{controllers[0]}",
+        "{says} 1 (smoother)",
+        "smoothness",
     )
-    return Section(rows=(row,), pictures=(picture,))
+    return drawn(f"himpc-fig-{number}", caption, panels, 2, rows=(row,))
 
 
 def _fig_8(results: Results, quick: bool) -> Section:
@@ -148,30 +140,23 @@ def _fig_8(results: Results, quick: bool) -> Section:
         for run, cost in zip(runs, costs, strict=True)
     )
     own, tdeosf, hiqp = costs
-    says = printed("himpc_text")
     compared = (
         *(
-            Row(
+            stated(
                 f"average cost of level {k + 1}, HIMPC's over the best rival's",
-                "1",
-                None,
                 own[k] / min(tdeosf[k], hiqp[k]),
-                "the paper says: HIMPC's is the lowest",
-                turns_at=1.0,
-                says=says[f"cheapest_on_level_{k + 1}"],
-                topic="average-cost",
+                f"cheapest_on_level_{k + 1}",
+                "HIMPC's is the lowest",
+                "average-cost",
             )
             for k in (0, 1)
         ),
-        Row(
+        stated(
             "average cost of level 2, HIQP's over TDEOSF's",
-            "1",
-            None,
             hiqp[1] / tdeosf[1],
-            "the paper says: HIQP's is higher",
-            turns_at=1.0,
-            says=says["hiqp_dearer_than_tdeosf"],
-            topic="average-cost",
+            "hiqp_dearer_than_tdeosf",
+            "HIQP's is higher",
+            "average-cost",
         ),
     )
     return Section(
@@ -185,33 +170,20 @@ def _fig_8(results: Results, quick: bool) -> Section:
     )
 
 
-_S1, _S2 = f"{SOURCE}-B", f"{SOURCE}-C"
-ITEMS = (
-    Item("himpc-fig-3", "RT1 and RT2", f"{_S1}, Fig. 3", lambda _: (rt1("himpc"), rt2("himpc")), _fig_3),
-    Item(
-        "himpc-fig-4", "Errors, four controllers", f"{_S1}, Fig. 4", lambda _: encoder_runs(COMPARED), _fig_4
-    ),
-    Item("himpc-fig-5", "Errors with TDE", f"{_S1}, Fig. 5", lambda _: encoder_runs(INCREMENTAL), _fig_5),
-    Item(
-        "himpc-fig-6",
-        "Torques of TDEOSF and HIMPC",
-        f"{_S1}, Fig. 6",
-        lambda _: encoder_runs(("tdeosf", "himpc")),
-        lambda results, _: _torques(results, 6, ("tdeosf", "himpc")),
-    ),
-    Item(
-        "himpc-fig-7",
-        "Torques of HIQP and HIMPC",
-        f"{_S1}, Fig. 7",
-        lambda _: encoder_runs(("hiqp", "himpc")),
-        lambda results, _: _torques(results, 7, ("hiqp", "himpc")),
-    ),
-    Item(
-        "himpc-fig-8",
-        "Average cost",
-        f"{_S1}, Fig. 8 and (41)",
-        lambda _: encoder_runs(("himpc", "tdeosf", "hiqp")),
-        _fig_8,
-    ),
-    Item("himpc-fig-9", "RT3", f"{_S2}, Fig. 9", lambda _: (rt3("himpc"),), _fig_9),
+def _fig_6(results: Results, quick: bool) -> Section:
+    return _torques(results, 6, ("tdeosf", "himpc"))
+
+
+def _fig_7(results: Results, quick: bool) -> Section:
+    return _torques(results, 7, ("hiqp", "himpc"))
+
+
+ITEMS = figures(
+    (3, "RT1 and RT2", f"{SOURCE}-B, Fig. 3", (rt1("himpc"), rt2("himpc")), _fig_3),
+    (4, "Errors, four controllers", f"{SOURCE}-B, Fig. 4", encoder_runs(COMPARED), _fig_4),
+    (5, "Errors with TDE", f"{SOURCE}-B, Fig. 5", encoder_runs(INCREMENTAL), _fig_5),
+    (6, "Torques of TDEOSF and HIMPC", f"{SOURCE}-B, Fig. 6", encoder_runs(("tdeosf", "himpc")), _fig_6),
+    (7, "Torques of HIQP and HIMPC", f"{SOURCE}-B, Fig. 7", encoder_runs(("hiqp", "himpc")), _fig_7),
+    (8, "Average cost", f"{SOURCE}-B, Fig. 8 and (41)", encoder_runs(("himpc", "tdeosf", "hiqp")), _fig_8),
+    (9, "RT3", f"{SOURCE}-C, Fig. 9", (rt3("himpc"),), _fig_9),
 )

@@ -10,12 +10,11 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from lessons.experiments.jobs import Job, JobResult, Results
-from lessons.papers.curves import PLANAR_ERRORS, curve, error_panels, joint_panels
+from lessons.papers.curves import PLANAR_ERRORS, curve, drawn, error_panels, joint_panels
 from lessons.papers.himpc_paper.planar import SOURCE, level_1, rt1, rt2, rt3
-from lessons.papers.item import Item, Row, Section
-from lessons.papers.printed import printed
-from lessons.papers.words import trouble
-from lessons.plots.panels import Bars, Panel, Picture, PlotCurve
+from lessons.papers.item import Row, Section, figures
+from lessons.papers.words import stated, trouble, unprinted
+from lessons.plots.panels import Panel, PlotCurve
 from lessons.plots.style import name
 from robots import Robot, load_robot
 
@@ -27,17 +26,13 @@ def _runs(results: Results, jobs: Sequence[Job]) -> list[JobResult]:
     return [results[job] for job in jobs]
 
 
-def _picture(name: str, caption: str, panels: Sequence[Panel | Bars], columns: int = 1) -> Section:
-    return Section(pictures=(Picture(name, caption, tuple(panels), columns),))
-
-
 # ------------------------------------------------------------------------ Figs. 10 to 13: conflict
 
 
 def _fig_10(results: Results, quick: bool) -> Section:
     runs = _runs(results, (rt2("hqp"), rt2("himpc")))
     caption = "Tracking errors on RT2. While the tasks conflict, level 2 gives way."
-    return _picture("himpc-fig-10", caption, error_panels(runs, PLANAR_ERRORS))
+    return drawn("himpc-fig-10", caption, error_panels(runs, PLANAR_ERRORS))
 
 
 def _fig_11(results: Results, quick: bool) -> Section:
@@ -55,15 +50,12 @@ def _fig_11(results: Results, quick: bool) -> Section:
             panels.append(Panel(f"$e_{axis}$ (mm)", curves, title=title, y_range=(-size, size)))
         growth[controller] = level_1(conflict) / level_1(circle)
     caption = "Level-1 errors with (RT2) and without (RT1) conflict. HIMPC's axes are enlarged tenfold."
-    return Section(
-        rows=_growth_rows(results, growth),
-        pictures=(Picture("himpc-fig-11", caption, (panels[0], panels[2], panels[1], panels[3]), 2),),
-    )
+    ordered = (panels[0], panels[2], panels[1], panels[3])
+    return drawn("himpc-fig-11", caption, ordered, 2, rows=_growth_rows(results, growth))
 
 
 def _growth_rows(results: Results, growth: dict[str, float]) -> tuple[Row, ...]:
     """Rows for the statements of the paper about the figure, which has no readable numbers."""
-    says = printed("himpc_text")
     lines = (
         ("HIMPC: level-1 RMSE in RT2 over RT1", growth["himpc"], "conflict_himpc", "nearly not affected"),
         ("HQP: level-1 RMSE in RT2 over RT1", growth["hqp"], "conflict_hqp", "deteriorates"),
@@ -80,19 +72,7 @@ def _growth_rows(results: Results, growth: dict[str, float]) -> tuple[Row, ...]:
             "HIMPC's is lower",
         ),
     )
-    return tuple(
-        Row(
-            quantity,
-            "1",
-            None,
-            ours,
-            f"the paper says: {words}",
-            turns_at=1.0,
-            says=says[key],
-            topic="conflict-reaches-level-1",
-        )
-        for quantity, ours, key, words in lines
-    )
+    return tuple(stated(*line, topic="conflict-reaches-level-1") for line in lines)
 
 
 _CHATTER = (0.5, 1.6)
@@ -102,13 +82,13 @@ _CHATTER = (0.5, 1.6)
 def _fig_12(results: Results, quick: bool) -> Section:
     runs = _runs(results, (rt2("hqp"), rt2("himpc")))
     panels = joint_panels(runs, "tau_demand", r"\tau", "N·m", bound="tau_upper", weights=_CHATTER)
-    return _picture("himpc-fig-12", "Torque demands on RT2, with their bounds.", panels)
+    return drawn("himpc-fig-12", "Torque demands on RT2, with their bounds.", panels)
 
 
 def _fig_13(results: Results, quick: bool) -> Section:
     runs = _runs(results, (rt2("hqp"), rt2("himpc")))
     panels = joint_panels(runs, "v", r"\dot q", "deg/s", DEG, bound="v_limit", weights=_CHATTER)
-    return _picture("himpc-fig-13", "Joint velocities on RT2, with their bounds.", panels)
+    return drawn("himpc-fig-13", "Joint velocities on RT2, with their bounds.", panels)
 
 
 # ------------------------------------------------------------------------ Figs. 14 and 15: singularity
@@ -156,7 +136,7 @@ def _fig_14(results: Results, quick: bool) -> Section:
             notes = tuple(_time_beside(points[-1], x_d, float(run.t[place])) for place, points in chains[:-1])
             panels.append(Panel("y (m)", (*arms, path), "x (m)", equal=True, title=title, notes=notes))
     caption = f"HIMPC on RT3 in {POSES} poses; straight and singular in the 1st, 10th and 19th (thick)."
-    return _picture("himpc-fig-14", caption, panels or (Panel("y (m)", ()),), 2)
+    return drawn("himpc-fig-14", caption, panels or (Panel("y (m)", ()),), 2)
 
 
 def _fig_15(results: Results, quick: bool) -> Section:
@@ -166,64 +146,25 @@ def _fig_15(results: Results, quick: bool) -> Section:
         replace(panel, marks=(0.0, 8.0, 16.0), mark_label="straight and singular")
         for panel in error_panels([run], PLANAR_ERRORS)
     )
-    found = _picture("himpc-fig-15", "Tracking errors of HIMPC on RT3.", panels)
-    return Section(
-        rows=tuple(
-            Row(
-                f"HIMPC, {axis}: RMSE over the whole run",
-                "m",
-                None,
-                value,
-                trouble(run) or "the paper: a curve only",
-            )
-            for axis, value in zip("xy", whole, strict=True)
-        ),
-        pictures=found.pictures,
+    why = trouble(run) or "the paper: a curve only"
+    rows = (
+        unprinted(f"HIMPC, {axis}: RMSE over the whole run", "m", x, why)
+        for axis, x in zip("xy", whole, strict=True)
     )
+    return drawn("himpc-fig-15", "Tracking errors of HIMPC on RT3.", panels, rows=tuple(rows))
 
 
-_S2 = f"{SOURCE}-C"
-ITEMS = (
-    Item(
-        "himpc-fig-10",
-        "Errors under conflict",
-        f"{_S2}, Fig. 10",
-        lambda _: (rt2("hqp"), rt2("himpc")),
-        _fig_10,
-    ),
-    Item(
-        "himpc-fig-11",
-        "Level 1 with and without conflict",
-        f"{_S2}, Fig. 11",
-        lambda _: tuple(make(controller) for make in (rt1, rt2) for controller in ("hqp", "himpc")),
-        _fig_11,
-    ),
-    Item(
-        "himpc-fig-12",
-        "Torques under conflict",
-        f"{_S2}, Fig. 12",
-        lambda _: (rt2("hqp"), rt2("himpc")),
-        _fig_12,
-    ),
-    Item(
-        "himpc-fig-13",
-        "Velocities under conflict",
-        f"{_S2}, Fig. 13",
-        lambda _: (rt2("hqp"), rt2("himpc")),
-        _fig_13,
-    ),
-    Item(
-        "himpc-fig-14",
-        "Through the singularity, poses",
-        f"{_S2}, Fig. 14",
-        lambda _: (rt3("himpc"),),
-        _fig_14,
-    ),
-    Item(
-        "himpc-fig-15",
-        "Through the singularity, errors",
-        f"{_S2}, Fig. 15",
-        lambda _: (rt3("himpc"),),
-        _fig_15,
-    ),
+_BOTH = (rt2("hqp"), rt2("himpc"))
+ITEMS = figures(
+    *(
+        (number, title, f"{SOURCE}-C, Fig. {number}", runs, report)
+        for number, title, runs, report in (
+            (10, "Errors under conflict", _BOTH, _fig_10),
+            (11, "Level 1 with and without conflict", (rt1("hqp"), rt1("himpc"), *_BOTH), _fig_11),
+            (12, "Torques under conflict", _BOTH, _fig_12),
+            (13, "Velocities under conflict", _BOTH, _fig_13),
+            (14, "Through the singularity, poses", (rt3("himpc"),), _fig_14),
+            (15, "Through the singularity, errors", (rt3("himpc"),), _fig_15),
+        )
+    )
 )

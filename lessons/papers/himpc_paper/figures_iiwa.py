@@ -8,7 +8,7 @@ import numpy as np
 
 from himpc.telemetry import AT_POSITION
 from lessons.experiments.jobs import Job, Results
-from lessons.papers.curves import banded, by_controller, curve, excerpt, spans
+from lessons.papers.curves import banded, by_controller, curve, drawn, excerpt, spans
 from lessons.papers.himpc_paper.iiwa import SOURCE, rt4
 from lessons.papers.himpc_paper.table_6 import horizon_job, horizons
 from lessons.papers.himpc_paper.table_7 import step_seconds, timed
@@ -42,7 +42,7 @@ def _fig_17(results: Results, quick: bool) -> Section:
         )
     )
     caption = "Tracking errors of HIMPC on RT4, N = 5. Shaded: a position limit is active."
-    return Section(pictures=(Picture("himpc-fig-17", caption, panels),))
+    return drawn("himpc-fig-17", caption, panels)
 
 
 def _fig_18_jobs(quick: bool) -> tuple[Job, ...]:
@@ -54,10 +54,8 @@ def _fig_18(results: Results, quick: bool) -> Section:
         curve(results[job], "error/position", 0, 1e3, label=f"N = {N}", colour=str(k))
         for k, (job, N) in enumerate(zip(_fig_18_jobs(quick), horizons("himpc", quick), strict=True))
     )
-    panel = Panel("$e_x$ (mm)", curves)
-    return Section(
-        pictures=(Picture("himpc-fig-18", "Error of x on RT4 against the horizon N, HIMPC.", (panel,)),)
-    )
+    caption = "Error of x on RT4 against the horizon N, HIMPC."
+    return drawn("himpc-fig-18", caption, (Panel("$e_x$ (mm)", curves),))
 
 
 def _fig_19_horizons(quick: bool) -> tuple[int, ...]:
@@ -79,7 +77,7 @@ def _fig_19(results: Results, quick: bool) -> Section:
         curves = by_controller(runs, "error/position", 0, 1e3)
         panels.append(Panel("$e_x$ (mm)", curves, title=f"N = {N}"))
     caption = "Error of x on RT4, Jacobians along the last plan (HIMPC) and along the current one (NHIMPC)."
-    return Section(pictures=(Picture("himpc-fig-19", caption, tuple(panels)),))
+    return drawn("himpc-fig-19", caption, panels)
 
 
 def _fig_20_horizons(quick: bool) -> tuple[int, ...]:
@@ -121,7 +119,7 @@ def _fig_21(results: Results, quick: bool) -> Section:
         replace(excerpt(whole, 1.0, 1.05), title="an excerpt of 50 ms"),
     )
     caption = f"Torque of joint 1 with encoders of 5e-3°: S = {number(smoothness(coarse, benchmark))} N·m."
-    return Section(pictures=(Picture("himpc-fig-21", caption, panels, 2),))
+    return drawn("himpc-fig-21", caption, panels, 2)
 
 
 ITEMS = (

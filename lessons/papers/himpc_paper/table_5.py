@@ -8,7 +8,7 @@ from lessons.experiments.jobs import Job, Results
 from lessons.papers.himpc_paper.iiwa import COORDINATES, DISTURBED, OPEN, RT4, RT4_DATA_SHEET, SOURCE, rt4
 from lessons.papers.item import Item, PaperCheck, Row, Section, Table, between
 from lessons.papers.printed import printed
-from lessons.papers.words import gain_rows, number, trouble
+from lessons.papers.words import gain_rows, number, trouble, unprinted
 from lessons.scenes.run_spec import RunSpec
 
 _SCENES = {False: (RT4, RT4_DATA_SHEET), True: (RT4,)}
@@ -138,7 +138,7 @@ def _share_rows(results: Results) -> list[Row]:
         for label, share in _shares(results, _LIGHT_WRIST).items()
         if label in ("o_X", "o_Y", "o_Z", "q₁")
     ]
-    return [Row(text, "1", None, share, "the paper prints no such number") for text, share in rows]
+    return [unprinted(text, "1", share, "the paper prints no such number") for text, share in rows]
 
 
 def _others(results: Results) -> Table:

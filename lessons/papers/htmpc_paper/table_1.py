@@ -6,7 +6,7 @@ from lessons.experiments.jobs import Job, Results
 from lessons.papers.htmpc_paper.runs import SOURCE, example, hand_mm, normalised
 from lessons.papers.item import Item, PaperCheck, Row, Section, Table, between
 from lessons.papers.printed import printed
-from lessons.papers.words import number, trouble
+from lessons.papers.words import number, trouble, unprinted
 from lessons.plots.panels import Panel, Picture, PlotCurve
 
 EQUATIONS = {"cost": "(11)", "per_coordinate": "(12)"}
@@ -48,7 +48,7 @@ def _table(results: Results, quick: bool) -> Section:
             quantity = f"{label}: {words} of the EE error"
             rows.append(Row(quantity, "mm", paper[e][d][words], ours, why, topic=_TOPIC[f]))
         parts = [run.figure("parts", k, "normalised_base_error") for k in (0, 1)]
-        rows.append(Row(f"{label}: base error, Part 2", "1", None, parts[1], "Fig. 5 shows curves only"))
+        rows.append(unprinted(f"{label}: base error, Part 2", "1", parts[1], "Fig. 5 shows curves only"))
         zero = run.figure("line_search", "zero_share")
         step = run.figure("line_search", "mean_step")
         lines.append((label, *(number(x) for x in (largest, *parts, step, zero))))

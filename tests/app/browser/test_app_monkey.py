@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from playwright.sync_api import Browser
 
 from app.link.choice import SceneChoice
@@ -11,6 +12,7 @@ from benchmarks.monkey import walk
 from lessons.scenes.run_spec import RunSpec
 
 
+@pytest.mark.nightly("benchmarks/monkey.py", "app/link", "app/page")
 def test_a_minute_of_anything_breaks_nothing(browser: Browser) -> None:
     with StandardError() as said:
         server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)

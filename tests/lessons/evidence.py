@@ -1,36 +1,29 @@
-"""Finds every sentence that gives a reason, in all texts that users read, and the place of the sentence.
+"""Finds the sentences that give a reason and the numbers in explanations, and reads the notes of documents.
 
-`passages` yields the texts of the page, the command line and the site; `causal` selects the sentences that
-give a reason.
+A lesson has its notes beside its sentences. `evidence_of_documents.md` has those of the other texts that
+users read.
 """
 
 from __future__ import annotations
 
-import ast
 import re
 import tomllib
 from collections.abc import Iterator
+from functools import cache
+from itertools import pairwise
 from pathlib import Path
+from typing import NamedTuple
 
 from docs.further import further
-from docs.pages.api import INSIDE, PACKAGES
-from lessons.course import COURSE, load_lesson
+from lessons.course import COURSE, lesson_file, load_lesson
 from lessons.exercises import EXERCISES, load_exercise, start_of
-from lessons.teaching.lesson import Step
+from lessons.scenes.run_spec import RunSpec
+from lessons.teaching.lesson import Lesson, Step
+from lessons.teaching.note import Note
+from lessons.teaching.reader import read_lesson, read_note
 
 ROOT = Path(__file__).parents[2]
-_IN_DOCS = (
-    *(
-        "authoring",
-        "disagreements",
-        "export",
-        "house",
-        "instructors",
-        "results",
-        "serving",
-        "settings",
-    ),
-)
+_IN_DOCS = ("authoring", "disagreements", "export", "house", "instructors", "results", "serving", "settings")
 DOCUMENTS = {
     "README": "README.md",
     "contributing": "CONTRIBUTING.md",
@@ -60,6 +53,8 @@ CAUSE = re.compile(
 GIVEN = re.compile(r"\bgiven, not\b|\(given\b", re.IGNORECASE)
 """Marks a sentence whose reason was not measured here."""
 
+MARK = "¶"
+"""Stands for a mark of a note in a text."""
 _PROGRAM = re.compile(r"```.*?```|\$\$.*?\$\$", re.DOTALL)
 _LABEL = re.compile(r"\*\*(?:Likely cause|Our evidence|See it)\.\*\*")
 _END = re.compile(
@@ -72,6 +67,73 @@ _END = re.compile(
     """,
     re.VERBOSE,
 )
+_WORDS = "half|third|quarter|fifth|tenth|thousand|million|doubles|halves"
+_NUMBER = re.compile(rf"(?<![\w.−-])−?\d+(?:\.\d+)?(?!/s)|\b(?:{_WORDS})\b|{MARK}")
+"""Digits, and words that denote numbers; marks of notes."""
+_NAME = re.compile(
+    r"\(\d+\w?\)|(?:[Ll]evels?|[Jj]oints?|links|Remark|Part|Table|Theorem|Lemma|task|disc) "
+    r"[\dIVX]+(?: and \d)?"
+)
+
+
+class Told(NamedTuple):
+    """A sentence of a document or a part of it, and a note that allows it.
+
+    at: name of a document of `DOCUMENTS`, "glossary", or "further/LESSON" for the page of a lesson.
+    run: the run of the lesson's step with which the line of the note begins, if it names one.
+    """
+
+    at: str
+    says: str
+    note: Note
+    run: RunSpec | None
+
+
+@cache
+def documents() -> tuple[Told, ...]:
+    """Returns the notes of `evidence_of_documents.md`."""
+    path = Path(__file__).with_name("evidence_of_documents.md")
+    text = path.read_text(encoding="utf-8")
+    found, at, says = [], "", ""
+    for match in re.finditer(r"^(## |- |  - )(.*(?:\n +[^-\s].*)*)", text, re.MULTILINE):
+        line, words = text.count("\n", 0, match.start()) + 1, " ".join(match[2].split())
+        if match[1] == "## ":
+            at = words
+        elif match[1] == "- ":
+            says = words
+        else:
+            step = re.match(r"([\w-]+) step (\d+): ", words)
+            lesson = load_lesson(step[1]) if step else None
+            run = lesson.run_of(lesson.steps[int(step[2]) - 1]) if step and lesson else None
+            found.append(Told(at, says, read_note(path.name, line, words[step.end() if step else 0 :]), run))
+    return tuple(found)
+
+
+@cache
+def marked(name: str) -> Lesson:
+    """Returns a lesson of the course with the marks of its notes in its texts."""
+    path = lesson_file(name)
+    return read_lesson(name, str(path), path.read_text(encoding="utf-8"), marks=True)
+
+
+def with_marks(text: str) -> str:
+    """Returns a text in which `MARK` stands for each mark of a note, in front of the end of a sentence."""
+    return re.sub(rf"([.!?…,;:]+)({MARK}+)", r"\2\1", re.sub(r"\[\^[\w-]+\]", MARK, text))
+
+
+def unmarked_numbers(text: str) -> list[str]:
+    """Returns the numbers after which no mark stands before the next number or the end of the sentence.
+    Equations, names such as *level 1*, and numbers of equations are not numbers here."""
+    found = []
+    for sentence in sentences(re.sub(r"\$\$?.+?\$\$?", "§", with_marks(text), flags=re.DOTALL)):
+        tokens = [*_NUMBER.findall(_NAME.sub("§", sentence)), ""]
+        found += [one for one, following in pairwise(tokens) if MARK not in (one, following)]
+    return found
+
+
+def unmarked_reasons(text: str) -> list[str]:
+    """Returns the sentences that give a reason and have no mark."""
+    return [each for each in causal(with_marks(text)) if MARK not in each]
 
 
 def sentences(text: str) -> list[str]:
@@ -100,15 +162,10 @@ def of_step(step: Step) -> Iterator[str]:
 
 
 def passages() -> Iterator[tuple[str, str]]:
-    """Yields (place, text) of all texts. The place is written as in `interventions.Intervention.at`, as
-    "exercise/name", or as the name of a source file."""
+    """Yields (place, text) of all texts that users read, except for lessons and sources. The place is written
+    as in `Told.at`, or as "exercise/name"."""
     for name in COURSE:
-        lesson, more = load_lesson(name), further(name)
-        yield name, lesson.card.question
-        for number, step in enumerate(lesson.steps):
-            yield from ((f"{name}/{number}", text) for text in of_step(step))
-        if lesson.challenge is not None:
-            yield name, lesson.challenge.text
+        more = further(name)
         told = [line.words for line in more.derivation]
         told += [text for each in more.questions for text in (each.asked, each.answered)]
         yield from ((f"further/{name}", text) for text in told)
@@ -126,24 +183,3 @@ def passages() -> Iterator[tuple[str, str]]:
         yield name, (ROOT / file).read_text(encoding="utf-8")
     glossary = tomllib.loads((ROOT / "app/html/glossary.toml").read_text(encoding="utf-8"))
     yield from (("glossary", str(entry["means"])) for entry in glossary.values())
-    yield from _sources()
-
-
-def _sources() -> Iterator[tuple[str, str]]:
-    """Yields texts of the page and the command line, and the docstrings that the site shows."""
-    for top in (*PACKAGES, "app", "examples"):
-        for path in sorted((ROOT / top).rglob("*.py")):
-            place = path.relative_to(ROOT).as_posix()
-            if not place.startswith(("lessons/course/", "lessons/exercises/")):
-                yield from ((place, text) for text in _strings(path, place))
-
-
-def _strings(path: Path, place: str) -> Iterator[str]:
-    module = place.removesuffix(".py").replace("/", ".")
-    shown = place.startswith("examples/") or (not place.startswith("app/") and not module.startswith(INSIDE))
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    notes = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
-    for node in ast.walk(tree):
-        value = node.value if isinstance(node, ast.Constant) else None
-        if isinstance(value, str) and " " in value and (shown or id(node) not in notes):
-            yield value
