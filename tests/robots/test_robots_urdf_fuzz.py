@@ -81,9 +81,10 @@ def test_no_mutation_of_a_urdf_raises_anything_but_an_input_error(data: st.DataO
 
 TAGS = ("box", "sphere", "cylinder", "mesh", "cone", "geometry", "visual", "collision", "origin", "color")
 SHAPES = (
-    '<visual><origin xyz="0 0 1" rpy="0 1 0"/><geometry><box size="1 1 1"/></geometry><material name="m">'
-    '<color rgba="1 0 0 1"/></material></visual>'
-    '<visual><geometry><cylinder radius="1" length="2"/></geometry><material name="m"/></visual><collision><geometry><sphere radius="1"/></geometry></collision>'
+    '<visual><origin xyz="0 0 1" rpy="0 1 0"/><geometry><box size="1 1 1"/></geometry>'
+    '<material name="m"><color rgba="1 0 0 1"/></material></visual>'
+    '<visual><geometry><cylinder radius="1" length="2"/></geometry><material name="m"/></visual>'
+    '<collision><geometry><sphere radius="1"/></geometry></collision>'
 )
 
 
