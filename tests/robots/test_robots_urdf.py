@@ -231,6 +231,7 @@ BOX = '<visual><geometry><box size="0.1 0.1 0.1"/></geometry></visual>'
         ('<collision><geometry><box size="1 2"/></geometry></collision>', "size is '1 2'"),
         ("<visual><geometry><cone/></geometry></visual>", "one of box, cylinder, sphere, mesh"),
         ("<visual/>", "one of box"),
+        ('<visual><geometry/><geometry><box size="1 1 1"/></geometry></visual>', "one of box"),
         ('<visual><origin xyz="0 0 nan"/><geometry><sphere radius="1"/></geometry></visual>', "xyz is"),
     ],
 )
