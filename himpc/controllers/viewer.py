@@ -206,6 +206,6 @@ def wanted(form: StackForm, previews: Mapping[str, Preview], N: int) -> tuple[Ar
     for task, rows in zip(form.tasks, form.sizes, strict=True):
         preview = still(N, rows) if isinstance(task, Damping) else previews[task.name]
         for column, each in zip(found, preview[1:], strict=True):
-            column.append(each)
+            column.append(each[: N + 1])
     displacement, velocity, acceleration = (np.concatenate(column, axis=1) for column in found)
     return displacement, velocity, acceleration
