@@ -11,19 +11,22 @@ import pinocchio as pin
 LARGEST_EIGENVALUE = 1.5
 """λ_max(M⁻¹M̄) of a suggested M̄ over the sampled configurations; the limit of stability is 2."""
 
-_WIDEST = 40.0  # widest sampled range, rad or m; further turns repeat the same configurations
+_WIDEST = 4.0 * np.pi + 1e-6  # widest sampled range, rad or m; further turns repeat the same configurations
 
 
 def finite_range(q_lower: np.ndarray, q_upper: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Returns the ends of the ranges in which configurations are sampled: the limits of a joint with two
-    limits, ±π for an unbounded joint, and otherwise the only limit and the angle one turn away from it."""
+    limits, ±π for an unbounded joint, and otherwise the only limit and the angle one turn away from it. Of a
+    range of more than two turns only the part within ±π is used, or half a turn if it has none."""
     turn = 2.0 * np.pi
     from_above = np.where(np.isfinite(q_upper), q_upper - turn, -np.pi)
     from_below = np.where(np.isfinite(q_lower), q_lower + turn, np.pi)
     lower = np.where(np.isfinite(q_lower), q_lower, from_above)
     upper = np.where(np.isfinite(q_upper), q_upper, from_below)
-    middle, half = 0.5 * (lower + upper), np.minimum(0.5 * (upper - lower), 0.5 * _WIDEST)
-    return middle - half, middle + half
+    wide = upper - lower > _WIDEST
+    low = np.maximum(lower, np.minimum(-np.pi, upper - np.pi))
+    high = np.minimum(upper, np.maximum(np.pi, low + np.pi))
+    return np.where(wide, low, lower), np.where(wide, high, upper)
 
 
 def sample_configurations(
