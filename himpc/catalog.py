@@ -23,6 +23,7 @@ VELOCITY_CONTROLLERS: dict[str, str] = {
     "htmpc_wpt": "HTMPC without preview: it receives a trajectory as separate waypoints",
     "stmpc": "single-task MPC: it solves only the first task of the window",
     "htidkc": "hierarchical-task inverse differential kinematics: cascaded QPs, no prediction",
+    "placo": "inverse kinematics by the library placo: one QP, only level 1 is strict, no prediction",
 }
 """Velocity-level controllers: name and description."""
 

@@ -22,6 +22,7 @@ DOORS = {
     "mujoco": ("robots/plant.py", "robots/mechanics/"),
     "daqp": ("himpc/qp.py",),
     "proxsuite": ("himpc/qp.py",),
+    "placo": ("himpc/htmpc/placo_control.py",),
     "numba": ("himpc/compilation/",),
     "llvmlite": ("himpc/export/objects.py",),
     "casadi": ("himpc/qp.py",),

@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from himpc.htmpc.base import G, base_joints
     from himpc.htmpc.htidkc import HTIDKC
     from himpc.htmpc.htmpc import HTMPC
+    from himpc.htmpc.placo_control import Placo
     from himpc.htmpc.plan import LevelEvidence, VelocityPlan
     from himpc.htmpc.settings import (
         FORMULATIONS,
@@ -31,6 +32,7 @@ __all__ = [
     "LevelEvidence",
     "MotionBounds",
     "MotionLimits",
+    "Placo",
     "VelocityPlan",
     "base_joints",
     "bounds",
@@ -50,6 +52,7 @@ __getattr__ = lazily(
         "HTMPCSettings": "settings",
         "LevelEvidence": "plan",
         "MotionLimits": "settings",
+        "Placo": "placo_control",
         "VelocityPlan": "plan",
         "base_joints": "base",
         "bounds": "settings",

@@ -89,6 +89,7 @@ class VelocityPlan(NamedTuple):
         bounds: the bounds that apply now.
         clearance: m, the smallest signed distance to an obstacle along the plan; infinite if none is near.
         step_us: wall time from state to plan, microseconds, kinematics included.
+        notice: one sentence for the user if the controller could not do what was asked; None otherwise.
     """
 
     command: Array
@@ -102,6 +103,7 @@ class VelocityPlan(NamedTuple):
     bounds: MotionBounds
     clearance: float
     step_us: float
+    notice: str | None = None
 
     def binding(self, joint_names: Sequence[str]) -> list[Binding]:
         """Returns all active constraints, level by level."""

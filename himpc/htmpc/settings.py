@@ -18,6 +18,7 @@ from robots.ranges import Range, Shown, check_fields
 Array = NDArray[np.float64]
 Formulation = Literal["proximal", "paper"]
 Lexicographic = Literal["per_coordinate", "cost"]
+FirstLevel = Literal["scaled", "hard", "soft"]
 
 FORMULATIONS: tuple[Formulation, ...] = ("proximal", "paper")
 LEXICOGRAPHIC: tuple[Lexicographic, ...] = ("per_coordinate", "cost")
@@ -70,9 +71,11 @@ class HTMPCSettings:
         velocity_effort: S of (10) on the velocities (positions have no weight).
         input_effort: R of (10); None: 0.1 for the base's joints, 0.02 for all others.
         change_effort: W of (10) on Δu; None: 0.1 for the base's joints, 0 for all others.
-        gains: used by HTIDKC only, 1/s: ẋ = ṙ + gain · (r − x) at each enabled level. The last gain applies
-            to all further levels.
-        rho: used by HTIDKC only: ρ, the weight of ‖q̇‖² at every level.
+        gains: used by HTIDKC and placo only, 1/s: ẋ = ṙ + gain · (r − x) at each enabled level. The last gain
+            applies to all further levels.
+        rho: used by HTIDKC and placo only: ρ, the weight of ‖q̇‖², for HTIDKC at every level.
+        first_level: used by placo only: how it treats the first enabled level, see
+            `himpc.htmpc.placo_control.Placo`.
         obstacles: obstacles of the collision avoidance (7c).
         delay_s: delay of a command in s. The measured state is predicted forward by this time. The caller
             samples the references at t + delay_s.
@@ -113,10 +116,15 @@ class HTMPCSettings:
     change_effort: Annotated[Weight | None, Range(0.0), Shown(
         "W changes", _EFFORT, "", 0.0, 1.0, 0.01)] = None
     gains: Annotated[tuple[float, ...], Range(0.0), Shown(
-        "Gains", "Gains of HTIDKC, one per level: ẋ = ṙ + gain · (r − x)", "1/s",
+        "Gains", "Gains of HTIDKC and placo, one per level: ẋ = ṙ + gain · (r − x)", "1/s",
     ), Shown("Gain of level *", "ẋ = ṙ + gain · (r − x)", "1/s", 0.0, 3.0, 0.05)] = (0.5, 0.3)
     rho: Annotated[float, Range(1e-8, 1e3), Shown(
-        "ρ", "Weight of ‖q̇‖² in every level of HTIDKC", low=0.001, high=1.0, log=True)] = 0.01
+        "ρ", "Weight of ‖q̇‖² in every level of HTIDKC, and in the QP of placo", low=0.001, high=1.0,
+        log=True)] = 0.01
+    first_level: Annotated[FirstLevel, Shown(
+        "First level of placo",
+        "scaled: kept exactly, with a velocity that is reduced as far as the limits require. hard: kept "
+        "exactly, or the robot brakes. soft: weighed by its Q like the other levels")] = "scaled"
     limits: MotionLimits = field(default_factory=MotionLimits)
     obstacles: tuple[Obstacle, ...] = ()
     margin_m: Annotated[float, Range(0.0, 1.0), Shown(

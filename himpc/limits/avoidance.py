@@ -21,8 +21,6 @@ class Avoidance:
         pull: m, the largest error on which tasks of positions act while `on` or with `Limits.stall_guard`;
             for other tasks the largest error is TURN_PULL · pull, rad. A larger error, for example of a
             target that cannot be reached, acts like the largest one. 0: no limit.
-        velocity_margin: used while `on` or with `Limits.stall_guard`. Time-delay estimation reacts late when
-            other joints accelerate a joint that is at its limit.
     """
 
     # fmt: off
@@ -50,8 +48,8 @@ class Avoidance:
     velocity_margin: Annotated[float, Range(0.0, 0.9), Shown(
         "Free velocity",
         "Share of the velocity limits that is not used while distances are kept or a blocked robot is "
-        "guarded, for the delay of time-delay estimation", "", 0.0, 0.5, 0.01, name="margin of velocities",
-        group="Distances")] = 0.08
+        "guarded, for the delay of time-delay estimation",
+        "", 0.0, 0.5, 0.01, name="margin of velocities", group="Distances")] = 0.08
     # fmt: on
 
     def __post_init__(self) -> None:

@@ -17,6 +17,7 @@ CONTROLLER_COLOURS: dict[str, str] = {
     "htmpc_wpt": "#56B4E9",
     "stmpc": "#E07A00",
     "htidkc": "#009E73",
+    "placo": "#C2185B",
 }
 """Colours that can be distinguished with the common colour-vision deficiencies and, by lightness, in grey
 print."""

@@ -115,4 +115,6 @@ def _limits(recording: Recording) -> dict[str, dict[str, float | None]]:
 def _qp_method(settings: VelocitySettings) -> str:
     """Returns the method that solves the QPs. If the compiled method finds no solution, DAQP is tried."""
     solver = settings.htmpc.solver
+    if settings.controller == "placo":
+        return "placo"
     return OWN_METHOD if solver == "daqp" and settings.controller != "htidkc" else solver

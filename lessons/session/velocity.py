@@ -77,6 +77,7 @@ class VelocitySession(Session):
         self._commands: Commands | None = None
         self._commanded = self._input = np.zeros(self.robot.n)
         self._nearest = np.full(2, np.inf)
+        self._noticed: str | None = None
 
     @property
     def over(self) -> bool:
@@ -122,6 +123,7 @@ class VelocitySession(Session):
         if settings.controller != self.settings.controller:
             self.controller = fitted if self.controller is not None else None
         self.settings, self.bounds, self._distances = settings, limits, distances
+        self._noticed = None
 
     def _for_controller(self, settings: VelocitySettings) -> HTMPCSettings:
         """Returns the controller's settings for the levels of this tick."""
@@ -185,6 +187,9 @@ class VelocitySession(Session):
         ahead, htmpc = t + controller.settings.delay_s, settings.htmpc
         plan = controller.step(state.q, state.v, previews(references, ahead, htmpc.dt, htmpc.horizon))
         self.plan, self._solve_ms = plan, 1e-3 * plan.step_us
+        if plan.notice not in (None, self._noticed):
+            self.notices.append(plan.notice)  # once; the level's fallback shows how long it lasts
+            self._noticed = plan.notice
         if (felt := settings.felt(self._solve_ms)) != self.plant.settings:
             self.plant.configure(felt)
         row = self._row

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.htmpc import HTIDKC, HTMPC, HTMPC_WPT, STMPC, HTMPCSettings, VelocityPlan
+from himpc.htmpc import HTIDKC, HTMPC, HTMPC_WPT, STMPC, HTMPCSettings, Placo, VelocityPlan
 from himpc.references import Preview
 from robots import Robot
 
@@ -39,6 +39,7 @@ _MAKERS: dict[str, Callable[[Robot, HTMPCSettings], VelocityController]] = {
     "htmpc_wpt": HTMPC_WPT,
     "stmpc": STMPC,
     "htidkc": HTIDKC,
+    "placo": Placo,
 }
 
 

@@ -23,7 +23,7 @@ from robots.ranges import Folder, Shown
 STAGE_WEIGHT: dict[str, float] = {"proximal": 10.0, "paper": 1.0}
 """Q of (8) with which each formulation was tuned; the choice of a formulation sets this Q."""
 
-_RATE_HZ = {"htidkc": 50.0}
+_RATE_HZ = {"htidkc": 50.0, "placo": 50.0}
 """Control rates of the controllers whose rate is not 10 Hz. The choice of a controller sets the rate."""
 
 

@@ -46,10 +46,15 @@ def allocated() -> int:
     return size["current"] + size["mmap"] - size["fast"] - size["rest"]
 
 
-@pytest.mark.parametrize("scene", ["iiwa14-hold", "planar3-circle", "ridgeback-ur10-drag"])
-def test_ticks_keep_nothing(scene: str) -> None:
+PLACO = RunSpec("iiwa14-htmpc", controller="placo")
+
+
+@pytest.mark.parametrize(
+    "run_spec", [*map(RunSpec, ("iiwa14-hold", "planar3-circle", "ridgeback-ur10-drag")), PLACO], ids=str
+)
+def test_ticks_keep_nothing(run_spec: RunSpec) -> None:
     """A leak of 80 bytes per tick would be 5 MB per minute."""
-    body = SimulationRunner(SceneChoice(RunSpec(scene)))
+    body = SimulationRunner(SceneChoice(run_spec))
 
     def run() -> None:
         for _ in range(TICKS // 20):
@@ -65,6 +70,21 @@ def test_ticks_keep_nothing(scene: str) -> None:
         assert allocated() - before < 8 * TICKS
     finally:
         body.close()
+
+
+def test_ten_changes_of_the_scene_make_one_robot_of_placo() -> None:
+    """placo never frees a robot, of which each has 0.2 MB: ten scenes with placo must not have ten."""
+
+    def visit(times: int) -> int:
+        for _ in range(times):
+            body = SimulationRunner(SceneChoice(PLACO))
+            body.tick(20)
+            body.close()
+        return allocated()
+
+    visit(3)
+    before = visit(1)
+    assert visit(10) - before < 500_000
 
 
 def test_scenes_that_were_left_keep_nothing() -> None:

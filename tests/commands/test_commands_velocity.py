@@ -47,7 +47,7 @@ def test_scenes_and_controllers_are_listed(capsys: pytest.CaptureFixture[str]) -
     assert SQUARE in {each["name"] for each in json.loads(capsys.readouterr().out)}
     assert main(["controllers", "--json", "-"]) == 0
     names = {each["name"] for each in json.loads(capsys.readouterr().out)}
-    assert names >= {"himpc", "htmpc", "htmpc_wpt", "stmpc", "htidkc"}
+    assert names >= {"himpc", "htmpc", "htmpc_wpt", "stmpc", "htidkc", "placo"}
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from htmpc_problems import at_home, mobile_settings, previews
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from himpc.htmpc import HTIDKC, HTMPC, HTMPC_WPT, STMPC, VelocityPlan
+from himpc.htmpc import HTIDKC, HTMPC, HTMPC_WPT, STMPC, Placo, VelocityPlan
 from himpc.htmpc.settings import FORMULATIONS
 from himpc.references import Hold
 from robots import Robot, load_robot
@@ -32,7 +32,7 @@ HOSTILE = (
     -60.0,
     8.0,
 )
-CONTROLLERS = (HTMPC, HTMPC_WPT, STMPC, HTIDKC)
+CONTROLLERS = (HTMPC, HTMPC_WPT, STMPC, HTIDKC, Placo)
 
 
 @pytest.fixture(scope="module")

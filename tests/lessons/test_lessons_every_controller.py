@@ -1,4 +1,5 @@
-"""Every registered controller holds every fixed-base robot of the catalog."""
+"""Every registered controller holds every robot: those of the catalog at torque level, and those of the
+scenes at velocity level."""
 
 from __future__ import annotations
 
@@ -8,10 +9,12 @@ import numpy as np
 import pytest
 
 from himpc import CONTROLLERS
+from himpc.catalog import VELOCITY_CONTROLLERS
 from lessons.recording.recording import Recording
 from lessons.recording.run import run
 from lessons.scenes.catalog import torque_scene
 from lessons.scenes.names import SCENES
+from lessons.scenes.run_spec import RunSpec
 from robots import CATALOG, load_robot
 
 SECONDS, AGAIN = 2.0, 0.3
@@ -36,3 +39,19 @@ def test_every_controller_holds_every_robot(controller: str, robot: str) -> None
         np.testing.assert_array_equal(first[name][: len(again.rows)], again[name])
     assert not first.session.notices
     assert np.abs(first["q"] - load_robot(robot).home).max() < 1e-2
+
+
+@pytest.mark.parametrize("scene", ["iiwa14-htmpc", "panda-htmpc", "ridgeback-ur10-drag"])
+@pytest.mark.parametrize("controller", VELOCITY_CONTROLLERS)
+def test_every_velocity_controller_holds_every_robot(controller: str, scene: str) -> None:
+    """For 1 s the robot stays in place, and its commands are within the limits. A second run gives bitwise
+    the same first 0.2 s."""
+    first, again = (
+        run(RunSpec(scene, controller=controller, duration=seconds).prepared()) for seconds in (1.0, 0.2)
+    )
+    assert first.session.settings.controller == controller
+    for name in ("q", "v", "tau"):
+        assert np.isfinite(first[name]).all()
+        np.testing.assert_array_equal(first[name][: len(again.rows)], again[name])
+    assert not first.session.notices
+    assert np.abs(first["q"] - first.session.robot.home).max() < 1e-2

@@ -17,6 +17,7 @@ RUNS = (
     "planar3-plane/himpc",
     "ridgeback-ur10-drag/htmpc",
     "ridgeback-ur10-square/htidkc",
+    "iiwa14-htmpc/placo",
 )
 
 LOOK = """

@@ -47,6 +47,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> set[str]:
         ("iiwa14-htmpc", "htmpc", ("solver=proxqp",), "proxqp"),
         ("iiwa14-htmpc", "htidkc", (), "daqp"),
         ("iiwa14-htmpc", "htidkc", ("solver=proxqp",), "proxqp"),
+        ("iiwa14-htmpc", "placo", (), "placo"),
     ],
 )
 def test_the_reported_solver_is_the_one_that_ran(
@@ -56,7 +57,7 @@ def test_the_reported_solver_is_the_one_that_ran(
     spec = RunSpec(scene, controller=controller, set=(*scaled, *settings), duration=0.1)
     found = summary(run(spec.prepared()))["solver"]
     assert found["backend"] == told and found["fallbacks"] == {}
-    assert asked == {told} - {OWN_METHOD, None}
+    assert asked == {told} - {OWN_METHOD, "placo", None}
 
 
 @pytest.mark.parametrize("controller", CONTROLLERS)

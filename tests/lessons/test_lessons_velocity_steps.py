@@ -10,10 +10,12 @@ import pytest
 
 from himpc.htmpc import HTMPC, VelocityPlan
 from lessons.events import Event, MoveLevel, MoveTarget, Reset, Set
-from lessons.scenes.catalog import load_scene, prepared
+from lessons.scenes.catalog import as_torque_scene, load_scene, prepared
+from lessons.scenes.run_spec import RunSpec
 from lessons.scenes.velocity_scene import VelocityScene
 from lessons.session.velocity import VelocitySession
-from lessons.session.velocity_rows import AT_ACCELERATION, AT_VELOCITY
+from lessons.session.velocity_rows import AT_ACCELERATION, AT_VELOCITY, FALLBACKS
+from robots import InputError
 from robots.stretch import horizontal_reach
 
 OUT_OF_REACH = MoveTarget("base", (-1.5, 0.0))
@@ -184,3 +186,39 @@ def test_the_robot_feels_the_time_of_planning_if_asked_to(monkeypatch: pytest.Mo
     made.post(Set("delay_measured", False))
     made.tick()
     assert made.plant.settings == made.settings.plant
+
+
+def test_the_learner_reads_once_what_placo_says() -> None:
+    """placo with a hard first level cannot follow a target that jumps far. The session says so once, until
+    the settings change; the level shows its fallback at every tick, and the robot does not move."""
+    made = session("iiwa14-htmpc", "controller=placo", "first_level=hard")
+    made.tick()
+    assert made.notices == []
+    assert made.plan is not None
+    x, y, z = made.plan.values["position"]
+    made.post(MoveTarget("position", (x, y + 0.5, z)))
+    rows = [made.tick().copy() for _ in range(20)]
+    (notice,) = made.notices
+    assert "placo found no velocity, and the robot brakes: Problem: Infeasible QP" in notice
+    at = made.layout.fields
+    assert {float(row[at["rung/position"]][0]) for row in rows} == {float(FALLBACKS.index("keep"))}
+    np.testing.assert_allclose(rows[-1][at["q"]], made.robot.home, atol=1e-9)
+    made.post(Set("first_level", "scaled"))
+    rows = [made.tick().copy() for _ in range(150)]
+    assert len(made.notices) == 1
+    assert np.linalg.norm(rows[-1][at["error/position"]]) < np.linalg.norm(rows[0][at["error/position"]]) / 2
+    made.post(Set("first_level", "hard"))
+    made.post(MoveTarget("position", (3.0, 0.0, 0.5)))
+    made.tick()
+    assert len(made.notices) == 2
+
+
+def test_placo_is_not_exported() -> None:
+    """Export takes torques: a scene at velocity level is refused, and placo at torque level as well."""
+    velocities = RunSpec("iiwa14-htmpc", controller="placo").prepared()
+    with pytest.raises(InputError, match="is driven by velocities; export takes torques"):
+        as_torque_scene(velocities, "export")
+    with pytest.raises(
+        InputError, match="controller 'placo' commands velocities and scene 'iiwa14-hold' takes"
+    ):
+        RunSpec("iiwa14-hold", controller="placo").prepared()

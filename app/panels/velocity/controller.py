@@ -67,8 +67,8 @@ class HtmpcPanel:
             for part in ("base", "arm") if base_joints(self._robot) else ("arm",):
                 self._effort("input_effort", "R", part)
                 self._effort("change_effort", "W", part)
-            with gui.add_folder("HTIDKC", expand_by_default=False):
-                self._controls.add("gains.1", "gains.2")
+            with gui.add_folder("HTIDKC and placo", expand_by_default=False):
+                self._controls.add("gains.1", "gains.2", "first_level")
 
     def _effort(self, path: str, symbol: str, part: str) -> None:
         """Adds one slider for the weights of a group of joints."""
