@@ -4,6 +4,7 @@ inertia."""
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import reduce
 
 import numpy as np
 import pinocchio as pin
@@ -61,7 +62,8 @@ def _from_shapes(root: Element, carried: str) -> tuple[pin.Inertia, str]:
     link = named(root, "link")[carried]
     for tag in ("collision", "visual"):
         parts = [part for shape in link.findall(tag) if (part := _solid(shape)) is not None]
-        if parts and (whole := sum(parts[1:], parts[0])).mass >= _LEAST_MASS:
+        whole = reduce(lambda one, other: one + other, parts, pin.Inertia.Zero())
+        if whole.mass >= _LEAST_MASS:
             return whole, "the solid of its shapes"
     ends = [
         placement(joint).translation for joint in root.findall("joint") if end_of(joint, "parent") == carried

@@ -209,9 +209,8 @@ def test_what_cannot_be_is_nothing() -> None:
 
 def test_a_cut_that_misses_what_is_allowed_says_so() -> None:
     problem = LevelProblem(
-        "a", np.array([[[0.0, 0.0, 1.0]]]), np.ones((1, 1, 1)), np.zeros((1, 1)), np.zeros((1, 1)),
-        np.ones(1), np.ones((1, 1, 1)), np.ones(3), 1, 1.0,
-    )  # fmt: skip
+        "a", np.array([[[0.0, 0.0, 1.0]]]), np.ones((1, 1, 1)), np.zeros((1, 1)), np.ones(1), np.ones(3), 1
+    )
     rows = Rows(np.ones((1, 1)), -np.ones((1, 3)), np.ones((1, 3)), (TORQUE,))
     U = np.zeros((1, 3))
     assert cut([problem], rows, [U], (0, 1), U).levels[0].leaves.span.shape == (2, 2)
