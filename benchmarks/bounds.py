@@ -4,7 +4,8 @@
                                 [--velocity SCALE …] [--torque SCALE …] [--printed]
 
 Every torque scene runs with every horizon and every scale of its velocity and torque limits, while all its
-targets jump every 80 ms. For each run the program prints a line of a Markdown table: the number of QPs
+targets jump every 80 ms, without distances and without the guard of a blocked robot (`avoidance.on=false`,
+`limits.stall_guard=false`). For each run the program prints a line of a Markdown table: the number of QPs
 without a verified optimum, the largest joint velocity as a share of its limit, the processor time of the
 longest and of the median step, and the largest share of its budget that a tick used. --quick runs only the
 hardest cells; --printed also runs himpc_printed. The exit code is 1 if more than 1 % of the QPs of a
@@ -80,7 +81,14 @@ QUICK = (
 def session_of(cell: Cell, controller: str) -> TorqueSession:
     """Returns a session with the settings of a cell."""
     scene = torque_scene(cell.scene)
-    limits = replace(scene.settings.limits, velocity_scale=cell.velocity, torque_scale=cell.torque)
+    # Without distances and without the guard of a blocked robot, as in the scenes of the papers.
+    limits = replace(
+        scene.settings.limits,
+        velocity_scale=cell.velocity,
+        torque_scale=cell.torque,
+        stall_guard=False,
+        avoidance=replace(scene.settings.limits.avoidance, on=False),
+    )
     settings = replace(scene.settings, horizon=cell.N, controller=controller, limits=limits)
     return TorqueSession(replace(scene, settings=settings))
 

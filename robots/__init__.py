@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from robots.catalog import CATALOG
     from robots.collision import Ball, Box, Floor
     from robots.errors import InputError
-    from robots.inertia import convergence_eigenvalues, convergence_gauge, suggest_M_bar
+    from robots.inertia import convergence_eigenvalues, convergence_gauge, suggest_M_bar, tracking_bandwidth
     from robots.loading.load import check_urdf, load_robot, load_urdf_text
     from robots.nominal import NominalModel, NominalSettings
     from robots.plant import Plant
@@ -40,6 +40,7 @@ __all__ = [
     "load_robot",
     "load_urdf_text",
     "suggest_M_bar",
+    "tracking_bandwidth",
 ]
 
 __getattr__ = lazily(
@@ -66,5 +67,6 @@ __getattr__ = lazily(
         "load_robot": "loading.load",
         "load_urdf_text": "loading.load",
         "suggest_M_bar": "inertia",
+        "tracking_bandwidth": "inertia",
     },
 )

@@ -23,7 +23,8 @@ class PlantSettings:
         payload_kg: kg, a point mass at the robot's tip frame.
         friction: N·m, Coulomb friction per joint (one number or one per joint; N for prismatic joints).
             MuJoCo models friction as a soft constraint: a joint that should stick moves very slowly.
-        armature: kg·m², reflected rotor inertia, added to M_ii.
+        armature: kg·m², reflected rotor inertia, added to M_ii; 0: the one that the import of the robot's
+            URDF assumed (0 for the robots of the catalog).
         inertia_scale: factor on the rotational inertia of this body about its centre of mass, whose position
             is not changed. If both factors are equal, the body has another density. The payload is not
             scaled.

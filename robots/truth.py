@@ -27,7 +27,8 @@ def true_model(robot: Robot, settings: PlantSettings) -> pin.Model:
         payload = pin.Inertia(settings.payload_kg, np.zeros(3), np.zeros((3, 3)))
         if frame.parentJoint > 0:
             model.inertias[frame.parentJoint] += frame.placement.act(payload)
-    model.armature = settings.per_joint("armature", robot.n)
+    armature = settings.per_joint("armature", robot.n)
+    model.armature = np.where(armature > 0.0, armature, robot.model.armature)
     if not settings.gravity:
         model.gravity.linear = np.zeros(3)
     return model

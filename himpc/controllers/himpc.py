@@ -52,7 +52,7 @@ class HIMPC(TorqueController):
     def reset(self, tau_0: Array) -> None:
         """Clears plan and memory; τ₀ (n,) N·m is the torque acting now, and q̈ and ẍ start at zero."""
         super().reset(tau_0)
-        self._guard = guard_of(self._settings, len(self._form.tasks), self.robot.tau_limit)
+        self._guard = guard_of(self._settings, len(self._form.tasks), self.robot)
         self.kernel.forget()
         self._adaptation: Adaptation | None = None
         self._weight: dict[str, float] = {}
@@ -78,7 +78,7 @@ class HIMPC(TorqueController):
         check_solver(settings, self.solves)
         prepared = prepare(self.robot, settings)
         goal = in_force(self.robot, settings.limits)
-        guard = guard_of(settings, len(prepared.form.tasks), self.robot.tau_limit)
+        guard = guard_of(settings, len(prepared.form.tasks), self.robot)
         load = LoadModel(self.robot, settings.nominal) if settings.M_bar_adapt else None
         kernel = self._compile(settings, prepared)
         # Everything that may raise is above.

@@ -103,8 +103,8 @@ class PrintedTick:
         N, T_s = settings.horizon, settings.T_s
         before = self._solutions
         with np.errstate(all="ignore"):
-            now, values, errors = self._viewer.at(q, v, tau_0, M_bar, limits, previews)
             path = printed.knots(self._predicted, q, v, N, T_s)
+            now, values, errors = self._viewer.at(q, v, tau_0, M_bar, limits, previews, path)
             pulled = np.concatenate([errors[task.name] for task in form.tasks])
             pulled = form.pulling(pulled, self._pull) if math.isfinite(self._pull) else pulled
             levels = [

@@ -1,5 +1,5 @@
 """The guards of a controller, which lower velocity limits: one for controllers that keep distances, and one
-for the others, which stops a robot that presses."""
+for the others, which also stops a robot that presses."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from himpc.constants import PROGRESS
 from himpc.formulation.settings import Settings
 from himpc.limits import LimitsInForce
-from himpc.limits.windup import Windup, free, largest_error, stopped, wound_up
-from himpc.tick.distances import Distances
+from himpc.limits.windup import Windup, free, largest_error, stopped, taken_back, wound_up
+from himpc.tick.distances import Anywhere, Distances, carried
 from himpc.tick.kernel.slow_down import slow_down
+from robots import Robot
 
 Array = NDArray[np.float64]
 
@@ -42,7 +43,7 @@ class StallGuard:
         self._limits: tuple[LimitsInForce, Array, Array] | None = None
 
     def limits(
-        self, limits: LimitsInForce, tau: Array, v: Array, distances: Distances | None
+        self, limits: LimitsInForce, tau: Array, v: Array, distances: Distances | Anywhere | None
     ) -> LimitsInForce:
         """Returns the limits in force at this tick, with lower velocity limits.
 
@@ -70,42 +71,63 @@ class StallGuard:
 
 @final
 class WindupGuard:
-    """Contains the degree to which a controller without distances has wound up its torque.
+    """Guards a robot without distances. It slows joints down like a guard with distances whose obstacle is
+    always near, and stops a robot that presses.
 
     Attributes:
-        errors, fastest: as for `StallGuard`; the errors have no effect.
-        windup: the degree; None before the first tick.
+        errors, fastest: as for `StallGuard`.
+        windup: the degree to which the torque is wound up; None before the first tick.
     """
 
-    def __init__(self, largest_torque: Array, T_s: float) -> None:
-        """largest_torque: (n,) N·m."""
-        self._largest_torque, self._T_s = largest_torque, T_s
-        self.errors: Array | None = None
-        self.fastest = 0.0
+    def __init__(self, stall: StallGuard, robot: Robot, M_bar: Array, margin: float, T_s: float) -> None:
+        """stall: the guard for an obstacle that is near. M_bar: (n,) kg·m². margin: see `Avoidance`."""
+        self._stall, self._around, self._T_s = stall, Anywhere(carried(robot), margin), T_s
+        self._v_limit, self._largest = robot.v_limit, taken_back(M_bar, robot.v_limit, T_s)
         self.windup: Windup | None = None
+
+    @property
+    def errors(self) -> Array | None:
+        return self._stall.errors
+
+    @errors.setter
+    def errors(self, errors: Array) -> None:
+        self._stall.errors = errors
+
+    @property
+    def fastest(self) -> float:
+        return self._stall.fastest
+
+    @fastest.setter
+    def fastest(self, fastest: float) -> None:
+        self._stall.fastest = fastest
 
     def limits(self, limits: LimitsInForce, tau: Array, v: Array, _: object) -> LimitsInForce:
         """Returns the limits in force at this tick, see `StallGuard.limits`."""
         moves = self.fastest > PROGRESS
         before = free(tau) if self.windup is None else self.windup
-        self.windup = wound_up(before, tau, v, self._largest_torque, moves, self._T_s)
-        return stopped(limits, self.windup)
+        self.windup = wound_up(before, tau, v, self._largest, self._v_limit, moves, self._T_s)
+        return stopped(self._stall.limits(limits, tau, v, self._around), self.windup)
 
     @property
     def largest_error(self) -> float:
         """The largest error on which tasks act at this tick, m or rad."""
-        return math.inf if self.windup is None else largest_error(self.windup)
+        pressing = math.inf if self.windup is None else largest_error(self.windup)
+        return min(self._stall.largest_error, pressing)
 
 
-def guard_of(settings: Settings, tasks: int, largest_torque: Array) -> StallGuard | WindupGuard | None:
+def guard_of(settings: Settings, tasks: int, robot: Robot) -> StallGuard | WindupGuard | None:
     """Returns the guard for a controller; None if the settings have no guard.
 
     Args:
         settings: the settings of the controller.
         tasks: the number of its tasks.
-        largest_torque: (n,) N·m.
+        robot: the robot that it controls.
     """
     limits, T_s = settings.limits, settings.T_s
-    if limits.avoidance.on:
-        return StallGuard(tasks, T_s, limits.avoidance.largest_error)
-    return WindupGuard(largest_torque, T_s) if limits.stall_guard else None
+    avoidance = limits.avoidance
+    if not avoidance.on and not limits.stall_guard:
+        return None
+    stall = StallGuard(tasks, T_s, avoidance.pull or math.inf)
+    if avoidance.on:
+        return stall
+    return WindupGuard(stall, robot, np.array(settings.M_bar), avoidance.velocity_margin, T_s)

@@ -68,6 +68,7 @@ class Viewer:
         M_bar: Array,
         force: LimitsInForce,
         previews: Mapping[str, Preview],
+        path: Array | None = None,
     ) -> tuple[View, dict[str, Array], dict[str, Array]]:
         """Returns the view of a tick, and x and x̃ of every task by its name. The tick becomes the memory of
         the next tick.
@@ -78,6 +79,8 @@ class Viewer:
             M_bar: diagonal of M̄, (n,) kg·m².
             force: the limits in force.
             previews: the previews of all tasks.
+            path: q̂ at knots 0 … N−1, (N, n), along which references in the coordinates of a task are taken;
+                None: at the measured q.
         """
         settings, form, robot = self._settings, self.form, self._robot
         T_s, N = settings.T_s, settings.horizon
@@ -85,6 +88,8 @@ class Viewer:
         errors: dict[str, Array] = {}
         h = _NUDGE / max(1.0, float(np.abs(v).max()))
         here = Configuration(robot, self._data, q, v, previews=previews)
+        if path is not None:
+            here = Configuration(robot, self._data, q, v, path[1:], previews)
         J = form.jacobian(here)[0]
         error = measure(form.tasks, here, previews, values, errors)
         if self._off:
@@ -201,6 +206,6 @@ def wanted(form: StackForm, previews: Mapping[str, Preview], N: int) -> tuple[Ar
     for task, rows in zip(form.tasks, form.sizes, strict=True):
         preview = still(N, rows) if isinstance(task, Damping) else previews[task.name]
         for column, each in zip(found, preview[1:], strict=True):
-            column.append(each)
+            column.append(each[: N + 1])
     displacement, velocity, acceleration = (np.concatenate(column, axis=1) for column in found)
     return displacement, velocity, acceleration

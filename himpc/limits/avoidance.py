@@ -18,9 +18,9 @@ class Avoidance:
 
     Attributes:
         deceleration: the deceleration in m/s² of a pair that comes closer, as the bound assumes.
-        pull: m, the largest error on which tasks of positions act while `on`; for other tasks the largest
-            error is TURN_PULL · pull, rad. A larger error, for example of a target that cannot be reached,
-            acts like the largest one. 0: no limit.
+        pull: m, the largest error on which tasks of positions act while `on` or with `Limits.stall_guard`;
+            for other tasks the largest error is TURN_PULL · pull, rad. A larger error, for example of a
+            target that cannot be reached, acts like the largest one. 0: no limit.
     """
 
     # fmt: off
@@ -42,13 +42,14 @@ class Avoidance:
         "Deceleration", "Deceleration that the bound assumes for the approach to an object", "m/s²", 0.1,
         20.0, 0.1, name="deceleration of distances", group="Distances")] = 2.0
     pull: Annotated[float, Range(0.0, 10.0), Shown(
-        "Pull", "While distances are kept, a larger error of a position has the effect of this error. For "
-        "other tasks the limit is five times this number, in rad. 0: no limit", "m", 0.0, 2.0, 0.01,
-        name="pull of targets", group="Distances")] = 0.1
+        "Pull", "While distances are kept or a blocked robot is guarded, a larger error of a position has "
+        "the effect of this error. For other tasks the limit is five times this number, in rad. 0: no limit",
+        "m", 0.0, 2.0, 0.01, name="pull of targets", group="Distances")] = 0.1
     velocity_margin: Annotated[float, Range(0.0, 0.9), Shown(
         "Free velocity",
-        "Share of the velocity limits that is not used while distances are kept, for the delay of "
-        "time-delay estimation", "", 0.0, 0.5, 0.01, name="margin of velocities", group="Distances")] = 0.08
+        "Share of the velocity limits that is not used while distances are kept or a blocked robot is "
+        "guarded, for the delay of time-delay estimation",
+        "", 0.0, 0.5, 0.01, name="margin of velocities", group="Distances")] = 0.08
     # fmt: on
 
     def __post_init__(self) -> None:

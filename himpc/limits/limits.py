@@ -53,7 +53,7 @@ class Limits:
         10.0, name="torque rate limit", group="Limits")] = 0.0
     stall_guard: Annotated[bool, Shown(
         "Rest when blocked",
-        "A robot whose torque rises without progress of its tasks comes to rest, also if no distances are "
+        "A robot that presses, or whose tasks make no progress, comes to rest, also if no distances are "
         "kept. Without this guard, as printed, time-delay estimation increases the torque until it is at "
         "its limit. himpc, hiqp, nhimpc, weighted and himpc_printed have the guard, and always "
         "while they keep distances",

@@ -128,12 +128,17 @@ def _placements(robot: Robot, data: pin.Data, q: Array) -> tuple[Array, Array]:
     return placed[None], np.array(z)[None]
 
 
+def carried(robot: Robot) -> NDArray[np.bool_]:
+    """Returns whether the motor of joint j carries joint k, (n, n), entry [k, j]; true for k = j."""
+    return np.ascontiguousarray(geometry(robot).moves[1:] > 0)
+
+
 class Distances:
     """Computes the distances of a robot's cover from the objects that a controller knows, and between its
     links.
 
     Attributes:
-        carried: (n, n), entry [k, j]: whether the motor of joint j carries joint k; true for k = j.
+        carried: see the function `carried`.
         velocity_margin: see `Avoidance`.
     """
 
@@ -149,7 +154,7 @@ class Distances:
         # A joint without a limit gets the largest limit of the other joints.
         limited = np.isfinite(robot.v_limit)
         self._fastest = np.where(limited, robot.v_limit, robot.v_limit[limited].max(initial=1.0))
-        self.carried = np.ascontiguousarray(geometry(robot).moves[1:] > 0)
+        self.carried = carried(robot)
         self.velocity_margin = avoidance.velocity_margin
         self._observed = NOTHING
         self._know(NOTHING)
@@ -228,6 +233,19 @@ class Distances:
             *(self._moving, self._share, self._numbers),
         )
         return self._named
+
+
+class Anywhere(NamedTuple):
+    """Stands for the distances of a controller that keeps none: an obstacle may be near at any time.
+
+    Attributes:
+        carried, velocity_margin, room, moves: as for `Distances`.
+    """
+
+    carried: NDArray[np.bool_]
+    velocity_margin: float
+    room: float = 0.0
+    moves: bool = False
 
 
 def _kind(shape: WorldShape) -> tuple[object, ...]:

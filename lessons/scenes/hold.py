@@ -13,7 +13,7 @@ from himpc.stack import Level, freedom_left
 from himpc.tasks import FrameOrientation, FramePosition, Posture
 from lessons.scenes.torque_scene import TorqueScene
 from lessons.settings.torque import TorqueSettings
-from robots import Plant, PlantSettings, Robot, load_robot, load_urdf_text, suggest_M_bar
+from robots import Plant, PlantSettings, Robot, load_robot, load_urdf_text, suggest_M_bar, tracking_bandwidth
 from robots.floor import standing_floor
 
 TOUCHING = PlantSettings(contacts=True, joint_stops=True)
@@ -79,13 +79,10 @@ def gains(robot: Robot, plant: PlantSettings, T_s: float = 1e-3) -> tuple[float,
 
     With time-delay estimation the acceleration follows its desired value with a lag of about
     T_s/λ_min(M⁻¹M̄). With this lag (4) becomes a third-order loop, which is well damped if √K_p is at most
-    half the inverse of the lag. √K_p is at most 10 1/s.
+    half the inverse of the lag (`tracking_bandwidth`). √K_p is at most 10 1/s.
     """
-    M = Plant(robot, plant).mass_matrix()
-    root = np.sqrt(robot.M_bar)
-    slowest = float(np.linalg.eigvalsh(root[:, None] * np.linalg.inv(M) * root)[0])
-    omega = float(np.clip(round(0.5 * slowest / T_s, 1), 2.0, 10.0))
-    return round(omega**2, 1), 2 * omega
+    omega = min(tracking_bandwidth(Plant(robot, plant).mass_matrix(), robot.M_bar, T_s), 10.0)
+    return float(f"{omega**2:.3g}"), 2 * omega
 
 
 def _free_axes(robot: Robot) -> tuple[str, str]:

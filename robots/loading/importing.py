@@ -3,6 +3,7 @@ process, without limits on time or memory."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from robots.errors import InputError, unknown_name
-from robots.inertia import suggest_M_bar
+from robots.inertia import mass_matrix, rotor_inertia, suggest_M_bar, tracking_bandwidth
 from robots.loading.home import choose_tip, find_home, sensible_a_max
 from robots.loading.imported import with_collision
 from robots.meshes.files import has_meshes
@@ -20,6 +21,7 @@ from robots.robot import Robot
 from robots.urdf import UNBOUNDED, Canonical, canonicalise
 
 _TRIAL = 5  # number of periods of 1 ms
+_SLOW = 3.0  # 1/s: a robot with less bandwidth needs seconds to reach a target
 
 
 @dataclass(frozen=True)
@@ -85,18 +87,21 @@ def _robot(canonical: Canonical, tip: str | None) -> Robot | None:
     if tip is not None and tip not in frames:
         raise unknown_name(f"frame of robot '{canonical.name}' called", tip, frames)
     chosen = choose_tip(model, frames) if tip is None else tip
+    model.armature = rotor_inertia(model, lower, upper)
     try:
         M_bar = suggest_M_bar(model, lower, upper)
     except np.linalg.LinAlgError:
         return None
     if not np.all(np.isfinite(M_bar) & (M_bar > 0.0)):
         return None
+    home = find_home(model, frames[chosen], lower, upper)
+    findings = (*canonical.report.findings, *_assumed(model, home, M_bar))
     return Robot(
         name=canonical.name,
         model=model,
         joint_names=tuple(model.names)[1:],
         tip=chosen,
-        home=find_home(model, frames[chosen], lower, upper),
+        home=home,
         q_lower=lower,
         q_upper=upper,
         v_limit=model.velocityLimit,
@@ -104,8 +109,21 @@ def _robot(canonical: Canonical, tip: str | None) -> Robot | None:
         a_max=sensible_a_max(model, lower, upper, model.effortLimit),
         M_bar=M_bar,
         urdf_text=canonical.text,
-        report=replace(canonical.report, tip=chosen),
+        report=replace(canonical.report, tip=chosen, findings=findings),
     )
+
+
+def _assumed(model: pin.Model, home: np.ndarray, M_bar: np.ndarray) -> Iterator[Finding]:
+    """Yields what was assumed about the rotors, and whether the robot will be slow all the same."""
+    values = ", ".join(f"{value:g}" for value in model.armature)
+    text = f"a URDF does not tell their inertia; {values} kg·m² were assumed, plant.armature changes them"
+    yield Finding("filled", "rotors", text)
+    bandwidth = tracking_bandwidth(mass_matrix(model, model.createData(), home), M_bar, 1e-3)
+    if bandwidth < _SLOW:
+        text = (
+            f"M̄ has to be so small beside M that tasks settle with at most {bandwidth:g} 1/s: the arm is slow"
+        )
+        yield Finding("note", "control", text)
 
 
 def _trial(robot: Robot) -> str | None:

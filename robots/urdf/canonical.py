@@ -48,10 +48,9 @@ def canonicalise(
     contain all meshes except installed ones; None: meshes may be anywhere.
     """
     try:
-        root = parse(data, source)
+        root, findings = parse(data, source)
     except Refusal as refusal:
         return None, _report(source, [refusal.finding])
-    findings: list[Finding] = []
     passes: tuple[Callable[[Element], Iterator[Finding]], ...] = (
         lambda tree: check_structure(tree, source),
         normalise_joints,
@@ -70,8 +69,7 @@ def canonicalise(
         findings.extend(fill_efforts(root, model))
     except Refusal as refusal:
         return None, _report(source, [*findings, refusal.finding])
-    name = shortened(root.get("name", "").strip()) or "robot"
-    root.set("name", root.get("name", name))  # not every reader accepts a robot without a name
+    name = shortened(root.get("name", "").strip())
     report = replace(_report(source, findings), name=name, joints=tuple(model.names)[1:])
     text = etree.tostring(root, encoding="unicode", pretty_print=True)
     return Canonical(name, text, model, report), report
@@ -90,7 +88,8 @@ def _report(source: str, findings: list[Finding]) -> ImportReport:
 def _check_freedom(root: Element, source: str) -> Iterator[Finding]:
     count = len(movable_joints(root))
     if count == 0:
-        yield Finding("refused", source, "none of its joints moves; give a robot with a movable joint")
+        text = "none of its joints moves: all are fixed, or held because of their limits or names"
+        yield Finding("refused", source, f"{text}; give a robot with a movable joint")
     elif count > MAX_JOINTS:
         text = f"it has {count} moving joints; at most {MAX_JOINTS} can be controlled every millisecond"
         yield Finding("refused", source, f"{text}: make the other joints fixed")

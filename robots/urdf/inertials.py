@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+import pinocchio as pin
 from lxml import etree
 from lxml.etree import _Element as Element
 
@@ -13,9 +14,11 @@ from robots.report import Finding
 from robots.urdf.read import Refusal, end_of, label, named, numbers, placement
 from robots.urdf.structure import body_of, movable_joints
 
-_DENSITY = 1000.0  # kg/m³: density of the solid sphere that replaces a missing inertia
+_DENSITY = 1000.0  # kg/m³: density of the solids that replace missing masses and inertias
 _LEAST_MASS = 1e-6  # kg
-_FILL_MASS = 0.1  # kg: mass that a moving body without mass gets
+_FILL_MASS = 0.1  # kg: mass that a moving body without mass, shapes and length gets
+_SLENDER = 8.0  # length of a limb divided by its radius
+_HEAVIEST = 1e4  # kg: a heavier solid means that the shape has another unit
 _MARGIN = 1e-9  # distance of a repaired inertia from the limit of physical inertias, as a share of the trace
 _KEYS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
@@ -39,9 +42,58 @@ def repair_inertials(root: Element) -> Iterator[Finding]:
     for joint in movable_joints(root):
         carried = end_of(joint, "child")
         if total[carried] <= 0.0:
-            _write(links[carried], _FILL_MASS, np.eye(3) * _sphere(_FILL_MASS))
-            text = f"the body moved by {label(joint)} has no mass; a sphere of {_FILL_MASS} kg was put there"
+            try:
+                found, solid = _from_shapes(root, carried)
+            except Refusal as refusal:
+                yield refusal.finding
+                continue
+            _write(links[carried], found)
+            text = (
+                f"the body moved by {label(joint)} has no mass; {solid} of {found.mass:.3g} kg was put there"
+            )
             yield Finding("filled", label(links[carried]), text)
+
+
+def _from_shapes(root: Element, carried: str) -> tuple[pin.Inertia, str]:
+    """Returns the inertia that a link without mass gets, and what it is the inertia of: the simple shapes of
+    its collision geometry, or of its visual geometry, or a cylinder that reaches from its joint to the
+    farthest joint that it carries."""
+    link = named(root, "link")[carried]
+    for tag in ("collision", "visual"):
+        parts = [part for shape in link.findall(tag) if (part := _solid(shape)) is not None]
+        if parts and (whole := sum(parts[1:], parts[0])).mass >= _LEAST_MASS:
+            return whole, "the solid of its shapes"
+    ends = [
+        placement(joint).translation for joint in root.findall("joint") if end_of(joint, "parent") == carried
+    ]
+    end = max(ends, key=np.linalg.norm, default=np.zeros(3))
+    length = float(np.linalg.norm(end))
+    radius = length / _SLENDER
+    mass = _DENSITY * np.pi * radius**2 * length
+    if not _LEAST_MASS < mass < _HEAVIEST:
+        return pin.Inertia(_FILL_MASS, np.zeros(3), np.eye(3) * _sphere(_FILL_MASS)), "a sphere"
+    along = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), end / length).toRotationMatrix()
+    limb = pin.Inertia.FromCylinder(mass, radius, length)
+    return pin.SE3(along, 0.5 * end).act(limb), "a cylinder along its limb"
+
+
+def _solid(shape: Element) -> pin.Inertia | None:
+    """Returns the inertia of a box, a cylinder or a sphere; None for a mesh and a shape without volume."""
+    box, cylinder, sphere = (shape.find(f"geometry/{kind}") for kind in ("box", "cylinder", "sphere"))
+    if box is not None:
+        x, y, z = numbers(box, "size", 3)
+        mass, found = x * y * z, lambda mass: pin.Inertia.FromBox(mass, x, y, z)
+    elif cylinder is not None:
+        radius, length = (float(numbers(cylinder, name, 1)[0]) for name in ("radius", "length"))
+        mass, found = np.pi * radius**2 * length, lambda mass: pin.Inertia.FromCylinder(mass, radius, length)
+    elif sphere is not None:
+        radius = float(numbers(sphere, "radius", 1)[0])
+        mass, found = 4.0 / 3.0 * np.pi * radius**3, lambda mass: pin.Inertia.FromSphere(mass, radius)
+    else:
+        return None
+    if not 0.0 < _DENSITY * mass < _HEAVIEST:
+        return None
+    return placement(shape).act(found(_DENSITY * mass))
 
 
 def nearest_physical(inertia: np.ndarray) -> tuple[np.ndarray, float]:
@@ -116,10 +168,11 @@ def _sphere(mass: float) -> float:
     return 0.4 * mass * radius**2
 
 
-def _write(link: Element, mass: float, inertia: np.ndarray) -> None:
+def _write(link: Element, found: pin.Inertia) -> None:
     inertial = etree.SubElement(link, "inertial")
-    etree.SubElement(inertial, "mass", value=repr(mass))
-    _write_inertia(inertial, inertia)
+    etree.SubElement(inertial, "origin", xyz=" ".join(repr(float(value)) for value in found.lever))
+    etree.SubElement(inertial, "mass", value=repr(float(found.mass)))
+    _write_inertia(inertial, found.inertia)
 
 
 def _write_inertia(inertial: Element, inertia: np.ndarray) -> None:

@@ -14,10 +14,11 @@ from lxml.etree import _Element as Element
 
 from robots.errors import shortened
 from robots.report import Finding
-from robots.urdf.read import Refusal, end_of, label, named, numbers, placement
+from robots.urdf.read import UNLIMITED, Refusal, end_of, label, limit_value, named, numbers, placement
 from robots.urdf.structure import movable_joints, parent_joints
 
-UNBOUNDED = 1e6  # rad or m: limit of a joint without limits, so that nq = nv; it is read as ±inf
+UNBOUNDED = UNLIMITED  # limit of a joint without limits, so that nq = nv; it is read as ±inf
+_TURNS = 4.0 * math.pi  # rad: no arm's joint turns further, but a limit in degrees says so
 _GRIPPER_JOINT = re.compile(r"finger|knuckle|gripper|thumb|jaw", re.IGNORECASE)
 _GRIPPER_LINK = re.compile(r"finger|knuckle|thumb", re.IGNORECASE)  # "gripper" also names whole hands
 
@@ -25,7 +26,7 @@ _GRIPPER_LINK = re.compile(r"finger|knuckle|thumb", re.IGNORECASE)  # "gripper" 
 def normalise_joints(root: Element) -> Iterator[Finding]:
     """Rewrites all joints so that each has exactly one coordinate in Pinocchio; yields the changes."""
     try:
-        frozen = _to_freeze(root)
+        frozen, unlimited = _to_freeze(root), _without_range(root)
     except Refusal as refusal:
         yield refusal.finding
         return
@@ -37,7 +38,7 @@ def normalise_joints(root: Element) -> Iterator[Finding]:
                 _drop(joint, "limit", "axis", "mimic")
                 continue
             yield from _axis(joint)
-            yield from _limits(joint)
+            yield from _limits(joint, joint in unlimited)
             if joint.get("name") in frozen:
                 yield freeze(joint, *frozen[joint.get("name", "")])
             else:
@@ -118,7 +119,23 @@ def _axis(joint: Element) -> Iterator[Finding]:
     axis.set("xyz", _text(direction / length) if length != 1.0 else _text(direction))
 
 
-def _limits(joint: Element) -> Iterator[Finding]:
+def _without_range(root: Element) -> list[Element]:
+    """Returns the joints whose lower and upper limits are 0 if these are most of the robot's joints, because
+    then nobody filled them in. A single such joint is held at 0."""
+
+    def is_zero(joint: Element) -> bool:
+        limit = joint.find("limit")
+        try:
+            return limit is not None and limit_value(limit, "lower") == limit_value(limit, "upper") == 0.0
+        except Refusal:
+            return False
+
+    joints = [joint for joint in movable_joints(root) if joint.get("type") != "continuous"]
+    zero = [joint for joint in joints if is_zero(joint)]
+    return zero if 2 * len(zero) > len(joints) else []
+
+
+def _limits(joint: Element, without_range: bool) -> Iterator[Finding]:
     limit = joint.find("limit")
     if limit is None:
         limit = etree.SubElement(joint, "limit")
@@ -134,20 +151,25 @@ def _limits(joint: Element) -> Iterator[Finding]:
         yield Finding("filled", label(joint), "no position limits; it is treated as unbounded")
         return
     # The URDF default of a missing bound is 0.
-    lower = float(numbers(limit, "lower", 1, (0.0,))[0])
-    upper = float(numbers(limit, "upper", 1, (0.0,))[0])
-    if lower == upper == 0.0 and float(numbers(limit, "velocity", 1, (0.0,))[0]) <= 0.0:
+    lower, upper = limit_value(limit, "lower"), limit_value(limit, "upper")
+    if lower == upper == 0.0 and (without_range or limit_value(limit, "velocity") <= 0.0):
         lower, upper = -UNBOUNDED, UNBOUNDED
-        text = "all its limits are 0, a usual result of CAD exporters; it is treated as unbounded"
+        text = "its position limits are 0, a usual result of CAD exporters; it is treated as unbounded"
         yield Finding("filled", label(joint), text)
     if lower > upper:
         lower, upper = upper, lower
         yield Finding(
             "repaired", label(joint), f"lower limit above upper; swapped to [{lower:.4g}, {upper:.4g}]"
         )
-    if max(abs(lower), abs(upper)) > UNBOUNDED:
-        lower, upper = max(lower, -UNBOUNDED), min(upper, UNBOUNDED)
-        yield Finding("repaired", label(joint), f"limits beyond ±{UNBOUNDED:.0g} were reduced to this value")
+    bounded = [bound for bound in (lower, upper) if math.isfinite(bound)]
+    if len(bounded) < 2 or max(map(abs, bounded)) >= UNBOUNDED:
+        lower, upper = (float(np.clip(bound, -UNBOUNDED, UNBOUNDED)) for bound in (lower, upper))
+        if lower == upper:
+            lower, upper = -UNBOUNDED, UNBOUNDED
+        yield Finding("note", label(joint), f"a limit of {UNBOUNDED:.0g} or more means that it is unbounded")
+    elif joint.get("type") == "revolute" and max(map(abs, bounded)) > _TURNS:
+        text = f"its range [{lower:.4g}, {upper:.4g}] rad looks like degrees; a URDF has radians"
+        yield Finding("note", label(joint), text)
     limit.set("lower", repr(lower))
     limit.set("upper", repr(upper))
 
@@ -156,7 +178,8 @@ def _freeze_if_stuck(joint: Element) -> Iterator[Finding]:
     limit = _require(joint, "limit")
     lower, upper = float(limit.get("lower", "0")), float(limit.get("upper", "0"))
     if upper - lower < 1e-6:
-        yield freeze(joint, 0.5 * (lower + upper), "its limits allow no motion")
+        reason = "its limits allow no motion; set lower and upper to let it move"
+        yield freeze(joint, 0.5 * (lower + upper), reason)
 
 
 def _require(joint: Element, tag: str) -> Element:

@@ -12,12 +12,13 @@ from lxml.etree import _Element as Element
 from robots.inertia import mass_matrix, sample_configurations
 from robots.report import Finding
 from robots.urdf.joints import finite_bounds
-from robots.urdf.read import Refusal, label, numbers
+from robots.urdf.read import Refusal, label, limit_value
 from robots.urdf.structure import movable_joints
 
 _SPEED = {"revolute": np.pi, "prismatic": 0.5}  # rad/s, m/s: fast, but safe for an unknown arm
 _LEAST = 1e-6  # rad/s, N·m: a smaller limit counts as missing, because it would allow no motion
 _LEVER = 3.0  # effort limit divided by the largest gravity load
+_FASTEST = 50.0  # rad/s: no arm's joint is faster, but a limit in degrees says so
 _ACCELERATION = 10.0  # rad/s², m/s²: acceleration that the effort limit allows in addition to gravity
 
 
@@ -29,12 +30,17 @@ def fill_speeds(root: Element) -> Iterator[Finding]:
         if limit is None:
             limit = etree.SubElement(joint, "limit")
         try:
-            if float(numbers(limit, "velocity", 1, (0.0,))[0]) < _LEAST:
+            given = limit_value(limit, "velocity")
+            if given < _LEAST or np.isinf(given):
                 speed = float(_SPEED[joint.get("type", "")])
                 limit.set("velocity", repr(speed))
                 unit = "m/s" if joint.get("type") == "prismatic" else "rad/s"
                 yield Finding("filled", label(joint), f"no velocity limit; {speed:.3g} {unit} was used")
-            if float(numbers(limit, "effort", 1, (0.0,))[0]) < _LEAST:
+            elif joint.get("type") != "prismatic" and given > _FASTEST:
+                text = f"its velocity limit {given:.4g} rad/s looks like degrees; a URDF has radians"
+                yield Finding("note", label(joint), text)
+            effort = limit_value(limit, "effort")
+            if effort < _LEAST or np.isinf(effort):
                 limit.set("effort", "0")
         except Refusal as refusal:
             yield refusal.finding
@@ -42,26 +48,28 @@ def fill_speeds(root: Element) -> Iterator[Finding]:
 
 def fill_efforts(root: Element, model: pin.Model) -> Iterator[Finding]:
     """Fills the effort limits that are 0, in the tree and in its model: three times the largest gravity load
-    plus an effort for acceleration.
+    plus an effort for acceleration. Yields a note for each given limit that cannot hold the robot everywhere.
 
     τ_i = 3 max|g_i(q)| + 10 rad/s² · max M_ii(q) over sampled configurations, to two digits.
     """
-    joints = {joint.get("name", ""): joint for joint in movable_joints(root)}
-    missing = [name for name, joint in joints.items() if _effort(joint) <= 0.0]
-    if not missing:
-        return
-    needed = _needed_effort(model)
+    gravity, inertia = _loads(model)
     limits = model.effortLimit.copy()
-    for name in missing:
-        place = model.getJointId(name) - 1
-        effort = float(f"{needed[place]:.1e}")
+    for joint in movable_joints(root):
+        place = model.getJointId(joint.get("name", "")) - 1
+        unit = "N" if joint.get("type") == "prismatic" else "N·m"
+        given = _effort(joint)
+        if given > 0.0:
+            if given < gravity[place]:
+                text = f"its effort limit is {given:.3g} {unit}; holding the robot takes up to"
+                yield Finding("note", label(joint), f"{text} {gravity[place]:.2g} {unit}")
+            continue
+        effort = float(f"{max(_LEVER * gravity[place] + _ACCELERATION * inertia[place], 1e-3):.1e}")
         limits[place] = effort
-        limit = joints[name].find("limit")
+        limit = joint.find("limit")
         if limit is not None:
             limit.set("effort", repr(effort))
-        unit = "N" if joints[name].get("type") == "prismatic" else "N·m"
         text = f"no effort limit; {effort:g} {unit} was estimated from the weight it carries"
-        yield Finding("filled", label(joints[name]), text)
+        yield Finding("filled", label(joint), text)
     model.effortLimit = limits
 
 
@@ -70,7 +78,8 @@ def _effort(joint: Element) -> float:
     return 0.0 if limit is None else float(limit.get("effort", "0"))
 
 
-def _needed_effort(model: pin.Model) -> np.ndarray:
+def _loads(model: pin.Model) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the largest gravity load |g_i|, (n,) N·m, and the largest M_ii, (n,) kg·m², over samples."""
     data = model.createData()
     pairs = zip(model.lowerPositionLimit, model.upperPositionLimit, strict=True)
     bounded = np.array([finite_bounds(low, high) for low, high in pairs])
@@ -79,5 +88,4 @@ def _needed_effort(model: pin.Model) -> np.ndarray:
     samples = sample_configurations(lower, upper, 64)
     gravity = np.array([pin.computeGeneralizedGravity(model, data, q) for q in samples])
     inertia = np.array([np.diag(mass_matrix(model, data, q)) for q in samples])
-    needed = _LEVER * np.abs(gravity).max(axis=0) + _ACCELERATION * inertia.max(axis=0)
-    return np.maximum(needed, 1e-3)
+    return np.abs(gravity).max(axis=0), inertia.max(axis=0)

@@ -19,7 +19,12 @@ MAX_BYTES = 10_000_000
 _LARGEST = {"xyz": 1e3, "value": 1e5}  # m and kg: with larger numbers, sums of inertias lose all digits
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 """The format of numbers that C++ readers of URDF accept; Python also accepts other formats."""
-_XACRO_HINT = "; is this a xacro file? Run `xacro FILE > robot.urdf` first"
+UNLIMITED = 1e6  # rad, m, rad/s, N·m: a limit of at least this size, or an infinite one, limits nothing
+_INFINITE = re.compile(r"[+-]?(inf|infinity|\.inf)", re.IGNORECASE)
+_EXPAND = "run `pip install xacro`, then `xacro FILE > robot.urdf`, and give the result"
+_XACRO_HINT = f"; this is a xacro template: {_EXPAND}"
+_HARMLESS = (80, 201)  # libxml2: two hyphens in a comment; a prefix without a namespace
+_BEFORE_XML = re.compile(rb"(?:\s|<!--.*?-->)+(?=<\?xml)", re.DOTALL)
 
 
 class Refusal(Exception):
@@ -30,9 +35,11 @@ class Refusal(Exception):
         self.finding = Finding("refused", where, text)
 
 
-def parse(data: bytes, source: str) -> Element:
-    """Returns the root element `robot` of a URDF document. Comments and foreign sections are removed.
+def parse(data: bytes, source: str) -> tuple[Element, list[Finding]]:
+    """Returns the root element `robot` of a URDF document, and what had to be repaired or left out. Comments
+    and foreign sections are removed.
 
+    What other readers of URDF accept although it is not well-formed XML is accepted outside links and joints.
     No entity is resolved, no DTD is loaded and nothing is downloaded. Raises Refusal for a document that is
     too large, is not XML, declares a DTD, is a xacro template, or has another root element.
     """
@@ -40,25 +47,103 @@ def parse(data: bytes, source: str) -> Element:
         raise Refusal(
             source, f"the file has {len(data) / 1e6:.0f} MB; give a URDF below {MAX_BYTES / 1e6:.0f} MB"
         )
-    parser = etree.XMLParser(
-        resolve_entities=False, no_network=True, load_dtd=False, remove_comments=True, remove_pis=True
-    )
-    try:
-        root = etree.fromstring(data, parser)
-    except (etree.XMLSyntaxError, ValueError) as error:
-        raise Refusal(
-            source, f"this is not well-formed XML ({_first_line(error)}); give a URDF file"
-        ) from None
+    findings: list[Finding] = []
+    root = _read(_as_unicode(_BEFORE_XML.sub(b"", data, count=1), source, findings), source, findings)
     if root.getroottree().docinfo.doctype:
         raise Refusal(source, "the file declares a DOCTYPE, which a URDF never needs; remove it")
-    if any("xacro" in str(element.tag) for element in root.iter()):
-        raise Refusal(source, "this is a xacro template; run `xacro FILE > robot.urdf` and give the result")
+    _drop_namespace(root, source, findings)
+    _drop_xacro(root, source, findings)
+    if root.tag == "mujoco":
+        raise Refusal(source, "this is a MuJoCo model (MJCF); a URDF starts with <robot>")
     if root.tag != "robot":
         raise Refusal(source, f"the root element is <{shortened(str(root.tag))}>, a URDF starts with <robot>")
     for child in list(root):
         if child.tag not in ("link", "joint", "material"):
             root.remove(child)
+    if not root.get("name", "").strip():
+        root.set("name", "robot")
+        findings.append(Finding("filled", source, "<robot> has no name; the name 'robot' was used"))
+    return root, findings
+
+
+def _as_unicode(data: bytes, source: str, findings: list[Finding]) -> bytes:
+    """Returns the document in UTF-8 if it contains Latin-1 without saying so; otherwise unchanged."""
+    declared = re.match(rb"[^>]*encoding=", data[:200])
+    if declared is not None or data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return data
+    try:
+        data.decode()
+    except UnicodeDecodeError:
+        findings.append(Finding("repaired", source, "it is not UTF-8 and was read as Latin-1"))
+        return data.decode("latin-1").encode()
+    return data
+
+
+def _read(data: bytes, source: str, findings: list[Finding]) -> Element:
+    """Returns the root element. A document that is not well-formed is read again, as other readers do, if no
+    link and no joint is damaged."""
+
+    def parser(recover: bool) -> etree.XMLParser:
+        return etree.XMLParser(
+            resolve_entities=False,
+            no_network=True,
+            load_dtd=False,
+            remove_comments=True,
+            remove_pis=True,
+            recover=recover,
+        )
+
+    try:
+        return etree.fromstring(data, parser(recover=False))
+    except (etree.XMLSyntaxError, ValueError) as error:
+        reason = _first_line(error)
+    lenient = parser(recover=True)
+    try:
+        root = etree.fromstring(data, lenient)
+    except (etree.XMLSyntaxError, ValueError):
+        root = None
+    faults = [(fault.line, fault.type) for fault in lenient.error_log]
+    if root is None or len(root) == 0 or any(_damages(root, *fault) for fault in faults):
+        raise Refusal(source, f"this is not well-formed XML ({reason}); correct it or give another URDF file")
+    text = f"it is not well-formed XML ({reason}); no link and no joint is affected"
+    findings.append(Finding("repaired", source, text))
     return root
+
+
+def _damages(root: Element, line: int, kind: int) -> bool:
+    """Whether a fault in this line can have damaged a link or a joint."""
+    if kind in _HARMLESS:
+        return False
+    before = [child for child in root if (child.sourceline or 0) <= line]
+    return not before or before[-1].tag in ("link", "joint")
+
+
+def _drop_namespace(root: Element, source: str, findings: list[Finding]) -> None:
+    space = root.nsmap.get(None)
+    if space is None:
+        return
+    for element in root.iter(f"{{{space}}}*"):
+        element.tag = etree.QName(element).localname
+    findings.append(Finding("note", source, f"its default namespace '{shortened(space)}' was left out"))
+
+
+def _drop_xacro(root: Element, source: str, findings: list[Finding]) -> None:
+    """Removes left-over elements of xacro. Raises Refusal for a template: values of links or joints are still
+    to be computed, or all joints are still to be added."""
+    left_over = [element for element in root.iter() if "xacro" in str(element.tag)]
+    for element in left_over:
+        parent = element.getparent()
+        if parent is not None:
+            parent.remove(element)
+    named_parts = (part for tag in ("link", "joint", "parent", "child") for part in root.iter(tag))
+    unfinished = any("${" in str(value) for part in named_parts for value in part.attrib.values())
+    if unfinished or (left_over and root.find("joint") is None):
+        raise Refusal(source, f"this is a xacro template; {_EXPAND}")
+    calls = sum("property" not in str(element.tag) for element in left_over)
+    if left_over:
+        text = f"{len(left_over)} left-over element(s) of xacro were left out"
+        text += f"; {calls} of them may have described links, sensors or colours" if calls else ""
+        findings.append(Finding("note", source, text))
 
 
 def load_bytes(path: Path) -> bytes:
@@ -112,6 +197,17 @@ def numbers(
     if max(abs(value) for value in values) > _LARGEST.get(attribute, 1e9):
         raise Refusal(where, f"{name} is '{shortened(text)}', too large for a real robot; check its unit")
     return np.array(values)
+
+
+def limit_value(limit: Element, attribute: str) -> float:
+    """Returns a limit; ±inf if it is infinite or so large that it limits nothing, 0 if it is missing. Raises
+    Refusal like `numbers`."""
+    text = limit.get(attribute, "").strip()
+    if _INFINITE.fullmatch(text):
+        return -math.inf if text.startswith("-") else math.inf
+    if _NUMBER.fullmatch(text) and abs(value := float(text)) >= UNLIMITED:
+        return math.copysign(math.inf, value)
+    return float(numbers(limit, attribute, 1, (0.0,))[0])
 
 
 def placement(element: Element) -> pin.SE3:

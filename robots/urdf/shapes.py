@@ -42,7 +42,8 @@ def remove_unusable_shapes(root: Element) -> Iterator[Finding]:
 def _check(shape: Element) -> None:
     """Raises Refusal for a shape without valid numbers."""
     placement(shape)
-    solid = shape.find("geometry/*")
+    geometry = shape.find("geometry")
+    solid = None if geometry is None or not len(geometry) else geometry[0]
     if solid is None or solid.tag not in _SIZES:
         raise Refusal("", f"its geometry is not one of {', '.join(_SIZES)}")
     for name, count in _SIZES[solid.tag].items():

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 
+from lxml import etree
 from lxml.etree import _Element as Element
 
 from robots.errors import nearest_name, shortened
@@ -27,6 +28,7 @@ _GUESSES = 5
 def check_structure(root: Element, source: str) -> Iterator[Finding]:
     """Yields a `refused` finding for every fault that prevents the description from being a single tree of
     links."""
+    yield from _repaired_roots(root)
     for checks in ((_sizes,), (_names,), (_joint_ends, _types), (_single_tree,)):
         faults = [fault for check in checks for fault in check(root, source)]
         yield from faults
@@ -56,6 +58,21 @@ def body_of(root: Element) -> dict[str, str]:
         first = found.get(at, at)
         found.update((each, first) for each in passed)
     return found
+
+
+def _repaired_roots(root: Element) -> Iterator[Finding]:
+    """Adds the link `world` if joints use it without its being described, and welds a base that a floating or
+    planar joint carries."""
+    carried = parent_joints(root)
+    for joint in root.findall("joint"):
+        parent = end_of(joint, "parent")
+        if parent == "world" and "world" not in named(root, "link"):
+            etree.SubElement(root, "link", name="world")
+            yield Finding("filled", label(joint), "its parent link 'world' is not described and was added")
+        if parent not in carried and (kind := joint.get("type")) in ("floating", "planar"):
+            joint.set("type", "fixed")
+            text = f"a {kind} joint carries the base; it was made fixed: only fixed bases can be controlled"
+            yield Finding("fixed", label(joint), text)
 
 
 def _sizes(root: Element, source: str) -> Iterator[Finding]:

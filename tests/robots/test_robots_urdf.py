@@ -28,7 +28,7 @@ def inertial(mass: str, moments: str) -> str:
 
 def test_a_clean_urdf_has_nothing_to_report() -> None:
     loaded = load(two_joint_arm())
-    assert [finding.where for finding in loaded.report.findings] == ["contacts", "floor"]
+    assert [finding.where for finding in loaded.report.findings] == ["rotors", "contacts", "floor"]
     assert loaded.report.usable
     np.testing.assert_array_equal(loaded.q_upper, [2, 2])
     np.testing.assert_array_equal(loaded.v_limit, [3, 3])
@@ -137,7 +137,7 @@ def test_unphysical_inertias_become_physical(inside: str, kind: Kind, words: str
 
 def test_massless_links_fixed_to_heavy_ones_are_fine() -> None:
     loaded = load(two_joint_arm(link("tool0", "") + joint("t", "l2", "tool0", "fixed", "")))
-    assert [finding.where for finding in loaded.report.findings] == ["contacts", "floor"]
+    assert [finding.where for finding in loaded.report.findings] == ["rotors", "contacts", "floor"]
     assert loaded.tip == "tool0"
 
 
@@ -231,6 +231,7 @@ BOX = '<visual><geometry><box size="0.1 0.1 0.1"/></geometry></visual>'
         ('<collision><geometry><box size="1 2"/></geometry></collision>', "size is '1 2'"),
         ("<visual><geometry><cone/></geometry></visual>", "one of box, cylinder, sphere, mesh"),
         ("<visual/>", "one of box"),
+        ('<visual><geometry/><geometry><box size="1 1 1"/></geometry></visual>', "one of box"),
         ('<visual><origin xyz="0 0 nan"/><geometry><sphere radius="1"/></geometry></visual>', "xyz is"),
     ],
 )

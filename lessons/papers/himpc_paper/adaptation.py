@@ -48,7 +48,11 @@ CASES = (
         for deg in ("0.00001", "0.0001", "0.001")
     ),
     *(
-        Case(f"{_HOLD}, {kg:g} kg", scene=_HOLD, set=("avoidance.on=false", *_payload(kg)))
+        Case(
+            f"{_HOLD}, {kg:g} kg",
+            scene=_HOLD,
+            set=("avoidance.on=false", "limits.stall_guard=false", *_payload(kg)),
+        )
         for kg in (0.0, 2.0, 4.0)
     ),
     Case("hiqp, 4 kg", "hiqp", set=_payload(4.0)),

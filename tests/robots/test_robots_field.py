@@ -1,0 +1,118 @@
+"""Small files with what URDFs of other people contain: each loads with a finding, or one sentence says what
+to change. Each file has one kind of fault."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from arms import load, two_joint_arm
+
+from robots import InputError, load_robot
+from robots.urdf import canonicalise
+
+FIELD = Path(__file__).parent / "field"
+ARM = two_joint_arm()
+
+
+def findings(text: str | bytes) -> str:
+    """Returns all findings of a document that can be used."""
+    data = text if isinstance(text, bytes) else text.encode()
+    canonical, report = canonicalise(data, "mine.urdf")
+    assert canonical is not None, report.findings
+    return " | ".join(map(str, report.findings))
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("default_namespace", "default namespace 'http://drake.mit.edu' was left out"),
+        ("limits_1e16", "means that it is unbounded"),
+        ("limits_in_degrees", "looks like degrees"),
+        ("undeclared_prefix_in_gazebo", "no link and no joint is affected"),
+        ("world_not_declared", "'world' is not described and was added"),
+        ("xacro_property_left_over", "1 left-over element(s) of xacro"),
+    ],
+)
+def test_files_of_other_people_load_with_a_finding(name: str, words: str) -> None:
+    loaded = load_robot(FIELD / f"{name}.urdf")
+    assert loaded.n == 3
+    assert words in " | ".join(map(str, loaded.report.findings))
+    # Home is inside ±π even if the limits are in degrees.
+    assert np.abs(loaded.home).max() <= np.pi
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "words"),
+    [
+        ("<robot", "\n <!-- made by hand -->\n<?xml version='1.0'?>\n<robot", ""),
+        ("<link", "<!-- a -- b --><link", "Double hyphen"),
+        ("</robot>", "<gazebo a='1' b=2><sensor:x/>a & b</gazebo></robot>", "not well-formed"),
+    ],
+    ids=["before the declaration", "hyphens", "gazebo"],
+)
+def test_xml_that_other_readers_accept(before: str, after: str, words: str) -> None:
+    assert words in findings(ARM.replace(before, after, 1))
+
+
+def test_latin_1_without_saying_so() -> None:
+    assert "read as Latin-1" in findings(ARM.replace("<link", "<!-- Größe --><link", 1).encode("latin-1"))
+
+
+@pytest.mark.parametrize("old", ['axis xyz="', "</joint>", '<parent link="'])
+def test_a_damaged_link_or_joint_stays_refused(old: str) -> None:
+    """What is lost cannot be known, so nothing is guessed."""
+    with pytest.raises(InputError, match="not well-formed XML"):
+        load(ARM.replace(old, old[:-1], 1))
+    with pytest.raises(InputError, match="not well-formed XML"):
+        load(ARM[: ARM.rindex("</joint>")])
+
+
+def test_a_template_is_told_from_left_over_elements() -> None:
+    call = '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"'
+    left = ARM.replace("<robot", call, 1).replace("</robot>", "<xacro:sensor name='s'/></robot>")
+    assert "1 of them may have described links, sensors or colours" in findings(left)
+    for template in (
+        left.replace('name="l1"', 'name="${prefix}l1"'),
+        f'{call} name="a"><link name="l0"/><xacro:arm prefix="a"/></robot>',
+    ):
+        with pytest.raises(InputError, match="xacro template; run `pip install xacro`"):
+            load(template)
+
+
+def test_a_robot_without_a_name_gets_one() -> None:
+    name = ARM[ARM.index("<robot") : ARM.index(">", ARM.index("<robot")) + 1]
+    assert "<robot> has no name" in findings(ARM.replace(name, "<robot>"))
+
+
+@pytest.mark.parametrize("kind", ["floating", "planar"])
+def test_a_floating_base_is_welded(kind: str) -> None:
+    base = f'<joint name="free" type="{kind}"><parent link="ground"/><child link="base"/></joint>'
+    text = ARM.replace("</robot>", f'<link name="ground"/>{base}</robot>')
+    assert f"a {kind} joint carries the base" in findings(text)
+
+
+def test_unlimited_speed_and_effort_are_filled() -> None:
+    for unlimited in ("inf", "1e16", "3.402823466e+38", "1.7976931348623157e308"):
+        text = ARM.replace('velocity="3"', f'velocity="{unlimited}"').replace(
+            'effort="50"', f'effort="{unlimited}"'
+        )
+        assert text != ARM
+        told = findings(text)
+        assert "no velocity limit" in told
+        assert "no effort limit" in told
+
+
+def test_an_effort_that_cannot_hold_the_arm_is_reported_and_kept() -> None:
+    weak = load(ARM.replace('effort="50"', 'effort="0.1"'))
+    assert "its effort limit is 0.1 N·m; holding the robot takes up to" in str(weak.report.findings)
+    np.testing.assert_array_equal(weak.tau_limit, 0.1)
+
+
+def test_position_limits_that_nobody_filled_in() -> None:
+    """If most joints have lower = upper = 0, they are unbounded. A single one is held."""
+    every = ARM.replace('lower="-2" upper="2"', 'lower="0" upper="0"')
+    assert np.isinf(load(every).q_upper).all()
+    one = ARM.replace('lower="-2" upper="2"', 'lower="0" upper="0"', 1)
+    assert load(one).n == 1
