@@ -77,8 +77,7 @@ def suggest_M_bar(
     1. shape: D_i = min over samples of 1/(M⁻¹)_ii, the least inertia of joint i while the other joints are
        free, so each joint gets its own scale, also if the joints have very different sizes;
     2. size: M̄ = LARGEST_EIGENVALUE · D / max over samples of λ_max(D^½ M⁻¹ D^½). Between the samples
-       λ(S) is larger: the page of the lesson *Your robot* finds 1.74 on its lamp, which is still stable for a
-       plant that is 13 % lighter than the model.
+       λ(S) is slightly larger: the page of the lesson *Your robot* finds 1.51 on its lamp.
 
     A larger M̄ improves the estimate and amplifies noise (Remark 4).
     """

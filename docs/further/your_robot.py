@@ -74,11 +74,11 @@ def _suggested(rng: np.random.Generator) -> tuple[float, float]:
 
 
 def _between(rng: np.random.Generator) -> tuple[float, float]:
-    return _worst(), 1.74
+    return _worst(), 1.51
 
 
 def _lighter(rng: np.random.Generator) -> tuple[float, float]:
-    return _worst() / 0.87, 2.0
+    return _worst() / 0.75, 2.0
 
 
 FURTHER = Further(
@@ -103,32 +103,33 @@ FURTHER = Further(
             _suggested,
         ),
         Line(
-            "Between these poses there are poses with a larger eigenvalue. A search over all poses of the "
-            "lesson's lamp finds",
-            r"\max_q \lambda_{\max}(M^{-1} \bar M) \approx 1.74",
+            "Between these poses there are poses with a slightly larger eigenvalue. A search over all poses "
+            "of the lesson's lamp finds",
+            r"\max_q \lambda_{\max}(M^{-1} \bar M) \approx 1.51",
             _between,
             5e-3,
         ),
         Line(
-            "The stability limit is 2, so that a real lamp may be 13 % lighter than its file says before it "
-            "reaches this limit in the worst pose:",
-            r"\max_q \lambda_{\max}\left( (0.87\, M)^{-1} \bar M \right) \approx 2",
+            "The stability limit is 2, so that a real lamp, with its motors, may be 25 % lighter than the model "
+            "before it reaches this limit in the worst pose:",
+            r"\max_q \lambda_{\max}\left( (0.75\, M)^{-1} \bar M \right) \approx 2",
             _lighter,
             5e-3,
         ),
     ),
     questions=(
         Question(
-            "In the worst pose the largest eigenvalue is 1.74, and the stability limit is 2. By which "
+            "In the worst pose the largest eigenvalue is 1.51, and the stability limit is 2. By which "
             r"factor may the suggested $\bar M$ be raised if the lamp must be stable in this pose? Why "
-            "could the lesson double it?",
-            "It may be raised by the factor $2/1.74 = ⟨factor⟩$. The lamp of the lesson moves little, and "
-            r"$\lambda_{\max}$ in its initial pose is ⟨here⟩. Twice this value is still below 2. In the "
-            "worst pose the doubled value would be ⟨there⟩.",
+            "could the lesson raise it by 1.5?",
+            "It may be raised by the factor $2/1.51 = ⟨factor⟩$. The lamp of the lesson moves little, and "
+            r"$\lambda_{\max}$ in its initial pose is ⟨here⟩. 1.5 times this value is ⟨raised⟩, below 2. In "
+            "the worst pose it would be ⟨there⟩.",
             {
-                "factor": (2 / 1.74, ".2f"),
+                "factor": (2 / 1.51, ".2f"),
                 "here": (_largest(_lamp()[1]), ".2f"),
-                "there": (2 * _worst(), ".2f"),
+                "raised": (1.5 * _largest(_lamp()[1]), ".2f"),
+                "there": (1.5 * _worst(), ".2f"),
             },
         ),
         Question(

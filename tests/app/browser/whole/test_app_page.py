@@ -234,7 +234,7 @@ def test_the_browser_tells_which_charts_it_shows(
     for name, seen, unseen in (
         ("Joints", "Torque, % of bound", "Control step, ms"),
         ("Who binds", "", "Torque, % of bound"),
-        ("Errors", "Control step, ms", "Torque, % of bound"),
+        ("Errors", "Error per task, mm or °", "Torque, % of bound"),
     ):
         tab(page, name)
         assert eventually(
