@@ -26,8 +26,22 @@ def record(robot: str, controller: str, seconds: float) -> Recording:
     return run(replace(scene, settings=scene.settings.changed("controller", controller)), seconds, seed=1)
 
 
-@pytest.mark.parametrize("robot", ROBOTS)
-@pytest.mark.parametrize("controller", CONTROLLERS)
+PAIRS = [
+    pytest.param(
+        controller,
+        robot,
+        id=f"{controller}-{robot}",
+        # A tick on paper takes a hundred times as long as a compiled one.
+        marks=pytest.mark.nightly("himpc/printed.py")
+        if controller == "himpc_printed" and robot != "planar3"
+        else (),
+    )
+    for controller in CONTROLLERS
+    for robot in ROBOTS
+]
+
+
+@pytest.mark.parametrize(("controller", "robot"), PAIRS)
 def test_every_controller_holds_every_robot(controller: str, robot: str) -> None:
     """For 2 s of the hold scene the values are finite and the robot stays in place. A second run gives
     bitwise the same first 0.3 s."""
