@@ -110,8 +110,8 @@ FURTHER = Further(
             5e-3,
         ),
         Line(
-            "The stability limit is 2, so that a real lamp, with its motors, may be 25 % lighter than the model "
-            "before it reaches this limit in the worst pose:",
+            "The stability limit is 2, so that a real lamp, with its motors, may be 25 % lighter than the "
+            "model before it reaches this limit in the worst pose:",
             r"\max_q \lambda_{\max}\left( (0.75\, M)^{-1} \bar M \right) \approx 2",
             _lighter,
             5e-3,
