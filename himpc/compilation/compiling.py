@@ -50,19 +50,29 @@ def compiled_functions() -> dict[str, frozenset[str]]:
 
 
 def _decorated(tree: ast.Module) -> list[str]:
-    """Returns the functions of a module whose decorator is imported from `himpc.compilation.compiled`."""
+    """Returns the functions of a module whose decorator is imported from `himpc.compilation.compiled`, also
+    those that are made by a call of the decorator: `name: type = decorator(…)`."""
     imported = {
         alias.asname or alias.name
         for node in tree.body
         if isinstance(node, ast.ImportFrom) and node.module == _DOOR
         for alias in node.names
     }
-    return [
+    decorated = [
         node.name
         for node in tree.body
         if isinstance(node, ast.FunctionDef)
         and any(_called(decorator) in imported for decorator in node.decorator_list)
     ]
+    made = [
+        node.target.id
+        for node in tree.body
+        if isinstance(node, ast.AnnAssign)
+        and isinstance(node.target, ast.Name)
+        and isinstance(node.value, ast.Call)
+        and _called(node.value) in imported
+    ]
+    return decorated + made
 
 
 def _called(decorator: ast.expr) -> str:

@@ -11,7 +11,7 @@ import pytest
 from right_laws import DISTANCE
 from submissions import MISTAKES
 
-import himpc.controllers.own as own
+from himpc.controllers import viewer
 from himpc.controllers.own import OwnController
 from himpc.controllers.view import View
 from lessons.exercises import load_exercise
@@ -103,7 +103,7 @@ def test_near_is_empty_and_costs_nothing_unless_distances_are_kept(monkeypatch: 
     def refused(*_: object) -> None:
         raise AssertionError("no distance is asked for")
 
-    monkeypatch.setattr(own, "Distances", refused)
+    monkeypatch.setattr(viewer, "Distances", refused)
     found: list[View] = []
     off = as_torque_scene(RunSpec("iiwa14-table").but("avoidance.on=false").prepared(), "it")
     TorqueSession(off, controllers=partial(seen_by, found, RIGHT)).tick()

@@ -70,13 +70,13 @@ class TickArrays(NamedTuple):
     ]
     K_p: Annotated[Array, "M", "1/s²", "configure → linearize"]
     K_v: Annotated[Array, "M", "1/s", "configure → linearize"]
-    root_Q: Annotated[Array, "M", "s²/m", "tables → finish_tick solve_level printed"]
-    C: Annotated[Array, "M N", "s²/m", "tables → finish_tick solve_level printed"]
+    root_Q: Annotated[Array, "M", "s²/m", "tables → fallbacks finish_tick solve_level"]
+    C: Annotated[Array, "M N", "s²/m", "tables → fallbacks finish_tick solve_level"]
     S: Annotated[Array, "M N N", "s⁴/m²", "tables → solve_level"]
     on_velocity: Annotated[Array, "N M", "1/s", "configure → linearize"]
     on_acceleration: Annotated[Array, "N M", "1", "configure → linearize"]
-    rho: Annotated[Array, "r", "1/(N·m)²", "tables → solve_level printed"]
-    metric: Annotated[Array, "r n", "1", "tables → solve_level printed"]
+    rho: Annotated[Array, "r", "1/(N·m)²", "tables → fallbacks solve_level"]
+    metric: Annotated[Array, "r n", "1", "tables → fallbacks solve_level"]
     R: Annotated[Array, "r n", "1/(N·m)²", "tables → finish_tick"]
     accuracy: Annotated[Array, "r", "1", "tables → solve_level"]
     limits: Annotated[
@@ -141,9 +141,9 @@ class TickArrays(NamedTuple):
         Array,
         "N M n",
         "m/s²/N·m",
-        "linearize problems → fallbacks finish_tick solve_level kinematics printed tick",
+        "linearize problems → fallbacks finish_tick solve_level kinematics tick",
     ]
-    free: Annotated[Array, "N M", "m/s²", "linearize problems → finish_tick solve_level printed tick"]
+    free: Annotated[Array, "N M", "m/s²", "linearize problems → fallbacks finish_tick solve_level tick"]
     Q: Annotated[Array, "N n n", "1", "solve_level → itself"]
     reflector: Annotated[Array, "N n n", "1", "solve_level → itself"]
     projected_jacobian: Annotated[Array, "N M n", "m/s²/N·m", "solve_level → itself"]
@@ -186,10 +186,10 @@ class TickArrays(NamedTuple):
     task: Annotated[Whole, "T 4", "1", "configure → finish_tick linearize"]
     part: Annotated[Whole, "M", "1", "configure → linearize"]
     law: Annotated[Whole, "T", "1", "configure preview_writer → linearize"]
-    row_knots: Annotated[Whole, "M", "1", "tables → finish_tick solve_level printed"]
+    row_knots: Annotated[Whole, "M", "1", "tables → fallbacks finish_tick solve_level"]
     # The bit of `at_bound` of each row.
     bit: Annotated[Whole, "b", "1", "configure problems → finish_tick"]
-    level: Annotated[Whole, "r 8", "1", "tables → fallbacks finish_tick solve_level printed"]
+    level: Annotated[Whole, "r 8", "1", "tables → fallbacks finish_tick solve_level"]
     # The robot.
     parent: Annotated[Whole, "J", "1", "configure → distance_rows linearize"]
     is_revolute: Annotated[Whole, "J", "1", "configure → distance_rows linearize"]
