@@ -120,8 +120,8 @@ class TickArrays(NamedTuple):
     cost: Annotated[Array, "r", "1", "finish_tick → gather problems"]
     kkt: Annotated[Array, "r", "1", "fallbacks solve_level → gather problems"]
     leak: Annotated[Array, "r", "m/s²", "finish_tick → gather problems"]
-    multiplier: Annotated[Array, "r k", "1/N·m", "fallbacks solve_level → finish_tick problems"]
-    slack: Annotated[Array, "r k", "N·m", "fallbacks solve_level → problems"]
+    multiplier: Annotated[Array, "r k", "1/N·m", "solve_level → finish_tick problems"]
+    slack: Annotated[Array, "r k", "N·m", "solve_level → problems"]
     # Further data for telemetry; NaN stands for missing data.
     quaternion: Annotated[Array, "T 4", "1", "finish_tick → gather"]
     quaternion_d: Annotated[Array, "T 4", "1", "finish_tick → gather"]
@@ -195,8 +195,8 @@ class TickArrays(NamedTuple):
     is_revolute: Annotated[Whole, "J", "1", "configure → distance_rows linearize"]
     frame_joint: Annotated[Whole, "F", "1", "configure → linearize"]
     # Further results of a tick.
-    active_row: Annotated[Whole, "r k", "1", "fallbacks solve_level → finish_tick problems"]
-    active_joint: Annotated[Whole, "r k", "1", "fallbacks solve_level → finish_tick problems"]
+    active_row: Annotated[Whole, "r k", "1", "solve_level → finish_tick problems"]
+    active_joint: Annotated[Whole, "r k", "1", "solve_level → finish_tick problems"]
     active_count: Annotated[Whole, "r", "1", "fallbacks solve_level → finish_tick problems"]
     left: Annotated[Whole, "r", "1", "solve_level → problems"]
     # Scratch.
