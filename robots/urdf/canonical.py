@@ -88,7 +88,7 @@ def _report(source: str, findings: list[Finding]) -> ImportReport:
 def _check_freedom(root: Element, source: str) -> Iterator[Finding]:
     count = len(movable_joints(root))
     if count == 0:
-        text = "none of its joints moves: all are fixed, or held because of their limits or names"
+        text = "none of its joints moves: all are fixed, or held (a floating base, a gripper, no range)"
         yield Finding("refused", source, f"{text}; give a robot with a movable joint")
     elif count > MAX_JOINTS:
         text = f"it has {count} moving joints; at most {MAX_JOINTS} can be controlled every millisecond"

@@ -211,15 +211,21 @@ def test_wrong_plant_settings_name_the_field(robot: Robot) -> None:
 
 
 def test_planar_and_floating_bases_are_refused_in_one_sentence() -> None:
-    """A base that is a single joint of several coordinates, such as a unicycle's, is not supported."""
+    """A base that is a single joint of several coordinates, such as a unicycle's, is welded; then nothing
+    moves here. Further up the tree such a joint is refused by its name."""
     for kind in ("planar", "floating"):
         text = f"""<robot name="cart"><link name="world"/><link name="cart"><inertial><mass value="1"/>
         <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
         <joint name="base" type="{kind}"><parent link="world"/><child link="cart"/></joint></robot>"""
         with pytest.raises(InputError) as refused:
             load_urdf_text(text)
-        assert "base" in str(refused.value)
+        assert "none of its joints moves" in str(refused.value)
+        assert "floating base" in str(refused.value)
         assert str(refused.value).count("\n") == 0
+        turns = """<link name="ground"/><joint name="turn" type="revolute"><parent link="ground"/>
+        <child link="world"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
+        with pytest.raises(InputError, match=f"joint 'base': a {kind} joint has several axes"):
+            load_urdf_text(text.replace("</robot>", turns))
 
 
 def test_wrong_obstacles_are_named() -> None:
