@@ -69,6 +69,8 @@ _LONG = (
     "tests/commands/test_commands_reproduce.py",
     "tests/commands/test_commands_export.py",
     "tests/robots/test_robots_catalog.py",
+    "tests/robots/test_robots_hostile.py",
+    "tests/lessons/test_lessons_switch.py",
     "tests/lessons/test_lessons_adaptation.py",
     "tests/app/test_app_lesson.py",
     "tests/app/test_app_fork_server.py",
