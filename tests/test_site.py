@@ -168,6 +168,8 @@ def test_a_quoted_number_is_still_so(tmp_path: Path) -> None:
     assert main(["lessons", "--check", QUICK, "--json", str(path)]) == 0
     (now,) = json.loads(path.read_text())["lessons"]
     for check in now["checks"]:
+        if check["what"].startswith("[^"):
+            continue  # a note; pages quote claims and predictions only
         then = told[check["step"], check["what"]]
         if check["measured"] is not None:
             assert then["measured"] == pytest.approx(check["measured"], rel=5e-3), check["what"]

@@ -36,7 +36,7 @@ def mechanics(robot: Robot) -> dict[str, Any]:
         mass, lever, inertia = inertial(model.inertias[joint])
         bodies.append(
             {"mass": mass, "ipos": lever.tolist(), "inertia": inertia}
-            | {"prismatic": joint_axis(model, joint)[0]}
+            | {"prismatic": joint_axis(model, joint)[0], "armature": float(model.armature[joint - 1])}
         )
     tip = model.frames[robot.frame_id(robot.tip)]
     places = np.array([model.jointPlacements[joint].translation for joint in range(1, model.njoints)])

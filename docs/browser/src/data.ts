@@ -5,7 +5,7 @@ import type { State } from "./code";
 export type Piece = [offset: number, bytes: number];
 export type Numbers = number | number[];
 
-export interface Body { mass: number; ipos: number[]; inertia: number[]; prismatic: boolean }
+export interface Body { mass: number; ipos: number[]; inertia: number[]; prismatic: boolean; armature: number }
 export interface Shape { joint: number; colour: string; grid: number; vertices: Piece; faces: Piece }
 export interface RobotData {
   name: string; joints: string[]; bodies: Body[]; reach: number; planar: boolean; tip: { joint: number; pos: number[] };

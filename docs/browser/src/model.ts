@@ -5,11 +5,11 @@ import { each, type Numbers, type PlantSettings, type RobotData, type SceneData 
 export function mjcf({ model, plant }: SceneData, robot: RobotData): string {
   const text = plant.contacts ? model : model.replace(/<!-- objects -->.*<!-- objects -->/, "");
   return text.replace(/@(\w+) (\d+)@/g, (_, name: string, joint: string) => {
-    const moved = inertia(robot, plant, Number(joint) - 1);
+    const k = Number(joint) - 1, moved = inertia(robot, plant, k);
     const own = name === "friction" || name === "damping" || name === "armature" ? plant[name] : 0;
     const found: Record<string, Numbers | string | boolean> = { ...moved, stops: plant.joint_stops,
       gravity: plant.gravity ? robot.gravity : [0, 0, 0], contacts: plant.contacts ? "enable" : "disable" };
-    return [found[name] ?? each(own, robot.bodies.length)[Number(joint) - 1]].flat().join(" ");
+    return [found[name] ?? (each(own, robot.bodies.length)[k] || (name === "armature" ? robot.bodies[k].armature : 0))].flat().join(" ");
   });
 }
 
