@@ -9,7 +9,7 @@ import pinocchio as pin
 from lxml import etree
 from lxml.etree import _Element as Element
 
-from robots.inertia import mass_matrix, sample_configurations
+from robots.inertia import largest_loads
 from robots.report import Finding
 from robots.urdf.joints import finite_bounds
 from robots.urdf.read import Refusal, label, limit_value
@@ -79,13 +79,9 @@ def _effort(joint: Element) -> float:
 
 
 def _loads(model: pin.Model) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the largest gravity load |g_i|, (n,) N·m, and the largest M_ii, (n,) kg·m², over samples."""
-    data = model.createData()
+    """Returns `largest_loads` inside the limits of a canonical model."""
     pairs = zip(model.lowerPositionLimit, model.upperPositionLimit, strict=True)
     bounded = np.array([finite_bounds(low, high) for low, high in pairs])
     lower = np.where(bounded, model.lowerPositionLimit, -np.inf)
     upper = np.where(bounded, model.upperPositionLimit, np.inf)
-    samples = sample_configurations(lower, upper, 64)
-    gravity = np.array([pin.computeGeneralizedGravity(model, data, q) for q in samples])
-    inertia = np.array([np.diag(mass_matrix(model, data, q)) for q in samples])
-    return np.abs(gravity).max(axis=0), inertia.max(axis=0)
+    return largest_loads(model, lower, upper)
