@@ -29,7 +29,9 @@ def sources_of(function: Callable[..., Any]) -> list[Path]:
     which set the compiler's options, are included too."""
     pieces = (getattr(each, "py_func", None) for each in function.__globals__.values())
     packages = {each.__module__.partition(".")[0] for each in (function, *filter(None, pieces))} | {_PACKAGE}
-    files = {Path(function.__code__.co_filename)}
+    # The text of a function of `as_function` is made by its module, which is then the file to begin with.
+    file = Path(function.__code__.co_filename)
+    files = {file if file.is_file() else Path(str(sys.modules[function.__module__].__file__))}
     waiting = [*files]
     files.update(Path(__file__).parent.glob("*.py"))
     while waiting:
