@@ -21,6 +21,13 @@ def shortened(text: str, most: int = 60) -> str:
     return "".join(each if each.isprintable() else "?" for each in text)
 
 
+def listed(names: Iterable[str], most: int = 3, width: int = 60) -> str:
+    """Returns the first names for a message, each in quotation marks and at most `width` characters long."""
+    every = list(names)
+    quoted = ", ".join(f"'{shortened(name, width)}'" for name in every[:most])
+    return quoted + (", …" if len(every) > most else "")
+
+
 def nearest_name(name: str, choices: Iterable[str], cutoff: float = 0.6) -> str | None:
     """Returns the choice that is most similar to a name, or None if no choice is similar."""
     folded = {choice.casefold(): choice for choice in reversed(list(choices))}

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import PurePath
+
+import numpy as np
 
 from robots.covering.covers import made_cover
+from robots.errors import listed
 from robots.floor import no_floor
 from robots.geometry.collision_model import CollisionModel
 from robots.geometry.cover import Cover
@@ -12,6 +17,10 @@ from robots.mechanics.exclusions import collision_model
 from robots.report import Finding
 from robots.robot import Robot
 from robots.shapes.collision_shapes import collision_solids
+from robots.shapes.limbs import chain_length
+from robots.shapes.read import described_shapes, mesh_surfaces
+
+_FAR_LARGER = 5.0  # size of a link's mesh, divided by the length of the arm
 
 
 def with_collision(robot: Robot, meshes: bool = True) -> Robot:
@@ -46,8 +55,39 @@ def with_cover(robot: Robot, meshes: bool = True) -> Robot:
 
 
 def with_geometry(robot: Robot, meshes: bool = True) -> Robot:
-    """Returns the robot with its collision geometry and its capsules."""
+    """Returns the robot with its collision geometry and its capsules, and notes about its meshes."""
+    for finding in _about_meshes(robot) if meshes else ():
+        robot = _noted(robot, finding.where, finding.text)
     return with_cover(with_collision(robot, meshes), meshes)
+
+
+def _about_meshes(robot: Robot) -> Iterator[Finding]:
+    """Yields a note for the meshes that could not be read, and for each link whose meshes are far larger than
+    the arm."""
+    shapes = [
+        shape
+        for what in ("visuals", "collisions")
+        for found in described_shapes(robot, what).values()
+        for shape in found
+        if shape.kind == "mesh"
+    ]
+    surfaces = mesh_surfaces(shapes)
+    missing = dict.fromkeys(PurePath(shape.mesh).name for shape in shapes if shape.mesh not in surfaces)
+    if missing:
+        yield Finding("note", "meshes", f"{len(missing)} mesh file(s) could not be read ({listed(missing)})")
+    sizes: dict[str, float] = {}
+    for shape in shapes:
+        for _, vertices, _ in surfaces.get(shape.mesh, ()):
+            extent = float((np.ptp(vertices, axis=0) * np.abs(shape.size)).max())
+            sizes[shape.link] = max(extent, sizes.get(shape.link, 0.0))
+    reach = chain_length(robot.model, robot.frame_id(robot.tip))
+    for link, size in sizes.items():
+        if size > _FAR_LARGER * reach:
+            text = (
+                f"its meshes are {size:.3g} m large, the whole arm is {reach:.2g} m long: STL and OBJ files"
+            )
+            text += ' have no unit; scale="0.001 0.001 0.001" in <mesh> turns millimetres into metres'
+            yield Finding("note", f"link '{link}'", text)
 
 
 def _noted(robot: Robot, where: str, text: str) -> Robot:

@@ -17,12 +17,14 @@ from robots.geometry.files import stored
 from robots.loading.imported import with_cover, with_geometry
 from robots.loading.importing import Import, bounds, import_robot
 from robots.meshes.files import has_meshes
-from robots.processes.isolation import Fault, isolated
+from robots.processes.isolation import Allowance, Fault, isolated
 from robots.report import Finding, ImportReport
 from robots.robot import Robot
 from robots.urdf import canonicalise, load_bytes
 
 _SHORT = 200_000  # bytes; the robots of the last four files up to this size stay in memory
+_GEOMETRY = Allowance(20.0)
+"""For the meshes of a robot, their hulls and capsules. At most 8 s are for reading (`READING`)."""
 
 
 def load_robot(name_or_path: str | Path, tip: str | None = None, within: Path | None = None) -> Robot:
@@ -81,7 +83,7 @@ def _import(
     if found.robot is None or not has_meshes(found.robot.urdf_text):
         return found
     try:
-        robot = isolated(with_geometry, found.robot)
+        robot = isolated(with_geometry, found.robot, within=_GEOMETRY)
     except Fault:
         robot = with_geometry(found.robot, meshes=False)
     return Import(robot.report, robot)

@@ -7,17 +7,32 @@ import site
 import sys
 from collections.abc import Iterator
 from functools import cache
+from itertools import chain
 from pathlib import Path, PurePosixPath
 from urllib.parse import unquote, urlparse
 
 from lxml import etree
 from lxml.etree import _Element as Element
 
-from robots.errors import shortened
+from robots.errors import listed, shortened
 from robots.report import Finding
 
-# In rtb-data, the folders of some packages have other names than the packages.
-_RENAMED = {"kuka_lbr_iiwa_support": "kuka_description/kuka_lbr_iiwa"}
+RENAMED = {"kuka_lbr_iiwa_support": "kuka_description/kuka_lbr_iiwa"}
+"""In rtb-data, the folders of some packages have other names than the packages."""
+IN_EXTRA = """a1_description abb_irb140_description alex_description alexander_description
+allegro_hand_description anymal_b_simple_description anymal_c_simple_description asr_twodof_description
+b1_description baxter_description bolt_description borinot_description cassie_description centauro_description
+clearpath_ridgeback_description double_pendulum_description example-robot-data finger_edu_description
+g1_description go1_description go2_description hector_description hextilt_description human_description
+hyq_description icub_description iris_description kinova_description kuka_description kuka_lbr_iiwa_support
+laikago_description lynxmotion_al5d_description panda_description pr2_description quadruped_description
+qut_frankie_description romeo_description simple_humanoid_description so_arm_description solo_description
+talos_data tiago_description tiago_pro_description trossen_descriptions unimation_puma560_description
+ur_description xarm_description z1_description"""
+"""The packages with meshes that the extra `meshes` installs."""
+
+_PLACES = "the folder of the URDF and all folders above it, the ROS package path, and the installed packages"
+_STAND_INS = 20  # largest number of findings about folders that stood in
 
 
 def localise(root: Element, folder: Path | None, within: Path | None = None) -> Iterator[Finding]:
@@ -26,7 +41,8 @@ def localise(root: Element, folder: Path | None, within: Path | None = None) -> 
     The name of a mesh in an installed package stays a `package://` name; all other names become absolute
     paths. within: folder that must contain all meshes that are not installed; None: they may be anywhere.
     """
-    missing: dict[str, int] = {}
+    missing: dict[str, str] = {}
+    stood_in: dict[str, Path] = {}
     for link in root.findall("link"):
         for shape in (*link.findall("visual"), *link.findall("collision")):
             mesh = shape.find("geometry/mesh")
@@ -35,18 +51,34 @@ def localise(root: Element, folder: Path | None, within: Path | None = None) -> 
             uri = mesh.get("filename", "")
             if installed_mesh(uri) is not None:
                 continue
-            path = None if folder is None else find_mesh(uri, folder)
-            if path is not None and (within is None or path.is_relative_to(within)):
+            package = (_package_parts(uri) or ("",))[0]
+            places = chain([(None, find_mesh(uri, folder))], _stand_ins(uri, folder)) if folder else ()
+            allowed = (each for each in places if each[1] and (not within or within in each[1].parents))
+            place, path = next(allowed, (None, None))
+            if path is not None:
                 mesh.set("filename", str(path))
+                if place is not None:
+                    what = (
+                        f"the package '{shortened(package)}'"
+                        if package
+                        else f"the path of '{shortened(uri)}'"
+                    )
+                    stood_in[what] = place
                 continue
             link.remove(shape)
             if shape.tag == "visual":
-                missing[uri] = missing.get(uri, 0) + 1
+                missing[uri] = package
+    for what, place in list(stood_in.items())[:_STAND_INS]:
+        yield Finding("note", "meshes", f"the folder '{shortened(place.name)}' stood in for {what}")
     if missing:
-        names = ", ".join(f"'{shortened(uri)}'" for uri in list(missing)[:3])
-        more = ", …" if len(missing) > 3 else ""
-        text = f"{len(missing)} mesh file(s) not found ({names}{more}); capsules are drawn instead"
-        yield Finding("note", "meshes", f"{text}. `pip install himpc-lab[meshes]` brings many robots' meshes")
+        text = f"{len(missing)} mesh file(s) not found ({listed(missing)}); capsules are drawn instead"
+        text += f"; looked for in {_PLACES}" if folder else "; a zip of the robot's folder brings them along"
+        text += (
+            "; `pip install himpc-lab[meshes]` brings them"
+            if {*IN_EXTRA.split()} & {*missing.values()}
+            else ""
+        )
+        yield Finding("note", "meshes", text)
 
 
 def has_meshes(text: str) -> bool:
@@ -83,6 +115,19 @@ def find_mesh(uri: str, folder: Path) -> Path | None:
     return next(filter(None, (_existing(place / parts[1]) for place in places)), None)
 
 
+def _stand_ins(uri: str, folder: Path) -> Iterator[tuple[Path, Path | None]]:
+    """Yields a folder and the file in it that may be meant by a URI whose package, or whose path on another
+    machine, does not exist: the path without the package's name in the parent folders, then the file's name
+    beside the URDF and in a folder `meshes`."""
+    parts = _package_parts(uri)
+    if parts is not None:
+        for place in (folder, *folder.parents):
+            yield place, _existing(place / parts[1])
+    name = PurePosixPath(uri.replace("\\", "/")).name
+    for place in (folder, folder / "meshes", folder.parent / "meshes") if "\0" not in uri else ():
+        yield place, _existing(place / name)
+
+
 def _package_parts(uri: str) -> tuple[str, str] | None:
     """Returns the package and the path inside the package for a `package://` URI whose path stays inside;
     None for any other URI."""
@@ -112,7 +157,7 @@ def _package_folders(package: str, folder: Path) -> Iterator[Path]:
 def _installed(package: str) -> Iterator[Path]:
     for share in installed_shares():
         yield share / package
-        yield share / _RENAMED.get(package, package)
+        yield share / RENAMED.get(package, package)
 
 
 @cache

@@ -13,10 +13,11 @@ import trimesh
 
 from robots.meshes.files import installed_mesh
 from robots.meshes.simplify import simplify
-from robots.processes.isolation import DEADLINE, Fault, isolated
+from robots.processes.isolation import Fault, inside, isolated
 
 MAX_FACES = 12_000  # faces per mesh; with this number, a laptop's browser rotates several robots smoothly
 MAX_BYTES = 100_000_000
+READING = 8.0  # s of processor time in which the meshes of a robot are read
 _FORMATS = (".stl", ".dae", ".obj", ".ply", ".glb", ".gltf", ".off")
 _BRIGHTEST = 238  # pure white would show no shading under the page's lights
 Colour = tuple[int, int, int]
@@ -41,18 +42,20 @@ def mesh_pieces(uris: Iterable[str]) -> dict[str, tuple[Piece, ...]]:
     return {**found, **_isolated_pieces(tuple(others))}
 
 
-def read_meshes(paths: tuple[str, ...]) -> dict[str, tuple[Piece, ...]]:
-    """Returns the pieces of all files that can be read within the time limit of isolated work."""
-    end = time.monotonic() + 0.7 * DEADLINE
-    found: dict[str, tuple[Piece, ...]] = {}
+def read_meshes(paths: tuple[str, ...], seconds: float) -> dict[str, tuple[Piece, ...]]:
+    """Returns the pieces of all files that can be read within a processor time, s. A process reads no file
+    twice."""
+    end = time.process_time() + seconds
     for path in paths:
-        if time.monotonic() > end:
-            break
-        try:
-            found[path] = read_mesh(Path(path))
-        except Exception:
-            continue
-    return found
+        if path not in _read:
+            try:
+                _read[path] = read_mesh(Path(path)) if time.process_time() < end else ()
+            except Exception:
+                _read[path] = ()  # mesh readers raise many kinds of errors for a bad file
+    return {path: _read[path] for path in paths if _read[path]}
+
+
+_read: dict[str, tuple[Piece, ...]] = {}
 
 
 def read_mesh(path: Path) -> tuple[Piece, ...]:
@@ -60,10 +63,13 @@ def read_mesh(path: Path) -> tuple[Piece, ...]:
     if path.suffix.lower() not in _FORMATS or path.stat().st_size > MAX_BYTES:
         raise ValueError(f"{path} is not a mesh file, or has more than {MAX_BYTES} bytes")
     scene = trimesh.load_scene(str(path))
+    metres = 1.0
+    if path.suffix.lower() == ".dae" and scene.units is not None:
+        metres = trimesh.units.unit_conversion(scene.units, "meters")  # Gazebo and RViz apply it, too
     pieces: dict[Colour | None, list[tuple[np.ndarray, np.ndarray]]] = {}
     for solid in scene.dump():
         if isinstance(solid, trimesh.Trimesh) and len(solid.faces):
-            vertices, faces = np.asarray(solid.vertices), np.asarray(solid.faces)
+            vertices, faces = metres * np.asarray(solid.vertices), np.asarray(solid.faces)
             if not np.isfinite(vertices).all():
                 continue
             if path.suffix.lower() == ".stl":
@@ -113,8 +119,10 @@ def _installed_pieces(path: Path) -> tuple[Piece, ...]:
 def _isolated_pieces(paths: tuple[str, ...]) -> dict[str, tuple[Piece, ...]]:
     if not paths:
         return {}
+    if inside():
+        return read_meshes(paths, READING)
     try:
-        return isolated(read_meshes, paths)
+        return isolated(read_meshes, paths, READING)
     except Fault:
         return {}
 

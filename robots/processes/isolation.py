@@ -24,6 +24,7 @@ MEMORY = 1_000_000_000  # bytes of address space
 
 _T = TypeVar("_T")
 _PARENT_DIES = 1  # PR_SET_PDEATHSIG of Linux
+_limited = False
 PATIENCE = 10.0
 """Largest wall time of isolated work, as a multiple of its time limit."""
 
@@ -106,6 +107,11 @@ def isolated(
     if fault is not None:
         raise Fault(fault)
     return result
+
+
+def inside() -> bool:
+    """Returns whether this process is one that `isolated` started: its limits hold already."""
+    return _limited
 
 
 def threads() -> int:
@@ -263,6 +269,8 @@ def _answer(request: bytes, within: Allowance) -> bytes:
 def _restrict(within: Allowance, parent: int) -> None:
     """Makes this process end when its parent ends, when the largest wall time has passed, and when the limit
     of memory is reached, as far as the system supports this."""
+    global _limited
+    _limited = True
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent notices this and ends the process
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
     signal.alarm(int(PATIENCE * within.seconds) + 1)

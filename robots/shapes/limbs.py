@@ -89,11 +89,12 @@ def joint_radius(model: pin.Model, tip: int, joint: int) -> float:
     return thickness * (1.0 - 0.4 * depth / max(deepest, 1))
 
 
-def _chain_length(model: pin.Model, tip: int) -> float:
+def chain_length(model: pin.Model, tip: int) -> float:
+    """Returns the length of the chain from the world to a frame, through all its joints, m."""
     frame = model.frames[tip]
     steps = [model.jointPlacements[k].translation for k in model.supports[frame.parentJoint] if k > 0]
     return sum(float(np.linalg.norm(step)) for step in (*steps, frame.placement.translation))
 
 
 def _thickness(model: pin.Model, tip: int) -> float:
-    return _SLENDER * max(_chain_length(model, tip), 0.05)
+    return _SLENDER * max(chain_length(model, tip), 0.05)

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from lxml import etree
 from lxml.etree import _Element as Element
 
-from robots.errors import nearest_name, shortened
+from robots.errors import listed, nearest_name, shortened
 from robots.report import Finding
 from robots.urdf.read import end_of, label, named
 
@@ -149,9 +149,7 @@ def _single_tree(root: Element, source: str) -> Iterator[Finding]:
         yield Finding("refused", source, "no link is the root: the joints form a loop; open the loop")
         return
     if len(roots) > 1:
-        names = ", ".join(f"'{shortened(name, 30)}'" for name in roots[:6])
-        more = ", …" if len(roots) > 6 else ""
-        text = f"it has {len(roots)} root links ({names}{more}); join them with fixed joints"
+        text = f"it has {len(roots)} root links ({listed(roots, 6, 30)}); join them with fixed joints"
         yield Finding("refused", source, text)
         return
     depths = _depths(root, roots[0])

@@ -118,7 +118,7 @@ def test_bad_meshes_are_left_out(tmp_path: Path) -> None:
     robot = import_robot(arm, "my.urdf", tmp_path).used()
     looks_like_something(robot, "meshes")
     assert any(shape.name == "l2/0" for shape in link_shapes(robot))
-    pieces = read_meshes(tuple(str(tmp_path / name) for name in names))
+    pieces = read_meshes(tuple(str(tmp_path / name) for name in names), 60.0)
     assert str(tmp_path / "zz_good.stl") in pieces
     for name in ("nan.stl", "infinite.stl", "nan.obj", "picture.png", "bomb.dae"):
         assert not pieces.get(str(tmp_path / name)), name

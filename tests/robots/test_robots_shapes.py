@@ -4,17 +4,25 @@ from __future__ import annotations
 
 import dataclasses
 import re
+import time
+from pathlib import Path
 
 import numpy as np
 import pytest
 from arms import INERTIAL, link, load, two_joint_arm
 
 from robots import CATALOG, Robot, load_robot
+from robots.loading.imported import with_geometry
 from robots.loading.importing import import_robot
-from robots.meshes.files import find_mesh, installed_mesh, installed_shares
+from robots.meshes import surfaces
+from robots.meshes.files import IN_EXTRA, RENAMED, find_mesh, installed_mesh, installed_shares
 from robots.meshes.simplify import simplify
-from robots.meshes.surfaces import MAX_FACES, mesh_pieces
+from robots.meshes.surfaces import MAX_FACES, mesh_pieces, read_meshes
 from robots.shapes.link_shapes import MAX_TOTAL, Shape, link_shapes
+from robots.urdf import canonicalise
+
+FIELD = Path(__file__).parent / "field"
+_MM = '<unit name="millimeter" meter="0.001"/>'
 
 
 def check(robot: Robot, shapes: list[Shape]) -> None:
@@ -112,6 +120,50 @@ def test_meshes_are_found_beside_the_urdf_and_in_its_packages(tmp_path) -> None:
         assert find_mesh(nothing, folder) is None
 
 
+def test_a_folder_stands_in_for_a_package_of_another_name() -> None:
+    robot = load_robot(FIELD / "renamed_package" / "urdf" / "arm.urdf")
+    part = FIELD / "renamed_package" / "meshes" / "part.dae"
+    assert robot.urdf_text.count(f'"{part}"') == 4
+    told = str(robot.report.findings)
+    assert "the folder 'renamed_package' stood in for the package 'arm_description'" in told
+    assert "not found" not in told
+
+
+def test_where_a_mesh_is_looked_for_at_last(tmp_path) -> None:
+    """Without the package's name, then in the folder `meshes` beside the URDF; never outside `within`."""
+    for name in ("own/robot/urdf", "own/robot/meshes", "own/parts"):
+        (tmp_path / name).mkdir(parents=True)
+    for name in ("own/robot/meshes/a.stl", "own/robot/urdf/b.stl", "own/parts/c.stl", "d.stl"):
+        (tmp_path / name).write_bytes(b"solid a")
+    own = tmp_path / "own"
+    for uri, there in (
+        ("package://x/meshes/a.stl", True),
+        ("package://x/visual/fine/a.stl", True),
+        ("file:///home/somebody/ws/a.stl", True),
+        ("C:\\somebody\\b.stl", True),
+        ("package://x/parts/c.stl", True),
+        ("package://x/d.stl", False),
+        ("package://x/nowhere.stl", False),
+    ):
+        arm = two_joint_arm(l2=mesh_visual(uri)).encode()
+        robot = import_robot(arm, "arm.urdf", own / "robot" / "urdf", within=own).used()
+        told = str(robot.report.findings)
+        assert ("mesh filename" in robot.urdf_text) is there, uri
+        assert ("stood in for" in told) is there, uri
+        assert ("the folder of the URDF and all folders above it" in told) is not there, uri
+
+
+def test_the_extra_is_recommended_only_if_it_has_the_package() -> None:
+    for package, helps in (("panda_description", True), ("arm_description", False)):
+        told = canonicalise(
+            two_joint_arm(l2=mesh_visual(f"package://{package}/none.stl")).encode(), "a.urdf"
+        )[1]
+        assert ("himpc-lab[meshes]" in str(told)) is helps
+    installed = [place.name for share in installed_shares() for place in share.iterdir() if place.is_dir()]
+    if installed:
+        assert {*installed, *RENAMED}.issuperset(IN_EXTRA.split())
+
+
 def mesh_visual(uri: str) -> str:
     return link("l2", f'{INERTIAL}<visual><geometry><mesh filename="{uri}"/></geometry></visual>')
 
@@ -120,6 +172,59 @@ def a_ball(path) -> None:
     import trimesh
 
     trimesh.creation.icosphere(subdivisions=1).export(path)
+
+
+@pytest.mark.parametrize(
+    ("unit", "metres"),
+    [
+        ('<unit name="millimeter" meter="0.001"/>', 1e-3),
+        ('<unit name="inch" meter="0.0254"/>', 0.0254),
+        ("", 1.0),
+    ],
+    ids=["mm", "inch", "none"],
+)
+def test_the_unit_of_a_collada_file_is_applied_before_the_scale(tmp_path, unit: str, metres: float) -> None:
+    text = (FIELD / "tetra_mm.dae").read_text()
+    (tmp_path / "part.dae").write_text(text.replace(_MM, unit))
+    mesh = mesh_visual("part.dae").replace('.dae"', '.dae" scale="1 2 0.5"')
+    robot = import_robot(two_joint_arm(l2=mesh).encode(), "arm.urdf", tmp_path).used()
+    (part,) = (shape for shape in link_shapes(robot) if shape.name.startswith("l2/"))
+    extents = np.ptp(part.vertices, axis=0)
+    np.testing.assert_allclose(extents, metres * np.array([50.0, 100.0, 150.0]), rtol=1e-5)
+
+
+def test_a_mesh_that_is_far_larger_than_the_robot_is_reported(tmp_path) -> None:
+    """An STL has no unit. Millimetres that are read as metres are drawn 1000 times too large."""
+    import trimesh
+
+    trimesh.creation.box((60.0, 80.0, 300.0)).export(tmp_path / "part.stl")
+    for scale, reported in (("", True), (' scale="0.001 0.001 0.001"', False)):
+        mesh = mesh_visual("part.stl").replace('.stl"', f'.stl"{scale}')
+        (tmp_path / "arm.urdf").write_text(two_joint_arm(l2=mesh))
+        told = str(load_robot(tmp_path / "arm.urdf").report.findings)
+        assert ("its meshes are 300 m large" in told) is reported
+        assert ("no unit" in told) is reported
+
+
+def test_the_wall_clock_drops_no_mesh(tmp_path, monkeypatch) -> None:
+    """On a slow or busy machine reading takes long; only processor time counts."""
+    a_ball(tmp_path / "ball.stl")
+    hours = iter(range(0, 10**6, 3600))
+    monkeypatch.setattr(time, "monotonic", lambda: next(hours))
+    assert len(read_meshes((str(tmp_path / "ball.stl"),), 7.0)) == 1
+
+
+def test_meshes_that_were_not_read_are_named(tmp_path, monkeypatch) -> None:
+    a_ball(tmp_path / "ball.stl")
+    (tmp_path / "broken.stl").write_bytes(b"solid a")
+    both = mesh_visual("broken.stl").replace("</link>", mesh_visual("ball.stl").split(INERTIAL)[1])
+    (tmp_path / "arm.urdf").write_text(two_joint_arm(l2=both))
+    told = str(load_robot(tmp_path / "arm.urdf").report.findings)
+    assert "1 mesh file(s) could not be read ('broken.stl')" in told
+    robot = import_robot((tmp_path / "arm.urdf").read_bytes(), "arm.urdf", tmp_path).used()
+    monkeypatch.setattr(surfaces, "READING", 0.0)
+    told = str(with_geometry(robot).report.findings)
+    assert "2 mesh file(s) could not be read ('broken.stl', 'ball.stl')" in told
 
 
 def test_the_owner_of_the_machine_uses_meshes_beside_a_urdf(tmp_path) -> None:
