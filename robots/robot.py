@@ -12,6 +12,7 @@ import pinocchio as pin
 from robots.errors import InputError, unknown_name
 from robots.geometry.collision_model import CollisionModel
 from robots.geometry.cover import Cover
+from robots.geometry.shape import Shape
 from robots.report import ImportReport
 
 
@@ -39,6 +40,7 @@ class Robot:
     report: ImportReport
     collision: CollisionModel = field(default_factory=CollisionModel)  # solids, and excluded pairs
     cover: Cover | None = None  # made by `cover_of` if it is None
+    surfaces: tuple[Shape, ...] = ()  # what is drawn, if the files of the meshes are gone
 
     def __post_init__(self) -> None:
         for name in ("home", "q_lower", "q_upper", "v_limit", "tau_limit", "a_max", "M_bar"):

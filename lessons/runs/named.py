@@ -28,7 +28,7 @@ TASK_SCENE = "iiwa14-hold"
 
 
 def scene_named(
-    name: str, urdf: str | None = None, tip: str | None = None, urdf_text: str | None = None
+    name: str, urdf: str | None = None, tip: str | None = None, urdf_text: str | bytes | None = None
 ) -> Scene:
     """Returns a scene by its name, or the scene or task of a file; the arguments are those of `load_scene`.
 

@@ -50,7 +50,7 @@ _MAKERS: dict[str, Callable[[], TorqueScene]] = {
 
 
 def load_scene(
-    name: str, urdf: str | None = None, tip: str | None = None, urdf_text: str | None = None
+    name: str, urdf: str | None = None, tip: str | None = None, urdf_text: str | bytes | None = None
 ) -> Scene:
     """Returns the scene with this name.
 
@@ -58,7 +58,7 @@ def load_scene(
         name: a key of ALL_SCENES.
         urdf: path of a URDF file or catalog name, for the scene "hold".
         tip: end-effector frame, for the scene "hold".
-        urdf_text: a URDF's text instead of its path (uploads).
+        urdf_text: a URDF's text, or a zip, instead of its path (uploads).
 
     Raises:
         InputError: the scene is unknown, a scene with its own robot gets a URDF, "hold" gets no URDF, or the

@@ -41,7 +41,7 @@ def hold_of(name: str) -> TorqueScene:
 
 
 def hold(
-    urdf: str | None, tip: str | None, urdf_text: str | None = None, within: Path | None = None
+    urdf: str | None, tip: str | None, urdf_text: str | bytes | None = None, within: Path | None = None
 ) -> TorqueScene:
     """Returns the hold scene of any robot: URDF path, catalog name or text of a URDF. within: see
     `load_robot`.

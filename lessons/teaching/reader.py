@@ -229,7 +229,7 @@ def read_lesson(name: str, path: str, text: str, marks: bool = False) -> Lesson:
 
 def _beside(path: str, name: str) -> str:
     """Returns the path of a file that a lesson names relative to its own folder; any other name unchanged."""
-    return str(Path(path).parent / name) if name.endswith((".urdf", ".py")) else name
+    return str(Path(path).parent / name) if name.endswith((".urdf", ".xml", ".zip", ".py")) else name
 
 
 def assignments(path: str, text: str) -> Iterator[tuple[int, str, str]]:

@@ -1,11 +1,12 @@
-"""`load_robot` returns a robot by its catalog name or from a URDF file. Files from other sources are read in
-a separate process."""
+"""`load_robot` returns a robot by its catalog name or from a description: a file, a folder or a zip. Files
+from other sources are read in a separate process."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from robots.errors import InputError, shortened, unknown_name
 from robots.geometry.collision_model import CollisionModel
 from robots.geometry.cover import Cover
 from robots.geometry.files import stored
+from robots.loading.archive import MAX_PACKED, description, unpack
 from robots.loading.imported import with_cover, with_geometry
 from robots.loading.importing import Import, bounds, import_robot
 from robots.meshes.files import has_meshes
@@ -28,8 +30,9 @@ _GEOMETRY = Allowance(20.0)
 
 
 def load_robot(name_or_path: str | Path, tip: str | None = None, within: Path | None = None) -> Robot:
-    """Returns the robot with this catalog name, or the robot that a URDF file describes.
+    """Returns the robot with this catalog name, or the robot of a description.
 
+    name_or_path: also a URDF file, a folder or a zip with one, or the path of a URDF inside a zip.
     tip: the default end-effector frame; None: the tip of the catalog, or the end of the longest chain.
     within: a folder, given without symbolic links. It must contain the URDF file and its meshes, except
     installed meshes. None: files may be anywhere.
@@ -44,31 +47,79 @@ def load_robot(name_or_path: str | Path, tip: str | None = None, within: Path | 
     path = Path(text)
     if "/" not in text and not path.suffix and not _exists(path):
         raise unknown_name("robot in the catalog called", text, CATALOG, "or give the path of a URDF file")
-    if within is not None and not path.resolve().is_relative_to(within):
-        raise InputError(f"The URDF '{shortened(text, 100)}' is not in the folder whose files may be opened.")
-    return _import_file(path, tip, within).used()
+    return _import_path(path, tip, within).used()
 
 
-def load_urdf_text(text: str, tip: str | None = None) -> Robot:
-    """Returns the robot that a URDF string describes: an upload, or a stored canonical text.
+def load_urdf_text(text: str | bytes, tip: str | None = None) -> Robot:
+    """Returns the robot that a URDF string describes: an upload, or a stored canonical text. Bytes are an
+    uploaded zip with the robot's folder.
 
-    The description can use the meshes of installed packages, by `package://`, and no other files.
+    The description can use the meshes in the zip, those of installed packages, by `package://`, and no other
+    files.
 
     Raises InputError like `load_robot`.
     """
+    if isinstance(text, bytes):
+        return _import_zip(text, "the zip", "leave only one of them in the zip", tip).used()
     return _import(text.encode(errors="replace"), "the URDF text", None, tip).used()
 
 
 def check_urdf(path: str | Path) -> ImportReport:
-    """Returns the import report of a URDF file: everything that the import repairs, adds, fixes or refuses.
+    """Returns the import report of a description, as `load_robot` finds it: everything that the import
+    repairs, adds, fixes or refuses.
 
     Invalid content raises no exception; InputError is raised if there is no such file.
     """
-    return _import_file(Path(path), None).report
+    return _import_path(Path(path), None).report
 
 
-def _import_file(path: Path, tip: str | None, within: Path | None = None) -> Import:
-    return _import(load_bytes(path), shortened(str(path), 100), path.resolve().parent, tip, within)
+def _import_path(path: Path, tip: str | None, within: Path | None = None) -> Import:
+    source = shortened(str(path), 100)
+    packed = next((place for place in (path, *path.parents) if place.suffix.lower() == ".zip"), None)
+    choose = f"choose one, such as {path}/{{}}"
+    _check_inside(path, within)
+    if packed is not None and packed.is_file():
+        inside = path.relative_to(packed)
+        return _import_zip(load_bytes(packed, MAX_PACKED), str(packed), choose, tip, inside)
+    if path.is_dir():
+        path = description(path, source, choose)
+        source = shortened(str(path), 100)
+        _check_inside(path, within)
+    return _import(load_bytes(path), source, path.resolve().parent, tip, within)
+
+
+def _check_inside(path: Path, within: Path | None, name: str = "") -> None:
+    if within is not None and not path.resolve().is_relative_to(within):
+        name = shortened(name or str(path), 100)
+        raise InputError(f"The URDF '{name}' is not in the folder whose files may be opened.")
+
+
+def _import_zip(data: bytes, source: str, choose: str, tip: str | None, inside: Path = Path()) -> Import:
+    """Imports the robot of a zip. The unpacked files are deleted afterwards, so the robot keeps its
+    surfaces.
+
+    choose: see `description`; inside: the path of the description in the zip, if it is known.
+    """
+    with TemporaryDirectory(prefix="himpc-lab-", ignore_cleanup_errors=True) as name:  # mode 0700
+        folder = Path(name).resolve()
+        try:
+            isolated(unpack, data, folder)
+        except Fault as fault:
+            return Import(ImportReport(source, (Finding("refused", source, str(fault)),)))
+        path = description(folder, source, choose) if inside == Path() else folder / inside
+        where = f"{source}/{path.relative_to(folder)}"
+        _check_inside(path, folder, where)
+        found = _import(load_bytes(path, name=where), shortened(where, 100), path.parent, tip, folder)
+        if found.robot is None:
+            return found
+        robot = _with_surfaces(found.robot)
+        return Import(found.report, replace(robot, urdf_text=robot.urdf_text.replace(f"{folder}/", "")))
+
+
+def _with_surfaces(robot: Robot) -> Robot:
+    from robots.shapes.link_shapes import link_shapes  # it loads trimesh
+
+    return replace(robot, surfaces=tuple(link_shapes(robot)))
 
 
 def _import(

@@ -52,33 +52,34 @@ def localise(root: Element, folder: Path | None, within: Path | None = None) -> 
             if installed_mesh(uri) is not None:
                 continue
             package = (_package_parts(uri) or ("",))[0]
-            places = chain([(None, find_mesh(uri, folder))], _stand_ins(uri, folder)) if folder else ()
-            allowed = (each for each in places if each[1] and (not within or within in each[1].parents))
-            place, path = next(allowed, (None, None))
+            place, path = mesh_file(uri, folder, within)
             if path is not None:
                 mesh.set("filename", str(path))
                 if place is not None:
-                    what = (
-                        f"the package '{shortened(package)}'"
-                        if package
-                        else f"the path of '{shortened(uri)}'"
-                    )
+                    what = f"package '{shortened(package)}'" if package else f"path of '{shortened(uri)}'"
                     stood_in[what] = place
                 continue
             link.remove(shape)
             if shape.tag == "visual":
                 missing[uri] = package
     for what, place in list(stood_in.items())[:_STAND_INS]:
-        yield Finding("note", "meshes", f"the folder '{shortened(place.name)}' stood in for {what}")
+        yield Finding("note", "meshes", f"the folder '{shortened(place.name)}' stood in for the {what}")
     if missing:
         text = f"{len(missing)} mesh file(s) not found ({listed(missing)}); capsules are drawn instead"
         text += f"; looked for in {_PLACES}" if folder else "; a zip of the robot's folder brings them along"
-        text += (
-            "; `pip install himpc-lab[meshes]` brings them"
-            if {*IN_EXTRA.split()} & {*missing.values()}
-            else ""
-        )
+        if not {*missing.values()}.isdisjoint(IN_EXTRA.split()):
+            text += "; `pip install himpc-lab[meshes]` brings them"
         yield Finding("note", "meshes", text)
+
+
+def mesh_file(uri: str, folder: Path | None, within: Path | None = None) -> tuple[Path | None, Path | None]:
+    """Returns the folder that stood in for the one that a mesh's name means, if one did, and the file; None
+    for what there is not. The arguments are those of `localise`."""
+    if folder is None:
+        return None, None
+    places = chain([(None, find_mesh(uri, folder))], _stand_ins(uri, folder))
+    allowed = (each for each in places if each[1] and (within is None or within in each[1].parents))
+    return next(allowed, (None, None))
 
 
 def has_meshes(text: str) -> bool:

@@ -4,13 +4,13 @@ capsules."""
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from functools import lru_cache
 from itertools import chain
 
 import numpy as np
 import trimesh
 
+from robots.geometry.shape import Shape
 from robots.meshes.surfaces import Colour, Piece, joined, limited, split_creases
 from robots.robot import Robot
 from robots.shapes.capsules import body_capsules
@@ -22,28 +22,14 @@ _COLOURS = 8  # largest number of shapes of a link: each is a separate object on
 _DEFAULT = (205, 209, 216)  # colour of a mesh without a colour
 
 
-@dataclass(frozen=True, eq=False)
-class Shape:
-    """One coloured piece of a robot's surface.
-
-    joint: the Pinocchio joint to which the piece is fixed, 0 = the world; vertices (V, 3) float32, m, in the
-    joint's frame; faces (F, 3) int32, counter-clockwise seen from outside; colour 0–255; name: unique. Faces
-    share vertices only where the surface is smooth: averaged vertex normals can be used for shading.
-    """
-
-    joint: int
-    vertices: np.ndarray
-    faces: np.ndarray
-    colour: Colour
-    name: str
-
-
 @np.errstate(all="ignore")
 def link_shapes(robot: Robot) -> list[Shape]:
     """Returns the shapes of all links. Visuals that cannot be drawn and visuals beyond MAX_TOTAL faces are
     left out. A body without any remaining shape is drawn as capsules along its kinematics. No content of the
     description or of a mesh file raises an error.
     """
+    if robot.surfaces:
+        return list(robot.surfaces)
     visuals = described_shapes(robot, "visuals")
     meshes = mesh_surfaces(chain(*visuals.values()))
     shapes: list[Shape] = []

@@ -26,6 +26,9 @@ _XACRO_HINT = f"; this is a xacro template: {_EXPAND}"
 _HARMLESS = (80, 201)  # libxml2: two hyphens in a comment; a prefix without a namespace
 _BEFORE_XML = re.compile(rb"(?:\s|<!--.*?-->)+(?=<\?xml)", re.DOTALL)
 
+_FIRST_TAG = re.compile(rb"<([A-Za-z_][\w:.-]*)")
+_ASIDE = re.compile(rb"<!--.*?-->|<\?.*?\?>|<!DOCTYPE[^>]*>", re.DOTALL)
+
 
 class Refusal(Exception):
     """An element that cannot be used; the import turns it into a `refused` finding."""
@@ -53,8 +56,6 @@ def parse(data: bytes, source: str) -> tuple[Element, list[Finding]]:
         raise Refusal(source, "the file declares a DOCTYPE, which a URDF never needs; remove it")
     _drop_namespace(root, source, findings)
     _drop_xacro(root, source, findings)
-    if root.tag == "mujoco":
-        raise Refusal(source, "this is a MuJoCo model (MJCF); a URDF starts with <robot>")
     if root.tag != "robot":
         raise Refusal(source, f"the root element is <{shortened(str(root.tag))}>, a URDF starts with <robot>")
     for child in list(root):
@@ -79,22 +80,24 @@ def _as_unicode(data: bytes, source: str, findings: list[Finding]) -> bytes:
     return data
 
 
+def parser(recover: bool = False) -> etree.XMLParser:
+    """Returns a parser that resolves no entity, loads no DTD and downloads nothing."""
+    return etree.XMLParser(
+        resolve_entities=False,
+        no_network=True,
+        load_dtd=False,
+        remove_comments=True,
+        remove_pis=True,
+        recover=recover,
+    )
+
+
 def _read(data: bytes, source: str, findings: list[Finding]) -> Element:
     """Returns the root element. A document that is not well-formed is read again, as other readers do, if no
     link and no joint is damaged."""
 
-    def parser(recover: bool) -> etree.XMLParser:
-        return etree.XMLParser(
-            resolve_entities=False,
-            no_network=True,
-            load_dtd=False,
-            remove_comments=True,
-            remove_pis=True,
-            recover=recover,
-        )
-
     try:
-        return etree.fromstring(data, parser(recover=False))
+        return etree.fromstring(data, parser())
     except (etree.XMLSyntaxError, ValueError) as error:
         reason = _first_line(error)
     lenient = parser(recover=True)
@@ -146,8 +149,9 @@ def _drop_xacro(root: Element, source: str, findings: list[Finding]) -> None:
         findings.append(Finding("note", source, text))
 
 
-def load_bytes(path: Path) -> bytes:
-    """Returns the content of a URDF file, at most one byte more than the parser accepts.
+def load_bytes(path: Path, most: int = MAX_BYTES, name: str = "") -> bytes:
+    """Returns the content of a file, at most one byte more than `most`, as many as the parser accepts. name:
+    the file's name in the message.
 
     Raises InputError if the path cannot be read or is not a regular file: a read from a pipe could block for
     ever.
@@ -159,11 +163,18 @@ def load_bytes(path: Path) -> bytes:
             reason = "it is not a regular file"
         else:
             with path.open("rb") as file:
-                return file.read(MAX_BYTES + 1)
+                return file.read(most + 1)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "this is not a valid path"
-    name = shortened(str(path), 100)
+    name = shortened(name or str(path), 100)
     raise InputError(f"Cannot read the URDF '{name}': {reason}; give the path of a URDF file.")
+
+
+def root_tag(data: bytes) -> str:
+    """Returns the name of the root element of an XML document, from its first megabyte; "" if there is
+    none."""
+    found = _FIRST_TAG.search(_ASIDE.sub(b"", data[:1_000_000]))
+    return "" if found is None else found[1].decode()
 
 
 def label(element: Element) -> str:

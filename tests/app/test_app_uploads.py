@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import os
 import signal
+import zipfile
 from collections.abc import Iterator
 
 import pytest
@@ -14,6 +16,7 @@ from app.link.choice import SceneChoice
 from app.server.server import PageServer
 from browsing.wire import Wire, eventually
 from lessons.scenes.run_spec import RunSpec
+from robots import CATALOG
 
 pytestmark = pytest.mark.usefixtures("one_fork_server")
 
@@ -84,6 +87,23 @@ def test_two_large_files_of_one_page_are_two_sentences(server: PageServer) -> No
             upload(page, name, bytes(PART), parts=2, size=LARGE)
         assert eventually(lambda: refusals(page) == 2, LONG)
         assert taken(page) and refusals(page) == 2
+
+
+def test_a_zip_brings_its_meshes(server: PageServer) -> None:
+    mesh = "o\nv 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+    text = CATALOG["planar3"].path.read_text()
+    end = text.index(">", text.index("<link", text.index("<link") + 1)) + 1
+    visual = '<visual><geometry><mesh filename="package://mine/meshes/part.obj"/></geometry></visual>'
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w") as made:
+        made.writestr("mine/urdf/robot.urdf", text[:end] + visual + text[end:])
+        made.writestr("mine/meshes/part.obj", mesh)
+    with Wire(server.link) as page:
+        upload(page, "zip", packed.getvalue())
+        assert eventually(lambda: page.shows("scene <b>hold</b>"), LONG), page.notices
+        assert not page.shows("not found")
+        upload(page, "broken", b"PK\x03\x04" + bytes(100))
+        assert eventually(lambda: page.shows("The zip cannot be read"), LONG)
 
 
 def test_a_file_for_what_was_replaced_is_told(server: PageServer) -> None:

@@ -17,6 +17,8 @@ from lessons.scenes.run_spec import RunSpec
 from robots import CATALOG, InputError
 
 _KINDS = {"repaired": LEVELS[0], "filled": LEVELS[1], "fixed": LEVELS[3], "refused": BAD, "note": DAMPING}
+_UPLOADED = ".urdf,.xml,.zip,application/xml,text/xml,application/zip"
+_ZIP = b"PK"  # the first bytes of a zip
 MAX_UPLOAD = 10_000_000  # bytes: the largest file that the importer reads
 
 
@@ -75,8 +77,12 @@ class RobotPanel:
                     lambda: self._ask_file(of_urdf, own_files, path.value.strip(), tip.value.strip() or None),
                 )
 
-            upload = gui.add_upload_button("Upload a URDF", mime_type=".urdf,.xml,application/xml,text/xml")
-            gui.add_html(block("An uploaded robot is drawn as capsules, without its mesh files."))
+            upload = gui.add_upload_button("Upload a URDF", mime_type=_UPLOADED)
+            gui.add_html(
+                block(
+                    "A zip of the robot's folder brings its meshes along. Without them, capsules are drawn."
+                )
+            )
         if own_files is not None:
             self._add_file(gui, ready.choice, own_files)
         self._report(gui, ready)
@@ -137,19 +143,19 @@ class RobotPanel:
         else:
             self._choose(SceneChoice(run, within=own_files.path))
 
-    def _ask(self, answer: viser.GuiHtmlHandle, run: RunSpec, urdf_text: str | None = None) -> None:
+    def _ask(self, answer: viser.GuiHtmlHandle, run: RunSpec, urdf_text: str | bytes | None = None) -> None:
         self._wait(answer)
         self._choose(SceneChoice(run, urdf_text))
 
     def _uploaded(self, answer: viser.GuiHtmlHandle, content: bytes, tip: str | None) -> None:
         self._wait(answer)
         if len(content) > MAX_UPLOAD:
-            self.refuse(f"The file has more than {MAX_UPLOAD // 1_000_000} MB; choose a smaller URDF.")
+            self.refuse(f"The file has more than {MAX_UPLOAD // 1_000_000} MB; choose a smaller one.")
             return
         try:
-            text = content.decode("utf-8")
+            text = content if content.startswith(_ZIP) else content.decode("utf-8")
         except UnicodeDecodeError:
-            self.refuse("The file is not text: upload the URDF file itself instead of a mesh or an archive.")
+            self.refuse("The file is not text: upload the URDF file itself, or a zip of the robot's folder.")
             return
         self._ask(answer, RunSpec("hold", tip=tip), text)
 
