@@ -19,7 +19,7 @@ ORDER = ("robots", "himpc", "lessons", "app", "himpc_lab", "tests")
 """Each package may import itself and the packages before it."""
 
 DOORS = {
-    "mujoco": ("robots/plant.py", "robots/mechanics/"),
+    "mujoco": ("robots/plant.py", "robots/mechanics/", "robots/mjcf/"),
     "daqp": ("himpc/qp.py",),
     "proxsuite": ("himpc/qp.py",),
     "placo": ("himpc/htmpc/placo_control.py",),
@@ -251,6 +251,7 @@ ROBOTS = {
     "processes": ("errors",),
     "meshes": ("processes", "report", "errors"),
     "urdf": ("meshes", "inertia", "report", "errors"),
+    "mjcf": ("urdf", "meshes", "report", "errors"),
     "geometry": (),
     "robot": ("geometry", "report", "errors"),
     "per_robot": ("robot",),
@@ -269,8 +270,8 @@ ROBOTS = {
     "plant": (*("mechanics", "world", "truth", "robot", "settings", "signals", "runge_kutta", "errors"),),
     "servo": ("plant", "robot", "settings", "ranges", "signals"),
     "loading": (
-        *("plant", "covering", "floor", "mechanics", "shapes", "robot", "geometry", "urdf", "meshes"),
-        *("processes", "catalog", "inertia", "report", "errors"),
+        *("plant", "covering", "floor", "mechanics", "shapes", "robot", "geometry", "mjcf", "urdf"),
+        *("meshes", "processes", "catalog", "inertia", "report", "errors"),
     ),
 }
 """The files and folders that each file or folder of robots/ may import beside itself. A robot contains its
@@ -279,8 +280,8 @@ geometry as data; the plant and the geometry of an imported robot are made from 
 
 @pytest.mark.parametrize("part", ROBOTS)
 def test_robots_are_built_in_one_direction(part: str) -> None:
-    """Imports go in the direction errors, urdf, geometry ← robot ← world, shapes ← mechanics ← covering,
-    plant ← loading. Imports for types and inside functions count as well."""
+    """Imports go in the direction errors, urdf, mjcf, geometry ← robot ← world, shapes ← mechanics ←
+    covering, plant ← loading. Imports for types and inside functions count as well."""
     assert not against_the_order("robots", part)
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
+from lxml import etree
 
 from robots.errors import InputError, unknown_name
 from robots.inertia import mass_matrix, rotor_inertia, suggest_M_bar, tracking_bandwidth
@@ -19,6 +20,7 @@ from robots.plant import Plant
 from robots.report import Finding, ImportReport
 from robots.robot import Robot
 from robots.urdf import UNBOUNDED, Canonical, canonicalise
+from robots.urdf.read import Refusal, named, root_tag
 
 _TRIAL = 5  # number of periods of 1 ms
 _SLOW = 3.0  # 1/s: a robot with less bandwidth needs seconds to reach a target
@@ -60,10 +62,19 @@ def import_robot(
     Raises:
         InputError: the tip is not a frame of the robot. All other problems are in the report.
     """
+    noted: tuple[Finding, ...] = ()
+    if root_tag(data) == "mujoco":
+        from robots.mjcf.to_urdf import as_urdf
+
+        try:
+            data, noted = as_urdf(data, source, folder, within)
+        except Refusal as refusal:
+            return Import(ImportReport(source, (refusal.finding,)))
     canonical, report = canonicalise(data, source, folder, within)
+    report = replace(report, findings=(*noted, *report.findings))
     if canonical is None:
         return Import(report)
-    robot = _robot(canonical, tip)
+    robot = _robot(replace(canonical, report=report), tip)
     fault = "its mass matrix is singular; check its inertias" if robot is None else _trial(robot)
     if robot is None or fault is not None:
         refused = Finding("refused", source, fault or "")
@@ -87,7 +98,8 @@ def _robot(canonical: Canonical, tip: str | None) -> Robot | None:
     if tip is not None and tip not in frames:
         raise unknown_name(f"frame of robot '{canonical.name}' called", tip, frames)
     chosen = choose_tip(model, frames) if tip is None else tip
-    model.armature = rotor_inertia(model, lower, upper)
+    given = _rotors_of(canonical)
+    model.armature = np.where(given > 0.0, given, rotor_inertia(model, lower, upper))
     try:
         M_bar = suggest_M_bar(model, lower, upper)
     except np.linalg.LinAlgError:
@@ -95,7 +107,7 @@ def _robot(canonical: Canonical, tip: str | None) -> Robot | None:
     if not np.all(np.isfinite(M_bar) & (M_bar > 0.0)):
         return None
     home = find_home(model, frames[chosen], lower, upper)
-    findings = (*canonical.report.findings, *_assumed(model, home, M_bar))
+    findings = (*canonical.report.findings, *_assumed(model, given, home, M_bar))
     return Robot(
         name=canonical.name,
         model=model,
@@ -113,11 +125,19 @@ def _robot(canonical: Canonical, tip: str | None) -> Robot | None:
     )
 
 
-def _assumed(model: pin.Model, home: np.ndarray, M_bar: np.ndarray) -> Iterator[Finding]:
+def _rotors_of(canonical: Canonical) -> np.ndarray:
+    """Returns the rotor inertias, (n,) kg·m² or kg, that a canonical description gives; 0: none."""
+    joints = named(etree.fromstring(canonical.text), "joint")
+    given = [joints[name].find("dynamics") for name in canonical.model.names[1:]]
+    return np.array([0.0 if each is None else float(each.get("armature", "0")) for each in given])
+
+
+def _assumed(model: pin.Model, given: np.ndarray, home: np.ndarray, M_bar: np.ndarray) -> Iterator[Finding]:
     """Yields what was assumed about the rotors, and whether the robot will be slow all the same."""
-    values = ", ".join(f"{value:g}" for value in model.armature)
-    text = f"a URDF does not tell their inertia; {values} kg·m² were assumed, plant.armature changes them"
-    yield Finding("filled", "rotors", text)
+    values = ", ".join(f"{value:g}" for value, own in zip(model.armature, given, strict=True) if own <= 0.0)
+    if values:
+        text = f"a URDF does not tell their inertia; {values} kg·m² were assumed, plant.armature changes them"
+        yield Finding("filled", "rotors", text)
     bandwidth = tracking_bandwidth(mass_matrix(model, model.createData(), home), M_bar, 1e-3)
     if bandwidth < _SLOW:
         text = (

@@ -33,10 +33,11 @@ def normalise_joints(root: Element) -> Iterator[Finding]:
     for joint in root.findall("joint"):
         try:
             placement(joint)
-            _drop(joint, "dynamics", "calibration", "safety_controller")
+            _drop(joint, "calibration", "safety_controller")
             if joint.get("type") == "fixed":
-                _drop(joint, "limit", "axis", "mimic")
+                _drop(joint, "limit", "axis", "mimic", "dynamics")
                 continue
+            _keep_armature(joint)
             yield from _axis(joint)
             yield from _limits(joint, joint in unlimited)
             if joint.get("name") in frozen:
@@ -67,7 +68,7 @@ def freeze(joint: Element, value: float, reason: str) -> Finding:
         origin.set("rpy", _text(pin.rpy.matrixToRpy(placed.rotation)))
     unit = "m" if joint.get("type") == "prismatic" else "rad"
     joint.set("type", "fixed")
-    _drop(joint, "limit", "axis", "mimic")
+    _drop(joint, "limit", "axis", "mimic", "dynamics")
     return Finding("fixed", label(joint), f"held at {value:.4g} {unit}: {reason}")
 
 
@@ -172,6 +173,15 @@ def _limits(joint: Element, without_range: bool) -> Iterator[Finding]:
         yield Finding("note", label(joint), text)
     limit.set("lower", repr(lower))
     limit.set("upper", repr(upper))
+
+
+def _keep_armature(joint: Element) -> None:
+    """Leaves of `dynamics` only the rotor inertia, kg·m² or kg, an attribute that other readers ignore. They
+    need one of the others."""
+    found = [numbers(each, "armature", 1, (0.0,))[0] for each in joint.findall("dynamics")]
+    _drop(joint, "dynamics")
+    if found and found[0] > 0.0:
+        etree.SubElement(joint, "dynamics", damping="0", armature=repr(float(found[0])))
 
 
 def _freeze_if_stuck(joint: Element) -> Iterator[Finding]:

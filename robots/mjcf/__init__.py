@@ -1,0 +1,1 @@
+"""Reads MuJoCo models (MJCF) and writes them as URDF."""

@@ -1,0 +1,242 @@
+"""MuJoCo models are imported as MuJoCo's own compiler reads them."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from arms import full_mass_matrix
+
+from robots import InputError, Robot, load_robot, load_urdf_text
+from robots.loading.importing import import_robot
+from robots.shapes.link_shapes import link_shapes
+
+ARM = """<mujoco model="my arm">
+  <compiler angle="degree" autolimits="true"/>
+  <default>
+    <joint armature="0.1" damping="1"/>
+    <default class="wrist"><joint armature="0.02"/></default>
+  </default>
+  <worldbody>
+    <geom type="plane" size="1 1 1"/>
+    <body name="base"><geom type="cylinder" size="0.05 0.05" pos="0 0 0.05"/>
+      <body name="upper" pos="0 0 0.1" quat="0.7071 0 0.7071 0">
+        <inertial pos="0.1 0 0.02" mass="2" fullinertia="0.02 0.03 0.04 0.001 0.002 0.003"/>
+        <joint name="shoulder" axis="1 0 0" range="-170 170" actuatorfrcrange="-60 60"/>
+        <joint name="lift" axis="0 1 0.5" pos="0 0.03 0.05" range="-90 120" ref="20"/>
+        <body name="rail" pos="0.3 0 0" euler="10 20 30">
+          <joint name="slide" type="slide" axis="0 0 1" range="-0.1 0.2" armature="3"/>
+          <geom name="beam" type="box" size="0.02 0.03 0.15" mass="0.7"/>
+          <body name="hand" pos="0 0.02 0.2" axisangle="1 1 0 40">
+            <joint class="wrist" name="turn" pos="0.01 0.02 0.03"/>
+            <geom type="capsule" fromto="0 0 0 0.1 0 0.1" size="0.02" density="800"/>
+            <geom type="ellipsoid" size="0.02 0.03 0.04" pos="0.1 0 0"/>
+            <site name="attachment_site" pos="0.1 0 0.1" quat="0.5 0.5 0.5 0.5"/>
+          </body>
+        </body>
+      </body>
+    </body>
+  </worldbody>
+  <actuator>
+    <position name="a" joint="shoulder" kp="100" forcerange="-87 87"/>
+    <motor name="b" joint="lift" gear="50" ctrlrange="-1 1"/>
+    <general name="c" joint="slide" forcerange="-10 20" gear="2"/>
+  </actuator>
+</mujoco>"""
+
+
+def loaded(text: str, folder: Path | None = None) -> Robot:
+    return import_robot(text.encode(), "arm.xml", folder).used()
+
+
+def same_mechanics(robot: Robot, model: mujoco.MjModel, close: float = 1e-9) -> None:
+    """Compares M(q), gravity and the frames of all bodies with MuJoCo's, at random q."""
+    import pinocchio as pin
+
+    data, own = mujoco.MjData(model), robot.model.createData()
+    joints = [model.joint(name) for name in robot.joint_names]
+    order = [int(joint.dofadr[0]) for joint in joints]
+    M = np.zeros((model.nv, model.nv))
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        q = rng.uniform(np.maximum(robot.q_lower, -2.0), np.minimum(robot.q_upper, 2.0))
+        for joint, value in zip(joints, q, strict=True):
+            data.qpos[joint.qposadr[0]] = value
+        mujoco.mj_forward(model, data)
+        mujoco.mj_fullM(model, data, M)
+        np.testing.assert_allclose(full_mass_matrix(robot.model, q), M[np.ix_(order, order)], atol=close)
+        gravity = pin.computeGeneralizedGravity(robot.model, own, q)
+        np.testing.assert_allclose(gravity, data.qfrc_bias[order], atol=close)
+        pin.framesForwardKinematics(robot.model, own, q)
+        for body in range(1, model.nbody):
+            frame = own.oMf[robot.frame_id(model.body(body).name)]
+            np.testing.assert_allclose(frame.translation, data.xpos[body], atol=1e-9)
+            np.testing.assert_allclose(frame.rotation, data.xmat[body].reshape(3, 3), atol=1e-9)
+
+
+def test_an_arm_has_the_mechanics_of_mujoco() -> None:
+    """Anchors, references, turned frames, inertias from shapes, a slide, several joints of a body: a link of
+    1 mg stands between these."""
+    robot = loaded(ARM)
+    model = mujoco.MjModel.from_xml_string(ARM)
+    same_mechanics(robot, model, close=1e-5)
+    one_each = ARM.replace('<joint name="lift"', '<body name="lifted"><geom size="0.1"/><joint name="lift"')
+    one_each = one_each.replace("  </worldbody>", "</body></worldbody>")
+    same_mechanics(loaded(one_each), mujoco.MjModel.from_xml_string(one_each))
+    same_mechanics(loaded_again(loaded(one_each)), mujoco.MjModel.from_xml_string(one_each))
+    limits = {name: (robot.q_lower[k], robot.q_upper[k]) for k, name in enumerate(robot.joint_names)}
+    for name, (lower, upper) in limits.items():
+        np.testing.assert_allclose(
+            (lower, upper), model.joint(name).range if name != "turn" else (-np.inf, np.inf)
+        )
+    effort = dict(zip(robot.joint_names, robot.tau_limit, strict=True))
+    assert (effort["shoulder"], effort["lift"], effort["slide"]) == (60.0, 50.0, 40.0)
+    assert robot.name == "my arm"
+    assert "attachment_site" in robot.frames
+    told = str(robot.report.findings)
+    assert "4 joints with friction, damping or a spring" in told
+    assert "were assumed" not in told, "the rotors are given"
+    assert "joint 'turn'" in told, "without limits"
+
+
+def loaded_again(robot: Robot) -> Robot:
+    return import_robot(robot.urdf_text.encode(), "the text").used()
+
+
+def test_what_a_chain_of_links_cannot_be_is_left_out_or_refused() -> None:
+    more = ARM.replace(
+        '<body name="base">',
+        '<body name="cup" pos="1 0 0"><freejoint/><geom size="0.1"/></body><body name="base"><freejoint/>',
+    ).replace(
+        "</mujoco>",
+        '<tendon><fixed name="t"><joint joint="turn" coef="1"/></fixed></tendon>'
+        '<equality><weld body1="hand" body2="cup"/></equality>'
+        '<sensor><jointpos joint="turn"/></sensor></mujoco>',
+    )
+    robot = loaded(more)
+    told = str(robot.report.findings)
+    for words in ("1 parts of things", "1 tendons", "1 equality", "its free joint was made fixed"):
+        assert words in told
+    assert robot.n == 4 and "cup" not in robot.frames
+    same = loaded(ARM)
+    np.testing.assert_allclose(
+        full_mass_matrix(robot.model, robot.home), full_mass_matrix(same.model, robot.home), atol=1e-12
+    )
+    for text, words in (
+        (
+            ARM.replace('type="slide" axis="0 0 1" range="-0.1 0.2"', 'type="ball"'),
+            "a ball joint has three axes",
+        ),
+        (ARM.replace("</body>", "", 1), "not well-formed XML"),
+        (ARM.replace('joint="lift"', 'joint="lfit"'), "MuJoCo cannot compile it"),
+        (
+            ARM.replace("<worldbody>", '<include file="/etc/passwd"/><worldbody>'),
+            "included file '/etc/passwd'",
+        ),
+        ("<mujoco/>", "none of its joints moves"),
+        (ARM.replace("<worldbody>", '<asset><model name="m" file="a.xml"/></asset><worldbody>'), "attaches"),
+    ):
+        if "ball" in text:
+            text = text.replace('<general name="c" joint="slide" forcerange="-10 20" gear="2"/>', "")
+        with pytest.raises(InputError, match=words):
+            loaded(text)
+
+
+def test_a_finger_that_follows_another_is_a_mimic_joint() -> None:
+    fingers = "".join(
+        f'<body name="{side}"><joint name="{side}" type="slide" range="0 0.04"/><geom size="0.01"/></body>'
+        for side in ("left", "right")
+    )
+    text = ARM.replace('<site name="att', f'{fingers}<site name="att').replace(
+        "</mujoco>",
+        '<equality><joint joint1="left" joint2="right" polycoef="0.01 1 0 0 0"/></equality></mujoco>',
+    )
+    robot = loaded(text)
+    assert "mimics 'right'" in str(robot.report.findings)
+    assert "equality" not in str(robot.report.findings)
+
+
+def brick(path: Path) -> None:
+    """Writes a mesh without symmetry that is away from the origin."""
+    corners = np.array([(0.1, 0, 0), (0.3, 0, 0), (0.1, 0.2, 0), (0.1, 0, 0.4)])
+    faces = [corners[list(face)] for face in ((0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3))]
+    packed = b"".join(struct.pack("<12fH", 0, 0, 0, *face.ravel(), 0) for face in faces)
+    path.write_bytes(bytes(80) + struct.pack("<I", len(faces)) + packed)
+
+
+MESHES = ARM.replace(
+    "<worldbody>",
+    '<asset><mesh name="brick" file="brick.stl" scale="1 0.5 -0.25"/><mesh name="gone" file="gone.stl"/>'
+    '<texture name="t" type="2d" file="t.png"/><material name="red" texture="t" rgba="1 0 0 1"/></asset>'
+    "<worldbody>",
+).replace(
+    '<geom name="beam"',
+    '<geom type="mesh" mesh="brick" pos="0.1 0.2 0.3" euler="30 40 50" material="red" contype="0" '
+    'conaffinity="0"/>'
+    '<geom type="mesh" mesh="gone"/><geom name="beam"',
+)
+
+
+@pytest.mark.parametrize("meshdir", ["", "parts"])
+def test_meshes_are_where_mujoco_draws_them(tmp_path: Path, meshdir: str) -> None:
+    """The compiler centres and turns meshes. A mesh that is missing is left out."""
+    text = MESHES.replace("<compiler", f'<compiler meshdir="{meshdir}"')
+    (tmp_path / meshdir).mkdir(exist_ok=True)
+    brick(tmp_path / meshdir / "brick.stl")
+    whole = text.replace('<mesh name="gone" file="gone.stl"/>', "").replace(
+        '<geom type="mesh" mesh="gone"/>', ""
+    )
+    whole = whole.replace('texture="t"', "").replace('<texture name="t" type="2d" file="t.png"/>', "")
+    (tmp_path / "whole.xml").write_text(whole)
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "whole.xml"))
+    (tmp_path / "arm.xml").write_text(text)
+    robot = load_robot(tmp_path / "arm.xml")
+    assert "1 mesh file(s) not found ('gone.stl')" in str(robot.report.findings)
+    same_mechanics(robot, model, close=1e-5)
+    data = mujoco.MjData(model)
+    for joint, value in zip(robot.joint_names, robot.home, strict=True):
+        data.qpos[model.joint(joint).qposadr[0]] = value
+    mujoco.mj_forward(model, data)
+    geom = int(np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_MESH)[0])
+    expected = model.mesh_vert @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom]
+    (shape,) = (shape for shape in link_shapes(robot) if shape.name == "rail/0" and shape.colour[1] == 0)
+    import pinocchio as pin
+
+    own = robot.model.createData()
+    pin.forwardKinematics(robot.model, own, robot.home)
+    at = own.oMi[shape.joint]
+    drawn = shape.vertices @ at.rotation.T + at.translation
+    for corner in expected:
+        assert np.linalg.norm(drawn - corner, axis=1).min() < 1e-6
+
+
+def test_included_files_are_read_beside_the_model_only(tmp_path: Path) -> None:
+    begin, end = ARM.index("  <worldbody>"), ARM.index("  <actuator>")
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "body.xml").write_text(f"<mujoco>{ARM[begin:end]}</mujoco>")
+    text = ARM[:begin] + '<include file="parts/body.xml"/>' + ARM[end:]
+    (tmp_path / "arm.xml").write_text(text)
+    assert load_robot(tmp_path / "arm.xml").n == 4
+    assert load_robot(tmp_path / "arm.xml", within=tmp_path).n == 4
+    with pytest.raises(InputError, match=r"included file 'parts/body\.xml'"):
+        load_urdf_text(text)
+    with pytest.raises(InputError, match=r"included file 'parts/body\.xml'"):
+        import_robot(text.encode(), "arm.xml", tmp_path, within=tmp_path / "elsewhere").used()
+    (tmp_path / "arm.xml").write_text(text.replace("parts/body.xml", "arm.xml"))
+    with pytest.raises(InputError, match="a file includes itself"):
+        load_robot(tmp_path / "arm.xml")
+
+
+@pytest.mark.parametrize("file", ["/dev/zero", "/etc/passwd", "../../../etc/passwd"])
+def test_a_model_of_a_stranger_opens_no_file(file: str) -> None:
+    text = MESHES.replace("brick.stl", file).replace("t.png", file)
+    assert "2 mesh file(s) not found" in str(load_urdf_text(text).report.findings)
+
+
+def test_a_model_that_grows_without_end_is_refused() -> None:
+    many = '<replicate count="100000" offset="0 0 1"><body><joint/><geom size="0.1"/></body></replicate>'
+    with pytest.raises(InputError):
+        load_urdf_text(ARM.replace("<worldbody>", f"<worldbody>{many}"))
