@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from app.commands.robots import RobotFile
 from robots import InputError
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ def export(
     scene: tyro.conf.Positional[str],
     target: str,
     out: str,
-    urdf: str | None = None,
+    urdf: RobotFile = None,
     tip: str | None = None,
     controller: str | None = None,
     stack: str | None = None,
@@ -36,7 +37,8 @@ def export(
         scene: name of a scene (see himpc-lab scenes).
         target: wasm32, x86_64-linux, aarch64-linux, x86_64-macos, aarch64-macos or x86_64-windows.
         out: folder for the files; it is created if it does not exist.
-        urdf: URDF file or catalog name, for the scene "hold".
+        urdf: robot for the scene "hold": a URDF or MuJoCo model (.xml), a folder or zip with one, or a name
+            of the catalog.
         tip: end-effector frame, for the scene "hold".
         controller: himpc, hiqp, nhimpc or weighted; the scene's own by default.
         stack: the levels as JSON, as --set stack=… of himpc-lab run takes them.

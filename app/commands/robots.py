@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+import tyro
+
 from app.commands.output import print_table, write_json
+
+RobotFile = Annotated[str | None, tyro.conf.arg(aliases=("--robot",), metavar="FILE")]
+"""The option that names a robot."""
 
 
 def robots(check: str | None = None, json: str | None = None) -> int:
-    """List the robots of the catalog, or check a URDF file. The check reports every repair, default value and
-    refusal.
+    """List the robots of the catalog, or check a robot's file. The check reports every repair, default value
+    and refusal.
 
     Args:
-        check: the URDF file to check. Exit code 1 if it cannot be used.
+        check: the URDF or MuJoCo model to check, or a folder or zip with one. Exit code 1 if it cannot be
+            used.
         json: write JSON to this file, or to standard output for "-".
     """
     if check is None:

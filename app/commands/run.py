@@ -9,6 +9,7 @@ import tyro
 
 from app.commands.output import check_file, print_table, write_file, write_json
 from app.commands.progress import progress_bar
+from app.commands.robots import RobotFile
 from robots import InputError
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 def run(
     scene: tyro.conf.Positional[str | None] = None,
-    urdf: str | None = None,
+    urdf: RobotFile = None,
     tip: str | None = None,
     controller: str | None = None,
     task: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="FILE.py")] = (),
@@ -35,7 +36,8 @@ def run(
     Args:
         scene: name of a scene (see himpc-lab scenes), or a Python file with a scene or task of your own. Not
             with --state.
-        urdf: URDF file or catalog name, for the scene "hold".
+        urdf: robot for the scene "hold": a URDF or MuJoCo model (.xml), a folder or zip with one, or a name
+            of the catalog.
         tip: end-effector frame, for the scene "hold".
         controller: controller to use instead of the scene's own: a name (see himpc-lab controllers) or a
             Python file of your own.

@@ -8,13 +8,14 @@ from typing import Annotated
 
 import tyro
 
+from app.commands.robots import RobotFile
 from robots import InputError
 
 
 def serve(
     lesson: str | None = None,
     scene: str | None = None,
-    urdf: str | None = None,
+    urdf: RobotFile = None,
     tip: str | None = None,
     controller: str | None = None,
     task: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="FILE.py")] = (),
@@ -47,7 +48,7 @@ def serve(
         controller: controller to start with, or a Python file of your own; its code is reloaded whenever
             you save the file.
         task: Python file with a task of your own, which can then be added to the stack.
-        urdf: URDF file of your own robot.
+        urdf: your own robot: a URDF or MuJoCo model (.xml), or a folder or zip with one.
         tip: end-effector frame of that robot.
         state: a state code, as the page shows it; the page gets its scene, robot, settings, seed, lesson and
             step.

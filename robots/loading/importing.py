@@ -136,7 +136,7 @@ def _assumed(model: pin.Model, given: np.ndarray, home: np.ndarray, M_bar: np.nd
     """Yields what was assumed about the rotors, and whether the robot will be slow all the same."""
     values = ", ".join(f"{value:g}" for value, own in zip(model.armature, given, strict=True) if own <= 0.0)
     if values:
-        text = f"a URDF does not tell their inertia; {values} kg·m² were assumed, plant.armature changes them"
+        text = f"their inertia is not described; {values} kg·m² were assumed, plant.armature changes them"
         yield Finding("filled", "rotors", text)
     bandwidth = tracking_bandwidth(mass_matrix(model, model.createData(), home), M_bar, 1e-3)
     if bandwidth < _SLOW:

@@ -20,6 +20,7 @@ from lessons.scenes.run_spec import RunSpec
 from robots import CATALOG
 
 ROOT = Path(__file__).parents[2]
+NO_ROBOT = str(ROOT / "robots" / "meshes")
 
 
 @pytest.fixture
@@ -34,7 +35,8 @@ WRONG: dict[str, tuple[list[str], str]] = {
     "no such scene": (["run", "iiwa14-hodl"], "iiwa14-hold"),
     "hold without a robot": (["run", "hold"], "--urdf"),
     "missing file": (["run", "hold", "--urdf", "/nowhere/arm.urdf"], "/nowhere/arm.urdf"),
-    "a folder": (["run", "hold", "--urdf", "/tmp"], "/tmp"),
+    "a folder without a robot": (["run", "hold", "--urdf", NO_ROBOT], "has no robot description"),
+    "the other name of the option": (["run", "hold", "--robot", "/nowhere/arm.xml"], "/nowhere/arm.xml"),
     "no such catalog robot": (["run", "hold", "--urdf", "iiwa15"], "iiwa14"),
     "unknown frame": (["run", "hold", "--urdf", "planar3", "--tip", "nose"], "nose"),
     "a robot for a fixed scene": (["run", "iiwa14-hold", "--urdf", "planar3"], "hold"),
