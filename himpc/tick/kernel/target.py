@@ -76,6 +76,37 @@ def jerked(
 
 
 @inline_kernel
+def slowed(along: Array, velocity: Array, acceleration: Array, caps: Array, T_s: float, m: int) -> None:
+    """Reduces the velocity `along`, which the jerk cap allows, to the speed cap. It is shortened if the jerk
+    cap allows this, too. Otherwise it moves towards the slowest velocity that the jerk cap allows, until it
+    meets the speed cap."""
+    length, radius = math.sqrt(dot(along, along, m)), caps[2] * T_s * T_s
+    if length <= caps[0]:
+        return
+    shorter, away, slow = caps[0] / length, 0.0, 0.0
+    for a in range(m):
+        unchanged = velocity[a] + T_s * acceleration[a]
+        away += (shorter * along[a] - unchanged) ** 2
+        slow += unchanged * unchanged
+    slow = math.sqrt(slow)
+    if away <= radius * radius * (1.0 + 1e-9) or slow <= radius:
+        for a in range(m):
+            along[a] *= shorter
+        return
+    # |along + share (slowest − along)| = speed cap.
+    square, product = 0.0, 0.0
+    for a in range(m):
+        step = (velocity[a] + T_s * acceleration[a]) * (1.0 - radius / slow) - along[a]
+        square += step * step
+        product += along[a] * step
+    root = math.sqrt(max(product * product - square * (length * length - caps[0] * caps[0]), 0.0))
+    share = min((-product - root) / square, 1.0)
+    for a in range(m):
+        step = (velocity[a] + T_s * acceleration[a]) * (1.0 - radius / slow) - along[a]
+        along[a] += share * step
+
+
+@inline_kernel
 def following(now: Array, then: Array, raw: Array, caps: Array, T_s: float, m: int, width: int) -> None:
     """Computes the next sample: one period of constant acceleration within the caps."""
     velocity, acceleration = now[width : width + m], now[width + m : width + 2 * m]
@@ -102,7 +133,7 @@ def following(now: Array, then: Array, raw: Array, caps: Array, T_s: float, m: i
     jerked(velocity, acceleration, along, speed, caps, T_s, m, change)
     for a in range(m):
         along[a] = velocity[a] + T_s * (acceleration[a] + change[a])
-    shorten(along, caps[0], m)
+    slowed(along, velocity, acceleration, caps, T_s, m)
     for a in range(m):
         then[width + a] = along[a]
         then[width + m + a] = (along[a] - velocity[a]) / T_s
