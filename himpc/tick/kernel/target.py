@@ -8,7 +8,7 @@ from himpc.compilation.compiled import GIVEN_MATRICES, MATRIX, NUMBER, VECTOR, W
 from himpc.compilation.views import matrix
 from himpc.constants import APPROACH_RATE, STILL, VELOCITY_RATE
 from himpc.tick.kernel.arrays import Array
-from himpc.tick.kernel.kinematics import turned_away
+from himpc.tick.kernel.kinematics import rotation_error
 from himpc.tick.kernel.linear import copy, dot
 
 
@@ -115,7 +115,7 @@ def following(now: Array, then: Array, raw: Array, caps: Array, T_s: float, m: i
     for a in range(m):
         away[a] = 0.0 if rests or width > m else raw[a] - now[a]
     if width > m and not rests:
-        turned_away(matrix(raw, 0, 3, 3), matrix(now, 0, 3, 3), away)
+        rotation_error(matrix(raw, 0, 3, 3), matrix(now, 0, 3, 3), away)
     distance, speed = math.sqrt(dot(away, away, m)), math.sqrt(dot(velocity, velocity, m))
     if rests or (distance < STILL and speed < 10.0 * STILL):
         copy(raw, then, width)
