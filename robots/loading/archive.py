@@ -6,7 +6,7 @@ import os
 import stat
 import zipfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from io import BytesIO
 from pathlib import Path, PurePosixPath
 
@@ -31,6 +31,8 @@ def unpack(data: bytes, folder: Path) -> None:
     Raises InputError for a zip that is damaged, encrypted, too large, has too many entries, or names a file
     outside the folder.
     """
+    if len(data) > MAX_PACKED:
+        raise InputError(f"The zip has more than {MAX_PACKED // 1_000_000} MB: leave out what is not needed.")
     try:
         with zipfile.ZipFile(BytesIO(data)) as archive:
             _unpack(archive, folder)
@@ -88,9 +90,9 @@ def _write(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, path: Path, left: i
     return left
 
 
-def description(folder: Path, source: str, choose: str) -> Path:
+def description(folder: Path, source: str, choose: Callable[[str], str]) -> Path:
     """Returns the robot description in or below a folder: the only one, or the only one with the folder's
-    name. choose: how the user chooses one of several, with {} for its path in the folder.
+    name. choose: returns how the user chooses one of several, such as the one with this path in the folder.
 
     Raises InputError if there is none or if there are several.
     """
@@ -105,7 +107,7 @@ def description(folder: Path, source: str, choose: str) -> Path:
         )
     names = [path.relative_to(folder).as_posix() for path in found]
     raise InputError(
-        f"{source} has {len(found)} robot descriptions ({listed(names, 10)}): {choose.format(names[0])}."
+        f"{source} has {len(found)} robot descriptions ({listed(names, 10)}): {choose(names[0])}."
     )
 
 

@@ -3,6 +3,7 @@ from other sources are read in a separate process."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -25,7 +26,7 @@ from robots.robot import Robot
 from robots.urdf import canonicalise, load_bytes
 
 _SHORT = 200_000  # bytes; the robots of the last four files up to this size stay in memory
-_GEOMETRY = Allowance(20.0)
+_GEOMETRY = Allowance(24.0)
 """For the meshes of a robot, their hulls and capsules. At most 8 s are for reading (`READING`)."""
 
 
@@ -60,7 +61,7 @@ def load_urdf_text(text: str | bytes, tip: str | None = None) -> Robot:
     Raises InputError like `load_robot`.
     """
     if isinstance(text, bytes):
-        return _import_zip(text, "the zip", "leave only one of them in the zip", tip).used()
+        return _import_zip(text, "the zip", lambda _: "leave only one of them in the zip", tip).used()
     return _import(text.encode(errors="replace"), "the URDF text", None, tip).used()
 
 
@@ -76,8 +77,11 @@ def check_urdf(path: str | Path) -> ImportReport:
 def _import_path(path: Path, tip: str | None, within: Path | None = None) -> Import:
     source = shortened(str(path), 100)
     packed = next((place for place in (path, *path.parents) if place.suffix.lower() == ".zip"), None)
-    choose = f"choose one, such as {path}/{{}}"
     _check_inside(path, within)
+
+    def choose(name: str) -> str:
+        return f"choose one, such as {path}/{name}"
+
     if packed is not None and packed.is_file():
         inside = path.relative_to(packed)
         return _import_zip(load_bytes(packed, MAX_PACKED), str(packed), choose, tip, inside)
@@ -94,11 +98,13 @@ def _check_inside(path: Path, within: Path | None, name: str = "") -> None:
         raise InputError(f"The URDF '{name}' is not in the folder whose files may be opened.")
 
 
-def _import_zip(data: bytes, source: str, choose: str, tip: str | None, inside: Path = Path()) -> Import:
+def _import_zip(
+    data: bytes, source: str, choose: Callable[[str], str], tip: str | None, inside: Path = Path()
+) -> Import:
     """Imports the robot of a zip. The unpacked files are deleted afterwards, so the robot keeps its
     surfaces.
 
-    choose: see `description`; inside: the path of the description in the zip, if it is known.
+    choose: see `description`. inside: the path of the description in the zip, if it is known.
     """
     with TemporaryDirectory(prefix="himpc-lab-", ignore_cleanup_errors=True) as name:  # mode 0700
         folder = Path(name).resolve()
@@ -125,8 +131,10 @@ def _with_surfaces(robot: Robot) -> Robot:
 def _import(
     data: bytes, source: str, folder: Path | None, tip: str | None, within: Path | None = None
 ) -> Import:
-    # A file without meshes always results in the same robot. The process that reads it uses a core for 1.8 s.
-    keeps = folder is not None and len(data) < _SHORT and b"mesh" not in data
+    # A file that names no other always results in the same robot. The process that reads it uses a core for
+    # 1.8 s.
+    alone = b"mesh" not in data and b"include" not in data
+    keeps = folder is not None and len(data) < _SHORT and alone
     try:
         found = (_kept if keeps else _read_apart)(data, source, folder, tip, within)
     except Fault as fault:

@@ -13,7 +13,7 @@ import trimesh
 
 from robots.meshes.files import installed_mesh
 from robots.meshes.simplify import simplify
-from robots.processes.isolation import Fault, inside, isolated
+from robots.processes.isolation import Allowance, Fault, inside, isolated
 
 MAX_FACES = 12_000  # faces per mesh; with this number, a laptop's browser rotates several robots smoothly
 MAX_BYTES = 100_000_000
@@ -122,7 +122,7 @@ def _isolated_pieces(paths: tuple[str, ...]) -> dict[str, tuple[Piece, ...]]:
     if inside():
         return read_meshes(paths, READING)
     try:
-        return isolated(read_meshes, paths, READING)
+        return isolated(read_meshes, paths, READING, within=Allowance(2.0 * READING))
     except Fault:
         return {}
 

@@ -62,7 +62,7 @@ def compiled_mjcf(
     try:
         spec = mujoco.MjSpec.from_string(etree.tostring(root, encoding="unicode"), assets=files)
         model = spec.compile()
-    except ValueError as error:
+    except (ValueError, RuntimeError, mujoco.FatalError) as error:
         reason = shortened(" ".join(str(error).split()), 150)
         raise Refusal(source, f"MuJoCo cannot compile it ({reason}); correct it or give another") from None
     text = f"{len(missing)} mesh file(s) not found ({listed(missing.values())})"

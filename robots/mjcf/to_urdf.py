@@ -14,13 +14,14 @@ from lxml import etree
 from lxml.etree import _Element as Element
 
 from robots.errors import shortened
-from robots.mjcf.compile import compiled_mjcf
+from robots.mjcf.compile import Compiled, compiled_mjcf
 from robots.report import Finding
 from robots.urdf.read import Refusal
 
 _TIP = re.compile(r"attach|grip|grasp|tcp|tool|pinch|flange|(^|_)(tip|ee|eef)(_|$)|end_?eff", re.IGNORECASE)
 _CUBE = (np.pi / 6.0) ** (1.0 / 3.0)
 """Edge of a cube, divided by the diameter of the ball with the same volume."""
+_NO_COLOUR = (0.5, 0.5, 0.5, 1.0)
 _LEAST_MASS, _LEAST_INERTIA = 1e-6, 1e-9  # kg, kg·m²
 _FREE, _BALL, _SLIDE, _HINGE = (
     int(getattr(mujoco.mjtJoint, f"mjJNT_{kind}")) for kind in ("FREE", "BALL", "SLIDE", "HINGE")
@@ -45,17 +46,14 @@ def as_urdf(
     followed = dict(_followed(model))
     for body in kept[1:]:
         _add_joints(root, model, body, followed)
+    links = {link.get("name") for link in root.iter("link")}
     for site in range(model.nsite):
-        name = model.site(site).name
-        if (
-            model.site_bodyid[site] in kept
-            and _TIP.search(name)
-            and root.find(f"link[@name='{name}']") is None
-        ):
+        name, body = model.site(site).name, int(model.site_bodyid[site])
+        if body in kept and _TIP.search(name) and name not in links:
             etree.SubElement(root, "link", name=name)
             at = _placement(model.site_pos[site], model.site_quat[site])
-            _joint(root, f"site {name}", _name(model, int(model.site_bodyid[site])), name, at, "fixed")
-    return etree.tostring(root), (*found.findings, *_left_out(model, source, kept, followed))
+            _joint(root, f"site {name}", _name(model, body), name, at, "fixed")
+    return etree.tostring(root), (*found.findings, *_left_out(found, source, kept, followed))
 
 
 def _name(model: mujoco.MjModel, body: int) -> str:
@@ -98,8 +96,9 @@ def _add_link(root: Element, model: mujoco.MjModel, body: int, meshes: dict[str,
         if len(touching) == len(own):
             tags = ("visual", "collision")  # there is no geometry for drawing alone
         for tag in tags:
-            material = int(model.geom_matid[geom])
-            rgba = model.geom_rgba[geom] if material < 0 else model.mat_rgba[material]
+            material, rgba = int(model.geom_matid[geom]), model.geom_rgba[geom]
+            if material >= 0 and np.allclose(rgba, _NO_COLOUR):
+                rgba = model.mat_rgba[material]
             for at, solid in _solids(model, geom, meshes) if tag == "collision" or rgba[3] > 0.0 else ():
                 shape = etree.SubElement(link, tag)
                 _origin(shape, at)
@@ -232,8 +231,9 @@ def _followed(model: mujoco.MjModel) -> Iterator[tuple[int, tuple[int, float, fl
 
 
 def _left_out(
-    model: mujoco.MjModel, source: str, kept: list[int], followed: dict[int, tuple[int, float, float]]
+    found: Compiled, source: str, kept: list[int], followed: dict[int, tuple[int, float, float]]
 ) -> Iterator[Finding]:
+    model = found.model
     for body in kept:
         if any(model.jnt_type[j] == _FREE for j in _joints(model, body)):
             text = "its free joint was made fixed: only fixed bases can be controlled"
@@ -245,6 +245,7 @@ def _left_out(
     counts = Counter(
         {
             "parts of things that stand beside the robot": model.nbody - len(kept),
+            "meshes without a file": model.nmesh - len(found.meshes),
             "equality constraints": model.neq - len(followed),
             "tendons": model.ntendon,
             "actuators of tendons and sites": int(elsewhere.sum()),

@@ -25,9 +25,9 @@ _EXPAND = "run `pip install xacro`, then `xacro FILE > robot.urdf`, and give the
 _XACRO_HINT = f"; this is a xacro template: {_EXPAND}"
 _HARMLESS = (80, 201)  # libxml2: two hyphens in a comment; a prefix without a namespace
 _BEFORE_XML = re.compile(rb"(?:\s|<!--.*?-->)+(?=<\?xml)", re.DOTALL)
-
-_FIRST_TAG = re.compile(rb"<([A-Za-z_][\w:.-]*)")
-_ASIDE = re.compile(rb"<!--.*?-->|<\?.*?\?>|<!DOCTYPE[^>]*>", re.DOTALL)
+_TAG = re.compile(rb"<([A-Za-z_][\w:.-]*)")
+_ASIDE = {b"<!--": b"-->", b"<?": b"?>", b"<!": b">"}
+"""The beginnings and ends of what may precede the root element."""
 
 
 class Refusal(Exception):
@@ -173,8 +173,16 @@ def load_bytes(path: Path, most: int = MAX_BYTES, name: str = "") -> bytes:
 def root_tag(data: bytes) -> str:
     """Returns the name of the root element of an XML document, from its first megabyte; "" if there is
     none."""
-    found = _FIRST_TAG.search(_ASIDE.sub(b"", data[:1_000_000]))
-    return "" if found is None else found[1].decode()
+    data, at = data[:1_000_000], 0
+    while (at := data.find(b"<", at)) >= 0:
+        end = next((end for begin, end in _ASIDE.items() if data.startswith(begin, at)), None)
+        if end is None:
+            found = _TAG.match(data, at)
+            return "" if found is None else found[1].decode()
+        at = data.find(end, at)
+        if at < 0:
+            break
+    return ""
 
 
 def label(element: Element) -> str:

@@ -14,6 +14,7 @@ import pytest
 from arms import INERTIAL, link, two_joint_arm
 
 from robots import InputError, check_urdf, load_robot, load_urdf_text
+from robots.loading import archive
 from robots.shapes.link_shapes import link_shapes
 from robots.urdf.read import root_tag
 
@@ -71,6 +72,16 @@ def test_a_folder_and_a_zip_bring_the_meshes_along(here: Path, kind: str) -> Non
     assert "not found" not in str(robot.report.findings)
     assert "temporary" not in robot.urdf_text
     assert [solid.source for solid in robot.collision.solids if solid.link == "l2"] == ["hull"]
+
+
+def test_a_mujoco_model_in_a_zip_finds_its_meshes(here: Path) -> None:
+    text = """<mujoco><compiler meshdir="assets"/>
+        <asset><mesh name="ball" file="ball.stl" scale="0.1 0.1 0.1"/></asset>
+        <worldbody><body name="a"><joint name="turn" armature="0.1"/><geom type="mesh" mesh="ball"/></body>
+        </worldbody></mujoco>"""
+    robot = load_urdf_text(packed({"arm/arm.xml": text.encode(), "arm/assets/ball.stl": ball()}))
+    assert robot.joint_names == ("turn",)
+    assert {len(shape.faces) for shape in link_shapes(robot) if shape.name == "a/0"} == {80}
 
 
 def test_one_of_several_descriptions_is_chosen(here: Path) -> None:
@@ -159,10 +170,17 @@ HOSTILE = {
     "encrypted": (encrypted, "without a password"),
     "a false size": (lying, "cannot be read"),
     "half a zip": (lambda: packed(FILES)[:-30], "cannot be read"),
+    "an unfinished document": (lambda: packed({"a.xml": b"<!-- " * 200_000}), "no robot description"),
     "zeros": (lambda: b"PK\x03\x04" + bytes(1000), "cannot be read"),
     "another method": (lambda: packed(FILES, zipfile.ZIP_LZMA), "deflate"),
     "a long name": (lambda: packed({"n" * 5_000 + ".urdf": ARM.encode()}), "no robot description"),
 }
+
+
+def test_a_zip_that_is_too_large_is_not_opened(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(archive, "MAX_PACKED", 1_000)
+    with pytest.raises(InputError, match="The zip has more than"):
+        archive.unpack(packed(FILES, zipfile.ZIP_STORED), here)
 
 
 @pytest.mark.parametrize("kind", HOSTILE)
@@ -201,5 +219,7 @@ def test_the_first_tag_of_a_document() -> None:
         ("\ufeff<robot name='a'/>", "robot"),
         ("<!DOCTYPE robot><robot/>", "robot"),
         ("no XML", ""),
+        ("<!-- " * 200_000, ""),
+        ("<!-- <a> -->" * 10_000 + "<mujoco>", "mujoco"),
     ):
         assert root_tag(text.encode()) == tag

@@ -236,6 +236,39 @@ def test_a_model_of_a_stranger_opens_no_file(file: str) -> None:
     assert "2 mesh file(s) not found" in str(load_urdf_text(text).report.findings)
 
 
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('mass="2"', 'mass="nan"'),
+        ('mass="2"', 'mass="1e300"'),
+        ('pos="0 0 0.1"', 'pos="nan inf 1e200"'),
+        ('axis="1 0 0"', 'axis="0 0 0"'),
+        ('range="-170 170"', 'range="nan -1"'),
+        ('armature="3"', 'armature="1e30"'),
+        ('armature="3"', 'armature="-3"'),
+        ('gear="50"', 'gear="nan"'),
+        ('name="attachment_site"', """name="tool'&quot;]" """),
+        ('name="rail"', 'name="upper after shoulder"'),
+        ('name="rail"', f'name="{"n" * 50_000}"'),
+        ("<worldbody>", "<worldbody>" + "<body>" * 5_000),
+        ("<worldbody>", '<extension><plugin plugin="evil"/></extension><worldbody>'),
+        ("<worldbody>", '<size memory="100G"/><worldbody>'),
+        ("<mujoco", '<!DOCTYPE mujoco [<!ENTITY a "b">]><mujoco'),
+        ("<compiler", '<compiler strippath="maybe" meshdir="/etc"'),
+    ],
+)
+def test_a_hostile_model_runs_or_is_refused_in_one_sentence(old: str, new: str) -> None:
+    assert old in ARM
+    try:
+        robot = loaded(ARM.replace(old, new, 1))
+    except InputError as error:
+        assert len(str(error)) < 400
+        assert str(error).isprintable()
+    else:
+        for values in (robot.home, robot.M_bar, robot.tau_limit, robot.model.armature):
+            assert np.isfinite(values).all()
+
+
 def test_a_model_that_grows_without_end_is_refused() -> None:
     many = '<replicate count="100000" offset="0 0 1"><body><joint/><geom size="0.1"/></body></replicate>'
     with pytest.raises(InputError):
