@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+import tyro
+
 from app.commands.output import print_table, write_json
 
 
-def robots(check: str | None = None, json: str | None = None) -> int:
+def robots(
+    check: str | None = None,
+    hold: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="PATTERN")] = (),
+    json: str | None = None,
+) -> int:
     """List the robots of the catalog, or check a URDF file. The check reports every repair, default value and
     refusal.
 
     Args:
         check: the URDF file to check. Exit code 1 if it cannot be used.
+        hold: hold the joints with this name or regular expression, as for himpc-lab run.
         json: write JSON to this file, or to standard output for "-".
     """
     if check is None:
@@ -28,7 +37,7 @@ def robots(check: str | None = None, json: str | None = None) -> int:
         return 0
     from robots import check_urdf
 
-    report = check_urdf(check)
+    report = check_urdf(check, hold)
     if json is not None:
         write_json({**report.as_dict(), "usable": report.usable}, json)
     else:

@@ -1,36 +1,16 @@
-"""Estimates a tip frame, a home configuration and acceleration limits for robots that are not in the
+"""Estimates a home configuration and acceleration limits for robots that are not in the
 catalog."""
 
 from __future__ import annotations
-
-import re
 
 import numpy as np
 import pinocchio as pin
 
 from robots.inertia import finite_range, mass_matrix, sample_configurations
 
-_TIP_NAMES = re.compile(
-    r"(hand_?tcp|tcp|tool_?0|tool_?frame|ee_?link|link_?eef|end_?effector|(^|_)ee$|eef|flange|tool)",
-    re.IGNORECASE,
-)
 _CANDIDATES = 300
 _STEPS = 60
 _PLAIN = 0.05  # accepted loss of score if a joint is put at the middle of its range
-
-
-def choose_tip(model: pin.Model, frames: dict[str, int]) -> str:
-    """Returns the frame at the end of the longest chain of joints; a frame with a name such as `tool0` is
-    preferred."""
-    depth = {name: len(model.supports[model.frames[i].parentJoint]) - 1 for name, i in frames.items()}
-    deepest = max(depth.values())
-    ends = [name for name in frames if depth[name] == deepest]
-    for preferred in (0, 1):
-        for name in reversed(ends) if preferred else ends:
-            match = _TIP_NAMES.search(name)
-            if match or preferred:
-                return name
-    return ends[-1]
 
 
 def find_home(

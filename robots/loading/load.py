@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -25,17 +26,27 @@ from robots.urdf import canonicalise, load_bytes
 _SHORT = 200_000  # bytes; the robots of the last four files up to this size stay in memory
 
 
-def load_robot(name_or_path: str | Path, tip: str | None = None, within: Path | None = None) -> Robot:
+def load_robot(
+    name_or_path: str | Path,
+    tip: str | None = None,
+    within: Path | None = None,
+    hold: tuple[str, ...] = (),
+) -> Robot:
     """Returns the robot with this catalog name, or the robot that a URDF file describes.
 
     tip: the default end-effector frame; None: the tip of the catalog, or the end of the longest chain.
     within: a folder, given without symbolic links. It must contain the URDF file and its meshes, except
     installed meshes. None: files may be anywhere.
+    hold: joints that are not controlled, "REGEX" or "REGEX=VALUE" with the whole name of a joint or a regular
+    expression for it, and the value at which it is held, rad or m (0 without it, and always inside its
+    limits). Home, M̄ and shapes of a robot of the catalog with held joints are estimated as for a file.
 
-    Raises InputError for an unknown name, a missing file, a description that cannot be used, or an unknown
-    tip. The message is one sentence that tells the user what to do.
+    Raises InputError for an unknown name, a missing file, a description that cannot be used, an unknown tip,
+    or a pattern that fits no joint. The message is one sentence that tells the user what to do.
     """
     text = str(name_or_path)
+    if text in CATALOG and hold:
+        return _import_file(CATALOG[text].path, tip or CATALOG[text].tip, hold=hold).used()
     if text in CATALOG:
         robot = _catalog_robot(CATALOG[text])
         return robot if tip is None else robot.with_tip(tip)
@@ -44,38 +55,46 @@ def load_robot(name_or_path: str | Path, tip: str | None = None, within: Path | 
         raise unknown_name("robot in the catalog called", text, CATALOG, "or give the path of a URDF file")
     if within is not None and not path.resolve().is_relative_to(within):
         raise InputError(f"The URDF '{shortened(text, 100)}' is not in the folder whose files may be opened.")
-    return _import_file(path, tip, within).used()
+    return _import_file(path, tip, within, hold).used()
 
 
-def load_urdf_text(text: str, tip: str | None = None) -> Robot:
+def load_urdf_text(text: str, tip: str | None = None, hold: tuple[str, ...] = ()) -> Robot:
     """Returns the robot that a URDF string describes: an upload, or a stored canonical text.
 
     The description can use the meshes of installed packages, by `package://`, and no other files.
 
     Raises InputError like `load_robot`.
     """
-    return _import(text.encode(errors="replace"), "the URDF text", None, tip).used()
+    return _import(text.encode(errors="replace"), "the URDF text", None, tip, None, hold).used()
 
 
-def check_urdf(path: str | Path) -> ImportReport:
+def check_urdf(path: str | Path, hold: tuple[str, ...] = ()) -> ImportReport:
     """Returns the import report of a URDF file: everything that the import repairs, adds, fixes or refuses.
 
-    Invalid content raises no exception; InputError is raised if there is no such file.
+    Invalid content raises no exception; InputError is raised if there is no such file, or if a pattern in
+    `hold` fits no joint.
     """
-    return _import_file(Path(path), None).report
+    return _import_file(Path(path), None, hold=hold).report
 
 
-def _import_file(path: Path, tip: str | None, within: Path | None = None) -> Import:
-    return _import(load_bytes(path), shortened(str(path), 100), path.resolve().parent, tip, within)
+def _import_file(
+    path: Path, tip: str | None, within: Path | None = None, hold: tuple[str, ...] = ()
+) -> Import:
+    return _import(load_bytes(path), shortened(str(path), 100), path.resolve().parent, tip, within, hold)
 
 
 def _import(
-    data: bytes, source: str, folder: Path | None, tip: str | None, within: Path | None = None
+    data: bytes,
+    source: str,
+    folder: Path | None,
+    tip: str | None,
+    within: Path | None,
+    hold: tuple[str, ...],
 ) -> Import:
     # A file without meshes always results in the same robot. The process that reads it uses a core for 1.8 s.
     keeps = folder is not None and len(data) < _SHORT and b"mesh" not in data
     try:
-        found = (_kept if keeps else _read_apart)(data, source, folder, tip, within)
+        found = (_kept if keeps else _read_apart)(data, source, folder, tip, within, hold)
     except Fault as fault:
         return Import(ImportReport(source, (Finding("refused", source, str(fault)),)))
     if found.robot is None or not has_meshes(found.robot.urdf_text):
@@ -87,17 +106,15 @@ def _import(
     return Import(robot.report, robot)
 
 
-def _read_apart(
-    data: bytes, source: str, folder: Path | None, tip: str | None, within: Path | None
-) -> Import:
-    return isolated(_imported, data, source, folder, tip, within)
+def _read_apart(*document: object) -> Import:
+    return isolated(_imported, *document)
 
 
 _kept = lru_cache(maxsize=4)(_read_apart)
 
 
-def _imported(data: bytes, source: str, folder: Path | None, tip: str | None, within: Path | None) -> Import:
-    found = import_robot(data, source, folder, tip, within)
+def _imported(*document: Any) -> Import:
+    found = import_robot(*document)
     if found.robot is None or has_meshes(found.robot.urdf_text):
         return found
     robot = with_cover(found.robot)
