@@ -20,7 +20,9 @@ _NAMES = tuple(
 )
 """Names of frames that are made to be the tip; earlier ones are preferred."""
 _LEG = re.compile(r"(?<![a-z])leg|foot|ankle|toe|sole|wheel|caster", re.IGNORECASE)
-_PART = re.compile(r"finger|knuckle|thumb|jaw|(?<![a-z])pad|camera|sensor|optical|imu|lidar", re.IGNORECASE)
+_PART = re.compile(
+    r"finger|knuckle|thumb|jaw|(?<![a-z])pad|mover|camera|sensor|optical|imu|lidar|range|meter", re.IGNORECASE
+)
 """Parts of a hand whose frames are turned or displaced from the axis of the hand."""
 
 
@@ -29,9 +31,9 @@ def choose_tip(root: Element) -> tuple[str, tuple[str, ...]]:
 
     The tip is at the end of the longest chain of joints that is not a leg. If several chains leave one body
     behind the middle of this chain and behind its fourth joint, they are fingers, and the tip is on that
-    body. Frames of fingers, jaws and sensors, and links with nothing but a collision shape, are used only if
-    there are no others. Frames with names such as `tool0` are preferred, in alphabetical order; the last of several frames
-    without such a name is used.
+    body. Frames of fingers, jaws and sensors are used only if there are no others. Frames with names such as
+    `tool0` are preferred, in alphabetical order; otherwise the tip is the last frame, if possible one with
+    more than a collision shape.
     """
     carried = chains(root)
     arms = not_legs(root)
@@ -44,13 +46,14 @@ def choose_tip(root: Element) -> tuple[str, tuple[str, ...]]:
         for name in arms
         if len(carried[name]) == length and not (palms and branches[carried[name][-1]] < 2)
     ]
-    links = named(root, "link")
-    hands = [name for name in ends if not (_PART.search(name) or _invisible(links[name]))] or ends
+    hands = [name for name in ends if not _PART.search(name)] or ends
     for pattern in _NAMES:
         alike = sorted(name for name in hands if pattern.search(name))
         if alike:
             return alike[0], tuple(alike[1:])
-    return hands[-1], tuple(hands[:-1])
+    links = named(root, "link")
+    seen = [name for name in hands if not _invisible(links[name])] or hands
+    return seen[-1], tuple(seen[:-1])
 
 
 def not_legs(root: Element) -> list[str]:
