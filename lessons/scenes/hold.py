@@ -58,8 +58,12 @@ def hold(
         robot = load_urdf_text(urdf_text, tip, hold)
     else:
         robot = load_robot(str(urdf), tip, within, hold)
-    plant = PLANAR3_PLANT if robot.name == "planar3" and not hold else TOUCHING
-    return _hold(robot, plant)
+    return hold_robot(robot)
+
+
+def hold_robot(robot: Robot) -> TorqueScene:
+    """Returns the hold scene of a robot that is loaded already."""
+    return _hold(robot, PLANAR3_PLANT if robot.name == "planar3" and robot.n == 3 else TOUCHING)
 
 
 def _hold(robot: Robot, plant: PlantSettings) -> TorqueScene:

@@ -30,7 +30,7 @@ def find_home(
     if len(moving) == 0:
         return middle
     data = model.createData()
-    reach = max(_reach(model, frame), 1e-3)
+    reach = max(chain_length(model, frame), 1e-3)
 
     chain = [int(joint) + 1 for joint in moving]
     pin.forwardKinematics(model, data, middle)
@@ -94,7 +94,7 @@ def sensible_a_max(
     return np.clip(0.5 * np.min(accelerations, axis=0), 1.0, 15.0)
 
 
-def _reach(model: pin.Model, frame: int) -> float:
+def chain_length(model: pin.Model, frame: int) -> float:
     """Returns the length of the chain from the first joint to the frame, m."""
     chain = [joint for joint in model.supports[model.frames[frame].parentJoint] if joint > 0][1:]
     lengths = [float(np.linalg.norm(model.jointPlacements[joint].translation)) for joint in chain]

@@ -46,7 +46,7 @@ def load_robot(
     """
     text = str(name_or_path)
     if text in CATALOG and hold:
-        return _import_file(CATALOG[text].path, tip or CATALOG[text].tip, hold=hold).used()
+        return import_file(CATALOG[text].path, tip or CATALOG[text].tip, hold=hold).used()
     if text in CATALOG:
         robot = _catalog_robot(CATALOG[text])
         return robot if tip is None else robot.with_tip(tip)
@@ -55,7 +55,7 @@ def load_robot(
         raise unknown_name("robot in the catalog called", text, CATALOG, "or give the path of a URDF file")
     if within is not None and not path.resolve().is_relative_to(within):
         raise InputError(f"The URDF '{shortened(text, 100)}' is not in the folder whose files may be opened.")
-    return _import_file(path, tip, within, hold).used()
+    return import_file(path, tip, within, hold).used()
 
 
 def load_urdf_text(text: str, tip: str | None = None, hold: tuple[str, ...] = ()) -> Robot:
@@ -74,12 +74,14 @@ def check_urdf(path: str | Path, hold: tuple[str, ...] = ()) -> ImportReport:
     Invalid content raises no exception; InputError is raised if there is no such file, or if a pattern in
     `hold` fits no joint.
     """
-    return _import_file(Path(path), None, hold=hold).report
+    return import_file(Path(path), None, hold=hold).report
 
 
-def _import_file(
-    path: Path, tip: str | None, within: Path | None = None, hold: tuple[str, ...] = ()
+def import_file(
+    path: Path, tip: str | None = None, within: Path | None = None, hold: tuple[str, ...] = ()
 ) -> Import:
+    """Returns the robot of a URDF file, or None for one that cannot be used, with the report of its import.
+    The arguments and the exceptions are those of `load_robot` and `check_urdf`."""
     return _import(load_bytes(path), shortened(str(path), 100), path.resolve().parent, tip, within, hold)
 
 
