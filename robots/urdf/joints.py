@@ -15,7 +15,7 @@ from lxml.etree import _Element as Element
 from robots.errors import shortened
 from robots.report import Finding
 from robots.urdf.read import UNLIMITED, Refusal, end_of, label, limit_value, named, numbers, placement
-from robots.urdf.structure import movable_joints, parent_joints
+from robots.urdf.structure import MOVABLE, movable_joints, parent_joints
 
 UNBOUNDED = UNLIMITED  # limit of a joint without limits, so that nq = nv; it is read as ±inf
 _TURNS = 4.0 * math.pi  # rad: no arm's joint turns further, but a limit in degrees says so
@@ -87,7 +87,14 @@ def _to_freeze(root: Element, held: dict[str, tuple[float, str]]) -> dict[str, t
             factor = float(numbers(mimic, "multiplier", 1, (1.0,))[0])
             leader = mimic.get("joint", "")
             led = factor * held[leader][0] if leader in held else 0.0
-            frozen[name] = (led + offset, f"it mimics '{shortened(leader)}'")
+            reason = f"it mimics '{shortened(leader)}'"
+            moves = leader in joints and leader not in held and joints[leader].get("type") in MOVABLE
+            if moves and _same_chain(carriers, joint, joints[leader]):
+                reason = (
+                    f"it should follow '{shortened(leader)}' with factor {factor:g}, which is not simulated: "
+                    "what it carries moves differently on the real robot"
+                )
+            frozen[name] = (led + offset, reason)
             if leader in joints and not _same_chain(carriers, joint, joints[leader]):
                 frozen.setdefault(leader, (0.0, f"'{name}' mimics it, so it drives a gripper"))
         elif _GRIPPER_JOINT.search(name) or _GRIPPER_LINK.search(end_of(joint, "child")):

@@ -124,6 +124,19 @@ def test_position_limits_that_nobody_filled_in() -> None:
     assert load(one).n == 1
 
 
+def test_a_joint_that_should_follow_another_is_held_and_the_report_says_what_is_wrong() -> None:
+    arm = load_robot(FIELD / "mimic_in_chain.urdf")
+    assert arm.joint_names == ("j1", "j2")
+    assert "it should follow 'j2' with factor -1, which is not simulated: what it carries moves" in str(
+        arm.report.of_kind("fixed")
+    )
+    both = load_robot(FIELD / "mimic_in_chain.urdf", hold=("j2=0.5",))
+    assert "not simulated" not in str(both.report.findings)
+    np.testing.assert_allclose(
+        both.model.frames[both.frame_id("link3")].placement.rotation, np.eye(3), atol=1e-12
+    )
+
+
 # ------------------------------------------------------------------ joints that are held
 
 
