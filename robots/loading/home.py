@@ -10,6 +10,7 @@ from robots.inertia import finite_range, mass_matrix, sample_configurations
 
 _CANDIDATES = 300
 _STEPS = 60
+_ROOM = 0.125  # height of the frame above the floor, as a share of the reach
 _PLAIN = 0.05  # accepted loss of score if a joint is put at the middle of its range
 
 
@@ -21,8 +22,9 @@ def find_home(
     The configuration maximises log σ_min(J) + log(joint margin) − 0.1‖q − middle‖², first over samples and
     then by random steps; the linear part of J is divided by the reach. The result is deterministic. Joints
     that do not move the frame are at the middle of their range (unbounded joints at 0). A chain that reaches
-    below the floor (z = 0, or the height of the first joint if lower) gets a lower score. An elbow above the
-    tip gets a higher score.
+    below the floor (z = 0, or the height of the first joint if lower) gets a lower score, and so does a frame
+    that is less than an eighth of the reach above it: one could not drag it down. An elbow above the tip gets
+    a higher score.
     """
     lower, upper = finite_range(q_lower, q_upper)
     middle, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
@@ -50,7 +52,7 @@ def find_home(
         singular = np.linalg.svd(jacobian, compute_uv=False)
         margin = float(((half - np.abs(q - middle)) / half)[moving].min())
         bend = float(np.square((q - middle)[moving] / np.pi).mean())
-        below = 8.0 * max(0.0, floor - lowest) / reach
+        below = 8.0 * max(0.0, floor - lowest, floor + _ROOM * reach - height) / reach
         return float(np.log(singular.min() + 1e-9) + 0.5 * np.log(max(margin, 1e-9)) - bend - below + elbow)
 
     samples = sample_configurations(
