@@ -29,21 +29,28 @@ def compile_apart(module: str, tell: Callable[[str], None]) -> None:
         module: its dotted name.
         tell: called with the dotted name of every compiled function.
     """
-    code = (
-        f"import sys; sys.path[:] = {sys.path!r}; "
-        f"from himpc.compilation.compiler_process import serve; serve({module!r})"
-    )
-    with subprocess.Popen(
-        (sys.executable, "-c", code),
-        stdin=subprocess.PIPE,  # nothing is written to this pipe; the child ends when the pipe is closed
-        stdout=subprocess.PIPE,
-        env={**os.environ, _COMPILES: "1", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"},
-        text=True,
-        process_group=0 if os.name == "posix" else -1,  # the child ignores Ctrl-C, which this process handles
-    ) as child:
+    with started(module, subprocess.PIPE) as child:
         try:
             assert child.stdout is not None
             for line in child.stdout:
                 tell(line.strip())
         finally:
             child.kill()
+
+
+def started(module: str, out: int, beside: bool = False) -> subprocess.Popen[str]:
+    """Returns a process that compiles and writes the dotted names of compiled functions to the file `out`. It
+    ends when this process ends or closes its pipe. beside: only the functions that the module needs are
+    compiled, see `compiler_process`."""
+    code = (
+        f"import sys; sys.path[:] = {sys.path!r}; "
+        f"from himpc.compilation.compiler_process import serve; serve({module!r}, {beside!r})"
+    )
+    return subprocess.Popen(
+        (sys.executable, "-c", code),
+        stdin=subprocess.PIPE,  # nothing is written to this pipe; the child ends when the pipe is closed
+        stdout=out,
+        env={**os.environ, _COMPILES: "1", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"},
+        text=True,
+        process_group=0 if os.name == "posix" else -1,  # the child ignores Ctrl-C, which this process handles
+    )

@@ -6,17 +6,25 @@ import os
 from importlib import import_module
 
 from himpc.compilation.compiled import on_compiled
-from himpc.compilation.compiling import compile_all
+from himpc.compilation.compiler import started
+from himpc.compilation.compiling import LARGEST, compile_all
 from robots.processes.orphans import end_with
 
 
-def serve(module: str) -> None:
-    """Imports a module, and reports every compiled function on standard output."""
+def serve(module: str, beside: bool = False) -> None:
+    """Compiles, and reports every compiled function on standard output: for a module of this package all
+    functions of the package, where a second process compiles the largest one; with `beside`, or for another
+    module, only those that the module needs."""
     end_with(0)
     # A module may print text, which must not be mixed with the reports.
     with os.fdopen(os.dup(1), "w", buffering=1) as out:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         with on_compiled(lambda name: print(name, file=out)):
-            import_module(module)
-            if module.startswith("himpc."):
-                compile_all(lambda *_: None)
+            if beside or not module.startswith("himpc."):
+                import_module(module)
+                return
+            with started(LARGEST, out.fileno(), beside=True) as largest:
+                try:
+                    compile_all(lambda *_: None)
+                finally:
+                    largest.kill()  # its code is on disk, or could not be stored

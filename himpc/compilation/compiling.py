@@ -9,6 +9,9 @@ from pathlib import Path
 
 _DOOR = "himpc.compilation.compiled"
 _PACKAGE = Path(__file__).parents[1]
+LARGEST = "himpc.tick.kernel.control_period"
+"""The module with the function whose compilation takes as long as that of all others. It is loaded after
+them: another process may compile it meanwhile, see `compiler_process`."""
 
 
 def compile_all(tell: Callable[[int, int], None]) -> None:
@@ -30,9 +33,9 @@ def compile_all(tell: Callable[[int, int], None]) -> None:
             tell(len(ready), total)
 
     with on_compiled(count):
-        for module, names in waiting.items():
+        for module in sorted(waiting, key=lambda name: name == LARGEST or ".export." in name):
             import_module(module)
-            ready |= names
+            ready |= waiting[module]
 
 
 def compiled_functions() -> dict[str, frozenset[str]]:

@@ -87,8 +87,9 @@ def _compiled_now(fast: Any, arguments: tuple[Any, ...]) -> Any:
                     compile_apart(module, lambda name: event.end_event(_APART, name))
                     found = load(fast, arguments)
         if not found:
-            with _one_at_a_time(place, "compiling"):
-                fast.compile(arguments)
+            with _one_at_a_time(place, f"compiling-{module}"):
+                if not load(fast, arguments):  # another process may have compiled it meanwhile
+                    fast.compile(arguments)
     fast.disable_compile()
     return fast
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import ctypes
 import os
+import re
 import stat
 import subprocess
 import sys
@@ -17,7 +18,7 @@ import numpy as np
 import pytest
 
 from himpc.compilation.compiled import VECTOR, WHOLE, intermediate
-from himpc.compilation.compiling import compile_all, compiled_functions
+from himpc.compilation.compiling import LARGEST, compile_all, compiled_functions
 from himpc.compilation.sources import sources_of
 from himpc.tick.kernel.linear import dot
 
@@ -203,6 +204,15 @@ def test_all_that_is_compiled_in_is_part_of_what_is_kept() -> None:
         assert imported(Path(str(loaded.__file__)), set()) <= set(found)
         checked.update(found)
     assert ROOT / "himpc" / "constants.py" in checked
+
+
+def test_the_largest_function_is_compiled_without_waiting_for_others() -> None:
+    """A second process compiles it meanwhile. Its module imports none that is compiled by itself."""
+    largest = import_module(LARGEST)
+    files = set(sources_of(largest.control_period.py_func)) - {Path(str(largest.__file__))}
+    own = re.compile(r"^@kernel\b|= kernel\(", re.MULTILINE)
+    assert ROOT / "himpc" / "tick" / "kernel" / "linearize.py" in files
+    assert [file.name for file in files if own.search(file.read_text())] == []
 
 
 def test_nobody_but_compiled_code_calls_a_piece() -> None:
