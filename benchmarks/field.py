@@ -2,9 +2,9 @@
 
     python -m benchmarks.field DIR_OR_FILE… [--out FILE.md] [--seconds 120]
 
-Each file is checked by `himpc-lab robots --check` in a process of its own. The table has a row per file: how many
-joints move, the tip, and how the robot follows a dragged target, or the first reason of a refusal. A summary is at its
-end.
+Each file is checked by `himpc-lab robots --check` in a process of its own. The table has a row per file: how
+many joints move, the tip, and how the robot follows a dragged target, or the first reason of a refusal. A
+summary is at its end.
 """
 
 from __future__ import annotations
@@ -35,9 +35,10 @@ def tried(path: Path, name: str, seconds: float) -> Tried:
     command = (sys.executable, "-m", "app", "robots", "--check", str(path), "--json", "-")
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=seconds, check=False)
-        told = json.loads(done.stdout)
     except subprocess.TimeoutExpired:
         return Tried(name, False, None, ("", "", f"takes longer than {seconds:g} s"))
+    try:
+        told = json.loads(done.stdout)
     except ValueError:
         last = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
         return Tried(name, False, None, ("", "", f"no answer: {last}"))
@@ -69,8 +70,8 @@ def summary(rows: list[Tried]) -> str:
     dragged = [row for row in loaded if row.follows is not None]
     follow = sum(row.follows is True for row in dragged)
     return (
-        f"{len(loaded)} of {len(rows)} files load; {follow} of {len(dragged)} dragged robots follow within 1 % "
-        "of the drag after 2 s."
+        f"{len(loaded)} of {len(rows)} files load; {follow} of {len(dragged)} dragged robots follow "
+        "within 1 % of the drag after 2 s."
     )
 
 
