@@ -23,6 +23,7 @@ def export(
     out: str,
     urdf: RobotFile = None,
     tip: str | None = None,
+    hold: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="PATTERN")] = (),
     controller: str | None = None,
     stack: str | None = None,
     set: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="PATH=VALUE")] = (),
@@ -40,6 +41,7 @@ def export(
         urdf: robot for the scene "hold": a URDF or MuJoCo model (.xml), a folder or zip with one, or a name
             of the catalog.
         tip: end-effector frame, for the scene "hold".
+        hold: hold the joints with this name or regular expression, as for himpc-lab run.
         controller: himpc, hiqp, nhimpc or weighted; the scene's own by default.
         stack: the levels as JSON, as --set stack=… of himpc-lab run takes them.
         set: change a setting, e.g. --set horizon=10 --set levels.2.enabled=false.
@@ -80,7 +82,7 @@ def export(
                 f"{each} is Python, which export cannot translate: give a scene and a controller of the lab"
             )
     assignments = (*([f"stack={stack}"] if stack is not None else ()), *set)
-    spec = RunSpec(scene, urdf, tip, controller=controller, seed=seed).but(*assignments)
+    spec = RunSpec(scene, urdf, tip, controller=controller, seed=seed, hold=hold).but(*assignments)
     loaded = as_torque_scene(spec.for_export().prepared(), "export's")
     if loaded.settings.limits != as_torque_scene(spec.prepared(), "export's").settings.limits:
         print(WITHOUT, flush=True)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
+from pathlib import Path
 from typing import Annotated
 
 import tyro
@@ -12,13 +14,18 @@ RobotFile = Annotated[str | None, tyro.conf.arg(aliases=("--robot",), metavar="F
 """The option that names a robot."""
 
 
-def robots(check: str | None = None, json: str | None = None) -> int:
-    """List the robots of the catalog, or check a robot's file. The check reports every repair, default value
-    and refusal.
+def robots(
+    check: str | None = None,
+    hold: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="PATTERN")] = (),
+    json: str | None = None,
+) -> int:
+    """List the robots of the catalog, or check a robot's file. The check prints every repair, default value
+    and refusal, and how the robot moves: its target is dragged by 15 % of the arm's length and back.
 
     Args:
         check: the URDF or MuJoCo model to check, or a folder or zip with one. Exit code 1 if it cannot be
             used.
+        hold: hold the joints with this name or regular expression, as for himpc-lab run.
         json: write JSON to this file, or to standard output for "-".
     """
     if check is None:
@@ -34,14 +41,18 @@ def robots(check: str | None = None, json: str | None = None) -> int:
             rows = [[str(value) for value in entry.values()] for entry in entries]
             print_table("Robots", ("robot", "what it is", "tip", "joints"), rows)
         return 0
-    from robots import check_urdf
+    from lessons.experiments.drag import dragged
+    from lessons.settings.values import finite
+    from robots.loading.load import import_file
 
-    report = check_urdf(check)
+    found = import_file(Path(check), hold=hold)
+    report, motion = found.report, None if found.robot is None else dragged(found.robot)
     if json is not None:
-        write_json({**report.as_dict(), "usable": report.usable}, json)
+        told = None if motion is None else {**asdict(motion), "follows": motion.follows, "text": str(motion)}
+        write_json(finite({**report.as_dict(), "motion": told}), json)
     else:
         verdict = "can be used" if report.usable else "cannot be used"
-        rows = [[finding.kind, finding.where, finding.text] for finding in report.findings]
-        title = f"{check} {verdict}: {len(report.joints)} joints, tip '{report.tip}'"
-        print_table(title, ("finding", "where", "what"), rows)
+        print(f"{check} {verdict}: {len(report.joints)} joints, tip '{report.tip}'")
+        for line in (*report.findings, *(() if motion is None else (f"motion: {motion}",))):
+            print(line)
     return 0 if report.usable else 1

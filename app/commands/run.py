@@ -21,6 +21,7 @@ def run(
     scene: tyro.conf.Positional[str | None] = None,
     urdf: RobotFile = None,
     tip: str | None = None,
+    hold: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="PATTERN")] = (),
     controller: str | None = None,
     task: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="FILE.py")] = (),
     duration: float | None = None,
@@ -39,6 +40,8 @@ def run(
         urdf: robot for the scene "hold": a URDF or MuJoCo model (.xml), a folder or zip with one, or a name
             of the catalog.
         tip: end-effector frame, for the scene "hold".
+        hold: hold the joints with this name or regular expression at 0, or with PATTERN=VALUE at VALUE (rad
+            or m), for the scene "hold"; e.g. --hold 'left_.*' --hold gripper_joint=0.02.
         controller: controller to use instead of the scene's own: a name (see himpc-lab controllers) or a
             Python file of your own.
         task: Python file with a task of your own, for a --state whose stack contains this task. With
@@ -56,7 +59,7 @@ def run(
     from lessons.recording.summary import summary
     from lessons.recording.table import as_npz
 
-    spec = _given(scene, urdf, tip, state)
+    spec = _given(scene, urdf, tip, hold, state)
     if controller is not None:
         told = (each for each in spec.set if not each.startswith("controller="))
         spec = replace(spec, controller=controller, set=tuple(told))
@@ -75,6 +78,7 @@ def run(
             "scene": spec.scene,
             "urdf": spec.urdf,
             "tip": spec.tip,
+            "hold": list(spec.hold),
             "controller": result["controller"],
             "seed": spec.seed,
             "duration": recording.duration,
@@ -88,7 +92,9 @@ def run(
     return 0
 
 
-def _given(scene: str | None, urdf: str | None, tip: str | None, code: str | None) -> RunSpec:
+def _given(
+    scene: str | None, urdf: str | None, tip: str | None, hold: tuple[str, ...], code: str | None
+) -> RunSpec:
     """Returns the run to execute: the named scene, or the run of a state code."""
     from lessons.replay.state import decode
     from lessons.scenes.run_spec import RunSpec
@@ -96,9 +102,10 @@ def _given(scene: str | None, urdf: str | None, tip: str | None, code: str | Non
     if code is None:
         if scene is None:
             raise InputError("run needs a scene, e.g. himpc-lab run iiwa14-hold, or --state CODE")
-        return RunSpec(scene, urdf, tip)
-    if (scene, urdf, tip) != (None, None, None):
-        raise InputError("--state brings its own scene and robot: leave out the scene, --urdf and --tip")
+        return RunSpec(scene, urdf, tip, hold=hold)
+    if (scene, urdf, tip, hold) != (None, None, None, ()):
+        others = "the scene, --urdf, --tip and --hold"
+        raise InputError(f"--state brings its own scene and robot: leave out {others}")
     return decode(code).run
 
 

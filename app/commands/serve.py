@@ -17,6 +17,7 @@ def serve(
     scene: str | None = None,
     urdf: RobotFile = None,
     tip: str | None = None,
+    hold: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="PATTERN")] = (),
     controller: str | None = None,
     task: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="FILE.py")] = (),
     state: str | None = None,
@@ -50,6 +51,8 @@ def serve(
         task: Python file with a task of your own, which can then be added to the stack.
         urdf: your own robot: a URDF or MuJoCo model (.xml), or a folder or zip with one.
         tip: end-effector frame of that robot.
+        hold: hold the joints of that robot with this name or regular expression at 0, or with PATTERN=VALUE
+            at VALUE (rad or m).
         state: a state code, as the page shows it; the page gets its scene, robot, settings, seed, lesson and
             step.
         max_sessions: number of people who may use the page at once, each with a robot of their own.
@@ -98,10 +101,12 @@ def serve(
     if not 0.0 <= drain <= 3600.0:
         raise InputError(f"--drain {drain}: give a time from 0 to 3600 s")
     bringing = [name for name, given in (("--lesson", lesson), ("--state", state)) if given is not None]
-    if len(bringing) > 1 or (bringing and (scene, urdf, tip) != (None, None, None)):
-        others = "--scene, --urdf, --tip and --" + ("state" if bringing[0] == "--lesson" else "lesson")
+    if len(bringing) > 1 or (bringing and (scene, urdf, tip, hold) != (None, None, None, ())):
+        others = "--scene, --urdf, --tip, --hold and --"
+        others += "state" if bringing[0] == "--lesson" else "lesson"
         raise InputError(f"{bringing[0]} brings its own scene and robot: leave out {others}")
-    own = SceneChoice.starting(scene or ("hold" if urdf else FIRST.run.scene), urdf, tip, controller, task)
+    first = scene or ("hold" if urdf else FIRST.run.scene)
+    own = SceneChoice.starting(first, urdf, tip, controller, task, hold)
     if lesson is not None:
         choice = SceneChoice.opening(lesson).admitting(own)
     elif state is not None:

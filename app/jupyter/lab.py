@@ -144,7 +144,7 @@ class Lab:
         if record is None or rows is None:
             raise InputError("the simulation was stopped: call show again")
         run = self._learner.choice.run
-        how = {"scene": run.scene, "urdf": run.urdf, "tip": run.tip, "seed": run.seed}
+        how = {"scene": run.scene, "urdf": run.urdf, "tip": run.tip, "hold": list(run.hold), "seed": run.seed}
         return named(ready.robot, self.settings, record.layout, rows, how)
 
     def stop(self) -> None:

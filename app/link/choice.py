@@ -54,11 +54,12 @@ class SceneChoice:
         tip: str | None = None,
         controller: str | None = None,
         tasks: tuple[str, ...] = (),
+        hold: tuple[str, ...] = (),
     ) -> SceneChoice:
         """Returns the choice of a command line: scene and controller by name or file path, and files of
         tasks."""
         files = (controller,) if controller is not None and is_file(controller) else ()
-        begun = cls.of_run(RunSpec(scene, urdf, tip, controller, files=files, tasks=tasks))
+        begun = cls.of_run(RunSpec(scene, urdf, tip, controller, files=files, tasks=tasks, hold=hold))
         return replace(begun, scenes=(scene,) if is_file(scene) else ())
 
     @classmethod
@@ -95,7 +96,7 @@ class SceneChoice:
             return cls.of_run(run)
         lesson = cls.of_lesson(LessonPlace.at(state.lesson, state.step or 1))
         own = replace(lesson.run, seed=run.seed, files=run.files, tasks=run.tasks)
-        if (own.scene, own.urdf, own.tip) != (run.scene, run.urdf, run.tip):
+        if (own.scene, own.urdf, own.tip, own.hold) != (run.scene, run.urdf, run.tip, run.hold):
             raise InputError(
                 f"step {state.step or 1} of lesson '{state.lesson}' has another scene than the code: "
                 "it was made by another version; open the lesson itself"
@@ -220,9 +221,9 @@ class SceneChoice:
         if self.within is not None:
             from lessons.scenes.hold import hold
 
-            return hold(run.urdf, run.tip, within=self.within)
+            return hold(run.urdf, run.tip, within=self.within, hold=run.hold)
         load = scene_named if self.exercise is not None or run.scene in self.scenes else load_scene
-        return load(run.scene, run.urdf, run.tip, self.urdf_text)
+        return load(run.scene, run.urdf, run.tip, self.urdf_text, run.hold)
 
 
 def _both(one: tuple[str, ...], other: tuple[str, ...]) -> tuple[str, ...]:

@@ -74,7 +74,7 @@ class Page:
         self._event_loop = loop
         self._notebook, self._comfort = notebook, comfort
         self._phone = self._narrow = False
-        self._seen: tuple[str | None, ...] | None = None  # the scene for which the camera was turned
+        self._seen: tuple[object, ...] | None = None  # the scene for which the camera was turned
         self._stage: Stage | None = None
         self._built: Ready | None = None
         self._trouble: Trouble | None = None
@@ -249,7 +249,7 @@ class Page:
             add_command(self._client.gui, "Camera: show the whole robot", "F", self._frame)
             self._comfort.opened(self.learner)
             run = ready.choice.run
-            seen = (run.scene, run.urdf, run.tip, ready.choice.urdf_text, ready.robot.name)
+            seen = (run.scene, run.urdf, run.tip, run.hold, ready.choice.urdf_text, ready.robot.name)
             if seen != self._seen:  # after a restart the camera stays as the learner left it
                 ways = [task.path for task in ready.tasks if task.path is not None]
                 aim(self._client.camera, ready.robot, self._phone, ready.room, ways)

@@ -39,7 +39,7 @@ def script(run: RunSpec, log: Log, duration: float) -> str:
     events = log[start:]
     own = next((each for each in assignments if each.startswith("controller=") and is_file(each)), None)
     assignments = tuple(each for each in assignments if each != own)
-    find = ", ".join(repr(each) for each in _arguments(run))
+    find = ", ".join(map(repr, _arguments(run))) + (f", hold={run.hold!r}" if run.hold else "")
     parts = [
         _HEAD.format(
             what=f"{run.scene} under {settings.controller}, {duration:g} s",

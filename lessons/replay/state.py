@@ -29,7 +29,9 @@ _MAX_TEXT = 60_000
 _MAX_ASSIGNMENTS = 500
 _MAX_ASSIGNMENT = 2_000
 _PREFIX = re.compile(r"hl(\d{1,6})-")
-_KEYS = {"scene": "s", "urdf": "r", "tip": "t", "set": "a", "seed": "n", "lesson": "l", "step": "p"}
+_KEYS = {"scene": "s", "urdf": "r", "tip": "t", "hold": "h", "set": "a", "seed": "n", "lesson": "l"} | {
+    "step": "p"
+}
 
 
 @dataclass(frozen=True)
@@ -68,7 +70,7 @@ def state_of(
         InputError: the scene cannot be loaded, or the settings cannot be written as assignments.
     """
     files = tuple(filter(is_file, settings.controllers))
-    own = RunSpec(run.scene, run.urdf, run.tip, seed=run.seed, files=files, tasks=run.tasks)
+    own = replace(run, controller=None, set=(), events=None, duration=None, files=files)
     before = own.loaded().settings if before is None else before
     return State(replace(own, set=differences(before, settings)), lesson, step)
 
@@ -176,11 +178,7 @@ def _checked(given: Any) -> State:
             "the code names a robot that is not in the catalog, and a code may not open files: "
             "start with --urdf and your own file instead"
         )
-    assignments = given.get("a", [])
-    if not isinstance(assignments, list) or not all(isinstance(each, str) for each in assignments):
-        raise _wrong("list of settings")
-    if not _fits(assignments):
-        raise _wrong("number or length of settings")
+    assignments, hold = _texts(given, "a", "settings"), _texts(given, "h", "joints to hold")
     lesson = _text(given, "l", "lesson")
     if lesson is not None and lesson not in COURSE:
         raise unknown_name("lesson", lesson, COURSE)
@@ -190,6 +188,7 @@ def _checked(given: Any) -> State:
         _text(given, "t", "tip"),
         set=tuple(_of_today(assignments)),
         seed=_whole(given, "n", "seed", MAX_SEED) or 0,
+        hold=tuple(hold),
     )
     return State(run, lesson, _whole(given, "p", "step", 100))
 
@@ -213,6 +212,15 @@ def _text(given: Mapping[str, Any], key: str, what: str) -> str | None:
     value = given.get(key)
     if value is not None and not (isinstance(value, str) and len(value) <= 200 and value.isprintable()):
         raise _wrong(what)
+    return value
+
+
+def _texts(given: Mapping[str, Any], key: str, what: str) -> list[str]:
+    value = given.get(key, [])
+    if not isinstance(value, list) or not all(isinstance(each, str) for each in value):
+        raise _wrong(f"list of {what}")
+    if not _fits(value):
+        raise _wrong(f"number or length of {what}")
     return value
 
 

@@ -28,7 +28,11 @@ TASK_SCENE = "iiwa14-hold"
 
 
 def scene_named(
-    name: str, urdf: str | None = None, tip: str | None = None, urdf_text: str | bytes | None = None
+    name: str,
+    urdf: str | None = None,
+    tip: str | None = None,
+    urdf_text: str | bytes | None = None,
+    hold: tuple[str, ...] = (),
 ) -> Scene:
     """Returns a scene by its name, or the scene or task of a file; the arguments are those of `load_scene`.
 
@@ -36,9 +40,9 @@ def scene_named(
         InputError: see `load_scene`; or the file cannot be used, and the message names the line.
     """
     if not is_file(name):
-        return load_scene(name, urdf, tip, urdf_text)
-    if (urdf, tip, urdf_text) != (None, None, None):
-        raise InputError(f"{name} brings its own robot: leave out --urdf and --tip")
+        return load_scene(name, urdf, tip, urdf_text, hold)
+    if (urdf, tip, urdf_text, hold) != (None, None, None, ()):
+        raise InputError(f"{name} brings its own robot: leave out --urdf, --tip and --hold")
     return _scene_of(read(name))
 
 

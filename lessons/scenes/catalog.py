@@ -11,7 +11,8 @@ from himpc.tasks import Task
 from lessons.own.files import is_file
 from lessons.scenes.circle import iiwa14_circle, iiwa14_circle_paper
 from lessons.scenes.furnished import iiwa14_table, panda_post
-from lessons.scenes.hold import hold, hold_of
+from lessons.scenes.hold import hold as hold_scene
+from lessons.scenes.hold import hold_of
 from lessons.scenes.missions import velocity_scene
 from lessons.scenes.mobile_hold import ridgeback_hold
 from lessons.scenes.names import ALL_SCENES, VELOCITY_SCENES
@@ -50,7 +51,11 @@ _MAKERS: dict[str, Callable[[], TorqueScene]] = {
 
 
 def load_scene(
-    name: str, urdf: str | None = None, tip: str | None = None, urdf_text: str | bytes | None = None
+    name: str,
+    urdf: str | None = None,
+    tip: str | None = None,
+    urdf_text: str | bytes | None = None,
+    hold: tuple[str, ...] = (),
 ) -> Scene:
     """Returns the scene with this name.
 
@@ -59,6 +64,7 @@ def load_scene(
         urdf: path of a URDF file or catalog name, for the scene "hold".
         tip: end-effector frame, for the scene "hold".
         urdf_text: a URDF's text, or a zip, instead of its path (uploads).
+        hold: patterns of joints that are held, for the scene "hold"; see `robots.load_robot`.
 
     Raises:
         InputError: the scene is unknown, a scene with its own robot gets a URDF, "hold" gets no URDF, or the
@@ -69,9 +75,11 @@ def load_scene(
     if name == "hold":
         if urdf is None and urdf_text is None:
             raise InputError("scene 'hold' needs a robot: add --urdf FILE.urdf, or choose iiwa14-hold")
-        return hold(urdf, tip, urdf_text)
-    if urdf is not None or urdf_text is not None or tip is not None:
-        raise InputError(f"scene '{name}' brings its own robot: use the scene 'hold' with --urdf and --tip")
+        return hold_scene(urdf, tip, urdf_text, hold=hold)
+    if (urdf, tip, urdf_text, hold) != (None, None, None, ()):
+        raise InputError(
+            f"scene '{name}' brings its own robot: use the scene 'hold' with --urdf, --tip and --hold"
+        )
     return velocity_scene(name) if name in VELOCITY_SCENES else _MAKERS[name]()
 
 

@@ -41,17 +41,29 @@ def hold_of(name: str) -> TorqueScene:
 
 
 def hold(
-    urdf: str | None, tip: str | None, urdf_text: str | bytes | None = None, within: Path | None = None
+    urdf: str | None,
+    tip: str | None,
+    urdf_text: str | bytes | None = None,
+    within: Path | None = None,
+    hold: tuple[str, ...] = (),
 ) -> TorqueScene:
-    """Returns the hold scene of any robot: URDF path, catalog name or text of a URDF. within: see
+    """Returns the hold scene of any robot: URDF path, catalog name or text of a URDF. within, hold: see
     `load_robot`.
 
     Raises:
-        InputError: the URDF cannot be used, or it has no frame with the name of the tip.
+        InputError: the URDF cannot be used, it has no frame with the name of the tip, or a pattern in `hold`
+            fits no joint.
     """
-    robot = load_urdf_text(urdf_text, tip) if urdf_text is not None else load_robot(str(urdf), tip, within)
-    plant = PLANAR3_PLANT if robot.name == "planar3" else TOUCHING
-    return _hold(robot, plant)
+    if urdf_text is not None:
+        robot = load_urdf_text(urdf_text, tip, hold)
+    else:
+        robot = load_robot(str(urdf), tip, within, hold)
+    return hold_robot(robot)
+
+
+def hold_robot(robot: Robot) -> TorqueScene:
+    """Returns the hold scene of a robot that is loaded already."""
+    return _hold(robot, PLANAR3_PLANT if robot.name == "planar3" and robot.n == 3 else TOUCHING)
 
 
 def _hold(robot: Robot, plant: PlantSettings) -> TorqueScene:

@@ -41,6 +41,7 @@ class RunSpec:
         files: Python files that can be selected as the controller, named by the person who started the
             program.
         tasks: Python files whose tasks the stack can name; the same person has named these files.
+        hold: patterns of joints that are held, for the scene "hold", as of `robots.load_robot`.
     """
 
     scene: str
@@ -53,6 +54,7 @@ class RunSpec:
     seed: int = 0
     files: tuple[str, ...] = ()
     tasks: tuple[str, ...] = ()
+    hold: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         check_seed(self.seed)
@@ -65,7 +67,7 @@ class RunSpec:
         """
         from lessons.runs.named import scene_named, with_files
 
-        scene = scene_named(self.scene, self.urdf, self.tip) if bare is None else bare
+        scene = scene_named(self.scene, self.urdf, self.tip, hold=self.hold) if bare is None else bare
         return with_files(scene, self.files, self.tasks)
 
     def prepared(self, bare: Scene | None = None) -> Scene:
@@ -103,8 +105,8 @@ class RunSpec:
         words = ["himpc-lab", "run", self.scene]
         for name, value in (("urdf", self.urdf), ("tip", self.tip), ("controller", controller)):
             words += [f"--{name}", value] if value is not None else []
-        for each in self.tasks:
-            words += ["--task", each]
+        for name, values in (("hold", self.hold), ("task", self.tasks)):
+            words += [word for value in values for word in (f"--{name}", value)]
         words += (
             ["--duration", repr(float(self.duration)).removesuffix(".0")] if self.duration is not None else []
         )

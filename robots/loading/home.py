@@ -1,36 +1,17 @@
-"""Estimates a tip frame, a home configuration and acceleration limits for robots that are not in the
+"""Estimates a home configuration and acceleration limits for robots that are not in the
 catalog."""
 
 from __future__ import annotations
-
-import re
 
 import numpy as np
 import pinocchio as pin
 
 from robots.inertia import finite_range, mass_matrix, sample_configurations
 
-_TIP_NAMES = re.compile(
-    r"(hand_?tcp|tcp|tool_?0|tool_?frame|ee_?link|link_?eef|end_?effector|(^|_)ee$|eef|flange|tool)",
-    re.IGNORECASE,
-)
 _CANDIDATES = 300
 _STEPS = 60
+_ROOM = 0.125  # height of the frame above the floor, as a share of the reach
 _PLAIN = 0.05  # accepted loss of score if a joint is put at the middle of its range
-
-
-def choose_tip(model: pin.Model, frames: dict[str, int]) -> str:
-    """Returns the frame at the end of the longest chain of joints; a frame with a name such as `tool0` is
-    preferred."""
-    depth = {name: len(model.supports[model.frames[i].parentJoint]) - 1 for name, i in frames.items()}
-    deepest = max(depth.values())
-    ends = [name for name in frames if depth[name] == deepest]
-    for preferred in (0, 1):
-        for name in reversed(ends) if preferred else ends:
-            match = _TIP_NAMES.search(name)
-            if match or preferred:
-                return name
-    return ends[-1]
 
 
 def find_home(
@@ -41,8 +22,9 @@ def find_home(
     The configuration maximises log σ_min(J) + log(joint margin) − 0.1‖q − middle‖², first over samples and
     then by random steps; the linear part of J is divided by the reach. The result is deterministic. Joints
     that do not move the frame are at the middle of their range (unbounded joints at 0). A chain that reaches
-    below the floor (z = 0, or the height of the first joint if lower) gets a lower score. An elbow above the
-    tip gets a higher score.
+    below the floor (z = 0, or the height of the first joint if lower) gets a lower score, and so does a frame
+    that is less than an eighth of the reach above it: one could not drag it down. An elbow above the tip gets
+    a higher score.
     """
     lower, upper = finite_range(q_lower, q_upper)
     middle, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
@@ -50,7 +32,7 @@ def find_home(
     if len(moving) == 0:
         return middle
     data = model.createData()
-    reach = max(_reach(model, frame), 1e-3)
+    reach = max(chain_length(model, frame), 1e-3)
 
     chain = [int(joint) + 1 for joint in moving]
     pin.forwardKinematics(model, data, middle)
@@ -70,7 +52,7 @@ def find_home(
         singular = np.linalg.svd(jacobian, compute_uv=False)
         margin = float(((half - np.abs(q - middle)) / half)[moving].min())
         bend = float(np.square((q - middle)[moving] / np.pi).mean())
-        below = 8.0 * max(0.0, floor - lowest) / reach
+        below = 8.0 * max(0.0, floor - lowest, floor + _ROOM * reach - height) / reach
         return float(np.log(singular.min() + 1e-9) + 0.5 * np.log(max(margin, 1e-9)) - bend - below + elbow)
 
     samples = sample_configurations(
@@ -114,7 +96,7 @@ def sensible_a_max(
     return np.clip(0.5 * np.min(accelerations, axis=0), 1.0, 15.0)
 
 
-def _reach(model: pin.Model, frame: int) -> float:
+def chain_length(model: pin.Model, frame: int) -> float:
     """Returns the length of the chain from the first joint to the frame, m."""
     chain = [joint for joint in model.supports[model.frames[frame].parentJoint] if joint > 0][1:]
     lengths = [float(np.linalg.norm(model.jointPlacements[joint].translation)) for joint in chain]

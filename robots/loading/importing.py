@@ -11,9 +11,9 @@ import numpy as np
 import pinocchio as pin
 from lxml import etree
 
-from robots.errors import InputError, unknown_name
+from robots.errors import InputError
 from robots.inertia import mass_matrix, rotor_inertia, suggest_M_bar, tracking_bandwidth
-from robots.loading.home import choose_tip, find_home, sensible_a_max
+from robots.loading.home import find_home, sensible_a_max
 from robots.loading.imported import with_collision
 from robots.meshes.files import has_meshes
 from robots.plant import Plant
@@ -49,6 +49,7 @@ def import_robot(
     folder: Path | None = None,
     tip: str | None = None,
     within: Path | None = None,
+    hold: tuple[str, ...] = (),
 ) -> Import:
     """Builds the robot of a URDF document and tests it in the plant for a few milliseconds.
 
@@ -58,9 +59,11 @@ def import_robot(
         folder: folder to which mesh paths are relative; None: only meshes of installed packages are used.
         tip: default end-effector frame; None: the end of the longest chain.
         within: folder that must contain all other meshes; None: meshes may be anywhere.
+        hold: patterns of joints that are held, see `load_robot`.
 
     Raises:
-        InputError: the tip is not a frame of the robot. All other problems are in the report.
+        InputError: the tip is not a frame of the robot, or a pattern fits no joint. All other problems
+            are in the report.
     """
     noted: tuple[Finding, ...] = ()
     if root_tag(data) == "mujoco":
@@ -70,11 +73,11 @@ def import_robot(
             data, noted = as_urdf(data, source, folder, within)
         except Refusal as refusal:
             return Import(ImportReport(source, (refusal.finding,)))
-    canonical, report = canonicalise(data, source, folder, within)
+    canonical, report = canonicalise(data, source, folder, within, tip, hold)
     report = replace(report, findings=(*noted, *report.findings))
     if canonical is None:
         return Import(report)
-    robot = _robot(replace(canonical, report=report), tip)
+    robot = _robot(replace(canonical, report=report))
     fault = "its mass matrix is singular; check its inertias" if robot is None else _trial(robot)
     if robot is None or fault is not None:
         refused = Finding("refused", source, fault or "")
@@ -90,14 +93,11 @@ def bounds(model: pin.Model) -> tuple[np.ndarray, np.ndarray]:
     return np.where(lower <= -UNBOUNDED, -np.inf, lower), np.where(upper >= UNBOUNDED, np.inf, upper)
 
 
-def _robot(canonical: Canonical, tip: str | None) -> Robot | None:
+def _robot(canonical: Canonical) -> Robot | None:
     """Returns the robot of a canonical description, or None if the mass matrix is singular."""
     model = canonical.model
     lower, upper = bounds(model)
     frames = {f.name: i for i, f in enumerate(model.frames) if f.type == pin.FrameType.BODY}
-    if tip is not None and tip not in frames:
-        raise unknown_name(f"frame of robot '{canonical.name}' called", tip, frames)
-    chosen = choose_tip(model, frames) if tip is None else tip
     given = _rotors_of(canonical)
     model.armature = np.where(given > 0.0, given, rotor_inertia(model, lower, upper))
     try:
@@ -106,13 +106,13 @@ def _robot(canonical: Canonical, tip: str | None) -> Robot | None:
         return None
     if not np.all(np.isfinite(M_bar) & (M_bar > 0.0)):
         return None
-    home = find_home(model, frames[chosen], lower, upper)
+    home = find_home(model, frames[canonical.report.tip], lower, upper)
     findings = (*canonical.report.findings, *_assumed(model, given, home, M_bar))
     return Robot(
         name=canonical.name,
         model=model,
         joint_names=tuple(model.names)[1:],
-        tip=chosen,
+        tip=canonical.report.tip,
         home=home,
         q_lower=lower,
         q_upper=upper,
@@ -121,7 +121,7 @@ def _robot(canonical: Canonical, tip: str | None) -> Robot | None:
         a_max=sensible_a_max(model, lower, upper, model.effortLimit),
         M_bar=M_bar,
         urdf_text=canonical.text,
-        report=replace(canonical.report, tip=chosen, findings=findings),
+        report=replace(canonical.report, findings=findings),
     )
 
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 
@@ -30,28 +31,38 @@ _GEOMETRY = Allowance(24.0)
 """For the meshes of a robot, their hulls and capsules. At most 8 s are for reading (`READING`)."""
 
 
-def load_robot(name_or_path: str | Path, tip: str | None = None, within: Path | None = None) -> Robot:
+def load_robot(
+    name_or_path: str | Path,
+    tip: str | None = None,
+    within: Path | None = None,
+    hold: tuple[str, ...] = (),
+) -> Robot:
     """Returns the robot with this catalog name, or the robot of a description.
 
     name_or_path: also a URDF file, a folder or a zip with one, or the path of a URDF inside a zip.
     tip: the default end-effector frame; None: the tip of the catalog, or the end of the longest chain.
     within: a folder, given without symbolic links. It must contain the URDF file and its meshes, except
     installed meshes. None: files may be anywhere.
+    hold: joints that are not controlled, "REGEX" or "REGEX=VALUE" with the whole name of a joint or a regular
+    expression for it, and the value at which it is held, rad or m (0 without it, and always inside its
+    limits). Home, M̄ and shapes of a robot of the catalog with held joints are estimated as for a file.
 
-    Raises InputError for an unknown name, a missing file, a description that cannot be used, or an unknown
-    tip. The message is one sentence that tells the user what to do.
+    Raises InputError for an unknown name, a missing file, a description that cannot be used, an unknown tip,
+    or a pattern that fits no joint. The message is one sentence that tells the user what to do.
     """
     text = str(name_or_path)
+    if text in CATALOG and hold:
+        return import_file(CATALOG[text].path, tip or CATALOG[text].tip, hold=hold).used()
     if text in CATALOG:
         robot = _catalog_robot(CATALOG[text])
         return robot if tip is None else robot.with_tip(tip)
     path = Path(text)
     if "/" not in text and not path.suffix and not _exists(path):
         raise unknown_name("robot in the catalog called", text, CATALOG, "or give the path of a URDF file")
-    return _import_path(path, tip, within).used()
+    return import_file(path, tip, within, hold).used()
 
 
-def load_urdf_text(text: str | bytes, tip: str | None = None) -> Robot:
+def load_urdf_text(text: str | bytes, tip: str | None = None, hold: tuple[str, ...] = ()) -> Robot:
     """Returns the robot that a URDF string describes: an upload, or a stored canonical text. Bytes are an
     uploaded zip with the robot's folder.
 
@@ -61,20 +72,25 @@ def load_urdf_text(text: str | bytes, tip: str | None = None) -> Robot:
     Raises InputError like `load_robot`.
     """
     if isinstance(text, bytes):
-        return _import_zip(text, "the zip", lambda _: "leave only one of them in the zip", tip).used()
-    return _import(text.encode(errors="replace"), "the URDF text", None, tip).used()
+        return _import_zip(text, "the zip", lambda _: "leave only one of them in the zip", tip, hold).used()
+    return _import(text.encode(errors="replace"), "the URDF text", None, tip, None, hold).used()
 
 
-def check_urdf(path: str | Path) -> ImportReport:
+def check_urdf(path: str | Path, hold: tuple[str, ...] = ()) -> ImportReport:
     """Returns the import report of a description, as `load_robot` finds it: everything that the import
     repairs, adds, fixes or refuses.
 
-    Invalid content raises no exception; InputError is raised if there is no such file.
+    Invalid content raises no exception; InputError is raised if there is no such file, or if a pattern in
+    `hold` fits no joint.
     """
-    return _import_path(Path(path), None).report
+    return import_file(Path(path), hold=hold).report
 
 
-def _import_path(path: Path, tip: str | None, within: Path | None = None) -> Import:
+def import_file(
+    path: Path, tip: str | None = None, within: Path | None = None, hold: tuple[str, ...] = ()
+) -> Import:
+    """Returns the robot of a file, a folder or a zip, or None for one that cannot be used, with the report of
+    its import. The arguments and the exceptions are those of `load_robot` and `check_urdf`."""
     source = shortened(str(path), 100)
     packed = next((place for place in (path, *path.parents) if place.suffix.lower() == ".zip"), None)
     _check_inside(path, within)
@@ -84,12 +100,12 @@ def _import_path(path: Path, tip: str | None, within: Path | None = None) -> Imp
 
     if packed is not None and packed.is_file():
         inside = path.relative_to(packed)
-        return _import_zip(load_bytes(packed, MAX_PACKED), str(packed), choose, tip, inside)
+        return _import_zip(load_bytes(packed, MAX_PACKED), str(packed), choose, tip, hold, inside)
     if path.is_dir():
         path = description(path, source, choose)
         source = shortened(str(path), 100)
         _check_inside(path, within)
-    return _import(load_bytes(path), source, path.resolve().parent, tip, within)
+    return _import(load_bytes(path), source, path.resolve().parent, tip, within, hold)
 
 
 def _check_inside(path: Path, within: Path | None, name: str = "") -> None:
@@ -99,15 +115,20 @@ def _check_inside(path: Path, within: Path | None, name: str = "") -> None:
 
 
 def _import_zip(
-    data: bytes, source: str, choose: Callable[[str], str], tip: str | None, inside: Path = Path()
+    data: bytes,
+    source: str,
+    choose: Callable[[str], str],
+    tip: str | None,
+    hold: tuple[str, ...],
+    inside: Path = Path(),
 ) -> Import:
     """Imports the robot of a zip. The unpacked files are deleted afterwards, so the robot keeps its
     surfaces.
 
     choose: see `description`. inside: the path of the description in the zip, if it is known.
     """
-    with TemporaryDirectory(prefix="himpc-lab-", ignore_cleanup_errors=True) as name:  # mode 0700
-        folder = Path(name).resolve()
+    with TemporaryDirectory(prefix="himpc-lab-", ignore_cleanup_errors=True) as temporary:  # mode 0700
+        folder = Path(temporary).resolve()
         try:
             isolated(unpack, data, folder)
         except Fault as fault:
@@ -115,7 +136,8 @@ def _import_zip(
         path = description(folder, source, choose) if inside == Path() else folder / inside
         where = f"{source}/{path.relative_to(folder)}"
         _check_inside(path, folder, where)
-        found = _import(load_bytes(path, name=where), shortened(where, 100), path.parent, tip, folder)
+        data, name = load_bytes(path, name=where), shortened(where, 100)
+        found = _import(data, name, path.parent, tip, folder, hold)
         if found.robot is None:
             return found
         robot = _with_surfaces(found.robot)
@@ -129,14 +151,19 @@ def _with_surfaces(robot: Robot) -> Robot:
 
 
 def _import(
-    data: bytes, source: str, folder: Path | None, tip: str | None, within: Path | None = None
+    data: bytes,
+    source: str,
+    folder: Path | None,
+    tip: str | None,
+    within: Path | None,
+    hold: tuple[str, ...],
 ) -> Import:
     # A file that names no other always results in the same robot. The process that reads it uses a core for
     # 1.8 s.
     alone = b"mesh" not in data and b"include" not in data
     keeps = folder is not None and len(data) < _SHORT and alone
     try:
-        found = (_kept if keeps else _read_apart)(data, source, folder, tip, within)
+        found = (_kept if keeps else _read_apart)(data, source, folder, tip, within, hold)
     except Fault as fault:
         return Import(ImportReport(source, (Finding("refused", source, str(fault)),)))
     if found.robot is None or not has_meshes(found.robot.urdf_text):
@@ -148,17 +175,15 @@ def _import(
     return Import(robot.report, robot)
 
 
-def _read_apart(
-    data: bytes, source: str, folder: Path | None, tip: str | None, within: Path | None
-) -> Import:
-    return isolated(_imported, data, source, folder, tip, within)
+def _read_apart(*document: object) -> Import:
+    return isolated(_imported, *document)
 
 
 _kept = lru_cache(maxsize=4)(_read_apart)
 
 
-def _imported(data: bytes, source: str, folder: Path | None, tip: str | None, within: Path | None) -> Import:
-    found = import_robot(data, source, folder, tip, within)
+def _imported(*document: Any) -> Import:
+    found = import_robot(*document)
     if found.robot is None or has_meshes(found.robot.urdf_text):
         return found
     robot = with_cover(found.robot)

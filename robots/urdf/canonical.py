@@ -3,7 +3,7 @@ reported. Every import of a URDF begins with this conversion."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -12,20 +12,20 @@ import pinocchio as pin
 from lxml import etree
 from lxml.etree import _Element as Element
 
-from robots.errors import shortened
+from robots.errors import shortened, unknown_name
 from robots.meshes.files import localise
 from robots.report import Finding, ImportReport
+from robots.urdf.hold import MAX_JOINTS, held_by_name, hold_what_does_not_move
 from robots.urdf.inertials import repair_inertials
 from robots.urdf.joints import normalise_joints
 from robots.urdf.limits import fill_efforts, fill_speeds
-from robots.urdf.read import Refusal, parse, without_shapes
+from robots.urdf.read import Refusal, named, parse, without_shapes
 from robots.urdf.shapes import remove_unusable_shapes
 from robots.urdf.structure import check_structure, movable_joints
+from robots.urdf.tip import choose_tip
 
-MAX_JOINTS = 20
-"""Largest number of moving joints. With this number, a tick with three levels takes 0.4 ms of the control
-period of 1 ms."""
 MAX_FINDINGS = 200
+_ALIKE = 4  # largest number of other frames that the note about the tip lists
 
 
 @dataclass(frozen=True)
@@ -39,30 +39,49 @@ class Canonical:
 
 
 def canonicalise(
-    data: bytes, source: str, folder: Path | None = None, within: Path | None = None
+    data: bytes,
+    source: str,
+    folder: Path | None = None,
+    within: Path | None = None,
+    tip: str | None = None,
+    hold: tuple[str, ...] = (),
 ) -> tuple[Canonical | None, ImportReport]:
     """Returns the canonical form of a URDF document (None if it cannot be used) and the report of the import.
 
     source: name of the document in messages. folder: folder from which relative and `package://` mesh paths
     are searched; None for a description that may use installed packages only. within: folder that must
-    contain all meshes except installed ones; None: meshes may be anywhere.
+    contain all meshes except installed ones; None: meshes may be anywhere. tip: see `choose_tip` for None.
+    hold: see `held_by_name`.
+
+    Raises InputError if the tip is no link, or for a pattern in `hold` that fits no joint.
     """
     try:
         root, findings = parse(data, source)
     except Refusal as refusal:
         return None, _report(source, [refusal.finding])
-    passes: tuple[Callable[[Element], Iterator[Finding]], ...] = (
+
+    def refused_by(*passes: Callable[[Element], Iterable[Finding]]) -> bool:
+        for each in passes:
+            findings.extend(each(root))
+            if any(finding.kind == "refused" for finding in findings):
+                return True
+        return False
+
+    if refused_by(
         lambda tree: check_structure(tree, source),
-        normalise_joints,
+        lambda tree: normalise_joints(tree, held_by_name(tree, hold)),
+    ):
+        return None, _report(source, findings)
+    chosen, told = _tip(root, tip)
+    if refused_by(
+        lambda _: told,
+        lambda tree: hold_what_does_not_move(tree, chosen),
         lambda tree: _check_freedom(tree, source),
         repair_inertials,
         fill_speeds,
         remove_unusable_shapes,
-    )
-    for each in passes:
-        findings.extend(each(root))
-        if any(finding.kind == "refused" for finding in findings):
-            return None, _report(source, findings)
+    ):
+        return None, _report(source, findings)
     findings.extend(localise(root, folder, within))
     try:
         model = _model(root)
@@ -70,7 +89,7 @@ def canonicalise(
     except Refusal as refusal:
         return None, _report(source, [*findings, refusal.finding])
     name = shortened(root.get("name", "").strip())
-    report = replace(_report(source, findings), name=name, joints=tuple(model.names)[1:])
+    report = replace(_report(source, findings), name=name, joints=tuple(model.names)[1:], tip=chosen)
     text = etree.tostring(root, encoding="unicode", pretty_print=True)
     return Canonical(name, text, model, report), report
 
@@ -85,6 +104,21 @@ def _report(source: str, findings: list[Finding]) -> ImportReport:
     return ImportReport(source, tuple(findings))
 
 
+def _tip(root: Element, asked: str | None) -> tuple[str, tuple[Finding, ...]]:
+    """Returns the tip, and a note of the frames that are as likely if nobody has named it."""
+    if asked is not None:
+        links = named(root, "link")
+        if asked not in links:
+            name = shortened(root.get("name", "").strip())
+            raise unknown_name(f"frame of robot '{name}' called", asked, links)
+        return asked, ()
+    chosen, alike = choose_tip(root)
+    if not alike:
+        return chosen, ()
+    names = ", ".join(shortened(name) for name in alike[:_ALIKE]) + ", …" * (len(alike) > _ALIKE)
+    return chosen, (Finding("note", "tip", f"'{shortened(chosen)}' was chosen; as likely: {names} (--tip)"),)
+
+
 def _check_freedom(root: Element, source: str) -> Iterator[Finding]:
     count = len(movable_joints(root))
     if count == 0:
@@ -92,7 +126,7 @@ def _check_freedom(root: Element, source: str) -> Iterator[Finding]:
         yield Finding("refused", source, f"{text}; give a robot with a movable joint")
     elif count > MAX_JOINTS:
         text = f"it has {count} moving joints; at most {MAX_JOINTS} can be controlled every millisecond"
-        yield Finding("refused", source, f"{text}: make the other joints fixed")
+        yield Finding("refused", source, f"{text}: hold the others with --hold PATTERN")
 
 
 def _model(root: Element) -> pin.Model:

@@ -15,7 +15,7 @@ from lxml.etree import _Element as Element
 from robots.errors import shortened
 from robots.report import Finding
 from robots.urdf.read import UNLIMITED, Refusal, end_of, label, limit_value, named, numbers, placement
-from robots.urdf.structure import movable_joints, parent_joints
+from robots.urdf.structure import MOVABLE, movable_joints, parent_joints
 
 UNBOUNDED = UNLIMITED  # limit of a joint without limits, so that nq = nv; it is read as ±inf
 _TURNS = 4.0 * math.pi  # rad: no arm's joint turns further, but a limit in degrees says so
@@ -23,10 +23,13 @@ _GRIPPER_JOINT = re.compile(r"finger|knuckle|gripper|thumb|jaw", re.IGNORECASE)
 _GRIPPER_LINK = re.compile(r"finger|knuckle|thumb", re.IGNORECASE)  # "gripper" also names whole hands
 
 
-def normalise_joints(root: Element) -> Iterator[Finding]:
-    """Rewrites all joints so that each has exactly one coordinate in Pinocchio; yields the changes."""
+def normalise_joints(root: Element, held: dict[str, tuple[float, str]]) -> Iterator[Finding]:
+    """Rewrites all joints so that each has exactly one coordinate in Pinocchio; yields the changes.
+
+    held: the joints that a user holds, as name → (value in rad or m, reason).
+    """
     try:
-        frozen, unlimited = _to_freeze(root), _without_range(root)
+        frozen, unlimited = _to_freeze(root, held), _without_range(root)
     except Refusal as refusal:
         yield refusal.finding
         return
@@ -72,24 +75,35 @@ def freeze(joint: Element, value: float, reason: str) -> Finding:
     return Finding("fixed", label(joint), f"held at {value:.4g} {unit}: {reason}")
 
 
-def _to_freeze(root: Element) -> dict[str, tuple[float, str]]:
-    """Returns the joints that an arm controller does not move, as name → (value, reason)."""
-    frozen: dict[str, tuple[float, str]] = {}
+def _to_freeze(root: Element, held: dict[str, tuple[float, str]]) -> dict[str, tuple[float, str]]:
+    """Returns the joints that an arm controller does not move, as name → (value, reason). A joint that
+    mimics another is at the value that it has beside the held value of the other one, or beside 0."""
+    frozen = dict(held)
     joints, carriers = named(root, "joint"), parent_joints(root)
     for joint in movable_joints(root):
         name = joint.get("name", "")
         mimic = joint.find("mimic")
-        if mimic is not None:
+        if mimic is not None and name not in held:
             offset = float(numbers(mimic, "offset", 1, (0.0,))[0])
+            factor = float(numbers(mimic, "multiplier", 1, (1.0,))[0])
             leader = mimic.get("joint", "")
-            frozen[name] = (offset, f"it mimics '{shortened(leader)}'")
+            led = factor * held[leader][0] if leader in held else 0.0
+            reason = f"it mimics '{shortened(leader)}'"
+            moves = leader in joints and leader not in held and joints[leader].get("type") in MOVABLE
+            if moves and _same_chain(carriers, joint, joints[leader]):
+                reason = (
+                    f"it should follow '{shortened(leader)}' with factor {factor:g}, which is not simulated: "
+                    "what it carries moves differently on the real robot"
+                )
+            frozen[name] = (led + offset, reason)
             if leader in joints and not _same_chain(carriers, joint, joints[leader]):
                 frozen.setdefault(leader, (0.0, f"'{name}' mimics it, so it drives a gripper"))
         elif _GRIPPER_JOINT.search(name) or _GRIPPER_LINK.search(end_of(joint, "child")):
             frozen.setdefault(name, (0.0, "by its name it belongs to a gripper"))
     # The robot may be a hand without an arm: if no other joints move, joints with gripper names stay movable.
     if len(frozen) == len(movable_joints(root)):
-        frozen = {name: why for name, why in frozen.items() if joints[name].find("mimic") is not None}
+        asked = (name for name in frozen if name in held or joints[name].find("mimic") is not None)
+        frozen = {name: frozen[name] for name in asked}
     return frozen
 
 

@@ -24,7 +24,7 @@ _INFINITE = re.compile(r"[+-]?(inf|infinity|\.inf)", re.IGNORECASE)
 _EXPAND = "run `pip install xacro`, then `xacro FILE > robot.urdf`, and give the result"
 _XACRO_HINT = f"; this is a xacro template: {_EXPAND}"
 _HARMLESS = (80, 201)  # libxml2: two hyphens in a comment; a prefix without a namespace
-_BEFORE_XML = re.compile(rb"(?:\s|<!--.*?-->)+(?=<\?xml)", re.DOTALL)
+_BEFORE_XML = re.compile(rb"\A(?:\s|<!--(?:(?!-->).)*-->)+(?=<\?xml)", re.DOTALL)
 _TAG = re.compile(rb"<([A-Za-z_][\w:.-]*)")
 _ASIDE = {b"<!--": b"-->", b"<?": b"?>", b"<!": b">"}
 """The beginnings and ends of what may precede the root element."""

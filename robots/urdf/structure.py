@@ -46,6 +46,23 @@ def parent_joints(root: Element) -> dict[str, Element]:
     return {end_of(joint, "child"): joint for joint in root.findall("joint")}
 
 
+def chains(root: Element) -> dict[str, tuple[str, ...]]:
+    """Returns, for every link, the names of the moving joints that carry it, from the base on."""
+    carriers = parent_joints(root)
+    found: dict[str, tuple[str, ...]] = {}
+    for link in named(root, "link"):
+        passed, at = [], link
+        while at not in found and at in carriers:
+            passed.append(at)
+            at = end_of(carriers[at], "parent")
+        below = found.setdefault(at, ())
+        for each in reversed(passed):
+            if carriers[each].get("type") in MOVABLE:
+                below = (*below, carriers[each].get("name", ""))
+            found[each] = below
+    return {link: found[link] for link in named(root, "link")}
+
+
 def body_of(root: Element) -> dict[str, str]:
     """Returns, for every link, the first link of its rigid body: the link that a moving joint carries."""
     carriers = parent_joints(root)

@@ -39,6 +39,8 @@ WRONG: dict[str, tuple[list[str], str]] = {
     "the other name of the option": (["run", "hold", "--robot", "/nowhere/arm.xml"], "/nowhere/arm.xml"),
     "no such catalog robot": (["run", "hold", "--urdf", "iiwa15"], "iiwa14"),
     "unknown frame": (["run", "hold", "--urdf", "planar3", "--tip", "nose"], "nose"),
+    "unknown joint to hold": (["run", "hold", "--urdf", "planar3", "--hold", "nose"], "joint_1"),
+    "held joints of a fixed scene": (["--scene", "planar3-hold", "--hold", "joint_1"], "hold"),
     "a robot for a fixed scene": (["run", "iiwa14-hold", "--urdf", "planar3"], "hold"),
     "unknown controller": (["run", "iiwa14-hold", "--controller", "himcp"], "himpc"),
     "N = 0": (["run", "iiwa14-hold", "--set", "horizon=0"], "horizon"),

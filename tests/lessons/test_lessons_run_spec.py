@@ -9,6 +9,8 @@ import pytest
 
 from app.link.choice import SceneChoice
 from lessons.events import Push
+from lessons.replay.script import script
+from lessons.replay.state import decode, encode, state_of
 from lessons.scenes.run_spec import MAX_SEED, RunSpec
 from robots import InputError
 
@@ -32,6 +34,24 @@ def test_the_command_line_says_all_but_the_script() -> None:
         "--duration", "2.5", "--seed", "4", "--set", "Q=[1,2]",
     ]  # fmt: skip
     assert RunSpec("planar3-hold", set=("controller=osf",)).command_line().endswith("--controller osf")
+
+
+def test_held_joints_travel_with_a_run() -> None:
+    """The command line, the state code, the script and the page carry which joints are held."""
+    spec = RunSpec("hold", "panda", hold=("joint3=0.3", "joint[67]"), seed=3)
+    scene = spec.prepared()
+    assert scene.robot.joint_names == ("joint1", "joint2", "joint4", "joint5")
+    assert shlex.split(spec.command_line())[3:] == [
+        "--urdf", "panda", "--hold", "joint3=0.3", "--hold", "joint[67]", "--seed", "3",
+    ]  # fmt: skip
+    code = encode(state_of(spec, scene.settings.changed("horizon", 7)))
+    again = decode(code).run
+    assert (again.urdf, again.hold, again.seed) == (spec.urdf, spec.hold, 3)
+    assert again.prepared().settings == scene.settings.changed("horizon", 7)
+    assert SceneChoice.of_run(spec).scene().robot.n == 4
+    assert "load_scene('hold', 'panda', hold=('joint3=0.3', 'joint[67]'))" in script(spec, (), 1.0)
+    with pytest.raises(InputError, match="brings its own robot"):
+        RunSpec("panda-hold", hold=("joint3",)).prepared()
 
 
 @pytest.mark.parametrize("duration", [1234.5678, 0.1 + 0.2, 1e-7, 4.0, 3])

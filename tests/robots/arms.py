@@ -47,3 +47,43 @@ def full_mass_matrix(model: pin.Model, q: np.ndarray) -> np.ndarray:
 def load(text: str) -> Robot:
     """Loads a URDF like `load_urdf_text`, but in this process."""
     return import_robot(text.encode(), "the URDF text").used()
+
+
+def humanoid() -> str:
+    """Returns a small humanoid with 29 joints, as many as a Unitree G1: two legs of 6, a waist of 3, two arms
+    of 7."""
+    axes = ("1 0 0", "0 1 0", "0 0 1")
+
+    def limb(parent: str, names: list[str], at: str, along: str) -> str:
+        parts, here = "", parent
+        for place, name in enumerate(names):
+            solid = (
+                f'<inertial><origin xyz="{along}"/><mass value="{1.5 - 0.1 * place}"/><inertia ixx="0.01" '
+                'iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>'
+            )
+            parts += f'<link name="{name}_link">{solid}</link><joint name="{name}_joint" type="revolute">'
+            parts += (
+                f'<parent link="{here}"/><child link="{name}_link"/><origin xyz="{along if place else at}"/>'
+            )
+            parts += f'<axis xyz="{axes[place % 3]}"/><limit lower="-2" upper="2" velocity="6" effort="80"/>'
+            parts += "</joint>"
+            here = f"{name}_link"
+        return parts
+
+    leg = ["hip_pitch", "hip_roll", "hip_yaw", "knee", "ankle_pitch", "ankle_roll"]
+    arm = [
+        "shoulder_pitch",
+        "shoulder_roll",
+        "shoulder_yaw",
+        "elbow",
+        "wrist_roll",
+        "wrist_pitch",
+        "wrist_yaw",
+    ]
+    parts = [link("pelvis"), limb("pelvis", ["waist_yaw", "waist_roll", "torso"], "0 0 0.1", "0 0 0.1")]
+    for side, y in (("left", 0.15), ("right", -0.15)):
+        parts.append(limb("pelvis", [f"{side}_{name}" for name in leg], f"0 {y} 0", "0 0 -0.13"))
+        parts.append(limb("torso_link", [f"{side}_{name}" for name in arm], f"0 {y} 0.2", "0.05 0 -0.08"))
+        parts.append(link(f"{side}_hand", ""))
+        parts.append(joint(f"{side}_hand_joint", f"{side}_wrist_yaw_link", f"{side}_hand", "fixed", ""))
+    return robot(*parts)

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from arms import load, two_joint_arm
+from arms import humanoid, joint, link, load, two_joint_arm
 
-from robots import InputError, load_robot
+from robots import InputError, load_robot, load_urdf_text
 from robots.urdf import canonicalise
 
 FIELD = Path(__file__).parent / "field"
@@ -58,6 +58,12 @@ def test_xml_that_other_readers_accept(before: str, after: str, words: str) -> N
 
 def test_latin_1_without_saying_so() -> None:
     assert "read as Latin-1" in findings(ARM.replace("<link", "<!-- Größe --><link", 1).encode("latin-1"))
+
+
+def test_comments_cost_no_time() -> None:
+    """An exporter writes a comment before each link; reading them once took longer than the limit of 10 s."""
+    comments = "<!-- a link -->\n" * 20_000
+    assert load_urdf_text(ARM.replace("<link", f"{comments}<link", 1)).n == 2
 
 
 @pytest.mark.parametrize("old", ['axis xyz="', "</joint>", '<parent link="'])
@@ -116,3 +122,78 @@ def test_position_limits_that_nobody_filled_in() -> None:
     assert np.isinf(load(every).q_upper).all()
     one = ARM.replace('lower="-2" upper="2"', 'lower="0" upper="0"', 1)
     assert load(one).n == 1
+
+
+def test_a_joint_that_should_follow_another_is_held_and_the_report_says_what_is_wrong() -> None:
+    arm = load_robot(FIELD / "mimic_in_chain.urdf")
+    assert arm.joint_names == ("j1", "j2")
+    assert "it should follow 'j2' with factor -1, which is not simulated: what it carries moves" in str(
+        arm.report.of_kind("fixed")
+    )
+    both = load_robot(FIELD / "mimic_in_chain.urdf", hold=("j2=0.5",))
+    assert "not simulated" not in str(both.report.findings)
+    np.testing.assert_allclose(
+        both.model.frames[both.frame_id("link3")].placement.rotation, np.eye(3), atol=1e-12
+    )
+
+
+# ------------------------------------------------------------------ joints that are held
+
+
+def test_joints_that_do_not_move_the_tip_are_held_where_too_many_move() -> None:
+    """An arm with a hand of 15 joints moves with its palm; one finding is about the hand."""
+    arm = load_robot(FIELD / "arm_and_hand_21_joints.urdf")
+    assert arm.joint_names == tuple(f"j{k}" for k in range(1, 7))
+    assert arm.tip == "link6"
+    (held,) = arm.report.of_kind("fixed")
+    assert str(held) == (
+        "fixed: link 'link6': 15 joints that it carries (f00 … f42) do not move the tip 'link6': held at 0; "
+        "--hold or --tip chooses others"
+    )
+    finger = load_robot(FIELD / "arm_and_hand_21_joints.urdf", "h42")
+    assert finger.joint_names == (*arm.joint_names, "f40", "f41", "f42")
+
+
+def test_a_humanoid_of_29_joints_stands_on_its_pelvis_and_works_with_one_arm_or_two() -> None:
+    both = load_urdf_text(humanoid())
+    assert both.n == 17
+    assert not any("hip" in name or "ankle" in name for name in both.joint_names)
+    told = str(both.report.of_kind("fixed"))
+    assert "12 joints that it carries (left_hip_pitch_joint … right_ankle_roll_joint)" in told
+    one = load_urdf_text(humanoid(), "left_hand", hold=("right_(should|elb|wri).*", "waist_roll_joint=0.2"))
+    assert (one.n, one.tip) == (9, "left_hand")
+    assert "joint 'waist_roll_joint': held at 0.2 rad: 'waist_roll_joint=0.2' holds it" in str(
+        [*map(str, one.report.findings)]
+    )
+    frame = one.model.frames[one.frame_id("waist_roll_link")].placement
+    np.testing.assert_allclose(frame.rotation[2, 2], np.cos(0.2), atol=1e-12)
+
+
+def test_patterns_hold_joints_of_every_robot_and_count_before_the_limit() -> None:
+    assert load_urdf_text(ARM, hold=("j2",)).joint_names == ("j1",)
+    arm = load_robot("panda", hold=("joint[35]", "joint7=9"))
+    assert arm.joint_names == ("joint1", "joint2", "joint4", "joint6")
+    assert arm.tip == load_robot("panda").tip
+    assert "held at 2.897 rad" in str(arm.report.of_kind("fixed"))  # the end of its range
+    gripper = joint("drive", "l2", "f1") + joint(
+        "other", "l2", "f2", inside='<limit lower="-2" upper="2"/><mimic joint="drive" multiplier="-0.5"/>'
+    )
+    text = ARM.replace("</robot>", link("f1") + link("f2") + gripper + "</robot>")
+    open_ = load_urdf_text(text, hold=("drive=0.6",))
+    turned = [open_.model.frames[open_.frame_id(name)].placement.rotation[0, 2] for name in ("f1", "f2")]
+    np.testing.assert_allclose(turned, np.sin([0.6, -0.3]), atol=1e-12)  # the other finger follows
+
+
+@pytest.mark.parametrize(
+    ("pattern", "words"),
+    [
+        ("j(", "is not a regular expression"),
+        ("j9", "j1, j2"),
+        ("j", r"describes a whole name, such as '\.\*j\.\*'"),
+        ("j1=nan", "nan"),
+        ("j[12]", "none of its joints moves"),
+    ],
+)
+def test_a_wrong_pattern_is_one_sentence(pattern: str, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        load_urdf_text(ARM, hold=(pattern,))

@@ -6,10 +6,12 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from arms import INERTIAL, LIMIT, joint, link, load, robot, two_joint_arm
 
 from robots import InputError, Robot, check_urdf, load_robot
+from robots.loading.home import chain_length
 from robots.loading.importing import import_robot
 from robots.meshes.files import installed_shares
 from robots.report import Kind
@@ -268,6 +270,8 @@ EXAMPLES = {
     "xarm_description/urdf/xarm7.urdf": (7, "link_eef"),
     "panda_description/urdf/panda.urdf": (7, "panda_hand_tcp"),
     "kinova_description/robots/kinova.urdf": (6, "j2s6s200_end_effector"),
+    "so_arm_description/urdf/so101.urdf": (5, "gripper_frame_link"),
+    "g1_description/urdf/g1_29dof_rev_1_0.urdf": (17, "left_rubber_hand"),
 }
 
 
@@ -282,5 +286,9 @@ def test_robots_of_example_robot_data(file: str) -> None:
     assert loaded.tip == tip
     assert np.all((loaded.home >= loaded.q_lower) & (loaded.home <= loaded.q_upper))
     assert np.all(loaded.tau_limit > 0)
+    tip, data = loaded.frame_id(loaded.tip), loaded.model.createData()
+    pin.framesForwardKinematics(loaded.model, data, loaded.home)
+    room = data.oMf[tip].translation[2] / chain_length(loaded.model, tip)
+    assert room > 0.1, "at home the tip has no room below it"
     assert "mesh file" not in texts(loaded, "note")
     assert load_robot(paths[0]).home.tobytes() == loaded.home.tobytes()

@@ -78,6 +78,7 @@ class ExportPanel:
             "scene": spec.scene,
             "urdf": spec.urdf,
             "tip": spec.tip,
+            "hold": list(spec.hold),
             "seed": spec.seed,
             "rows_per_second": float(1 / np.median(gap)),
         }

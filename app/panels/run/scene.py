@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import viser
 
@@ -67,14 +68,24 @@ class RobotPanel:
             tip = gui.add_text(
                 "Hand frame", "", hint="Name of a link; if empty, the end of the longest chain"
             )
+            hold = gui.add_text(
+                "Held joints",
+                "",
+                hint="Names or regular expressions, separated by spaces; joint=0.5 at 0.5 rad",
+            )
             of_urdf = _answer(gui)
+
+            def asked(urdf: str | None = None) -> RunSpec:
+                held = tuple(hold.value.split())
+                return RunSpec("hold", urdf, tip.value.strip() or None, hold=held)
+
             if own_files is not None:
                 path = gui.add_text("File", "", hint="Path of a URDF on the machine that runs this page")
                 load_path = gui.add_button("Load file")
 
                 on_click(
                     load_path,
-                    lambda: self._ask_file(of_urdf, own_files, path.value.strip(), tip.value.strip() or None),
+                    lambda: self._ask_file(of_urdf, own_files, asked(path.value.strip())),
                 )
 
             upload = gui.add_upload_button("Upload a URDF", mime_type=_UPLOADED)
@@ -105,7 +116,7 @@ class RobotPanel:
 
         @upload.on_upload
         async def _(_: object) -> None:
-            self._uploaded(of_urdf, upload.value.content, tip.value.strip() or None)
+            self._uploaded(of_urdf, upload.value.content, asked())
 
     def _add_file(self, gui: viser.GuiApi, current: SceneChoice, own_files: Folder) -> None:
         with gui.add_folder("A file of your own"):
@@ -131,13 +142,13 @@ class RobotPanel:
             else:
                 self._choose(choice)
 
-    def _ask_file(self, answer: viser.GuiHtmlHandle, own_files: Folder, path: str, tip: str | None) -> None:
+    def _ask_file(self, answer: viser.GuiHtmlHandle, own_files: Folder, run: RunSpec) -> None:
         self._wait(answer)
-        if not path:
+        if not run.urdf:
             self.refuse("First enter the path of a URDF file.")
             return
         try:
-            run = RunSpec("hold", own_files.admits(path), tip)
+            run = replace(run, urdf=own_files.admits(run.urdf))
         except InputError as error:
             self.refuse(str(error))
         else:
@@ -147,7 +158,7 @@ class RobotPanel:
         self._wait(answer)
         self._choose(SceneChoice(run, urdf_text))
 
-    def _uploaded(self, answer: viser.GuiHtmlHandle, content: bytes, tip: str | None) -> None:
+    def _uploaded(self, answer: viser.GuiHtmlHandle, content: bytes, run: RunSpec) -> None:
         self._wait(answer)
         if len(content) > MAX_UPLOAD:
             self.refuse(f"The file has more than {MAX_UPLOAD // 1_000_000} MB; choose a smaller one.")
@@ -157,7 +168,7 @@ class RobotPanel:
         except UnicodeDecodeError:
             self.refuse("The file is not text: upload the URDF file itself, or a zip of the robot's folder.")
             return
-        self._ask(answer, RunSpec("hold", tip=tip), text)
+        self._ask(answer, run, text)
 
     def _wait(self, answer: viser.GuiHtmlHandle) -> None:
         """Shows that a request is in progress. `answer` is the text above the control that was used; a text

@@ -1,0 +1,132 @@
+"""Whether a robot moves well: its target is dragged away and back under HIMPC, without a page."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from itertools import product
+from time import process_time
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from lessons.events import MoveTarget
+from lessons.scenes.hold import hold_robot
+from lessons.session.start import begin
+from robots import Robot
+from robots.loading.home import chain_length
+from robots.reach import ReachJudge
+
+Array = NDArray[np.float64]
+
+SHARE = 0.15
+"""Length of the drag as a share of the arm's length."""
+START, HOLD = 0.1, 2.0  # s: when the target moves first, and how long it stays at each place
+FOLLOWS = 0.01  # largest error, as a share of the drag, of a robot that follows
+_STILL = 0.01  # largest speed, as a share of its limit, of a joint at rest
+_SECONDS = 120.0  # s of processor time for a drag
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What was measured while the target was dragged.
+
+    Attributes:
+        drag: length of the drag, m; 0 if no target was found that the tip can reach.
+        error: distance of the tip from the target 2 s after the drag, m.
+        back: the same 2 s after the way back.
+        torque, speed: largest share of a joint's limit.
+        rest: whether all joints are at rest at the end.
+        lost: simulated time at which control was lost, s; None if it was not.
+        over: whether the time of the computation ended before the drag.
+    """
+
+    drag: float
+    error: float = math.nan
+    back: float = math.nan
+    torque: float = math.nan
+    speed: float = math.nan
+    rest: bool = False
+    lost: float | None = None
+    over: bool = False
+
+    @property
+    def follows(self) -> bool:
+        """Whether the tip was within 1 % of the drag both times, and control was not lost."""
+        return self.lost is None and max(self.error, self.back) <= FOLLOWS * self.drag
+
+    def __str__(self) -> str:
+        if self.drag == 0.0:
+            return "not dragged: no target at 15 % of the arm's length was found that it can reach"
+        if self.over:
+            return f"not known: a drag of {1e3 * self.drag:.0f} mm takes over {_SECONDS:.0f} s to compute"
+        if self.lost is not None:
+            return f"loses control {self.lost:.1f} s after the start of a drag of {1e3 * self.drag:.0f} mm"
+        worst, drag = 1e3 * max(self.error, self.back), 1e3 * self.drag
+        end = "at rest" if self.rest else "still moving 2 s after the way back"
+        how = f"follows within {worst:.2g} mm" if self.follows else f"stays {worst:.2g} mm away"
+        return (
+            f"{how} after 2 s (drag of {drag:.0f} mm); uses {100 * self.torque:.0f} % of a torque limit and "
+            f"{100 * self.speed:.0f} % of a speed limit; {end}"
+        )
+
+
+def dragged(robot: Robot) -> Motion:
+    """Drags the target of a robot's hold scene by 15 % of the arm's length (see `target`), holds it there for
+    2 s, and drags it back for 2 s, with HIMPC and the scene's own settings."""
+    scene = hold_robot(robot)
+    length = SHARE * chain_length(robot.model, robot.frame_id(robot.tip))
+    there, home = target(robot, length, bool(scene.world)), _points(robot, robot.home)[-1]
+    if there is None:
+        return Motion(0.0)
+    places, drag = (there, home), float(np.linalg.norm(there - home))
+    events = tuple(
+        (START + k * HOLD, MoveTarget("position", tuple(map(float, place)))) for k, place in enumerate(places)
+    )
+    session = begin(replace(scene, events=events), 0)
+    errors, torque, speed, began = [], 0.0, 0.0, process_time()
+    for place in places:
+        while session.t < START + (len(errors) + 1) * HOLD - 0.5 * session.settings.T_s:
+            row, at = session.tick(), session.layout.fields
+            torque = max(torque, float(np.abs(row[at["tau"]] / robot.tau_limit).max()))
+            speed = max(speed, float(np.abs(row[at["v"]] / robot.v_limit).max()))
+            if session.diverged_at is not None:
+                return Motion(drag, lost=max(session.diverged_at - START, 0.0))
+            if process_time() - began > _SECONDS:
+                return Motion(drag, over=True)
+        errors.append(float(np.linalg.norm(session.plant.frame_pose(robot.tip)[1] - place)))
+    still = float(np.abs(session.plant.v / robot.v_limit).max()) < _STILL
+    return Motion(drag, *errors, torque=torque, speed=speed, rest=still)
+
+
+def target(robot: Robot, drag: float, floor: bool) -> Array | None:
+    """Returns the place (3,), m, to which the tip is dragged.
+
+    Inverse kinematics from home tries 26 places, at the distance `drag`, m, along the axes and their
+    diagonals. Of those that the tip can reach, the one is taken for which the joints turn by the least share
+    of their range. If it can reach none of them, as with two joints, a place counts that is nearest to one of
+    them and at least half as far. Above a floor, joints and tip stay half the drag above it, or as far as at
+    home if that is less. None: there is no such place.
+    """
+    judge, span = ReachJudge(robot), np.clip(robot.q_upper - robot.q_lower, 0.0, 2.0 * np.pi)
+    home = _points(robot, robot.home)
+    least = min(0.5 * drag, float(home[:, 2].min())) - 1e-3 if floor else -math.inf
+    found: list[tuple[bool, float, int, Array]] = []
+    for place, signs in enumerate(each for each in product((0.0, 1.0, -1.0), repeat=3) if any(each)):
+        way = np.array(signs) / np.linalg.norm(signs)
+        result = judge.solve(home[-1] + drag * way)
+        points = _points(robot, result.q)
+        far = float(np.linalg.norm(points[-1] - home[-1])) >= 0.5 * drag
+        if far and float(points[:, 2].min()) >= least:
+            turn = float((np.abs(result.q - robot.home) / span).max())
+            found.append((not result.reachable, turn, place, points[-1]))
+    return min(found)[3] if found else None
+
+
+def _points(robot: Robot, q: Array) -> Array:
+    """Returns the positions of all joints and of the tip, (n + 1, 3) m."""
+    data = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, data, q)
+    joints = [placed.translation for placed in list(data.oMi)[1:]]
+    return np.array([*joints, data.oMf[robot.frame_id(robot.tip)].translation])

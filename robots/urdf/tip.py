@@ -1,0 +1,67 @@
+"""The tip of a robot if nobody names one: a link of the hand, found by the tree of joints and by its name."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+
+from lxml.etree import _Element as Element
+
+from robots.urdf.read import named
+from robots.urdf.structure import chains
+
+_NAMES = tuple(
+    re.compile(pattern, re.IGNORECASE)
+    for pattern in (
+        r"tcp|tool_?0|tool_?frame|tool_?cent|grasp|(?<![a-z])ee(?![a-z])|ee_?link|eef|end_?effector",
+        r"flange|tool",
+        r"gripper|hand|palm",
+    )
+)
+"""Names of frames that are made to be the tip; earlier ones are preferred."""
+_LEG = re.compile(r"(?<![a-z])leg|foot|ankle|toe|sole|wheel|caster", re.IGNORECASE)
+_PART = re.compile(
+    r"finger|knuckle|thumb|jaw|(?<![a-z])pad|mover|camera|sensor|optical|imu|lidar|range|meter", re.IGNORECASE
+)
+"""Parts of a hand whose frames are turned or displaced from the axis of the hand."""
+
+
+def choose_tip(root: Element) -> tuple[str, tuple[str, ...]]:
+    """Returns the tip and the frames that are as likely.
+
+    The tip is at the end of the longest chain of joints that is not a leg. If several chains leave one body
+    behind the middle of this chain and behind its fourth joint, they are fingers, and the tip is on that
+    body. Frames of fingers, jaws and sensors are used only if there are no others. Frames with names such as
+    `tool0` are preferred, in alphabetical order; otherwise the tip is the last frame, if possible one with
+    more than a collision shape.
+    """
+    carried = chains(root)
+    arms = not_legs(root)
+    chain = max((carried[name] for name in arms), key=len)
+    branches = Counter(above[-2] for above in set(carried.values()) if len(above) > 1)
+    palms = [k for k in range(max(len(chain) // 2 + 1, 4), len(chain)) if branches[chain[k - 1]] >= 2]
+    length = palms[0] if palms else len(chain)
+    ends = [
+        name
+        for name in arms
+        if len(carried[name]) == length and not (palms and branches[carried[name][-1]] < 2)
+    ]
+    hands = [name for name in ends if not _PART.search(name)] or ends
+    for pattern in _NAMES:
+        alike = sorted(name for name in hands if pattern.search(name))
+        if alike:
+            return alike[0], tuple(alike[1:])
+    links = named(root, "link")
+    seen = [name for name in hands if not _invisible(links[name])] or hands
+    return seen[-1], tuple(seen[:-1])
+
+
+def not_legs(root: Element) -> list[str]:
+    """Returns the links that are not at the end of a leg; all links if no arm with three joints remains."""
+    carried = chains(root)
+    arms = [name for name in carried if not _LEG.search(name)]
+    return arms if max((len(carried[name]) for name in arms), default=0) >= 3 else list(carried)
+
+
+def _invisible(link: Element) -> bool:
+    return link.find("collision") is not None and link.find("visual") is None

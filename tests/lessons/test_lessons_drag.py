@@ -1,0 +1,57 @@
+"""The verdict by motion: a target is dragged away and back, and what the robot does is said in one line."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.__main__ import main
+from lessons.experiments.drag import Motion, target
+from robots import load_robot
+
+FIELD = Path(__file__).parents[1] / "robots" / "field"
+
+
+def test_the_check_ends_with_the_motion(capfd: pytest.CaptureFixture[str]) -> None:
+    file = str(FIELD / "no_inertials_7_joints.urdf")
+    assert main(["robots", "--check", file, "--json", "-"]) == 0
+    told = json.loads(capfd.readouterr().out)["motion"]
+    assert told["follows"] is True and told["rest"] is True
+    assert 0.0 < told["torque"] <= 1.0 and 0.0 < told["speed"] <= 1.05
+    assert max(told["error"], told["back"]) < 1e-2 * told["drag"]
+    assert told["text"].startswith("follows within")
+    assert main(["robots", "--check", str(FIELD / "tetra_mm.dae")]) == 1
+    assert "motion" not in capfd.readouterr().out
+
+
+def test_one_line_a_finding_and_the_verdict_last(capfd: pytest.CaptureFixture[str]) -> None:
+    """The tip of this arm is moved by two joints, so that its target is on a surface."""
+    assert main(["robots", "--check", str(FIELD / "limits_1e16.urdf")]) == 0
+    first, *findings, last = capfd.readouterr().out.strip().splitlines()
+    assert first.endswith("can be used: 3 joints, tip 'link3'")
+    assert all(line.split(":")[0] in ("filled", "note", "repaired", "fixed") for line in findings)
+    assert last.startswith("motion: follows within") and last.endswith("; at rest")
+
+
+def test_the_drag_stays_within_reach_and_above_the_floor() -> None:
+    """A planar arm is dragged within its plane; a target that no joint can reach is no failure."""
+    planar = load_robot("planar3")
+    there = target(planar, 0.1, floor=False)
+    home = target(planar, 0.0, floor=False)
+    assert there is not None and home is not None
+    assert there[2] == pytest.approx(home[2]) and np.linalg.norm(there - home) == pytest.approx(0.1, abs=2e-3)
+    assert target(planar, 100.0, floor=False) is None
+    lamp = load_robot(FIELD / "limits_in_degrees.urdf")
+    low = target(lamp, 0.1, floor=True)
+    assert low is not None and low[2] > 0.04
+
+
+def test_what_is_not_good_is_said() -> None:
+    assert str(Motion(0.0)).startswith("not dragged: no target")
+    late = Motion(0.1, 0.01, 0.0, 1.0, 0.5, rest=False)
+    assert not late.follows and "stays 10 mm away" in str(late) and "still moving" in str(late)
+    assert "loses control 0.5 s" in str(Motion(0.1, lost=0.5))
+    assert str(Motion(0.1, over=True)).startswith("not known")
