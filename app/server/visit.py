@@ -181,6 +181,7 @@ class Visit:
             return
         if room is not None and not leads and not isinstance(learner, Watcher):
             room.recognise(learner.token, tokens, self._account)
+            learner.shows_ghosts = isinstance(self._sessions, Classroom)
         if isinstance(self._sessions, Sessions) and not leads and learner.token not in tokens:
             before = place.read(kept, self._sessions.start)
             if before is not None:

@@ -60,13 +60,18 @@ def state(part: Part, lecture: Lecture, best: float | None) -> str:
     return html
 
 
-def after(part: Part, lecture: Lecture) -> str:
-    """Returns the explanation of the result, and what to do now."""
+def why(part: Part) -> str:
+    """Returns the explanation of the result."""
     if isinstance(part, Challenge):
         return ""
-    return block(
-        f"<b>Why</b>{rendered(part.why)}", f"border-left:3px solid {css(LEVELS[2])};margin:0.3em 0"
-    ) + block(f'<b>Now you:</b> {rendered_line(part.do)}<div style="opacity:0.75">{_free(lecture)}</div>')
+    return block(f"<b>Why</b>{rendered(part.why)}", f"border-left:3px solid {css(LEVELS[2])};margin:0.3em 0")
+
+
+def now_you(part: Part, lecture: Lecture) -> str:
+    """Returns what the learner can do now."""
+    if isinstance(part, Challenge):
+        return ""
+    return block(f'<b>Now you:</b> {rendered_line(part.do)}<div style="opacity:0.75">{_free(lecture)}</div>')
 
 
 def _free(lecture: Lecture) -> str:
@@ -111,8 +116,8 @@ def _claim(claim: Claim, place: int, lecture: Lecture) -> str:
     holds = lecture.holds[place] if place < len(lecture.holds) else None
     value = lecture.values[place] if place < len(lecture.values) else math.nan
     sign, word, colour = _SIGNS[holds]
-    if lecture.phase == "running" and holds is not None:
-        word += " so far"
+    if lecture.phase == "running" and holds is not None:  # more of the run may turn it around
+        sign, word, colour = "…", "so far", BOUND
     unit = claim.measure.unit
     measured = (
         ""

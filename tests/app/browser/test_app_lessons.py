@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, Locator, Page, expect
 
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace, parts_of
@@ -99,9 +99,24 @@ def walk(page: Page, school: PageServer, lesson: Lesson) -> None:
         expect(marks(page, "✓")).to_have_count(len(part.claims))
         expect(marks(page, "✗")).to_have_count(0)
         expect(page.get_by_text("You predicted:")).to_have_count(int(part.prediction is not None))
-        expect(page.get_by_text("Now you:")).to_be_visible()
+        assert_order(page.get_by_text("Now you:"), page.get_by_text("Controls of this step"), next_of(page))
         if part is not parts_of(lesson)[-1]:
-            page.get_by_role("button", name="Next: ").click()
+            next_of(page).click()
+
+
+def next_of(page: Page) -> Locator:
+    return page.get_by_role("button", name="Next: ")
+
+
+def assert_order(*shown: Locator) -> None:
+    """Checks that the page shows these one below the other."""
+    tops = []
+    for each in shown:
+        expect(each).to_be_visible()
+        box = each.bounding_box()
+        assert box is not None
+        tops.append(box["y"])
+    assert tops == sorted(tops)
 
 
 def kept(page: Page) -> dict[str, Any]:
