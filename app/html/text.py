@@ -117,7 +117,11 @@ _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 def _power(value: float) -> str:
     mantissa, _, power = f"{value:.1e}".partition("e")  # rounds first, as the rounding may change the power
-    return f"{float(mantissa):g}·10{str(int(power)).translate(_RAISED)}"
+    return f"{float(mantissa):g}·{power_of_ten(int(power))}"
+
+
+def power_of_ten(power: int) -> str:
+    return f"10{str(power).translate(_RAISED)}"
 
 
 def free_name(wanted: str, taken: Sequence[str]) -> str:

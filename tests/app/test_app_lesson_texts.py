@@ -15,10 +15,11 @@ import pytest
 from app.client.progress import Notebook
 from app.html.glossary import explained, words
 from app.html.markdown import rendered, rendered_line
+from app.html.palette import GHOST
 from app.html.text import figure, readable
 from app.link.exercise import Lecture, LessonPlace, SignalCurve
 from app.panels.lesson.claims import state
-from app.panels.lesson.drawing import Bound, chart, scale, sketch
+from app.panels.lesson.drawing import TRUTH, Bound, Line, chart, scale, sketch
 from app.panels.lesson.prediction import Asking
 from app.panels.widgets.controls import STEPS, place_of, value_at
 from himpc.tasks import KINDS
@@ -107,9 +108,11 @@ def test_pictures_show_numbers_for_people_and_survive_bad_ones() -> None:
     assert "your guess 5 mm" in drawn and "measured 16 mm" in drawn
     assert "measured" not in scale(0.1, 100.0, 5.0, math.nan, 1.5, "mm")
     curve = SignalCurve(np.array([0.0, 0.5, 1.0]), np.array([math.nan, math.inf, 3.0]))
-    assert "nan" not in chart("error", "mm", curve, curve, [Bound(1.0, "<b>")], 1.0)
+    lines, bounds = [Line("robot", TRUTH, curve), Line("<i>", GHOST, curve)], [Bound(1.0, "≤ 1 mm", "<b>")]
+    drawn = chart("error", "mm", lines, bounds, [(0.5, "push")], 1.0, 220)
+    assert "nan" not in drawn and "<b>" not in drawn and "<i>" not in drawn and ">≤ 1 mm<" in drawn
     nothing = SignalCurve(np.array([0.0]), np.array([math.nan]))
-    assert chart("error", "mm", nothing, None, [], 1.0) == ""
+    assert chart("error", "mm", [Line("", TRUTH, nothing)], [], [], 1.0, 220) == ""
     assert "measured" in sketch(0.0, 6.0, 1.2, [(0.0, 1.0), (1.2, 2.0)], curve, "mm")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -99,6 +100,8 @@ def walk(page: Page, school: PageServer, lesson: Lesson) -> None:
         expect(marks(page, "✓")).to_have_count(len(part.claims))
         expect(marks(page, "✗")).to_have_count(0)
         expect(page.get_by_text("You predicted:")).to_have_count(int(part.prediction is not None))
+        drawn = page.get_by_role("img", name=re.compile("over time$")).first.bounding_box()
+        assert drawn is not None and drawn["height"] >= 200
         assert_order(page.get_by_text("Now you:"), page.get_by_text("Controls of this step"), next_of(page))
         if part is not parts_of(lesson)[-1]:
             next_of(page).click()
