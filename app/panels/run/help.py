@@ -50,6 +50,7 @@ _DRAWN = (
         "the target that you can drag: its arrows move it along the world's axes; its rings turn it while "
         "the orientation level is on",
     ),
+    ("line to the ball", "the way that the hand still has to its target, with its length"),
     ("small frame with a ball", "the filtered target for the controller (limited speed and acceleration)"),
     ("large thin frame", "the actual pose of the hand"),
     ("line behind the hand", "the path of the hand in the last seconds"),
