@@ -116,7 +116,7 @@ def test_a_page_that_fails_says_so_and_can_be_started_again(
             assert again is not None and page.find("Playback") is None
             broken.set()
             page.write(again, value=True)
-            assert eventually(lambda: page.shows("RUNNING"))
+            assert eventually(lambda: page.shows("Running"))
             learner = server.sessions.learners[0]
             assert isinstance(learner, SimulationClient) and learner.failure is None
     finally:

@@ -43,7 +43,7 @@ from browsing.wire import Wire, eventually
 running = PageServer(SceneChoice(RunSpec("{scene}")), port=0, class_names={named})
 try:
     with Wire(running.guest_link) as page:
-        assert eventually(lambda: page.shows("RUNNING"), 110.0)
+        assert eventually(lambda: page.shows("Running"), 110.0)
     print(*sorted({"numba", "matplotlib"} & set(sys.modules)))
 finally:
     running.close()

@@ -42,7 +42,7 @@ _MARKS = (
         "HTMPC: the amount by which lower levels may enlarge a higher level's error, up to |e*| + δ",
     ),
     ("window", "HTMPC: the mission's tasks that the controller performs now, highest priority first"),
-    ("CAPPED", "this computer cannot keep up: simulated time runs slower, no tick is skipped"),
+    ("slower than real time", "this computer cannot keep up; no tick is skipped"),
 )
 _DRAWN = (
     (

@@ -47,7 +47,7 @@ def learner_page(browser: Browser, school: PageServer) -> Iterator[Page]:
 def test_a_page_can_open_at_a_lesson(learner_page: Page) -> None:
     lesson = load_lesson(COURSE[0])
     expect_part(learner_page, lesson, lesson.steps[1])
-    expect(learner_page.get_by_text("PAUSED", exact=True).first).to_be_visible()
+    expect(learner_page.get_by_text("Paused", exact=True).first).to_be_visible()
     key(learner_page, "p")
     expect(learner_page.get_by_text("Make a prediction first:")).to_be_visible()
     key(learner_page, "b")
@@ -159,4 +159,4 @@ def test_the_cards_show_what_was_done(learner_page: Page) -> None:
     assert eventually(page, lambda: page.get_by_text("✓ DONE", exact=True).count() == len(walked))
     press(page, "Go to the laboratory")
     expect(page.get_by_text("Drag the target by its arrows")).to_be_visible()
-    expect(page.get_by_text("RUNNING", exact=True).first).to_be_visible()
+    expect(page.get_by_text("Running", exact=True).first).to_be_visible()
