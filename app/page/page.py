@@ -9,7 +9,6 @@ import threading
 import time
 import traceback
 from collections.abc import Callable
-from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, final
 
@@ -26,7 +25,7 @@ from app.link.messages import Ready
 from app.page.comfort import Comfort
 from app.page.lesson_file import LessonFile
 from app.panels.widgets.command import add_command
-from lessons.course import COURSE
+from lessons.course import COURSE, heading
 from lessons.own.folder import Folder
 from lessons.scenes.names import ALL_SCENES
 
@@ -61,13 +60,12 @@ def starting(choice: SceneChoice) -> str:
 
 def first_lesson(choice: SceneChoice) -> str:
     """Returns the title and the question of the lesson that will be shown, or of the first lesson; "" for a
-    user's own lesson. They are read without loading the lesson, which needs the robots."""
+    user's own lesson."""
     name = COURSE[0] if choice.exercise is None else choice.exercise.lesson
     if name not in COURSE:
         return ""
-    text = (files("lessons.course") / f"{name}.md").read_text(encoding="utf-8")
-    title, question, _ = text.split("\n\n", 2)
-    title = f"Lesson {COURSE.index(name) + 1} · {title.removeprefix('# ')}"
+    title, question = heading(name)
+    title = f"Lesson {COURSE.index(name) + 1} · {title}"
     return block(f"<b>{esc(title)}</b><br>{esc(question)}")
 
 

@@ -13,10 +13,12 @@ import pytest
 
 from app.client.simulation import trouble_of
 from app.link.choice import SceneChoice
+from app.link.exercise import LessonPlace
 from app.link.process import Process
 from app.server.server import PageServer
 from app.server.visit import FIRST_TEXT, Visit
 from browsing.wire import Wire, eventually
+from lessons.course import COURSE, heading, load_lesson
 from lessons.scenes.run_spec import RunSpec
 from robots import InputError
 
@@ -160,3 +162,11 @@ def test_the_first_frame_is_the_labs_own_and_goes_when_the_page_is_there(
     finally:
         wait.set()
         running.close()
+
+
+def test_a_lesson_opens_by_its_title() -> None:
+    for words in ("A redundant arm", "a redundant ARM", "a-redundant-arm"):
+        assert SceneChoice.opening(words).exercise == LessonPlace("a-redundant-arm")
+    assert {heading(name) for name in COURSE} == {
+        (card.title, card.question) for card in (load_lesson(name).card for name in COURSE)
+    }
