@@ -110,6 +110,12 @@ def readable(words: str) -> str:
     return _EXPONENT.sub(lambda found: figure(float(found[0])), _DEGREES.sub("°", words))
 
 
+def joints_named(words: str) -> str:
+    """Returns a text in which every joint has one name: "joint 1" for "joint_1", "joint1" and "q1"."""
+    return _JOINT.sub(r"joint \1", words)
+
+
+_JOINT = re.compile(r"\b(?:joint_?|q)(\d+)\b")
 _DEGREES = re.compile(r" deg\b")
 _EXPONENT = re.compile(r"-?\d+(?:\.\d+)?e[+-]\d+")
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")

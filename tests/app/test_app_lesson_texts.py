@@ -16,9 +16,9 @@ from app.client.progress import Notebook
 from app.html.glossary import explained, words
 from app.html.markdown import rendered, rendered_line
 from app.html.palette import GHOST
-from app.html.text import figure, readable
+from app.html.text import figure, joints_named, readable
 from app.link.exercise import Lecture, LessonPlace, SignalCurve
-from app.panels.lesson.claims import state
+from app.panels.lesson.claims import pictures, state
 from app.panels.lesson.drawing import TRUTH, Bound, Line, chart, scale, sketch
 from app.panels.lesson.prediction import Asking
 from app.panels.widgets.controls import STEPS, place_of, value_at
@@ -186,3 +186,21 @@ def test_a_guess_that_came_too_late_is_not_drawn() -> None:
     asking.show(graded(prediction, kept, kept))
     guess = re.findall(r">your guess ([^<]*)", picture.content)
     assert guess == [figure(kept, prediction.measure.unit)]
+
+
+def test_a_joint_has_one_name() -> None:
+    assert joints_named("error of q1 and joint_2, joint3 of joint 4") == (
+        "error of joint 1 and joint 2, joint 3 of joint 4"
+    )
+    assert joints_named("panda_joint1, q, joint") == "panda_joint1, q, joint"
+    part = next(
+        step for step in load_lesson("two-tasks").steps if any("q1" in each.name for each in step.plots)
+    )
+    curve = SignalCurve(np.array([0.0, 1.0]), np.array([1.0, 2.0]))
+    lecture = Lecture(LessonPlace("two-tasks"), "done", 1, 1.0, 1.0, curves=(curve,) * len(part.plots))
+    drawn = pictures(part, lecture)
+    assert "error of joint 1" in drawn and "q1" not in drawn
+    claims = load_lesson("a-redundant-arm").steps[0].claims
+    assert f"≥ {claims[0].bound:g}" in pictures(
+        load_lesson("a-redundant-arm").steps[0], replace(lecture, curves=(curve,) * 3)
+    ), "the predicted number of joints is plotted, with its bound"

@@ -7,7 +7,7 @@ import math
 from app.html.glossary import STYLE
 from app.html.markdown import rendered, rendered_line
 from app.html.palette import BAD, BOUND, GHOST, GOOD, LEVELS, RGB, css, ink, on
-from app.html.text import badge, bar, block, esc, figure
+from app.html.text import badge, bar, block, esc, figure, joints_named
 from app.link.exercise import Lecture, LessonPlace, parts_of, signals_of
 from app.panels.lesson.drawing import TRUTH, Bound, Line, chart
 from lessons.course import COURSE
@@ -182,7 +182,7 @@ def pictures(part: Part, lecture: Lecture) -> str:
         if beside is not None:
             lines.append(Line(f"ghost: {ghost}", GHOST, beside, "5 4"))
         drawn += chart(
-            signals[k].words,
+            joints_named(signals[k].words),
             _unit(signals[k]),
             lines,
             _bounds(claims, signals[k]),

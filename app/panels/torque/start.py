@@ -9,7 +9,7 @@ import viser
 
 from app.client.pending_edit import Send
 from app.html.palette import BAD, BOUND, GOOD, RGB, TARGET, ink
-from app.html.text import block, esc, quantity, swatch
+from app.html.text import block, esc, joints_named, quantity, swatch
 from app.link.messages import Ready, TaskView
 from app.panels.widgets.command import add_command, on_click
 from app.panels.widgets.controls import in_colours_of_axes
@@ -107,7 +107,7 @@ def _listed(places: Mapping[str, int]) -> str:
 
 def spoken(level: str) -> str:
     """Returns the name of a level as words."""
-    return level.replace("+", " and ").replace("_", " ")
+    return joints_named(level).replace("+", " and ").replace("_", " ")
 
 
 def _paragraph(head: str, rest: str) -> str:
