@@ -83,7 +83,7 @@ def _until_one_dies(
     workers = min(cores(), len(waiting))
     with _pool(workers) as pool, suppress(BrokenProcessPool):
         while not orphans and (waiting or under_way):
-            with _born_deaf():
+            with _signals_blocked():
                 # At most one item per process is submitted: if a process dies, the items that wait are not
                 # lost.
                 while waiting and len(under_way) < workers:
@@ -123,7 +123,7 @@ def sentence(error: BaseException) -> str:
 
 def _alone(function: Callable[[T], U], item: T) -> U | FailedJob:
     with _pool(1) as pool:
-        with _born_deaf():
+        with _signals_blocked():
             future = pool.submit(guarded, function, item)
         try:
             return future.result()
@@ -151,7 +151,7 @@ def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
 
 
 @contextmanager
-def _born_deaf() -> Iterator[None]:
+def _signals_blocked() -> Iterator[None]:
     """Blocks Ctrl-C while processes start. A child inherits the block: otherwise Ctrl-C would end the child
     with a traceback before our code runs in it. In the owner the block prevents a half-finished start; a
     signal that arrives meanwhile, in any thread, is handled afterwards.

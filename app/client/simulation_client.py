@@ -18,6 +18,7 @@ from app.link.choice import SceneChoice
 from app.link.exercise import Lecture, LessonPlace, Predict, RunStep
 from app.link.messages import (
     Command,
+    GetRun,
     Lead,
     Load,
     Loading,
@@ -26,11 +27,10 @@ from app.link.messages import (
     Ready,
     Report,
     ResetAll,
+    RunDescription,
     Script,
     SimulationFailed,
     Status,
-    Tell,
-    Told,
     WaitAt,
 )
 from app.link.process import Process
@@ -68,8 +68,8 @@ class SimulationClient(Simulation):
         self.coming: Coming | None = None  # the class's step, until the robot has loaded it
         self._behind: int | None = None  # the process with the lower priority
         self._rest = Rest()
-        self._questions = Questions()
-        self._unheard: Unheard | None = None
+        self._questions = RunRequests()
+        self._unheard: RequestedScene | None = None
         super().__init__(spares)
         self.send(Load(choice))
 
@@ -143,7 +143,7 @@ class SimulationClient(Simulation):
             if ended and self.trouble() is not None:
                 self.restart(choice)
                 return
-            self._unheard = Unheard(choice, -1 if self.status is None else self.status.resets)
+            self._unheard = RequestedScene(choice, -1 if self.status is None else self.status.resets)
             self.send(command)
 
     def restart(self, choice: SceneChoice | None = None) -> None:
@@ -198,7 +198,7 @@ class SimulationClient(Simulation):
                         self.coming = None
             case LoadRefused():
                 self.coming = None
-            case Told():
+            case RunDescription():
                 self._questions.answer(report)
             case SimulationFailed(_, died):
                 with self._lock:
@@ -220,11 +220,11 @@ class SimulationClient(Simulation):
         pid = self.pid
         if pid is not None and pid != self._behind:
             self._behind = pid
-            let_go_first(pid)
+            lower_priority(pid)
 
     # ---------------------------------------------------------------- questions
 
-    def ask(self, timeout: float = 10.0) -> Told | None:
+    def ask(self, timeout: float = 10.0) -> RunDescription | None:
         """Requests the run so far; returns None if the simulation does not answer within `timeout` seconds.
         This call blocks: do not call it on the page's loop or on viser's."""
         with self._lock:
@@ -275,24 +275,24 @@ class SimulationClient(Simulation):
 
 
 @final
-class Questions:
+class RunRequests:
     """The questions that a process has not answered yet."""
 
     def __init__(self) -> None:
         self._lock = Lock()
-        self._waiting: deque[Queue[Told | None]] = deque()
+        self._waiting: deque[Queue[RunDescription | None]] = deque()
 
-    def ask(self, process: Process) -> Queue[Told | None] | None:
+    def ask(self, process: Process) -> Queue[RunDescription | None] | None:
         """Requests the run so far. Returns the queue that will get the answer; None if the process has
         ended."""
-        answer: Queue[Told | None] = Queue()
+        answer: Queue[RunDescription | None] = Queue()
         with self._lock:
-            if not process.send(Tell()):
+            if not process.send(GetRun()):
                 return None
             self._waiting.append(answer)
         return answer
 
-    def answer(self, told: Told) -> None:
+    def answer(self, told: RunDescription) -> None:
         """Passes an answer to the oldest question."""
         with self._lock:
             if self._waiting:
@@ -305,13 +305,13 @@ class Questions:
                 self._waiting.popleft().put(None)
 
 
-class Unheard(NamedTuple):
+class RequestedScene(NamedTuple):
     """The scene (None: the present one), and the number of resets when it was requested."""
 
     choice: SceneChoice | None
     resets: int
 
-    def after(self, report: Report) -> Unheard | None:
+    def after(self, report: Report) -> RequestedScene | None:
         """Returns None if the report answers this request, else this request."""
         match report:
             case Status(resets=resets) if resets != self.resets:
@@ -322,7 +322,7 @@ class Unheard(NamedTuple):
                 return self
 
 
-def let_go_first(pid: int) -> None:
+def lower_priority(pid: int) -> None:
     """Gives a process a lower priority than this one."""
     with suppress(OSError):  # the process has ended, or the system forbids the change
         os.setpriority(os.PRIO_PROCESS, pid, os.getpriority(os.PRIO_PROCESS, 0) + BEHIND)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from app.link.choice import SceneChoice
-from app.link.messages import Told
+from app.link.messages import RunDescription
 from lessons.replay.state import State, state_of
 from robots import InputError
 
 
-def state_now(told: Told) -> State:
+def state_now(told: RunDescription) -> State:
     """Returns the state of the setting on a page. Raises InputError for a robot that was uploaded."""
-    choice = from_a_name(told.choice)
+    choice = refuse_uploaded_robot(told.choice)
     exercise = choice.exercise
     return state_of(
         choice.run,
@@ -20,7 +20,7 @@ def state_now(told: Told) -> State:
     )
 
 
-def from_a_name(choice: SceneChoice) -> SceneChoice:
+def refuse_uploaded_robot(choice: SceneChoice) -> SceneChoice:
     """Returns the choice unchanged. Raises InputError if its robot was uploaded."""
     if choice.urdf_text is not None:
         raise InputError(

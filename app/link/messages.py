@@ -101,8 +101,8 @@ class FollowLeader:
 
 
 @dataclass(frozen=True)
-class Tell:
-    """Request a description of the run; the answer is `Told`."""
+class GetRun:
+    """Request a description of the run; the answer is `RunDescription`."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ Command = (
     | Lead
     | WaitAt
     | FollowLeader
-    | Tell
+    | GetRun
     | Predict
     | RunStep
     | InsideRequest
@@ -265,7 +265,7 @@ class Reached:
 
 
 @dataclass(frozen=True, eq=False)
-class Told:
+class RunDescription:
     """A description with which a run can be repeated.
     choice: the scene as it was loaded; settings: the settings in force; log: (time, event) of every event
     that took effect since loading; t: time since the last reset, s.
@@ -277,4 +277,4 @@ class Told:
     t: float
 
 
-Report = Ready | Loading | Status | LoadRefused | SimulationFailed | Script | Reached | Told
+Report = Ready | Loading | Status | LoadRefused | SimulationFailed | Script | Reached | RunDescription

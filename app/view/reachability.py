@@ -30,13 +30,13 @@ class Question:
 @dataclass(frozen=True, eq=False)
 class Reachability:
     """accepted: the target's position, or the nearest reachable position that was found; missing: distance
-    between the two positions, m; turned_away: orientation error at the accepted position, rad (0 if no
+    between the two positions, m; rotation_error: orientation error at the accepted position, rad (0 if no
     orientation was requested); fault: why the target could not be checked, else ""."""
 
     question: Question
     accepted: np.ndarray
     missing: float
-    turned_away: float
+    rotation_error: float
     fault: str = ""
 
     @property

@@ -13,6 +13,7 @@ from app.link.inside import InsideRequest
 from app.link.messages import (
     Begin,
     Command,
+    GetRun,
     Lead,
     Load,
     LoadRefused,
@@ -22,13 +23,12 @@ from app.link.messages import (
     Ready,
     Report,
     ResetAll,
+    RunDescription,
     RunStep,
     Script,
     Speed,
     Status,
     StepTicks,
-    Tell,
-    Told,
     WaitAt,
 )
 from app.link.ring import Block
@@ -226,8 +226,10 @@ class SimulationRunner:
                 return self._load(choice)
             case InsideRequest() as watch:
                 self.run.watch = watch
-            case Tell():
-                return Told(self.choice, self.session.settings_now, tuple(self.session.log), self.session.t)
+            case GetRun():
+                return RunDescription(
+                    self.choice, self.session.settings_now, tuple(self.session.log), self.session.t
+                )
             case Lead(on):
                 self._lead(on)
             case WaitAt(until) if self.leader.on:

@@ -10,7 +10,7 @@ from himpc.controllers.weighted import Weighted
 from himpc.formulation.settings import Settings
 from himpc.limits.constraints import imposed
 from himpc.tick.configure import is_built_in
-from himpc.tick.tables import given_of
+from himpc.tick.tables import python_constraints
 from robots import InputError
 
 
@@ -27,7 +27,7 @@ def check(controller: Controller, settings: Settings) -> None:
         )
     if settings.limits.stall_guard:
         raise InputError("the guard of a blocked robot is not exported: set limits.stall_guard to false")
-    given = given_of(imposed(settings.limits))
+    given = python_constraints(imposed(settings.limits))
     if given:
         raise InputError(
             f"the limit '{given[0].label}' is computed in Python, which is not exported: switch it off"

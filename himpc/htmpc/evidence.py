@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.htmpc.kernel.kinds import COLLISION, LEXICOGRAPHIC
-from himpc.htmpc.plan import Felt, LevelEvidence
+from himpc.htmpc.plan import ActiveMotionRows, LevelEvidence
 from himpc.htmpc.problem import Iterate
 from himpc.htmpc.rows import ConstraintRows
 from himpc.htmpc.sqp import Solved
@@ -47,13 +47,13 @@ def evidence(
         iterations=len(solved.steps),
         unsolved=solved.unsolved,
         time_us=solved.time_us,
-        felt=_felt(solved.rows, solved.multipliers, guards, named),
+        active=_active_rows(solved.rows, solved.multipliers, guards, named),
     )
 
 
-def _felt(
+def _active_rows(
     rows: ConstraintRows, multipliers: Array, guards: Sequence[str], named: Callable[[int], str] | None
-) -> Felt:
+) -> ActiveMotionRows:
     """Returns the active rows. The bounds of the slacks, whose multipliers are the last ones, are left
     out."""
     multipliers = multipliers[: len(rows.kind)]
@@ -64,4 +64,4 @@ def _felt(
         named(each) if is_pair and named else of_guards.get(row, "")
         for row, is_pair, each in zip(some.tolist(), (kind == COLLISION).tolist(), part.tolist(), strict=True)
     )
-    return Felt(kind, rows.knot[some], part, multipliers[some], names)
+    return ActiveMotionRows(kind, rows.knot[some], part, multipliers[some], names)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from himpc.htmpc.differential import Box, DifferentialController, Solved, wanted
 from himpc.htmpc.kernel.kinds import VELOCITY
-from himpc.htmpc.plan import Felt, LevelEvidence
+from himpc.htmpc.plan import ActiveMotionRows, LevelEvidence
 from himpc.htmpc.settings import HTMPCSettings
 from himpc.htmpc.tracking import check_dimensions
 from himpc.kinematics.configuration import Configuration
@@ -67,7 +67,7 @@ class HTIDKC(DifferentialController):
     def _evidence(self, level: Level, gap: Array, solution: QPSolution, begun: int) -> LevelEvidence:
         multipliers = solution.multipliers[: self.robot.n]
         part = np.flatnonzero(np.abs(multipliers) > 1e-6)
-        felt = Felt(
+        active = ActiveMotionRows(
             np.full(len(part), VELOCITY),
             np.ones(len(part), np.int64),
             part,
@@ -86,5 +86,5 @@ class HTIDKC(DifferentialController):
             iterations=1,
             unsolved=int(not solution.solved),
             time_us=(perf_counter_ns() - begun) / 1e3,
-            felt=felt,
+            active=active,
         )

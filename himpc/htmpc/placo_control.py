@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.htmpc.differential import Box, DifferentialController, Solved, wanted
-from himpc.htmpc.plan import Felt, LevelEvidence
+from himpc.htmpc.plan import ActiveMotionRows, LevelEvidence
 from himpc.htmpc.settings import HTMPCSettings
 from himpc.kinematics.configuration import Configuration, joint_indices
 from himpc.references import Preview
@@ -35,7 +35,9 @@ _FLOATING = 7
 keeps it in place."""
 _FASTEST = 1e4
 """Stands for an infinite bound on a velocity, rad/s or m/s."""
-_NO_ROWS = Felt(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0), ())
+_NO_ROWS = ActiveMotionRows(
+    np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0), ()
+)
 _ONE_AT_A_TIME = Lock()
 """All controllers of a robot in this process share one wrapper, which contains the state."""
 
@@ -118,7 +120,7 @@ class Placo(DifferentialController):
                     iterations=int(first),
                     unsolved=int(first and notice is not None),
                     time_us=time_us if first else 0.0,
-                    felt=_NO_ROWS,
+                    active=_NO_ROWS,
                 )
             )
         return Solved(command, tuple(levels), notice)

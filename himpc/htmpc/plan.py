@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
 
 
-class Felt(NamedTuple):
+class ActiveMotionRows(NamedTuple):
     """Active constraint rows: kind, knot and part as in `ConstraintRows`, and the multipliers, all (r,).
     `name` is the pair of a row of a distance, the coordinate of a row of (12), the cost of a row of (11), and
     "" for the rows of a joint."""
@@ -46,7 +46,7 @@ class LevelEvidence(NamedTuple):
         iterations: number of solved QPs; second attempts are not counted.
         unsolved: number of these QPs that had no verified point.
         time_us: wall time.
-        felt: constraints with a nonzero multiplier in the last QP.
+        active: constraints with a nonzero multiplier in the last QP.
     """
 
     name: str
@@ -60,12 +60,12 @@ class LevelEvidence(NamedTuple):
     iterations: int
     unsolved: int
     time_us: float
-    felt: Felt
+    active: ActiveMotionRows
 
     def binding(self, joint_names: Sequence[str]) -> list[Binding]:
         """Returns the active constraints with the names of joints and kinds."""
         found: list[Binding] = []
-        kinds, knots, parts, values, names = self.felt
+        kinds, knots, parts, values, names = self.active
         each = zip(kinds.tolist(), knots.tolist(), parts.tolist(), values.tolist(), names, strict=True)
         for kind, knot, part, multiplier, name in each:
             joint = name or joint_names[int(part)]

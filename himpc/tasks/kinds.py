@@ -63,14 +63,14 @@ OWN = "own"
 """Name of the kind of tasks that are not built in."""
 
 
-def word_of(task: Task) -> str:
+def kind_name(task: Task) -> str:
     """Returns the name of a task's kind, or OWN for a class that is not built in."""
     return _WORDS.get(type(task), OWN)
 
 
-def said(task: Task) -> str:
+def description(task: Task) -> str:
     """Returns a description of a task in one line."""
-    word = word_of(task)
+    word = kind_name(task)
     return KINDS[word].says if word != OWN else (type(task).__doc__ or "a task of your own").split("\n")[0]
 
 

@@ -53,7 +53,7 @@ class OrientationTask(OnAxes):
         """Returns the Jacobian of ω at every knot, (N, 3, n)."""
 
     def error(self, value: Array, desired: Array) -> Array:
-        return turned_away(value @ desired.T, self.axes)
+        return rotation_error(value @ desired.T, self.axes)
 
     def jacobian(self, configuration: Configuration) -> Array:
         rows, preview = self.angular_jacobian(configuration), configuration.previews.get(self.name)
@@ -97,7 +97,7 @@ class OrientationTask(OnAxes):
         return found
 
 
-def turned_away(E: Array, axes: str) -> Array:
+def rotation_error(E: Array, axes: str) -> Array:
     """Returns x̃ of E = R R_dᵀ on some axes, (m,) rad; see `OrientationTask`."""
     if len(axes) != 2:
         found = log3(E)

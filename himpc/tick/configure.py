@@ -24,7 +24,7 @@ from himpc.tick.kernel.arena import Arena
 from himpc.tick.kernel.arrays import PULL, Array
 from himpc.tick.kernel.bounds import OFF, PAPER, VIABILITY
 from himpc.tick.kernel.references import EASED, SAMPLED, UNIFORM
-from himpc.tick.tables import LevelTable, given_of, sizes, write_effects, write_levels
+from himpc.tick.tables import LevelTable, python_constraints, sizes, write_effects, write_levels
 from robots import Robot
 
 Span = tuple[int, Task, slice]
@@ -53,7 +53,7 @@ def arena_for(
     counts = [*form.sizes, *(len(task.coordinates(robot)) for task in off)]
     constraints = imposed(settings.limits)
     N, solved = settings.horizon, sum(form.sizes)
-    bounds, directed = len(constraints) * N, len(given_of(constraints))
+    bounds, directed = len(constraints) * N, len(python_constraints(constraints))
     arena, spans = write_tasks(robot, tasks, counts, N, solved, len(levels), bounds, directed)
     f = arena.f
     model = form.model

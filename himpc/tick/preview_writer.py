@@ -9,17 +9,17 @@ from himpc.formulation.settings import Settings
 from himpc.references import Outlook, Preview, Reference, Target
 from himpc.tasks import Damping
 from himpc.tick.configure import write_curve, write_preview
-from himpc.tick.given import GivenRows
 from himpc.tick.kernel.arena import Arena
 from himpc.tick.kernel.arrays import NOW
 from himpc.tick.kernel.references import SAMPLED
+from himpc.tick.python_rows import PythonRows
 
 
 @final
 class PreviewWriter:
     """Records the references that the arena of a tick already contains."""
 
-    def __init__(self, arena: Arena, given: GivenRows, settings: Settings) -> None:
+    def __init__(self, arena: Arena, given: PythonRows, settings: Settings) -> None:
         self._arena, self._given, self._T_s = arena, given, settings.T_s
         self._reach = settings.horizon + 1
         self._led = [each for each in given.spans if not isinstance(each[1], Damping)]

@@ -12,7 +12,7 @@ from himpc.tick.fallbacks import perform, solve_level
 from himpc.tick.kernel.arena import Arena, Snapshot
 from himpc.tick.kernel.arrays import PULL, Array
 from himpc.tick.kernel.control_period import FINISH, LEVELS
-from himpc.tick.tables import LevelTable, budget_of, given_of, sizes, write_effects, write_levels
+from himpc.tick.tables import LevelTable, budget_of, python_constraints, sizes, write_effects, write_levels
 
 
 def solve_problems(
@@ -30,7 +30,7 @@ def arena_of(problems: Sequence[LevelProblem], rows: Rows, previous: Mapping[str
     """Creates an arena and writes the problems into it."""
     N, _, n = problems[0].B.shape
     ends = np.cumsum([0] + [problem.B.shape[1] for problem in problems])
-    given = given_of(rows.constraints)
+    given = python_constraints(rows.constraints)
     arena = sizes(n, N, int(ends[-1]), int(ends[-1]), len(problems), len(rows.L), directed=len(given))
     f = arena.f
     tables = []
@@ -43,7 +43,7 @@ def arena_of(problems: Sequence[LevelProblem], rows: Rows, previous: Mapping[str
         tables.append(LevelTable(span, problem.knots, problem.R, span, problem.knots, problem.R))
         before = previous.get(problem.name)
         if before is not None:
-            press(arena, place, before.active)
+            write_warm_start(arena, place, before.active)
             if before.U.shape == (N, n):
                 f["U_was"][place], arena.i["known"][1] = before.U, 1
     write_levels(arena, tables)
@@ -87,7 +87,7 @@ def solutions(names: Sequence[str], found: Snapshot) -> list[LevelSolution]:
     ]
 
 
-def press(arena: Arena, place: int, active: ActiveRows) -> None:
+def write_warm_start(arena: Arena, place: int, active: ActiveRows) -> None:
     """Writes the active rows with which a level starts."""
     fits = active.row < len(arena.f["lower"])
     k = min(int(fits.sum()), arena.f["warm_multiplier"].shape[1])

@@ -57,7 +57,7 @@ class LevelTable:
 _BUILT_IN = (TORQUE, VELOCITY, POSITION)
 
 
-def given_of(constraints: Sequence[Constraint]) -> Sequence[Constraint]:
+def python_constraints(constraints: Sequence[Constraint]) -> Sequence[Constraint]:
     """Returns the constraints whose bounds the kernel does not compute itself. They come last in
     `constraints`."""
     known = sum(one is other for one, other in zip(constraints, _BUILT_IN, strict=False))

@@ -24,8 +24,6 @@ from himpc.tick.configure import arena_for, write_limits, write_velocity_limits
 from himpc.tick.distances import Distances
 from himpc.tick.fallbacks import perform
 from himpc.tick.gather import gathered
-from himpc.tick.given import GivenRows
-from himpc.tick.given_bounds import GivenBounds
 from himpc.tick.kernel.arena import Snapshot
 from himpc.tick.kernel.arrays import PULL, Array
 from himpc.tick.kernel.control_period import (
@@ -38,7 +36,9 @@ from himpc.tick.kernel.control_period import (
 )
 from himpc.tick.kernel.progress import progress
 from himpc.tick.preview_writer import PreviewWriter
-from himpc.tick.problems import press, solutions
+from himpc.tick.problems import solutions, write_warm_start
+from himpc.tick.python_bounds import PythonBounds
+from himpc.tick.python_rows import PythonRows
 from himpc.tick.tables import LevelTable, budget_of, write_effects
 from robots import Robot
 
@@ -70,11 +70,11 @@ class CompiledTick:
     ) -> None:
         self._form, self._settings, self._levels = form, settings, levels
         self.arena, self._spans = arena_for(robot, settings, form, off, levels)
-        self._given = GivenRows(robot, self.arena, self._spans)
+        self._given = PythonRows(robot, self.arena, self._spans)
         self._ends = np.array([span.stop for _, _, span in self._spans[: len(form.tasks)]], np.intp)
         constraints, f = imposed(settings.limits), self.arena.f
         self._rows = Rows(f["L"], f["lower"], f["upper"], constraints)
-        self._given_bounds = GivenBounds(robot, self.arena, settings, constraints)
+        self._python_bounds = PythonBounds(robot, self.arena, settings, constraints)
         self._tolerance, self._most = tolerance, most
         self._limits: LimitsInForce | None = None
         self._shares: list[float | Array] = [1.0] * len(form.levels)
@@ -100,7 +100,7 @@ class CompiledTick:
         for place, level in enumerate(self._form.levels if self._levels else ()):
             before = memory.solutions.get(level.name)
             if before is not None:
-                press(self.arena, place, before.active)
+                write_warm_start(self.arena, place, before.active)
                 if before.U.shape == f["U"][place].shape:
                     f["U_was"][place], i["known"][1] = before.U, 1
         self._started = True
@@ -130,7 +130,7 @@ class CompiledTick:
     @property
     def distances(self) -> Distances | None:
         """The pairs whose distances are kept; None if none are."""
-        return self._given_bounds.distances
+        return self._python_bounds.distances
 
     def progress(self) -> tuple[Array, float]:
         """Returns the length of the last error of each solved task, m or rad, and the largest velocity of a
@@ -195,7 +195,7 @@ class CompiledTick:
             else:
                 before = None
             self._given.write(previews)
-            self._rows = self._given_bounds.write(self._rows, limits, observed_by(previews))
+            self._rows = self._python_bounds.write(self._rows, limits, observed_by(previews))
             unsolved = perform(arena, parts, self._rows)
             if unsolved == NOT_FINITE:
                 return None

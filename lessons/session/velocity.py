@@ -127,7 +127,7 @@ class VelocitySession(Session):
 
     def _for_controller(self, settings: VelocitySettings) -> HTMPCSettings:
         """Returns the controller's settings for the levels of this tick."""
-        lag = 1e-3 * settings.felt(self._solve_ms).latency_ms if settings.compensate_delay else 0.0
+        lag = 1e-3 * settings.with_delay(self._solve_ms).latency_ms if settings.compensate_delay else 0.0
         hold = settings.htmpc.hold
         if settings.options.decoupled and self.progress.window:
             base = base_joints(self.robot)
@@ -190,8 +190,8 @@ class VelocitySession(Session):
         if plan.notice not in (None, self._noticed):
             self.notices.append(plan.notice)  # once; the level's fallback shows how long it lasts
             self._noticed = plan.notice
-        if (felt := settings.felt(self._solve_ms)) != self.plant.settings:
-            self.plant.configure(felt)
+        if (delayed := settings.with_delay(self._solve_ms)) != self.plant.settings:
+            self.plant.configure(delayed)
         row = self._row
         row.fill(np.nan)
         fields = self.layout.fields

@@ -101,7 +101,7 @@ def write_plan(row: Array, layout: Layout, plan: VelocityPlan, delta: float | No
             row[fields[f"rung/{role}"]] = FALLBACKS.index(level.fallback)
             row[fields[f"time_us/{role}"]] = level.time_us
             row[fields[f"step/{role}"]] = float(np.mean(level.steps)) if level.steps else np.nan
-            row[fields[f"active/{role}"]] = len(level.felt.kind)
+            row[fields[f"active/{role}"]] = len(level.active.kind)
 
 
 def write_truth(

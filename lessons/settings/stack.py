@@ -10,7 +10,7 @@ from typing import Any
 
 from himpc.stack import DAMPING_LEVEL, Level, Stack, check_names, essence
 from himpc.tasks import KINDS, Task
-from himpc.tasks.kinds import OWN, word_of
+from himpc.tasks.kinds import OWN, kind_name
 from lessons.own.files import by_name, is_file, with_fingerprint
 from lessons.settings.values import form_of
 from robots import InputError
@@ -55,13 +55,13 @@ def read_stack(value: Any, before: Stack, own: Own = NONE) -> Stack:
     return checked(tuple(level_of(entry, before, taken, own) for entry in value))
 
 
-def told(stack: Stack, own: Own = NONE) -> list[dict[str, Any]]:
+def stack_as_data(stack: Stack, own: Own = NONE) -> list[dict[str, Any]]:
     """Returns a stack as data from which `read_stack` makes the same stack again.
 
     Raises:
         InputError: the kind of a task has no name.
     """
-    return [_told_level(level, own) for level in stack]
+    return [_level_as_data(level, own) for level in stack]
 
 
 def same_tasks(one: Stack, other: Stack) -> bool:
@@ -206,15 +206,15 @@ def one(value: Any) -> Any:
     return value[0] if isinstance(value, tuple) else value
 
 
-def _told_level(level: Level, own: Own) -> dict[str, Any]:
+def _level_as_data(level: Level, own: Own) -> dict[str, Any]:
     plain = Level(level.tasks)
     extra = {key: getattr(level, key) for key in _LEVEL_KEYS if getattr(level, key) != getattr(plain, key)}
-    tasks = [_told_task(task, own) for task in level.tasks]
+    tasks = [_task_as_data(task, own) for task in level.tasks]
     return {**(tasks[0] if len(tasks) == 1 else {"tasks": tasks}), **extra}
 
 
-def _told_task(task: Task, own: Own) -> dict[str, Any]:
-    word, usual = word_of(task), {each.name: each.default for each in fields(task)}
+def _task_as_data(task: Task, own: Own) -> dict[str, Any]:
+    word, usual = kind_name(task), {each.name: each.default for each in fields(task)}
     if word == OWN:
         found = next((path for path, each in own.items() if type(each) is type(task)), None)
         if found is None:

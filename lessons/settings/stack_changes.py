@@ -8,7 +8,7 @@ from typing import Any
 
 from himpc.stack import Level, Stack
 from himpc.tasks import Task
-from himpc.tasks.kinds import word_of
+from himpc.tasks.kinds import kind_name
 from lessons.settings.stack import NONE, Own, checked, entry_of, fields_of, level_of, name_of, one, quoted
 from lessons.settings.values import form_of
 from robots import InputError
@@ -60,7 +60,7 @@ def edit(stack: Stack, value: Any) -> Stack:
     """Changes fields of a task, e.g. its axes or its frame: {"name": TASK, FIELD: VALUE, …}."""
     given = entry_of(value, "stack.edit")
     at, task = _find(stack, given.pop("name", None))
-    changes = fields_of(type(task), given, f"a task of kind '{word_of(task)}'")
+    changes = fields_of(type(task), given, f"a task of kind '{kind_name(task)}'")
     return _with_task(stack, at, task, replace(task, **changes))
 
 

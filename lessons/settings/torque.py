@@ -17,7 +17,7 @@ from lessons.own.files import by_name, is_file, with_fingerprint
 from lessons.settings.levels import moved, ordered
 from lessons.settings.schema import Setting, Shape, setting_of_all_levels, settings_of_levels
 from lessons.settings.settings import SceneSettings
-from lessons.settings.stack import Own, read_stack, same_tasks, told
+from lessons.settings.stack import Own, read_stack, same_tasks, stack_as_data
 from lessons.settings.stack_changes import CHANGES, add
 from lessons.settings.values import WORD, Form
 from robots import InputError, PlantSettings, Robot
@@ -152,7 +152,7 @@ class TorqueSettings(ControllerSettings, SceneSettings):
     def recomposed(self, wanted: TorqueSettings) -> list[tuple[str, Any]]:
         if same_tasks(self.levels, wanted.levels):
             return []
-        return [("stack", told(wanted.levels, dict(wanted.own_tasks)))]
+        return [("stack", stack_as_data(wanted.levels, dict(wanted.own_tasks)))]
 
 
 def _with_route(settings: TorqueSettings, route: str) -> TorqueSettings:
@@ -195,7 +195,7 @@ _STACK = _of_stack(
     "stack",
     Shown("Stack", "The levels with their tasks, highest priority first, as a list; see himpc.tasks.KINDS"),
     lambda s, value: read_stack(value, s.levels, _own(s)),
-    lambda s: told(s.levels, _own(s)),
+    lambda s: stack_as_data(s.levels, _own(s)),
 )
 _ORDER = _of_stack(
     "order",

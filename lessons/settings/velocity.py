@@ -68,7 +68,7 @@ class VelocitySettings(SceneSettings):
         if self.controller not in VELOCITY_CONTROLLERS:
             raise unknown_name("velocity-level controller", self.controller, VELOCITY_CONTROLLERS)
 
-    def felt(self, solve_ms: float) -> VelocityPlantSettings:
+    def with_delay(self, solve_ms: float) -> VelocityPlantSettings:
         """Returns the plant on which the commands of a plan act if the computation of the plan took this many
         ms."""
         if not self.delay_measured:

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 
 from app.link.choice import SceneChoice
-from app.link.messages import Load, Loading, Quit, Tell, Told
+from app.link.messages import GetRun, Load, Loading, Quit, RunDescription
 from app.link.wire import Wire
 from lessons.scenes.catalog import load_scene
 from lessons.scenes.run_spec import RunSpec
@@ -30,8 +30,8 @@ def main(wire: Wire) -> None:
             case Load(choice) if choice.run.scene == "loads":
                 wire.send(Loading())
                 time.sleep(1e6)
-            case Tell():
-                wire.send(Told(choice, settings, (), 0.0))
+            case GetRun():
+                wire.send(RunDescription(choice, settings, (), 0.0))
             case Quit():
                 return
             case _:

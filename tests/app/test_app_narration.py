@@ -20,7 +20,7 @@ from lessons.scenes.run_spec import RunSpec
 STILL = Facts(True, 0, (("position", True), ("posture", True)), {"position": (0.0, "m")}, frozenset())
 
 
-class Told:
+class RunDescription:
     """A narration with a clock of its own."""
 
     def __init__(self) -> None:
@@ -45,14 +45,14 @@ class Told:
     ],
 )
 def test_what_changes_is_said_once(change: dict[str, Any], words: str) -> None:
-    one = Told()
+    one = RunDescription()
     now = replace(STILL, **change)
     assert one.look(now) == words
     assert one.look(now) == ""
 
 
 def test_an_error_is_said_when_it_has_come_to_rest() -> None:
-    one = Told()
+    one = RunDescription()
     said = [one.look(replace(STILL, errors={"position": (each, "m")})) for each in (0.3, 0.1, 0.02, 0.003)]
     assert said == [""] * 4
     assert one.look(replace(STILL, errors={"position": (0.003, "m")})) == "Position 3.00 mm from its target."
@@ -60,7 +60,7 @@ def test_an_error_is_said_when_it_has_come_to_rest() -> None:
 
 
 def test_there_is_at_most_one_sentence_in_two_seconds_and_it_has_all_that_happened() -> None:
-    one = Told()
+    one = RunDescription()
     assert one.look(replace(STILL, running=False)) == "Paused."
     off = replace(STILL, levels=(("position", False), ("posture", True)))
     assert one.look(off, after=0.2) == ""
@@ -71,7 +71,7 @@ def test_there_is_at_most_one_sentence_in_two_seconds_and_it_has_all_that_happen
 
 
 def test_a_limit_that_comes_and_goes_is_not_said_again_and_again() -> None:
-    one, met = Told(), replace(STILL, limits=frozenset({("velocity", "joint 1")}))
+    one, met = RunDescription(), replace(STILL, limits=frozenset({("velocity", "joint 1")}))
     said = [one.look(met if k % 2 else STILL, after=0.5) for k in range(40)]
     assert [each for each in said if each] == ["Velocity limit of joint 1 is met."]
 

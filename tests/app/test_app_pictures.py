@@ -14,7 +14,7 @@ from app.html.palette import LEVELS
 from app.link.inside import Inside, InsideRequest
 from app.panels.inside import matrix as hessian
 from app.panels.inside import spectrum
-from app.panels.inside.inside import Watching
+from app.panels.inside.inside import InsideSubscription
 from app.panels.inside.plane import half_width, parts
 from lessons.events import MoveTarget
 from lessons.geometry.look import matrix_of, plane_of
@@ -114,7 +114,7 @@ def test_a_wish_is_sent_once_and_again_if_nothing_comes_of_it(monkeypatch: pytes
     now = [100.0]
     monkeypatch.setattr("app.panels.inside.inside.time.monotonic", lambda: now[0])
     sent: list[InsideRequest] = []
-    watching = Watching(sent.append)
+    watching = InsideSubscription(sent.append)
     watching.ask(InsideRequest(), None)
     assert not sent  # the panel is not visible, so nothing is requested
     wish = InsideRequest(plane=(0, 1))

@@ -20,7 +20,7 @@ from app.client import simulation
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.forkserver import ForkServer
-from app.link.messages import Load, Play, Post, Told
+from app.link.messages import Load, Play, Post, RunDescription
 from app.link.outbox import MOST
 from app.link.process import wait_until
 from app.link.ring import MAX_ROWS, MIN_ROWS, Block
@@ -141,19 +141,19 @@ def test_a_ghost_that_hangs_is_started_again_with_its_robot(start: Start) -> Non
 
 def test_quick_questions_are_all_answered(start: Start) -> None:
     learner = start("planar3-hold", "stubborn")
-    answers: list[Told | None] = []
+    answers: list[RunDescription | None] = []
     asking = [threading.Thread(target=lambda: answers.append(learner.ask(LONG))) for _ in range(8)]
     for each in asking:
         each.start()
     for each in asking:
         each.join(LONG)
-    assert len(answers) == 8 and all(isinstance(answer, Told) for answer in answers)
+    assert len(answers) == 8 and all(isinstance(answer, RunDescription) for answer in answers)
 
 
 def test_a_question_to_who_dies_is_answered_at_once(start: Start) -> None:
     learner = start("asleep", "stubborn")
     pid = born(learner)
-    answers: list[Told | None] = []
+    answers: list[RunDescription | None] = []
     asking = threading.Thread(target=lambda: answers.append(learner.ask(10 * LONG)))
     asking.start()
     assert wait_until(lambda: bool(learner._questions._waiting), LONG)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Generator, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Generator, Hashable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -16,6 +16,7 @@ from lessons.recording.run import record
 from lessons.scenes.run_spec import RunSpec
 from lessons.session.start import begin
 from lessons.teaching.check import Outcome, Piece, Verdict, judge, judge_note, needed, perform
+from lessons.teaching.lesson import Lesson
 from robots import InputError
 
 
@@ -26,15 +27,28 @@ class CourseRuns(NamedTuple):
     documents: Mapping[Told, Verdict]
 
 
-def course_runs() -> CourseRuns:
-    """Computes every run once. A run that is the beginning of a longer run is taken from the longer one."""
-    lessons = [load_lesson(name) for name in COURSE]
-    told = {each: each.note.runs(each.run) for each in documents() if each.note.measure is not None}
+def course_runs(noted: Collection[str], with_documents: bool) -> CourseRuns:
+    """Computes every run once. A run that is the beginning of a longer run is taken from the longer one.
+
+    noted: the lessons whose notes are judged, too; with_documents: whether the notes of documents are.
+    """
+    lessons = [
+        lesson if lesson.name in noted else without_notes(lesson) for lesson in map(load_lesson, COURSE)
+    ]
+    told = {
+        each: each.note.runs(each.run)
+        for each in (documents() if with_documents else ())
+        if each.note.measure is not None
+    }
     outcomes = perform(needed(lessons, [(each.note, runs) for each, runs in told.items()]), spread)
     return CourseRuns(
         [verdict for lesson in lessons for verdict in judge(lesson, outcomes)],
         {each: judge_note(each.at, each.says, each.note, runs, outcomes) for each, runs in told.items()},
     )
+
+
+def without_notes(lesson: Lesson) -> Lesson:
+    return replace(lesson, steps=tuple(replace(step, notes=()) for step in lesson.steps))
 
 
 def spread(function: Callable[[Any], Any], items: Sequence[Any]) -> Generator[tuple[int, Any], None, None]:

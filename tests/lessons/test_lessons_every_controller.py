@@ -18,6 +18,8 @@ from lessons.scenes.run_spec import RunSpec
 from robots import CATALOG, load_robot
 
 SECONDS, AGAIN = 2.0, 0.3
+ON_PAPER = 0.6
+"""Duration, s, for the controller in NumPy, whose tick takes a hundred times as long as a compiled one."""
 ROBOTS = [name for name in CATALOG if f"{name}-hold" in SCENES]
 
 
@@ -31,7 +33,6 @@ PAIRS = [
         controller,
         robot,
         id=f"{controller}-{robot}",
-        # A tick on paper takes a hundred times as long as a compiled one.
         marks=pytest.mark.nightly("himpc/printed.py")
         if controller == "himpc_printed" and robot != "planar3"
         else (),
@@ -45,9 +46,10 @@ PAIRS = [
 def test_every_controller_holds_every_robot(controller: str, robot: str) -> None:
     """For 2 s of the hold scene the values are finite and the robot stays in place. A second run gives
     bitwise the same first 0.3 s."""
-    first, again = record(robot, controller, SECONDS), record(robot, controller, AGAIN)
+    seconds = ON_PAPER if controller == "himpc_printed" else SECONDS
+    first, again = record(robot, controller, seconds), record(robot, controller, min(AGAIN, seconds / 4.0))
     assert first.session.settings.controller == controller
-    assert len(first.rows) == round(SECONDS / first.session.settings.T_s)
+    assert len(first.rows) == round(seconds / first.session.settings.T_s)
     for name in ("q", "v", "tau", "tau_demand"):
         assert np.isfinite(first[name]).all()
         np.testing.assert_array_equal(first[name][: len(again.rows)], again[name])

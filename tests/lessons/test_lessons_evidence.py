@@ -201,6 +201,7 @@ def test_the_walk_reaches_every_page_of_the_site() -> None:
 # -------------------------------------------------- the runs that notes name
 
 
+@pytest.mark.nightly("tests/lessons/evidence")
 @pytest.mark.parametrize(
     "each",
     [each for each in documents() if not each.note.told],

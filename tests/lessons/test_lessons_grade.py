@@ -114,7 +114,7 @@ def test_right_solution_gets_every_grade_point(exercise: str, thirty: Graded) ->
 
 
 CONTROL_LAWS = pytest.mark.nightly(
-    "himpc/controllers/own", "himpc/controllers/view", "lessons/exercises", "tests/lessons/right_laws"
+    "himpc/controllers/own.py", "himpc/controllers/view.py", "lessons/exercises", "tests/lessons/right_laws"
 )
 
 

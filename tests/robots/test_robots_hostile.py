@@ -3,7 +3,9 @@ sentence."""
 
 from __future__ import annotations
 
+import pickle
 import struct
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import hostile
@@ -15,12 +17,32 @@ from lessons.events import MoveTarget
 from lessons.scenes.hold import _hold
 from lessons.session.torque import TorqueSession
 from robots import InputError, PlantSettings, Robot
+from robots.covering import covers
+from robots.covering.covered import Patch
+from robots.covering.covering import covering
+from robots.geometry.cover import Capsule
 from robots.loading.importing import import_robot
 from robots.meshes.surfaces import read_meshes
 from robots.shapes.link_shapes import MAX_TOTAL, link_shapes
 
 DOCUMENTS = hostile.documents()
 GROUPS = 8  # number of tests; with one test per kind there would be 400, most of them of one millisecond
+
+
+@pytest.fixture(scope="module", autouse=True)
+def equal_shapes_are_covered_once() -> Iterator[None]:
+    """Capsules depend on surfaces and weights alone, and most kinds have the same surfaces."""
+    known: dict[bytes, tuple[Capsule, ...]] = {}
+
+    def remembered(surfaces: Sequence[Patch], weights: Mapping[int, float]) -> tuple[Capsule, ...]:
+        key = pickle.dumps((surfaces, weights))
+        if key not in known:
+            known[key] = covering(surfaces, weights)
+        return known[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(covers, "covering", remembered)
+        yield
 
 
 @pytest.mark.parametrize("group", range(GROUPS))

@@ -25,7 +25,7 @@ _AGAIN = 0.4
 request."""
 
 
-class Watching:
+class InsideSubscription:
     """Sends the request when it changes, and again while it is not answered."""
 
     def __init__(self, send: Callable[[InsideRequest], None]) -> None:
@@ -65,7 +65,7 @@ class InsidePanel:
         with client.gui.add_folder("The Hessian of one level", expand_by_default=False):
             self._matrix = MatrixPanel(client, in_view, ready.robot, levels)
         self._spectrum = spectrum
-        self._watching = Watching(send)
+        self._watching = InsideSubscription(send)
 
     def draw(self, moment: Moment) -> None:
         """Draws the data of an instant, and requests the data for the next one."""

@@ -7,10 +7,10 @@ from collections.abc import Callable
 import viser
 
 from app.client.simulation_client import SimulationClient
-from app.client.state_code import from_a_name, state_now
+from app.client.state_code import refuse_uploaded_robot, state_now
 from app.html.text import block
 from app.link.choice import SceneChoice
-from app.link.messages import Told
+from app.link.messages import RunDescription
 from lessons.replay.script import script
 from lessons.replay.state import decode, encode
 from robots import InputError
@@ -51,7 +51,7 @@ class SharePanel:
             except InputError as error:
                 _refuse(event.client, error)
 
-    def _try(self, client: viser.ClientHandle | None, make: Callable[[Told], None]) -> None:
+    def _try(self, client: viser.ClientHandle | None, make: Callable[[RunDescription], None]) -> None:
         told = self._learner.ask()
         try:
             if told is None:
@@ -60,7 +60,7 @@ class SharePanel:
         except InputError as error:
             _refuse(client, error)
 
-    def _write(self, told: Told) -> None:
+    def _write(self, told: RunDescription) -> None:
         state = state_now(told)
         self._line.value = state.run.command_line()
         self._line.visible = True
@@ -68,8 +68,8 @@ class SharePanel:
         self._code.value = encode(state)
         self._code.visible = True
 
-    def _save(self, client: viser.ClientHandle, told: Told) -> None:
-        choice = from_a_name(told.choice)
+    def _save(self, client: viser.ClientHandle, told: RunDescription) -> None:
+        choice = refuse_uploaded_robot(told.choice)
         text = script(choice.run, told.log, told.t)
         client.send_file_download(f"{choice.run.scene}.py", text.encode(), save_immediately=True)
 

@@ -224,7 +224,7 @@ class StartPanel:
                 if clamped
                 else "The controller gets your point unchanged."
             )
-        if verdict.turned_away > 0:
+        if verdict.rotation_error > 0:
             text += " The robot cannot have this orientation there: the lower level keeps an error."
         self._where.content = block(f'<b style="color:{colour}">●</b> {esc(text)}')
 

@@ -15,7 +15,7 @@ from app.panels.widgets.mirror import Bindings
 from himpc.stack import Stack
 from himpc.tasks import KINDS, Task
 from himpc.tasks.axes import OnAxes
-from himpc.tasks.kinds import said
+from himpc.tasks.kinds import description
 from himpc.tasks.pointing import DIRECTIONS
 from lessons.events import Set
 from lessons.settings.torque import TorqueSettings
@@ -36,7 +36,7 @@ class TaskEditor:
         """alone: whether the task has a level of its own."""
         self._gui, self._bindings, self._task = gui, bindings, task
         name = task.name
-        gui.add_html(block(f"<b>{esc(name)}</b>: {esc(said(task))}"))
+        gui.add_html(block(f"<b>{esc(name)}</b>: {esc(description(task))}"))
         if hasattr(task, "frame"):
             self._menu("Frame", "frame", robot.frames, robot.tip)
         if hasattr(task, "root"):
@@ -132,7 +132,7 @@ class AddTask:
     def _show(self) -> None:
         needs = self._needs()
         own = self._own.get(self._kind.value)
-        self._says.content = block(esc(said(own)) if own else KINDS[self._kind.value].says)
+        self._says.content = block(esc(description(own)) if own else KINDS[self._kind.value].says)
         for field, handle in (
             ("frame", self._frame),
             ("frame", self._pick),

@@ -12,7 +12,7 @@ from app.link.own_code import OwnCode
 from app.worker.reports.own_code import File
 from app.worker.reports.report import TOUCHING, SessionReport
 from himpc.tasks import PlaneDistance, Task
-from himpc.tasks.kinds import word_of
+from himpc.tasks.kinds import kind_name
 from lessons.geometry.look import matrix_of, plane_of
 from lessons.session.torque import TorqueSession
 from robots import InputError, convergence_eigenvalues, convergence_gauge
@@ -42,7 +42,7 @@ class TorqueRun(SessionReport):
         return TaskView(
             name=task.name,
             level=level,
-            kind=word_of(task),
+            kind=kind_name(task),
             unit=task.unit,
             frame=str(getattr(task, "frame", "")) or robot.tip,
             axes=str(getattr(task, "axes", "")),

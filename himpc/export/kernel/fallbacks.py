@@ -37,14 +37,14 @@ def period_with_fallbacks(
             return HOLD
         if reached == t.sizes[4]:
             return worst
-        found = climb_down(t, p, data, where, whole, whole_where, reached)
+        found = apply_fallback(t, p, data, where, whole, whole_where, reached)
         t.rung[reached] = float(found)
         worst = max(worst, found)
         parts, i = parts & ~LINEARIZE, reached + 1
 
 
 @inline_kernel
-def climb_down(
+def apply_fallback(
     t: TickArrays, p: LoopArrays, data: Array, where: Whole, whole: Whole, whole_where: Whole, i: int
 ) -> int:
     """Finds increments of level i that satisfy all rows if the rows are feasible; returns the fallback that

@@ -13,13 +13,13 @@ from himpc.tick.kernel.active_set import (
     correct,
     evaluate,
     point_from_multipliers,
+    remove_row,
     scale,
     unscale,
     update_multipliers,
-    without,
 )
 from himpc.tick.kernel.arrays import Array, Whole
-from himpc.tick.kernel.goldfarb_idnani import ROUNDED, TOLERANCE, release, take
+from himpc.tick.kernel.goldfarb_idnani import ROUNDED, TOLERANCE, dual_step, release
 from himpc.tick.kernel.linear import copy, copy_rows, dot, factorise, forward, subtract
 
 SOLVED, CONTRADICTION, LIMIT = range(3)
@@ -148,7 +148,7 @@ def solve(
     for p in range(count - 1, -1, -1):
         hold(active, p, active.multiplier[p] > 0.0, lower, upper)
         if not math.isfinite(active.target[p]):
-            without(active, p, count, n, budget)
+            remove_row(active, p, count, n, budget)
             count -= 1
     update_multipliers(active, cost, count)
     count = release(active, cost, count, budget)
@@ -185,7 +185,7 @@ def solve(
         scale(cost, active.normal[count], active.scaled_normal[count])
         if exact:
             point_from_multipliers(active, cost, count, z)
-        met, count = take(active, count, excess, z, n, budget)
+        met, count = dual_step(active, count, excess, z, n, budget)
         if met:
             hold(active, count - 1, above, lower, upper)
         elif budget[0] < 0.0:

@@ -92,7 +92,7 @@ def resolve(active: ActiveSet, index: int, D: int, budget: Array) -> float:
 
 
 @inline_kernel
-def fix(active: ActiveSet, index: int, length: float, D: int) -> None:
+def add_row(active: ActiveSet, index: int, length: float, D: int) -> None:
     """Adds the direction that `resolve` found for row `index` to the orthonormal basis."""
     active.cholesky_factor[index, index] = length
     for c in range(D):
@@ -100,7 +100,7 @@ def fix(active: ActiveSet, index: int, length: float, D: int) -> None:
 
 
 @inline_kernel
-def move(active: ActiveSet, source: int, to: int, D: int) -> None:
+def move_row(active: ActiveSet, source: int, to: int, D: int) -> None:
     """Copies a row to another index."""
     active.row[to], active.joint[to], active.side[to] = (
         active.row[source],
@@ -113,12 +113,12 @@ def move(active: ActiveSet, source: int, to: int, D: int) -> None:
 
 
 @inline_kernel
-def without(active: ActiveSet, index: int, k: int, D: int, budget: Array) -> None:
+def remove_row(active: ActiveSet, index: int, k: int, D: int, budget: Array) -> None:
     """Removes row `index` of k. The rows behind it move up, and rotations make `cholesky_factor` triangular
     again."""
     budget[0] -= 6.0 * D * (k - index)
     for p in range(index, k - 1):
-        move(active, p + 1, p, D)
+        move_row(active, p + 1, p, D)
     close_gap(active.cholesky_factor, active.orthonormal_basis, index, k, D)
 
 

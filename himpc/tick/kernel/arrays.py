@@ -36,29 +36,30 @@ class TickArrays(NamedTuple):
         Array,
         "n",
         "rad",
-        "kinematics tick → distance_rows fallbacks finish_tick given given_bounds linearize solve_level",
+        "kinematics tick → "
+        "distance_rows fallbacks finish_tick linearize python_bounds python_rows solve_level",
     ]
     v: Annotated[
         Array,
         "n",
         "rad/s",
-        "kinematics tick → distance_rows fallbacks finish_tick given given_bounds linearize",
+        "kinematics tick → distance_rows fallbacks finish_tick linearize python_bounds python_rows",
     ]
-    tau_0: Annotated[Array, "n", "N·m", "tick → gather given_bounds finish_tick linearize"]
+    tau_0: Annotated[Array, "n", "N·m", "tick → finish_tick gather linearize python_bounds"]
     x_d: Annotated[Array, "M", "m, rad", "configure kinematics linearize preview_writer → gather"]
     R_d: Annotated[Array, "T 3 3", "1", "configure kinematics preview_writer → finish_tick linearize"]
     # x_d(k+j) − x_d(k), ẋ_d and ẍ_d
     motion: Annotated[Array, "3 N1 M", "m, m/s, m/s²", "configure linearize preview_writer → gather progress"]
-    given: Annotated[Array, "N1 G n", "m, 1", "given → linearize"]
+    given: Annotated[Array, "N1 G n", "m, 1", "python_rows → linearize"]
     curve: Annotated[Array, "M 4", "m, rad", "configure → linearize"]
     pace: Annotated[Array, "T 2", "rad/s, rad", "configure → linearize"]
     # The memory of the previous tick.
-    q_was: Annotated[Array, "n", "rad", "finish_tick tick → given linearize"]
+    q_was: Annotated[Array, "n", "rad", "finish_tick tick → linearize python_rows"]
     v_was: Annotated[
-        Array, "n", "rad/s", "finish_tick tick → distance_rows fallbacks given given_bounds linearize"
+        Array, "n", "rad/s", "finish_tick tick → distance_rows fallbacks linearize python_bounds python_rows"
     ]
     x_dot_was: Annotated[Array, "M", "m/s", "finish_tick linearize tick → itself"]
-    path: Annotated[Array, "N1 n", "rad", "finish_tick kinematics tick → given linearize"]
+    path: Annotated[Array, "N1 n", "rad", "finish_tick kinematics tick → linearize python_rows"]
     warm_multiplier: Annotated[Array, "r k", "1/N·m", "finish_tick solve_level problems → itself"]
     U_was: Annotated[Array, "r N n", "N·m", "finish_tick problems tick → fallbacks"]
     # The settings.
@@ -66,7 +67,7 @@ class TickArrays(NamedTuple):
         Array,
         "n",
         "kg·m²",
-        "configure kinematics problems tick → distance_rows fallbacks finish_tick given_bounds linearize",
+        "configure kinematics problems tick → distance_rows fallbacks finish_tick linearize python_bounds",
     ]
     K_p: Annotated[Array, "M", "1/s²", "configure → linearize"]
     K_v: Annotated[Array, "M", "1/s", "configure → linearize"]
@@ -83,14 +84,16 @@ class TickArrays(NamedTuple):
         Array, "8 n", "N·m, rad/s, rad, rad/s²", "configure problems → gather finish_tick linearize"
     ]
     L: Annotated[Array, "b N", "1", "configure problems → distance_rows fallbacks solve_level tick"]
-    direction: Annotated[Array, "g n n", "1", "distance_rows given_bounds problems → finish_tick solve_level"]
+    direction: Annotated[
+        Array, "g n n", "1", "distance_rows problems python_bounds → finish_tick solve_level"
+    ]
     approach: Annotated[Array, "N", "1", "configure → distance_rows linearize"]
     scalars: Annotated[
         Array,
         "5",
         "s, m",
         "configure finish_tick kinematics preview_writer problems tick → "
-        "distance_rows fallbacks given_bounds linearize",
+        "distance_rows fallbacks linearize python_bounds",
     ]
     # The robot.
     rotation: Annotated[Array, "J 3 3", "1", "configure → distance_rows linearize"]
@@ -104,17 +107,17 @@ class TickArrays(NamedTuple):
         Array, "r N n", "N·m", "control_period fallbacks solve_level → finish_tick problems tables tick"
     ]
     predicted: Annotated[Array, "N1 n", "rad", "finish_tick → tick"]
-    value: Annotated[Array, "M", "m, rad", "given linearize → gather kinematics tick"]
-    error: Annotated[Array, "M", "m, rad", "given linearize → gather kinematics progress tick"]
-    R_now: Annotated[Array, "T 3 3", "1", "given linearize → finish_tick kinematics tick"]
+    value: Annotated[Array, "M", "m, rad", "linearize python_rows → gather kinematics tick"]
+    error: Annotated[Array, "M", "m, rad", "linearize python_rows → gather kinematics progress tick"]
+    R_now: Annotated[Array, "T 3 3", "1", "linearize python_rows → finish_tick kinematics tick"]
     lower: Annotated[
         Array,
         "b n",
         "N·m",
-        "distance_rows fallbacks given_bounds linearize problems → solve_level tables tick",
+        "distance_rows fallbacks linearize problems python_bounds → solve_level tables tick",
     ]
     upper: Annotated[
-        Array, "b n", "N·m", "distance_rows fallbacks given_bounds linearize problems → solve_level tick"
+        Array, "b n", "N·m", "distance_rows fallbacks linearize problems python_bounds → solve_level tick"
     ]
     stopping: Annotated[Array, "2 n", "1", "linearize → finish_tick tick"]
     cost: Annotated[Array, "r", "1", "finish_tick → gather problems"]
@@ -178,7 +181,9 @@ class TickArrays(NamedTuple):
         "configure tables → control_period distance_rows fallbacks finish_tick linearize solve_level",
     ]
     # The memory, and whether `x_dot_was` and `U_was` are known.
-    known: Annotated[Whole, "2", "1", "finish_tick linearize kinematics problems tick → fallbacks given"]
+    known: Annotated[
+        Whole, "2", "1", "finish_tick kinematics linearize problems tick → fallbacks python_rows"
+    ]
     warm_row: Annotated[Whole, "r k", "1", "finish_tick solve_level problems → itself"]
     warm_joint: Annotated[Whole, "r k", "1", "finish_tick solve_level problems → itself"]
     warm_count: Annotated[Whole, "r", "1", "finish_tick solve_level problems tick → itself"]

@@ -96,7 +96,7 @@ def count_coordinates(knots: int, n: int, count: Whole, start: Whole, offset: Wh
 
 
 @inline_kernel
-def widen(
+def prepare_bounds(
     index: int,
     levels: Whole,
     level: LevelQP,

@@ -11,7 +11,15 @@ from __future__ import annotations
 import math
 
 from himpc.compilation.compiled import inline_kernel
-from himpc.tick.kernel.active_set import ActiveSet, Quadratic, fix, move, resolve, update_multipliers, without
+from himpc.tick.kernel.active_set import (
+    ActiveSet,
+    Quadratic,
+    add_row,
+    move_row,
+    remove_row,
+    resolve,
+    update_multipliers,
+)
 from himpc.tick.kernel.arrays import Array
 from himpc.tick.kernel.linear import backward, subtract
 
@@ -42,7 +50,7 @@ def release(active: ActiveSet, cost: Quadratic, k: int, budget: Array) -> int:
         for p in range(k - 1, -1, -1):
             push = active.multiplier[p] * active.side[p]
             if active.side[p] != 0 and not push > 0.0 and not push > -_HARD * wrong:
-                without(active, p, kept, cost.D, budget)
+                remove_row(active, p, kept, cost.D, budget)
                 kept -= 1
         if kept == k:
             return k
@@ -52,7 +60,7 @@ def release(active: ActiveSet, cost: Quadratic, k: int, budget: Array) -> int:
 
 
 @inline_kernel
-def take(active: ActiveSet, k: int, excess: float, z: Array, D: int, budget: Array) -> tuple[bool, int]:
+def dual_step(active: ActiveSet, k: int, excess: float, z: Array, D: int, budget: Array) -> tuple[bool, int]:
     """Adds the row at index k, whose violation is `excess`, to the active rows. This is the dual step; it
     moves the point z (D,), in scaled coordinates. Returns whether a point that satisfies all these rows was
     found within the budget, and the number of active rows."""
@@ -60,7 +68,7 @@ def take(active: ActiveSet, k: int, excess: float, z: Array, D: int, budget: Arr
     active.multiplier[k] = 0.0
     length = resolve(active, k, D, budget)
     if length > 0.0:
-        fix(active, k, length, D)
+        add_row(active, k, length, D)
     while True:
         budget[0] -= float(k) * k
         change = active.change
@@ -93,13 +101,13 @@ def take(active: ActiveSet, k: int, excess: float, z: Array, D: int, budget: Arr
         if length > 0.0:
             # The rotations that remove row `first` also turn the row that is being
             # added, so `resolve` need not be called again.
-            without(active, first, k + 1, D, budget)
+            remove_row(active, first, k + 1, D, budget)
             k -= 1
             length = active.cholesky_factor[k, k]
         else:
-            without(active, first, k, D, budget)
-            move(active, k, k - 1, D)
+            remove_row(active, first, k, D, budget)
+            move_row(active, k, k - 1, D)
             k -= 1
             length = resolve(active, k, D, budget)
             if length > 0.0:
-                fix(active, k, length, D)
+                add_row(active, k, length, D)

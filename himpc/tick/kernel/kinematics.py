@@ -152,7 +152,7 @@ def about_one_axis(
         i = task[t, 2]
         a, j = part[i], frame_joint[task[t, 1]]
         rotation_of_frame(placed[j], frame_rotation[task[t, 1]], R_now[t])
-        turned_away(R_now[t], R_d[t], w)
+        rotation_error(R_now[t], R_d[t], w)
         square = dot3(w, w)
         angle = math.sqrt(square)
         even = 0.5 * angle / math.tan(0.5 * angle) if angle > 1e-4 else 1.0 - square / 12.0
@@ -170,7 +170,7 @@ def about_one_axis(
 
 
 @inline_kernel
-def leans(R: Array, D: Array, f: int, out: Array) -> None:
+def tilt_error(R: Array, D: Array, f: int, out: Array) -> None:
     """Computes φ (f × p)/‖f × p‖ of p = R Dᵀ f, (3,) rad: the residual of an orientation task with axis f
     free."""
     g, h = (f + 1) % 3, (f + 2) % 3
@@ -187,7 +187,7 @@ def leans(R: Array, D: Array, f: int, out: Array) -> None:
 
 
 @inline_kernel
-def turned_away(R: Array, D: Array, out: Array) -> None:
+def rotation_error(R: Array, D: Array, out: Array) -> None:
     """Computes log₃(R Dᵀ), (3,) rad: the residual of an orientation task.
 
     It uses a quaternion whose largest component is computed by a square root. The result is accurate at every

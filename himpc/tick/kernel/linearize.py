@@ -16,10 +16,10 @@ from himpc.tick.kernel.kinematics import (
     about_one_axis,
     forward_kinematics,
     jacobian,
-    leans,
     points,
+    rotation_error,
     rotation_of_frame,
-    turned_away,
+    tilt_error,
 )
 from himpc.tick.kernel.linear import dot
 from himpc.tick.kernel.pull import bounded_pull
@@ -55,9 +55,9 @@ def errors(t: TickArrays) -> None:
         if kind == ORIENTATION:
             rotation_of_frame(t.placed[t.frame_joint[frame]], t.frame_rotation[frame], R)
             if size == 2:
-                leans(R, R_d, 3 - t.part[first] - t.part[first + 1], turned)
+                tilt_error(R, R_d, 3 - t.part[first] - t.part[first + 1], turned)
             else:
-                turned_away(R, R_d, turned)
+                rotation_error(R, R_d, turned)
         for i in range(first, first + size):
             t.x_dot[i] = dot(t.B[0, i], t.v, t.v.size)
             if kind == GIVEN:

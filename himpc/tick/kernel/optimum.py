@@ -8,9 +8,9 @@ import math
 from himpc.compilation.compiled import inline_kernel
 from himpc.tick.kernel.active_set import (
     ActiveSet,
+    add_row,
     correct,
     evaluate,
-    fix,
     point_from_multipliers,
     resolve,
     unscale,
@@ -19,7 +19,7 @@ from himpc.tick.kernel.active_set import (
 from himpc.tick.kernel.arrays import Array, Whole
 from himpc.tick.kernel.bound_rows import farthest, lengths, most_violated, normal_of
 from himpc.tick.kernel.bounds import LevelBounds, constraint_values
-from himpc.tick.kernel.goldfarb_idnani import ROUNDED, TOLERANCE, release, take
+from himpc.tick.kernel.goldfarb_idnani import ROUNDED, TOLERANCE, dual_step, release
 from himpc.tick.kernel.level import LevelQP, increments
 from himpc.tick.kernel.linear import dot, subtract
 from himpc.tick.kernel.residual import add_effects, apply, gather, gather_effects
@@ -70,7 +70,7 @@ def warm_start(
         budget[0] -= 0.5 * d * d
         length = resolve(active, k, D, budget)
         if length > 0.0:
-            fix(active, k, length, D)
+            add_row(active, k, length, D)
             k += 1
     return k
 
@@ -175,7 +175,7 @@ def optimum(
             normal_of(level, active, k, bounds)
             if exact:
                 point_from_multipliers(active, level.cost, k, level.z)
-            met, k = take(active, k, excess, level.z, D, budget)
+            met, k = dual_step(active, k, excess, level.z, D, budget)
             if not met:
                 if budget[0] < 0.0:
                     return FAILED, k

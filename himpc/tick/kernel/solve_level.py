@@ -16,7 +16,7 @@ from himpc.tick.kernel.cascade import (
     LAST,
     count_coordinates,
     own_directions,
-    widen,
+    prepare_bounds,
 )
 from himpc.tick.kernel.level import LevelQP, prepare
 from himpc.tick.kernel.optimum import FAILED, optimum, warm_start
@@ -66,7 +66,7 @@ def solve_level(data: Any, where: Whole, whole: Whole, whole_where: Whole, i: in
     spared = 0.0 if i == len(levels) - 1 or levels[i, ALONE] else (1.0 - _SHARE) * granted
     t.budget[0] = granted - spared
     kkt, held = 0.0, 0
-    if widen(i, levels, level, bounds, t.lower, t.upper, t.U, room):
+    if prepare_bounds(i, levels, level, bounds, t.lower, t.upper, t.U, room):
         kkt = FAILED
         if prepare(level):
             row, joint, multiplier = t.warm_row[i], t.warm_joint[i], t.warm_multiplier[i]

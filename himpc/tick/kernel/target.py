@@ -8,7 +8,7 @@ from himpc.compilation.compiled import GIVEN_MATRICES, MATRIX, NUMBER, VECTOR, W
 from himpc.compilation.views import matrix
 from himpc.constants import APPROACH_RATE, STILL, VELOCITY_RATE
 from himpc.tick.kernel.arrays import Array
-from himpc.tick.kernel.kinematics import turned_away
+from himpc.tick.kernel.kinematics import rotation_error
 from himpc.tick.kernel.linear import copy, dot
 
 
@@ -76,6 +76,37 @@ def jerked(
 
 
 @inline_kernel
+def slowed(along: Array, velocity: Array, acceleration: Array, caps: Array, T_s: float, m: int) -> None:
+    """Reduces the velocity `along`, which the jerk cap allows, to the speed cap. It is shortened if the jerk
+    cap allows this, too. Otherwise it moves towards the slowest velocity that the jerk cap allows, until it
+    meets the speed cap."""
+    length, radius = math.sqrt(dot(along, along, m)), caps[2] * T_s * T_s
+    if length <= caps[0]:
+        return
+    shorter, away, slow = caps[0] / length, 0.0, 0.0
+    for a in range(m):
+        unchanged = velocity[a] + T_s * acceleration[a]
+        away += (shorter * along[a] - unchanged) ** 2
+        slow += unchanged * unchanged
+    slow = math.sqrt(slow)
+    if away <= radius * radius * (1.0 + 1e-9) or slow <= radius:
+        for a in range(m):
+            along[a] *= shorter
+        return
+    # |along + share (slowest − along)| = speed cap.
+    square, product = 0.0, 0.0
+    for a in range(m):
+        step = (velocity[a] + T_s * acceleration[a]) * (1.0 - radius / slow) - along[a]
+        square += step * step
+        product += along[a] * step
+    root = math.sqrt(max(product * product - square * (length * length - caps[0] * caps[0]), 0.0))
+    share = min((-product - root) / square, 1.0)
+    for a in range(m):
+        step = (velocity[a] + T_s * acceleration[a]) * (1.0 - radius / slow) - along[a]
+        along[a] += share * step
+
+
+@inline_kernel
 def following(now: Array, then: Array, raw: Array, caps: Array, T_s: float, m: int, width: int) -> None:
     """Computes the next sample: one period of constant acceleration within the caps."""
     velocity, acceleration = now[width : width + m], now[width + m : width + 2 * m]
@@ -84,7 +115,7 @@ def following(now: Array, then: Array, raw: Array, caps: Array, T_s: float, m: i
     for a in range(m):
         away[a] = 0.0 if rests or width > m else raw[a] - now[a]
     if width > m and not rests:
-        turned_away(matrix(raw, 0, 3, 3), matrix(now, 0, 3, 3), away)
+        rotation_error(matrix(raw, 0, 3, 3), matrix(now, 0, 3, 3), away)
     distance, speed = math.sqrt(dot(away, away, m)), math.sqrt(dot(velocity, velocity, m))
     if rests or (distance < STILL and speed < 10.0 * STILL):
         copy(raw, then, width)
@@ -102,7 +133,7 @@ def following(now: Array, then: Array, raw: Array, caps: Array, T_s: float, m: i
     jerked(velocity, acceleration, along, speed, caps, T_s, m, change)
     for a in range(m):
         along[a] = velocity[a] + T_s * (acceleration[a] + change[a])
-    shorten(along, caps[0], m)
+    slowed(along, velocity, acceleration, caps, T_s, m)
     for a in range(m):
         then[width + a] = along[a]
         then[width + m + a] = (along[a] - velocity[a]) / T_s

@@ -16,13 +16,13 @@ from himpc.references.observed import Observed
 from himpc.tick.distances import Distances
 from himpc.tick.kernel.arena import Arena
 from himpc.tick.kernel.arrays import PERIOD
-from himpc.tick.tables import given_of
+from himpc.tick.tables import python_constraints
 from robots import Robot
 
 
-class GivenBounds:
-    """The constraints that `given_of` returns. Their bounds are written to the arena before levels are
-    solved. The kernel computes the bounds of distances, from objects that are stored in Python.
+class PythonBounds:
+    """The constraints of `python_constraints`. Their bounds are written to the arena before the levels
+    are solved. The kernel computes the bounds of distances, from objects that are stored in Python.
 
     Attributes:
         distances: the pairs whose distances are kept; None if none are.
@@ -32,7 +32,7 @@ class GivenBounds:
         self, robot: Robot, arena: Arena, settings: Settings, constraints: Sequence[Constraint]
     ) -> None:
         self._arena, self._settings = arena, settings
-        self._given = given_of(constraints)
+        self._given = python_constraints(constraints)
         self._known = len(constraints) - len(self._given)
         self.distances = Distances(robot, settings.limits.avoidance) if DISTANCE in constraints else None
 

@@ -18,7 +18,7 @@ from himpc.tick.kernel.arrays import Array
 from robots import Robot
 
 
-class GivenRows:
+class PythonRows:
     """The tasks for which `is_built_in` is false. Their rows are written to the arena before `linearize`
     reads them.
 
