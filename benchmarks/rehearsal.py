@@ -170,7 +170,8 @@ def _all(waits: Waits, name: str, pages: Sequence[Learner], shows: Callable[[Lea
 
 def _vote(page: Learner, asked: object, number: int) -> None:
     if isinstance(asked, Choice):
-        page.use("I expect", "ABCDEFG"[number % len(asked.options)])
+        place = number % len(asked.options)
+        page.use(f"{'ABCDEFG'[place]}   {asked.options[place].text}", True)
     elif isinstance(asked, Value):
         page.use("My guess", STEPS // 2 + 1 + number % 7)  # the slider begins in the middle
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
+
 from playwright.sync_api import Locator, Page, expect
 
 from app.link.exercise import parts_of
-from browsing.browser_actions import BETWEEN, key, press, row
+from browsing.browser_actions import BETWEEN, key, row
 from lessons.course import COURSE
 from lessons.teaching.challenge import Challenge
 from lessons.teaching.lesson import Lesson, Step
@@ -38,8 +40,10 @@ def expect_part(page: Page, lesson: Lesson, part: Step | Challenge) -> None:
 def predict(page: Page, prediction: Prediction) -> None:
     """Enters a prediction with the controls that are shown."""
     if isinstance(prediction, Choice):
-        press(page, "ABCDEFG"[prediction.tempting])
-        expect(page.get_by_text("(your answer)")).to_be_visible()
+        letter, text = "ABCDEFG"[prediction.tempting], prediction.options[prediction.tempting].text
+        option = page.get_by_role("button", name=re.compile(rf"^{letter}\s+{re.escape(text)}"))
+        option.click()
+        expect(option).to_have_accessible_name(re.compile("your answer"))
         return
     label = f"at {prediction.until / 5:.2g} s" if isinstance(prediction, Sketch) else "My guess"
     # The arrow keys cannot be used: viser also turns the camera with them.

@@ -24,7 +24,7 @@ def reset_all(page: Page, learner: SimulationClient) -> None:
     if before is not None:
         assert eventually(page, lambda: _began_after(learner.status, before))
         assert eventually(page, lambda: _time_shown(page) < max(before.t, _SOON))
-    expect(page.get_by_text("RUNNING", exact=True).first).to_be_visible()
+    expect(page.get_by_text("Running", exact=True).first).to_be_visible()
     wait_for_scene(page)
 
 
@@ -35,7 +35,7 @@ def _began_after(status: Status | None, before: Status) -> bool:
 
 
 def _time_shown(page: Page) -> float:
-    found = re.search(r"t = ([\d.]+) s", page.locator("body").inner_text())
+    found = re.search(r"Running\W+([\d.]+) s", page.locator("body").inner_text())
     return float(found[1]) if found else math.inf
 
 

@@ -120,6 +120,12 @@ class Wire:
         shown = list(self.controls.items())
         return next((uuid for uuid, each in shown if each["props"].get("label") == label), None)
 
+    def begins(self, words: str) -> str | None:
+        """Returns the id of the first control whose label begins with these words, or None."""
+        shown = list(self.controls.items())
+        labels = ((uuid, str(each["props"].get("label", ""))) for uuid, each in shown)
+        return next((uuid for uuid, label in labels if label.startswith(words)), None)
+
     def folders(self, words: str) -> int:
         """Returns how many controls were created whose label begins with these words."""
         return sum(str(each["props"].get("label", "")).startswith(words) for each in list(self.made))

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from app.html.curves import tick_label as label
 from app.worker.lecturer import BUCKETS, thinned
-from docs.pages.curves import FLOORS, figure, label
+from docs.pages.curves import FLOORS, figure
 
 
 def test_a_peak_is_neither_lost_nor_moved() -> None:

@@ -46,6 +46,7 @@ PAGE = "window.__viserMutable"
 """The object of viser's page that sends messages."""
 CHART, CHART_TITLE = ".uplot", ".u-title"
 NUMBER_BOX, SLIDER_LABEL = ".mantine-NumberInput-root", ".mantine-Slider-label"
+BUTTON_INNER, BUTTON_LABEL = ".mantine-Button-inner", ".mantine-Button-label"
 SHEET = 'div[style*="width: 20em"]'
 """The sheet of controls at the bottom of a phone's screen."""
 ROW = ".mantine-Flex-root"
@@ -63,6 +64,8 @@ OF_THE_PAGE = (
     ("components/UplotComponent.css", f"{CHART} {CHART_TITLE} {{"),
     ("components/Slider.tsx", 'import { Slider, Flex, NumberInput } from "@mantine/core"'),
     ("components/Slider.tsx", "id={uuid}"),
+    ("components/Button.tsx", 'import { Button } from "@mantine/core"'),
+    ("components/Button.tsx", "id={uuid}"),
     ("ControlPanel/BottomPanel.tsx", 'width: "20em"'),
 )
 """Pairs: a file below viser's `client/src`, and a text that this file must contain."""

@@ -269,7 +269,12 @@ def control_of(client: viser.ClientHandle, uuid: object) -> viser.GuiInputHandle
     return None if found is None or found._impl.removed else found  # pyright: ignore[reportReturnType]
 
 
-def dom_id(handle: viser.GuiInputHandle[Any] | viser.GuiUploadButtonHandle) -> str:
+def dom_id(
+    handle: viser.GuiInputHandle[Any]
+    | viser.GuiButtonHandle
+    | viser.GuiButtonGroupHandle
+    | viser.GuiUploadButtonHandle,
+) -> str:
     """Returns a control's id in the browser's document."""
     return handle._impl.uuid
 

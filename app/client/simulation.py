@@ -57,10 +57,8 @@ def trouble_of(process: Process, loading: bool, quiet: float, who: str = "The si
     waited = f"{quiet:.0f} s"
     if doing is not None:
         what = f": {doing}" if doing else ""
-        late = quiet > FIRST_PATIENCE
-        return Trouble(
-            "PREPARING", f"The simulations are being prepared{what}. {waited} …", *(() if late else (None,))
-        )
+        sentence = f"The simulations are being prepared{what}, {waited} so far …"
+        return Trouble("PREPARING", sentence, *(() if quiet > FIRST_PATIENCE else (None,)))
     if not loading:
         why = "this computer is too busy, or the simulation hangs"
         return Trouble("SILENT", f"{who} has not reported anything for {waited}: {why}.")

@@ -59,6 +59,9 @@ class SimulationClient(Simulation):
         self.account = ""
         """The name with which the learner signed in at the proxy; "" if there is none."""
         self.ghost: GhostClient | None = None
+        self.shows_ghosts = True
+        """Whether a step of a lesson begins with its ghost in the scene. In a class, whose robots share one
+        computer, learners switch it on themselves."""
         self.lecture: Lecture | None = None
         self.kept_at: LessonPlace | None = None
         """The step at which a teacher keeps this learner; None: the learner may go anywhere."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from app.commands.output import print_table, write_json
+from app.commands.output import figure, print_table, write_json
 from app.commands.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -82,14 +82,10 @@ def _list(chosen: Sequence[Lesson], json: str | None) -> int:
 
 
 def _row(verdict: Verdict) -> list[str]:
-    wrong = f"{_number(verdict.wrong_value)} with {verdict.wrong}" if verdict.wrong else ""
-    measured = f"{_number(verdict.value)} {verdict.unit}".rstrip()
+    wrong = f"{figure(verdict.wrong_value)} with {verdict.wrong}" if verdict.wrong else ""
+    measured = f"{figure(verdict.value)} {verdict.unit}".rstrip()
     sign = "FAULT" if verdict.fault else "ok"
     return [sign, f"{verdict.where}: {verdict.what}", measured, verdict.condition, wrong]
-
-
-def _number(value: float) -> str:
-    return "–" if math.isnan(value) else f"{value:.4g}"
 
 
 def _as_data(chosen: Sequence[Lesson], verdicts: Sequence[Verdict]) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import json
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
@@ -46,6 +47,20 @@ def _reported(option: str, target: str) -> Iterator[None]:
         raise InputError(
             f"{option} {target}: cannot be written ({error.strerror}); give another file"
         ) from None
+
+
+def figure(value: float | None, least: float = 1e-9) -> str:
+    """Returns a number for people: three digits, and "0.00" for the rounding errors of a calculation, which
+    are smaller than `least`; "–" if there is no number."""
+    if value is None or not math.isfinite(value):
+        return "–"
+    return "0.00" if abs(value) < least else f"{value:.3g}"
+
+
+def readable_unit(value: float | None, unit: str) -> tuple[str, str]:
+    """Returns the number and the unit of an error: lengths in mm, and "0.00" for less than 0.005."""
+    factor, unit = (1e3, "mm") if unit == "m" else (1.0, unit)
+    return figure(None if value is None else factor * value, 0.005), unit
 
 
 def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:

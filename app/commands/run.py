@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from app.commands.output import check_file, print_table, write_file, write_json
+from app.commands.output import check_file, figure, print_table, readable_unit, write_file, write_json
 from app.commands.progress import progress_bar
 from app.commands.robots import RobotFile
 from robots import InputError
@@ -124,7 +124,13 @@ def _list(scene: Scene, json: str | None) -> int:
 def _show(result: dict[str, Any]) -> None:
     solver, limits, step = result["solver"], result["limits"], result["step_ms"]
     rows = [
-        [str(task["level"]), task["name"], axis, _figure(late), _figure(peak), task["unit"]]
+        [
+            str(task["level"]),
+            task["name"],
+            axis,
+            readable_unit(late, task["unit"])[0],
+            *readable_unit(peak, task["unit"]),
+        ]
         for task in result["tasks"]
         for axis, late, peak in zip(
             task["coordinates"], task["rmse_after_1s"] or task["rmse"], task["max_abs"], strict=True
@@ -137,13 +143,13 @@ def _show(result: dict[str, Any]) -> None:
     fallbacks = ", ".join(f"{fallback} {count}" for fallback, count in solver["fallbacks"].items()) or "none"
     pairs = {
         "largest share of its limit": ", ".join(
-            f"{kind} {_figure(limits[kind]['max_ratio'])}"
+            f"{kind} {figure(limits[kind]['max_ratio'])}"
             for kind in limits
             if limits[kind]["max_ratio"] is not None
         ),
         "QPs": f"{solver['solves']} ({solver['backend'] or 'no QP solver'}, {solver['route']}), "
         f"unsolved {solver['unsolved']}, fallbacks {fallbacks}, "
-        f"largest KKT residual {_figure(solver['max_kkt_residual'])}",
+        f"largest KKT residual {figure(solver['max_kkt_residual'], 0.0)}",
         **_ranks(result),
         "leak into higher levels": _leak(result),
         **_mission(result),
@@ -165,18 +171,18 @@ def _ranks(result: dict[str, Any]) -> dict[str, str]:
 
 
 def _leak(result: dict[str, Any]) -> str:
-    own = _figure(result["priority_leak_max"])
+    own = figure(result["priority_leak_max"])
     if "line_search" in result:
         return f"{own} m"
-    return f"controller's {own}, plant's {_figure(result['dynamic_leak_max'])} m/s² or rad/s²"
+    return f"controller's {own}, plant's {figure(result['dynamic_leak_max'])} m/s² or rad/s²"
 
 
 def _mission(result: dict[str, Any]) -> dict[str, str]:
     """Returns the figures that only velocity-level scenes have."""
     found = {
-        part["name"]: f"base error {_figure(part['normalised_base_error'])} of the initial error on average, "
-        f"{_figure(part['final_base_error'])} at the end; hand {_figure(part['ee_error_mm']['mean'])} mm "
-        f"on average, {_figure(part['ee_error_mm']['max'])} mm at most"
+        part["name"]: f"base error {figure(part['normalised_base_error'])} of the initial error on average, "
+        f"{figure(part['final_base_error'])} at the end; hand {figure(part['ee_error_mm']['mean'])} mm "
+        f"on average, {figure(part['ee_error_mm']['max'])} mm at most"
         for part in result.get("parts", ())
     }
     if result.get("base_path_m") is not None:
@@ -184,7 +190,3 @@ def _mission(result: dict[str, Any]) -> dict[str, str]:
     if result.get("completed"):
         found["mission"] = f"completed after {result['completion_time_s']:.1f} s"
     return found
-
-
-def _figure(value: float | None) -> str:
-    return "–" if value is None else f"{value:.3g}"

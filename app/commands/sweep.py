@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from app.commands.output import figure, readable_unit
 from app.commands.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -80,7 +81,7 @@ def sweep(
 
 
 def _conclude(definition: Sweep, cells: list[Cell], metric: str, out: Path) -> None:
-    from lessons.experiments.sweep import best_cell, draw_sweep
+    from lessons.experiments.sweep import best_cell, draw_sweep, unit_of
 
     picture = draw_sweep(definition, cells, metric, out)
     lost = sum(cell.diverged for cell in cells)
@@ -90,7 +91,9 @@ def _conclude(definition: Sweep, cells: list[Cell], metric: str, out: Path) -> N
     if best is not None:
         point = zip(definition.axes, definition.points[best.index], strict=True)
         at = ", ".join(f"{axis.path} = {value:g}" for axis, value in point)
-        print(f"smallest {metric}: {best.value(metric):.3g} at {at}")
+        unit = unit_of(cells, metric)
+        number = figure(best.value(metric)) if not unit else " ".join(readable_unit(best.value(metric), unit))
+        print(f"smallest {metric}: {number} at {at}")
     first = next((cell.error for cell in cells if cell.error), None)
     if first:
         print(f"first failure: {first}")

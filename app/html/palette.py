@@ -16,7 +16,11 @@ BAD: RGB = (215, 38, 38)
 GOOD: RGB = (22, 158, 100)
 BOUND: RGB = (139, 149, 161)
 GHOST: RGB = (124, 92, 230)
+AXES: tuple[RGB, ...] = ((255, 32, 96), (32, 223, 128), (32, 128, 255))
+"""The axes x, y and z: the colours of the arrows in viser's scene."""
 DAMPING: RGB = BOUND
+TARGET: RGB = (118, 152, 0)
+"""The dragged target: no robot of the catalog, level or arrow has this colour."""
 
 # Any two of these colours and BOUND differ by a CIEDE2000 of at least 10 for normal sight, deuteranopia and
 # protanopia. Each has a contrast of at least 3 on both pages. tests/app/test_app_palette.py checks this.

@@ -110,6 +110,12 @@ def readable(words: str) -> str:
     return _EXPONENT.sub(lambda found: figure(float(found[0])), _DEGREES.sub("°", words))
 
 
+def joints_named(words: str) -> str:
+    """Returns a text in which every joint has one name: "joint 1" for "joint_1", "joint1" and "q1"."""
+    return _JOINT.sub(r"joint \1", words)
+
+
+_JOINT = re.compile(r"\b(?:joint_?|q)(\d+)\b")
 _DEGREES = re.compile(r" deg\b")
 _EXPONENT = re.compile(r"-?\d+(?:\.\d+)?e[+-]\d+")
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -117,7 +123,11 @@ _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 def _power(value: float) -> str:
     mantissa, _, power = f"{value:.1e}".partition("e")  # rounds first, as the rounding may change the power
-    return f"{float(mantissa):g}·10{str(int(power)).translate(_RAISED)}"
+    return f"{float(mantissa):g}·{power_of_ten(int(power))}"
+
+
+def power_of_ten(power: int) -> str:
+    return f"10{str(power).translate(_RAISED)}"
 
 
 def free_name(wanted: str, taken: Sequence[str]) -> str:

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, final
 
 from app.link.exercise import LessonPlace
-from lessons.course import COURSE
+from lessons.course import name_of
 from lessons.own.files import is_file, is_lesson, read
 from lessons.scenes.names import ALL_SCENES
 from lessons.scenes.run_spec import RunSpec
 from robots.catalog import CATALOG
-from robots.errors import InputError, unknown_name
+from robots.errors import InputError
 
 if TYPE_CHECKING:
     from lessons.replay.state import State
@@ -66,9 +66,7 @@ class SceneChoice:
     def opening(cls, lesson: str) -> SceneChoice:
         """Returns the first step of a lesson whose file has not been read yet. Raises InputError for an
         unknown lesson."""
-        if lesson not in COURSE and not is_lesson(lesson):
-            raise unknown_name("lesson", lesson, COURSE)
-        return cls(RunSpec(""), exercise=LessonPlace(lesson))
+        return cls(RunSpec(""), exercise=LessonPlace(lesson if is_lesson(lesson) else name_of(lesson)))
 
     @classmethod
     def of_lesson(cls, exercise: LessonPlace) -> SceneChoice:

@@ -84,15 +84,18 @@ _BEGIN = """(() => {
   line.id = %(line)s;
   line.setAttribute("role", "status");
   line.setAttribute("aria-live", "polite");
-  line.style.cssText = "position:fixed;bottom:0.6em;left:50%%;transform:translateX(-50%%);z-index:5;" +
-    "max-width:min(36em,90vw);padding:0.2em 0.7em;border-radius:4px;pointer-events:none;font-size:0.85em;" +
-    "background:#222;color:#fff";
-  line.hidden = true;
+  line.style.cssText = %(look)s;
   document.body.append(line);
 })()"""
+_SHOWN = (
+    "position:fixed;bottom:0.6em;left:50%;transform:translateX(-50%);z-index:5;max-width:min(36em,90vw);"
+    "padding:0.2em 0.7em;border-radius:4px;pointer-events:none;font-size:0.85em;background:#222;color:#fff"
+)
+_ONLY_READ = "position:fixed;width:1px;height:1px;overflow:hidden;clip-path:inset(50%);white-space:nowrap"
+"""The look of the line for screen readers, which leave out what is hidden."""
 _SAY = """(() => {
   const line = document.getElementById(%s);
-  if (line) { line.textContent = %s; line.hidden = !line.textContent; }
+  if (line) line.textContent = %s;
 })()"""
 
 
@@ -118,25 +121,25 @@ class Comfort:
         """reduced: whether the user asked the browser for less motion; window: width and height of the
         browser's window, pixels, if known."""
         self._client, self._reduced, self.window = client, reduced, window
-        self.says = True
-        """Whether the line is shown."""
+        self.says = False
+        """Whether the line is on the screen. Screen readers always get it."""
         self._narration = Narration(time.monotonic)
 
     def opened(self, learner: SimulationClient) -> None:
         """Adds the line and the names for screen readers to a new scene, and pauses if the user wants less
         motion."""
         self._narration = Narration(time.monotonic)
-        private.run_script(self._client, _BEGIN % {"line": json.dumps(LINE)})
+        self._begin()
         private.run_script(self._client, _names_and_colours())
         if self._reduced:
             learner.send(Play(False))
 
     def add_switch(self, gui: viser.GuiApi) -> None:
-        """Adds the checkbox that shows or hides the line."""
+        """Adds the checkbox that shows the line on the screen."""
         switch = gui.add_checkbox(
             "Say what happens",
             self.says,
-            hint="A line below the robot, for screen readers: at most one sentence in two seconds",
+            hint="A line below the robot, at most one sentence in two seconds. Screen readers always read it",
         )
 
         @switch.on_update
@@ -144,12 +147,17 @@ class Comfort:
             if event.client is not None:
                 self.says = bool(switch.value)
                 self._show("")
+                self._begin()
 
     def follow(self, now: SessionSnapshot[SceneSettings]) -> None:
         """Shows a sentence about the events since the last call."""
         sentence = self._narration.look(facts_of(now))
-        if sentence and self.says:
+        if sentence:
             self._show(sentence)
+
+    def _begin(self) -> None:
+        look = _SHOWN if self.says else _ONLY_READ
+        private.run_script(self._client, _BEGIN % {"line": json.dumps(LINE), "look": json.dumps(look)})
 
     def _show(self, sentence: str) -> None:
         private.run_script(self._client, _SAY % (json.dumps(LINE), json.dumps(sentence)))

@@ -19,12 +19,13 @@ from app.adapter import private
 from app.client.progress import Notebook
 from app.client.simulation import Trouble
 from app.client.simulation_client import SimulationClient
-from app.html.text import block, in_trouble
+from app.html.text import block, esc, in_trouble
 from app.link.choice import SceneChoice
 from app.link.messages import Ready
 from app.page.comfort import Comfort
 from app.page.lesson_file import LessonFile
 from app.panels.widgets.command import add_command
+from lessons.course import COURSE, heading
 from lessons.own.folder import Folder
 from lessons.scenes.names import ALL_SCENES
 
@@ -43,6 +44,29 @@ CALM = 6.0  # Hz, the rate of poses, plots and texts when the robot has stood st
 STILL = 1.0  # s
 LEAST = 1 / 3
 """The smallest factor by which POSES and PLOTS are multiplied while simulated time is slowed down."""
+
+
+def lay_out(gui: viser.GuiApi) -> None:
+    """Names and places the main panel."""
+    gui.set_panel_label("himpc-lab")
+    gui.main_panel.dock_right()
+    gui.main_panel.set_width(400)
+
+
+def starting(choice: SceneChoice) -> str:
+    """Returns what a page shows until its robot is there."""
+    return block("<b>Starting the robot …</b>") + first_lesson(choice)
+
+
+def first_lesson(choice: SceneChoice) -> str:
+    """Returns the title and the question of the lesson that will be shown, or of the first lesson; "" for a
+    user's own lesson."""
+    name = COURSE[0] if choice.exercise is None else choice.exercise.lesson
+    if name not in COURSE:
+        return ""
+    title, question = heading(name)
+    title = f"Lesson {COURSE.index(name) + 1} · {title}"
+    return block(f"<b>{esc(title)}</b><br>{esc(question)}")
 
 
 class Page:
@@ -90,11 +114,9 @@ class Page:
         wide, high = self._comfort.window or (camera.image_width, camera.image_height)
         self._phone, self._narrow = wide < high, wide < max(high, NARROW)
         gui = self._client.gui
-        gui.set_panel_label("himpc-lab")
-        gui.main_panel.dock_right()
-        gui.main_panel.set_width(400)
+        lay_out(gui)
         self._theme(self._dark)
-        self._waiting = gui.add_html(block("<b>Starting the simulation …</b>"))
+        self._waiting = gui.add_html(starting(self.learner.choice))
         self._thread.start()
 
     def close(self) -> None:
@@ -205,9 +227,9 @@ class Page:
             return
         self._trouble = trouble
         self._waiting.content = (
-            block("<b>Starting the simulation …</b>")
+            starting(self.learner.choice)
             if trouble is None
-            else in_trouble(trouble.state, trouble.sentence)
+            else in_trouble(trouble.state, trouble.sentence) + first_lesson(self.learner.choice)
         )
         if self._again is None:
             self._again = self._client.gui.add_button("Start again")

@@ -151,7 +151,6 @@ class TorqueFace:
         self._hand = Hand(
             scene,
             ready,
-            context.colours,
             self._targets_now(),
             self._tip(),
             size,

@@ -21,6 +21,7 @@ class Watcher:
 
     token = ""
     attached = True
+    shows_ghosts = False
 
     def __init__(self, shown: SimulationClient, refuse: Refuse) -> None:
         """refuse: shows a sentence on the page: the reason why a command was refused."""

@@ -14,6 +14,7 @@ import viser
 from app.adapter import private
 from app.classes.words import TEACHER
 from app.link.choice import SceneChoice
+from app.page.page import lay_out, starting
 from app.server.address import LOOPBACK, address_in_use, check_address, local_url, seen_from_outside
 from app.server.classroom import Classroom
 from app.server.connection_limits import OF_A_CLASS, ConnectionLimits
@@ -22,7 +23,7 @@ from app.server.guard import ConnectionGuard
 from app.server.malloc_tuning import few_arenas, large_arrays_apart
 from app.server.passes import VARIABLE, Passes, new_key, new_token, shared
 from app.server.sessions import GRACE, Sessions
-from app.server.visit import Visit
+from app.server.visit import FIRST_TEXT, Visit
 from lessons.own.folder import Folder
 from lessons.scenes.run_spec import RunSpec
 from robots import InputError
@@ -127,6 +128,8 @@ class PageServer:
         self.outside = self.proxies[0] if self.proxies else seen_from_outside(host, self.url)
         """The address for other machines, in numbers, as phones rarely find a machine by its name."""
         self._viser.gui.configure_theme(show_share_button=False, show_logo=False)
+        lay_out(self._viser.gui)
+        self._viser.gui.add_html(f'<div id="{FIRST_TEXT}">{starting(choice)}</div>')
         self._viser.on_client_connect(self._connect)
         self._viser.on_client_disconnect(self._disconnect)
         self._class_file = class_file

@@ -40,6 +40,13 @@ if TYPE_CHECKING:  # needed for a class only, and loaded late
 
 STORAGE = 5.0
 """Time, s, within which a browser must send its stored values."""
+FIRST_TEXT = "himpc-lab-first"
+"""Identifier, in the browser's document, of the text that all browsers show before their own page."""
+_OWN_TEXT = f"""(() => {{
+  const style = document.createElement("style");
+  style.textContent = "#{FIRST_TEXT} {{ display: none }}";
+  document.head.append(style);
+}})()"""
 _TOKENS = "himpc-lab-sessions"
 _DARK = "himpc-lab-dark"
 _PROGRESS = "himpc-lab-lessons"
@@ -159,6 +166,7 @@ class Visit:
     def _admit(self, tokens: Sequence[str], kept: str | None) -> None:
         if self._left:
             return
+        private.run_script(self._client, _OWN_TEXT)
         watching, self._page = self._page, None
         if watching is not None:  # the page has only watched so far
             watching.close()
@@ -181,6 +189,7 @@ class Visit:
             return
         if room is not None and not leads and not isinstance(learner, Watcher):
             room.recognise(learner.token, tokens, self._account)
+            learner.shows_ghosts = isinstance(self._sessions, Classroom)
         if isinstance(self._sessions, Sessions) and not leads and learner.token not in tokens:
             before = place.read(kept, self._sessions.start)
             if before is not None:

@@ -13,25 +13,29 @@ import viser
 import viser.transforms as vtf
 
 from app.adapter import private
-from app.html.palette import BAD, RGB
+from app.html.palette import BAD, TARGET
+from app.html.text import quantity
 from app.link.messages import Ready, TaskView
 from app.view.coordinates import draggable, full, of_task, raw, xyzw
 from app.view.drag_target import Gap, Handle, Movable, turned
 from app.view.reachability import Question, Reachability, ReachabilityWorker
+from app.view.robot import ARROW, target_radius
 from lessons.events import MoveTarget
 from lessons.settings.torque import TorqueSettings
 
 Moved = Callable[[np.ndarray, np.ndarray | None], None]
 
-_BALL = 0.07  # m: the transparent ball is larger than most wrists and encloses them
 _FRAME = 0.09  # m
 _STILL = 1e-4  # m, and the same number of rad: about a tenth of a pixel
-_INVITATION = "drag an arrow"
+_INVITATION = "target: pull an arrow"
+_OPACITY = 0.5
+_NEAR = 2e-3
+"""Distance, m, below which the hand is at its target."""
 _OWN = 1.0
 """Time, s, after a drag during which changes of targets are attributed to this drag."""
 _PATIENCE = 0.05
 """Time, s, that a drag waits for the reachability check, which takes a millisecond for reachable targets."""
-_PAUSED, _LESSON_PAUSED = "paused: press Space or Run to continue", "paused: press P or Run this step"
+_PAUSED, _LESSON_PAUSED = "paused: press Run", "paused: press Run this step"
 Later = Callable[[float, Callable[[], None]], object]
 """Calls a function after a delay, s."""
 
@@ -40,9 +44,9 @@ class TargetGizmo:
     """The control of a target: arrows along the world's axes for a position task, rings for an orientation
     task of the same frame. The rings rotate with the target.
 
-    The ball is at the dragged position. If this position is out of reach, the ball becomes transparent and
-    red. A second ball in the task's colour, with a line to it, marks the position that the controller gets
-    instead.
+    The ball is at the dragged position, and a line leads to it from the hand. If this position is out of
+    reach, the ball becomes transparent and red. A second ball, with a line to it, marks the position that the
+    controller gets instead.
     """
 
     def __init__(
@@ -50,14 +54,14 @@ class TargetGizmo:
         scene: viser.SceneApi,
         position: TaskView,
         orientation: TaskView | None,
-        colour: RGB,
         start: np.ndarray,
         rotation: np.ndarray,
         size: float,
+        radius: float,
         moved: Moved,
     ) -> None:
-        """start (3,): initial position of the target, m; rotation (3, 3); size: of the gizmo, m; moved:
-        called with the raw position and, if rings are shown, the raw rotation."""
+        """start (3,): initial position of the target, m; rotation (3, 3); size: of the gizmo, m; radius: of
+        the ball, m; moved: called with the raw position and, if rings are shown, the raw rotation."""
         self.position, self.orientation = position, orientation
         self._rings = orientation is not None
 
@@ -78,21 +82,23 @@ class TargetGizmo:
             visible=orientation is not None,
         ).control
         self._ball = scene.add_icosphere(
-            "/target/ball", radius=_BALL, color=colour, opacity=0.8, cast_shadow=False
+            "/target/ball", radius=radius, color=TARGET, opacity=_OPACITY, cast_shadow=False
         )
         self._ghost = scene.add_icosphere(
-            "/target/ghost", radius=_BALL, color=BAD, opacity=0.45, visible=False, cast_shadow=False
+            "/target/ghost", radius=radius, color=BAD, opacity=0.45, visible=False, cast_shadow=False
         )
-        self._label = scene.add_label("/target/label", _INVITATION, position=(0.0, 0.0, size + 0.05))
+        self._label = scene.add_label("/target/label", _INVITATION, position=(0.0, 0.0, ARROW * size))
         self._said = _INVITATION
         self._invites, self._missing, self._paused = True, 0.0, ""
         self._accepted = scene.add_icosphere(
-            "/accepted", radius=_BALL, color=colour, opacity=0.6, visible=False, cast_shadow=False
+            "/accepted", radius=radius, color=TARGET, opacity=_OPACITY, visible=False, cast_shadow=False
         )
         self._then = scene.add_icosphere(
-            "/target_then", radius=_BALL, color=colour, opacity=0.8, visible=False, cast_shadow=False
+            "/target_then", radius=radius, color=TARGET, opacity=_OPACITY, visible=False, cast_shadow=False
         )
         self._gap = Gap(scene, "/gap", BAD, 0.006)
+        self._way = Gap(scene, "/way", TARGET, 0.004, _NEAR)
+        self._far = 0.0
 
     @property
     def raw(self) -> np.ndarray:
@@ -139,11 +145,19 @@ class TargetGizmo:
             self._paused = words
             self._say()
 
+    def reach_from(self, hand: np.ndarray) -> None:
+        """Draws the line from the hand (3,), m, to its target, and writes its length."""
+        target = np.array(self._accepted.position, float) if self._missing > 0.0 else self.raw
+        self._way.show(hand, target)
+        self._far = float(np.linalg.norm(target - hand))
+        self._say()
+
     def _say(self) -> None:
         if self._missing > 0.0:
             words = f"out of reach by {100 * self._missing:.0f} cm"
         else:
-            words = self._paused or (_INVITATION if self._invites else "")
+            far = f"{quantity(self._far, 'm')} to go" if self._far > _NEAR else ""
+            words = self._paused or far or (_INVITATION if self._invites else "")
         if words == self._said:
             return
         self._said = words
@@ -153,7 +167,7 @@ class TargetGizmo:
 
     def remove(self) -> None:
         """Removes the target from the scene."""
-        for node in (self._gizmo, self._accepted, self._then, self._gap):
+        for node in (self._gizmo, self._accepted, self._then, self._gap, self._way):
             node.remove()
 
     def look_back(self, then: np.ndarray | None) -> None:
@@ -161,6 +175,8 @@ class TargetGizmo:
         back = then is not None
         if self._then.visible != back:
             self._then.visible, self._gizmo.visible = back, not back
+        if back:
+            self._way.show(self.raw, self.raw)
         if then is not None:
             self._then.position = then
 
@@ -212,7 +228,6 @@ class Hand:
         self,
         scene: viser.SceneApi,
         ready: Ready,
-        colours: dict[str, RGB],
         targets: dict[str, np.ndarray],
         tip: np.ndarray,
         size: float,
@@ -247,10 +262,10 @@ class Hand:
             scene,
             position,
             orientation,
-            colours[position.level],
             self._place,
             np.eye(3) if turned is None else turned,
             size,
+            target_radius(ready.robot),
             self._moved,
         )
         self._judge = ReachabilityWorker(ready.robot, self._placed, self._judged)
@@ -372,6 +387,9 @@ class Hand:
         turned = None if gizmo.orientation is None else latest[fields[f"x_d/{gizmo.orientation.name}"]]
         position = latest[fields[f"x_d/{gizmo.position.name}"]]
         frames.desired(full(gizmo.position, position, gizmo.raw), turned)
+        hand = full(gizmo.position, latest[fields[f"x/{gizmo.position.name}"]], gizmo.raw)
+        if np.isfinite(hand).all():
+            gizmo.reach_from(hand)
         if gizmo.orientation is not None:
             name = gizmo.orientation.level
             gizmo.show_rings(any(level.name == name and level.enabled for level in settings.levels))

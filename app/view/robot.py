@@ -19,8 +19,10 @@ from robots.shapes.link_shapes import link_shapes
 _STILL = 1e-4
 """Smaller changes of a link's pose are not sent to the page; they move a link by about a tenth of a pixel.
 The number applies to the position, m, and to each component of the quaternion."""
-_ARROW = 1.2
+ARROW = 1.2
 """Length of an arrow with its head, as a multiple of the gizmo's size."""
+_SHORT = 0.4
+"""The camera looks at a shorter arm as at an arm of this length, m."""
 _OPACITY = 0.35
 
 
@@ -76,7 +78,8 @@ class RobotView:
 
 def camera_for(robot: Robot) -> tuple[np.ndarray, np.ndarray, float]:
     """Returns (position, look_at) of a camera that shows the robot well, and the length of its arm, m."""
-    points, direction, reach = _home(robot)
+    points, direction, length = _home(robot)
+    reach = max(_SHORT, length)
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     return middle + reach * direction, middle, reach
 
@@ -86,8 +89,13 @@ def gizmo_size(robot: Robot) -> float:
     return _gizmo(_home(robot)[2])
 
 
-def _gizmo(reach: float) -> float:
-    return float(np.clip(0.2 * reach, 0.12, 0.4))
+def target_radius(robot: Robot) -> float:
+    """Returns the radius of the ball that marks a target, m: 28 mm at an arm of 1.3 m."""
+    return float(np.clip(0.022 * _home(robot)[2], 0.006, 0.03))
+
+
+def _gizmo(length: float) -> float:
+    return float(np.clip(0.2 * length, 0.05, 0.4))
 
 
 def _home(robot: Robot) -> tuple[np.ndarray, np.ndarray, float]:
@@ -100,11 +108,10 @@ def _home(robot: Robot) -> tuple[np.ndarray, np.ndarray, float]:
     ends = [frame.translation for frame in data.oMf]
     points = np.vstack([np.zeros(3), joints, tip])
     length = float(np.sum(np.linalg.norm(np.diff(points[1:], axis=0), axis=1)))
-    reach = max(0.4, length)
-    planar = float(np.ptp(points[:, 2])) < 0.05 * reach
+    planar = float(np.ptp(points[:, 2])) < 0.05 * length
     direction = np.array([0.15, -0.55, 1.3]) if planar else np.array([1.0, 0.75, 0.55])
-    arrows = tip + _ARROW * _gizmo(reach) * np.eye(3)
-    return np.vstack([points, ends, arrows]), direction, reach
+    arrows = tip + ARROW * _gizmo(length) * np.eye(3)
+    return np.vstack([points, ends, arrows]), direction, length
 
 
 def aim(

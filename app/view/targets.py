@@ -12,11 +12,12 @@ from app.html.palette import BOUND, RGB
 from app.link.messages import Ready, TaskView
 from app.view.coordinates import draggable, full, of_task, xyzw
 from app.view.drag_target import Gap, Handle, Movable, turned
+from app.view.robot import target_radius
 from lessons.events import MoveTarget
 from robots import Robot
 
-_BALL = 0.035  # m
 _DISC = 0.09  # m
+_OPACITY = 0.5
 _STILL = 1e-4  # m, and the same number of rad
 _TURNING = ("orientation", "relative_orientation")
 _POINTS = ("position", "com", "pointing", "relative_position")
@@ -74,7 +75,7 @@ class _Target:
     ) -> None:
         self.name, self.task, self._robot, self._post = task.name, task, robot, post
         self._home = np.array(pin.centerOfMass(robot.model, robot.model.createData(), robot.home))
-        node = f"/targets/{task.name}"
+        node, radius = f"/targets/{task.name}", target_radius(robot)
         self._base = scene.add_frame(node, show_axes=False)
         turning, flat = task.kind in _TURNING, task.kind == "plane_distance"
         along = "xyz" if task.kind == "pointing" else "x" if flat else task.axes
@@ -83,13 +84,13 @@ class _Target:
         mark = f"{node}/control/mark"
         if flat:
             scene.add_box(
-                mark, color=colour, dimensions=(0.006, _DISC, _DISC), opacity=0.5, cast_shadow=False
+                mark, color=colour, dimensions=(0.006, _DISC, _DISC), opacity=_OPACITY, cast_shadow=False
             )
         elif not turning:
-            scene.add_icosphere(mark, radius=_BALL, color=colour, opacity=0.8, cast_shadow=False)
+            scene.add_icosphere(mark, radius=radius, color=colour, opacity=_OPACITY, cast_shadow=False)
         above = (0.65 if turning or "z" not in along else 1.0) * size + 0.04
         scene.add_label(f"{node}/control/label", task.name, position=(0.0, 0.0, above))
-        self._gap = Gap(scene, f"/gaps/{task.name}", colour, 0.005, _BALL)
+        self._gap = Gap(scene, f"/gaps/{task.name}", colour, 0.005, radius)
         self.follow(poses, task.raw, True)
 
     def _moved(self) -> None:

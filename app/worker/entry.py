@@ -14,7 +14,9 @@ def warm(say: Callable[[str], None]) -> None:
     from himpc.compilation.compiling import compile_all
 
     compile_all(
-        lambda ready, of: say(f"compiling the controllers, only this time: {ready} of {of} functions")
+        lambda ready, of: say(
+            f"compiling the controllers, only this time, for about a minute: {ready} of {of} functions"
+        )
     )
     from app.worker.main import rehearse
 

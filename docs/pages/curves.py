@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
+from app.html.curves import decades, path_through, tick_label, ticks
+
 WIDTH, HEIGHT = 640, 180
 LEFT, RIGHT, TOP, BOTTOM = 58, 8, 8, 22
 _DECADES = 300.0
@@ -46,45 +48,23 @@ def _plot(plot: Mapping[str, Any]) -> str:
         return TOP + (HEIGHT - TOP - BOTTOM) * (1.0 - share)
 
     lines = []
-    for tick in _decades(low, high) if log else ticks(low, high):
+    for tick in decades(low, high) if log else ticks(low, high):
         lines.append(f'<path class="grid" d="M{LEFT} {y(tick):.1f}H{WIDTH - RIGHT}"/>')
         lines.append(
-            f'<text x="{LEFT - 5}" y="{y(tick) + 4:.1f}" text-anchor="end">{label(tick, log)}</text>'
+            f'<text x="{LEFT - 5}" y="{y(tick) + 4:.1f}" text-anchor="end">{tick_label(tick, log)}</text>'
         )
     seconds = ticks(t[0], t[-1])
     for tick in seconds:
         unit = " s" if tick == seconds[-1] else ""
         lines.append(f'<text x="{x(tick):.1f}" y="{HEIGHT - 6}" text-anchor="middle">{tick:.4g}{unit}</text>')
     for kind, at, curve in reversed(list(zip(("own", "ghost"), times, curves, strict=False))):
-        path = _path([(x(s), y(v)) if v is not None else None for s, v in zip(at, curve, strict=True)])
+        path = path_through([(x(s), y(v)) if v is not None else None for s, v in zip(at, curve, strict=True)])
         lines.append(f'<path class="{kind}" d="{path}"/>' if path else "")
     return (
         f'<p class="what">{name}</p><svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{name}">'
         + "".join(lines)
         + "</svg>"
     )
-
-
-def label(tick: float, log: bool) -> str:
-    """Returns the text of a tick: a power of ten if that is shorter."""
-    power = round(math.log10(tick)) if log else 0
-    if -3 < power < 4:
-        return f"{tick:.4g}".replace("-", "−")
-    return "10" + str(power).translate(_RAISED)
-
-
-_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-
-
-def _path(points: Sequence[tuple[float, float] | None]) -> str:
-    parts, pen = [], "M"
-    for point in points:
-        if point is None:
-            pen = "M"
-            continue
-        parts.append(f"{pen}{point[0]:.1f} {point[1]:.1f}")
-        pen = "L"
-    return "".join(parts)
 
 
 def _values(plot: Mapping[str, Any]) -> list[float]:
@@ -97,7 +77,7 @@ def _floor_words(plot: Mapping[str, Any]) -> str:
     if not values:
         return ""
     low, _, log = _range(values, unit)
-    end = f"{label(low, log)} {unit}"
+    end = f"{tick_label(low, log)} {unit}"
     return f"Below {end} a curve is drawn at {end}." if log and min(values) < low else ""
 
 
@@ -110,18 +90,3 @@ def _range(values: Sequence[float], unit: str) -> tuple[float, float, bool]:
         return floor if low < floor else low or most, high, True
     margin = 0.05 * (high - low) or 0.5 * abs(high) or 1.0
     return (0.0 if 0 <= low < 0.5 * high else low - margin), high + margin, False
-
-
-def ticks(low: float, high: float, about: int = 4) -> list[float]:
-    """Returns round numbers between two values."""
-    raw = (high - low) / about
-    unit = 10.0 ** math.floor(math.log10(raw))
-    step = next(unit * k for k in (1, 2, 5, 10) if unit * k >= raw)
-    return [
-        round(k * step, 12) for k in range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1)
-    ]
-
-
-def _decades(low: float, high: float) -> list[float]:
-    found = [10.0**k for k in range(math.ceil(math.log10(low)), math.floor(math.log10(high)) + 1)]
-    return found[:: -(-len(found) // 5)]

@@ -39,10 +39,27 @@ COURSE: tuple[str, ...] = (
 
 
 def load_lesson(name: str) -> Lesson:
-    """Returns the lesson with this name. Raises InputError with the nearest name if there is none."""
-    if name not in COURSE:
-        raise unknown_name("lesson", name, COURSE)
-    return _read(name)
+    """Returns the lesson with this name or title. Raises InputError with the nearest name if there is
+    none."""
+    return _read(name_of(name))
+
+
+def name_of(words: str) -> str:
+    """Returns the name of the lesson with this name or title. Raises InputError with the nearest name if
+    there is none."""
+    if words in COURSE:
+        return words
+    titles = {heading(name)[0].casefold(): name for name in COURSE}
+    if words.casefold() not in titles:
+        raise unknown_name("lesson", words, COURSE)
+    return titles[words.casefold()]
+
+
+def heading(name: str) -> tuple[str, str]:
+    """Returns the title and the question of a lesson of the course. The lesson is not loaded, which needs its
+    robot."""
+    title, question, _ = lesson_file(name).read_text(encoding="utf-8").split("\n\n", 2)
+    return title.removeprefix("# "), question
 
 
 @cache

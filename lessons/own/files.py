@@ -152,10 +152,24 @@ def _beside(path: str) -> Iterator[None]:
         sys.path.remove(folder)
 
 
+def _shown(error: SyntaxError) -> str:
+    """Returns the wrong line with a caret below the place of the error, as two further lines; "" if they are
+    not known."""
+    line = (error.text or "").rstrip()
+    if not line.strip() or not error.offset:
+        return ""
+    indent = len(line) - len(line.lstrip())
+    place = max(error.offset - 1 - indent, 0)
+    return f"\n  {line.strip()[:_LONGEST_LINE]}\n  {' ' * place}^" if place < _LONGEST_LINE else ""
+
+
+_LONGEST_LINE = 100
+
+
 def sentence(path: str, error: BaseException) -> str:
     """Returns a sentence with the line of the file that raised an exception, and the exception's message."""
     if isinstance(error, SyntaxError) and error.filename == path:
-        return f"{path}, line {error.lineno}: {error.msg}"
+        return f"{path}, line {error.lineno}: {error.msg}{_shown(error)}"
     steps = traceback.walk_tb(error.__traceback__)
     lines = [line for frame, line in steps if frame.f_code.co_filename == path]
     place = f"{path}, line {lines[-1]}" if lines else path

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import pickle
+import re
 from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +15,7 @@ from app.client.decimated import BUCKETS, History
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
 from app.link.messages import Load, LoadRefused, Play, Post, Ready, ResetAll, Speed, StepTicks
+from app.panels.run.playback import headline
 from app.worker.pacing import BACKLOG, Pacer
 from app.worker.simulation import SimulationRunner
 from lessons.events import MoveLevel, MoveTarget, Reset, Set
@@ -248,3 +252,19 @@ def test_in_a_lesson_the_stack_stays() -> None:
     assert lesson.session.settings.levels == before
     assert "The stack cannot be changed in a lesson" in lesson.status().notices[0]
     lesson.close()
+
+
+def test_the_headline_is_one_quiet_line(body: SimulationRunner) -> None:
+    body.tick(2100)
+    status = replace(body.status(), over_budget=6, speed=1.0)
+
+    def told(**changes: Any) -> str:
+        return re.sub(r"<[^>]+>|&nbsp;", "", headline(replace(status, **changes), 1e-3)).replace("  ", " ")
+
+    assert told(running=True, capped=False, real_time_factor=0.98) == "Running · 2.1 s · real time"
+    assert told(running=True, capped=True, real_time_factor=0.97) == "Running · 2.1 s · real time"
+    slow = told(running=True, capped=True, real_time_factor=0.48)
+    assert slow == "Running · 2.1 s · slower than real time (0.5 ×)"
+    assert told(running=True, capped=False, real_time_factor=3.0) == "Running · 2.1 s · 3.0 × real time"
+    assert told(running=False) == "Paused · 2.100 s"
+    assert "tick 2100 at t = 2.100 s; 6 ticks over the 1 ms budget (0.3 %)" in headline(status, 1e-3)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from queue import Queue
 from types import SimpleNamespace
 from typing import Any
@@ -11,15 +13,19 @@ from unittest.mock import MagicMock
 import numpy as np
 import pytest
 
+from app.html.palette import JOINTS, LEVELS
 from app.link.choice import SceneChoice
 from app.link.messages import Post, Ready
 from app.panels.torque.start import StartPanel
 from app.view import drag
 from app.view.drag import Hand
 from app.view.reachability import Question, Reachability, ReachabilityWorker
+from app.view.robot import gizmo_size, target_radius
 from app.worker.simulation import SimulationRunner
 from lessons.events import Event, MoveTarget
 from lessons.scenes.run_spec import RunSpec
+from lessons.settings.torque import TorqueSettings
+from robots.loading.load import load_urdf_text
 from robots.reach import ReachJudge
 
 FAR = np.array([5.0, 0.0, 0.0])
@@ -36,7 +42,8 @@ class Scene:
     def __getattr__(self, _: str) -> Any:
         def add(name: str, *given: Any, **made: Any) -> Any:
             text = given[0] if given and isinstance(given[0], str) else ""
-            made = {"wxyz": np.array([1.0, 0, 0, 0]), "visible": True, "text": text, **made}
+            points = given[0] if given and isinstance(given[0], np.ndarray) else None
+            made = {"wxyz": np.array([1.0, 0, 0, 0]), "visible": True, "text": text, "points": points, **made}
             node = SimpleNamespace(**made, remove=lambda: None, on_update=self._listen)
             self.nodes[name] = node
             return node
@@ -80,11 +87,9 @@ class Held:
         self.scene: Any = Scene()
         self.targets = {task.name: task.raw for task in ready.tasks if task.raw is not None}
         self.start = self.targets["position"]
-        colours = {task.level: (1, 2, 3) for task in ready.tasks}
         self.hand = Hand(
             self.scene,
             ready,
-            colours,
             self.targets,
             TIP,
             0.2,
@@ -253,3 +258,35 @@ def test_keys_too_keep_the_target_within_reach(held: Callable[[bool], Held]) -> 
     assert one.take() == {}
     one.judge.place(one.judge.asked[-1], 0.1 * FAR)
     assert one.take()["position"] == (0.5, 0.0, 0.0)
+
+
+def test_a_line_with_its_length_leads_from_the_hand_to_a_small_target(
+    held: Callable[[bool], Held], ready: Ready
+) -> None:
+    one = held(False)
+    ball, line, label = (one.scene.nodes[name] for name in ("/target/ball", "/way", "/target/label"))
+    assert 0.025 <= ball.radius <= 0.03 and ball.opacity <= 0.5 and ball.color not in (*LEVELS, *JOINTS)
+    settings, row = ready.settings, np.full(ready.layout.size, np.nan)
+    assert isinstance(settings, TorqueSettings)
+    for hand, words in (
+        (one.start - [0.0, 0.123, 0.0], "123 mm to go"),
+        (one.start, "target: pull an arrow"),
+    ):
+        row[ready.layout.fields["x/position"]] = hand
+        one.hand.show(MagicMock(), settings, row, ready.layout.fields, running=True)
+        assert label.text == words
+        assert line.visible == ("to go" in words)
+    one.hand.show(MagicMock(), settings, row, ready.layout.fields, running=False)
+    assert label.text.startswith("paused")
+
+
+def test_target_and_arrows_have_the_size_of_the_robot() -> None:
+    text = Path("lessons/course/lamp.urdf").read_text()
+    lamp = load_urdf_text(text)
+    small = load_urdf_text(re.sub(r'(?<=origin xyz=")[^"]+', lambda found: halved(found[0]), text))
+    assert gizmo_size(small) == pytest.approx(0.5 * gizmo_size(lamp), rel=1e-6)
+    assert 0.006 < target_radius(small) < target_radius(lamp) <= 0.03
+
+
+def halved(numbers: str) -> str:
+    return " ".join(str(0.5 * float(number)) for number in numbers.split())

@@ -14,6 +14,7 @@ import pytest
 
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
+from app.link.exercise import LessonPlace
 from app.link.forkserver import ForkServer
 from app.link.messages import Lead, Load, Play, Post, ResetAll, Script, WaitAt
 from app.link.process import wait_until
@@ -233,3 +234,29 @@ def test_a_button_that_starts_a_process_does_not_hold_up_other_pages(monkeypatch
     finally:
         server.close()
     assert waits == [False]
+
+
+@pytest.mark.usefixtures("one_fork_server")
+@pytest.mark.parametrize("in_class", [False, True])
+def test_a_step_shows_its_ghost_until_it_is_hidden(in_class: bool) -> None:
+    """In a class, whose robots share one computer, a learner starts the ghost with the same checkbox."""
+    place = LessonPlace("a-redundant-arm", 2)
+    names = False if in_class else None
+    server = PageServer(SceneChoice.of_lesson(place), port=0, max_sessions=1, class_names=names)
+    try:
+        with Wire(server.guest_link) as page:
+            assert eventually(lambda: page.find("Ghost in the scene") is not None, LONG)
+            (learner,) = server.sessions.learners
+            switch = str(page.find("Ghost in the scene"))
+            assert eventually(lambda: learner.lecture is not None, LONG)
+            assert page.controls[switch]["value"] is not in_class
+            if in_class:
+                assert learner.ghost is None
+                page.write(switch, value=True)
+            assert eventually(lambda: "/ghost/label" in page.nodes, LONG)
+            ghost = learner.ghost
+            assert ghost is not None and ghost.words == "orientation kept"
+            page.write(switch, value=False)
+            assert eventually(lambda: learner.ghost is None and "/ghost" not in page.nodes, LONG)
+    finally:
+        server.close()

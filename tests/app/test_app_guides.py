@@ -51,7 +51,7 @@ def enabled(levels: Sequence[Level]) -> dict[str, int]:
     ("scene", "change"), [*((name, "") for name in SCENES), *(("iiwa14-hold", each) for each in CHANGES)]
 )
 def test_levels_are_named_where_they_are(scene: str, change: str) -> None:
-    """The guide names all enabled levels with their names and numbers; the ball has the colour of its
+    """The guide names all enabled levels with their names and numbers, and the colour of the dragged
     level."""
     tasks, levels = opened(scene, change)
     colours = level_colours([level.name for level in levels])
@@ -63,14 +63,14 @@ def test_levels_are_named_where_they_are(scene: str, change: str) -> None:
     if "position.enabled" not in change:
         assert told(first) == enabled(levels)
         own = next(level for level in levels if any(task.name == position.name for task in level.tasks))
-        assert f"the task of <b>{spoken(own.name)}</b>" in first and css(colours[own.name]) in first
+        assert f"<b>{spoken(own.name)}</b>" in first and css(colours[own.name]) in first
     else:
         assert "switched off" in first
     then = told(guide(tasks, levels, colours, dragged=True))
     assert then.items() <= enabled(levels).items() and len(then) == 2
     # The guide names no level of another scene, and no other numbers than those of levels.
     rest = re.sub(r"<b>[^<]+</b> \(level \d+\)|<[^>]+>", "", first)
-    assert "level" not in rest.replace("The ball's level", "")
+    assert "level" not in rest.replace("Its level", "")
     assert scene != "planar3-plane" or told(first) == {"reach": 1, "pose": 2, "wrist": 3}
 
 

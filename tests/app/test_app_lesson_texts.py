@@ -6,6 +6,7 @@ import asyncio
 import math
 import re
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from unittest.mock import MagicMock
 
 import numpy as np
@@ -14,15 +15,17 @@ import pytest
 from app.client.progress import Notebook
 from app.html.glossary import explained, words
 from app.html.markdown import rendered, rendered_line
-from app.html.text import figure, readable
+from app.html.palette import GHOST
+from app.html.text import figure, joints_named, readable
 from app.link.exercise import Lecture, LessonPlace, SignalCurve
-from app.panels.lesson.drawing import Bound, chart, scale, sketch
+from app.panels.lesson.claims import pictures, state
+from app.panels.lesson.drawing import TRUTH, Bound, Line, chart, scale, sketch
 from app.panels.lesson.prediction import Asking
 from app.panels.widgets.controls import STEPS, place_of, value_at
 from himpc.tasks import KINDS
 from lessons.course import COURSE, load_lesson
 from lessons.replay.progress import LearnerProgress, progress_from
-from lessons.teaching.prediction import PredictionResult, Value
+from lessons.teaching.prediction import Choice, PredictionResult, Value
 
 CALLED = {
     "com": "centre of mass",
@@ -105,10 +108,62 @@ def test_pictures_show_numbers_for_people_and_survive_bad_ones() -> None:
     assert "your guess 5 mm" in drawn and "measured 16 mm" in drawn
     assert "measured" not in scale(0.1, 100.0, 5.0, math.nan, 1.5, "mm")
     curve = SignalCurve(np.array([0.0, 0.5, 1.0]), np.array([math.nan, math.inf, 3.0]))
-    assert "nan" not in chart("error", "mm", curve, curve, [Bound(1.0, "<b>")], 1.0)
+    lines, bounds = [Line("robot", TRUTH, curve), Line("<i>", GHOST, curve)], [Bound(1.0, "≤ 1 mm", "<b>")]
+    drawn = chart("error", "mm", lines, bounds, [(0.5, "push")], 1.0, 220)
+    assert "nan" not in drawn and "<b>" not in drawn and "<i>" not in drawn and ">≤ 1 mm<" in drawn
     nothing = SignalCurve(np.array([0.0]), np.array([math.nan]))
-    assert chart("error", "mm", nothing, None, [], 1.0) == ""
+    assert chart("error", "mm", [Line("", TRUTH, nothing)], [], [], 1.0, 220) == ""
     assert "measured" in sketch(0.0, 6.0, 1.2, [(0.0, 1.0), (1.2, 2.0)], curve, "mm")
+
+
+def graded(prediction: Value | Choice, answer: float, truth: float) -> Lecture:
+    """Returns the state after a run that measured `truth`."""
+    return Lecture(
+        exercise=LessonPlace("one-task"),
+        phase="done",
+        attempt=1,
+        t=1.0,
+        duration=1.0,
+        answer=answer,
+        truth=truth,
+        grade=PredictionResult(float(bool(prediction.hits(answer, truth))), "It was so."),
+    )
+
+
+def test_the_options_are_the_buttons_and_say_what_was_right() -> None:
+    prediction = load_lesson("a-redundant-arm").steps[0].prediction
+    assert isinstance(prediction, Choice)
+    said: list[object] = []
+    gui = MagicMock()
+    options = [MagicMock(disabled=False) for _ in prediction.options]
+    gui.add_button.side_effect = options
+    asking = Asking(gui, prediction, said.append)
+    labels = [call.args[0] for call in gui.add_button.call_args_list]
+    assert labels == ["A   one or two", "B   three or four", "C   five or more"]
+    with ThreadPoolExecutor(1) as elsewhere:
+        elsewhere.submit(lambda: asyncio.run(options[0].on_click.call_args.args[0](None))).result()
+    assert said == [0] and options[0].label == "A   one or two   (your answer)"
+
+    asking.show(graded(prediction, 0, 7.0))
+    assert [each.label for each in options] == [
+        "A   one or two   (✗ your answer)",
+        "B   three or four",
+        "C   five or more   (✓ measured)",
+    ]
+    assert all(each.disabled for each in options)
+    asking.show(graded(prediction, 2, 7.0))
+    assert options[2].label == "C   five or more   (✓ your answer)"
+
+
+def test_a_claim_has_no_verdict_before_the_run_has_ended() -> None:
+    part = load_lesson("a-redundant-arm").steps[0]
+    lecture = Lecture(
+        LessonPlace("a-redundant-arm"), "running", 1, 0.5, 2.0, values=(5.0, math.nan, 1.0),
+        holds=(False, None, True),
+    )  # fmt: skip
+    running, done = (state(part, replace(lecture, phase=phase), None) for phase in ("running", "done"))
+    assert "so far</b> 5, must be ≥ 7" in running and ">false<" not in running and "✗" not in running
+    assert ">false<" in done and "✗" in done and "so far" not in done
 
 
 def test_a_guess_that_came_too_late_is_not_drawn() -> None:
@@ -120,25 +175,32 @@ def test_a_guess_that_came_too_late_is_not_drawn() -> None:
         if isinstance(each.prediction, Value)
     )
     gui = MagicMock()
-    picture, _ = gui.add_html.side_effect = [MagicMock(), MagicMock()]
+    picture, *_ = gui.add_html.side_effect = [MagicMock() for _ in range(3)]
     asking = Asking(gui, prediction, lambda _: None)
     slider = gui.add_slider.return_value
     slider.value = STEPS
     with ThreadPoolExecutor(1) as elsewhere:  # the browser of other tests has an event loop on this thread
         elsewhere.submit(lambda: asyncio.run(slider.on_update.call_args.args[0](None))).result()
     assert figure(prediction.high, prediction.measure.unit) in picture.content
-    graded = prediction.low * 2
-    asking.show(
-        Lecture(
-            exercise=LessonPlace("one-task"),
-            phase="done",
-            attempt=1,
-            t=1.0,
-            duration=1.0,
-            answer=graded,
-            truth=graded,
-            grade=PredictionResult(1.0, "Right."),
-        )
-    )
+    kept = prediction.low * 2
+    asking.show(graded(prediction, kept, kept))
     guess = re.findall(r">your guess ([^<]*)", picture.content)
-    assert guess == [figure(graded, prediction.measure.unit)]
+    assert guess == [figure(kept, prediction.measure.unit)]
+
+
+def test_a_joint_has_one_name() -> None:
+    assert joints_named("error of q1 and joint_2, joint3 of joint 4") == (
+        "error of joint 1 and joint 2, joint 3 of joint 4"
+    )
+    assert joints_named("panda_joint1, q, joint") == "panda_joint1, q, joint"
+    part = next(
+        step for step in load_lesson("two-tasks").steps if any("q1" in each.name for each in step.plots)
+    )
+    curve = SignalCurve(np.array([0.0, 1.0]), np.array([1.0, 2.0]))
+    lecture = Lecture(LessonPlace("two-tasks"), "done", 1, 1.0, 1.0, curves=(curve,) * len(part.plots))
+    drawn = pictures(part, lecture)
+    assert "error of joint 1" in drawn and "q1" not in drawn
+    claims = load_lesson("a-redundant-arm").steps[0].claims
+    assert f"≥ {claims[0].bound:g}" in pictures(
+        load_lesson("a-redundant-arm").steps[0], replace(lecture, curves=(curve,) * 3)
+    ), "the predicted number of joints is plotted, with its bound"

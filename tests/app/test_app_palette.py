@@ -26,6 +26,7 @@ from app.html.palette import (
     LEVELS,
     LIGHT_PAGE,
     RGB,
+    TARGET,
     button,
     contrast,
     ink,
@@ -79,12 +80,12 @@ def test_the_check_finds_the_pairs_that_looked_alike() -> None:
 
 
 @pytest.mark.parametrize("page", [LIGHT_PAGE, DARK_PAGE])
-@pytest.mark.parametrize("colour", [*LEVELS, *JOINTS, BAD, GOOD, GHOST, BOUND])
+@pytest.mark.parametrize("colour", [*LEVELS, *JOINTS, BAD, GOOD, GHOST, BOUND, TARGET])
 def test_curves_and_marks_stand_out_from_the_page(colour: RGB, page: RGB) -> None:
     assert contrast(colour, page) >= 3.0
 
 
-@pytest.mark.parametrize("colour", [*LEVELS, *JOINTS, BAD, GOOD, GHOST, BOUND])
+@pytest.mark.parametrize("colour", [*LEVELS, *JOINTS, BAD, GOOD, GHOST, BOUND, TARGET])
 def test_text_in_a_colour_can_be_read_on_both_pages(colour: RGB) -> None:
     found = [tuple(map(int, rgb)) for rgb in re.findall(r"rgba\((\d+),(\d+),(\d+),1\)", ink(colour))]
     assert ink(colour).startswith("light-dark(")

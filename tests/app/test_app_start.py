@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import asyncio
 import subprocess
 import sys
+import threading
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from app.client.simulation import trouble_of
 from app.link.choice import SceneChoice
+from app.link.exercise import LessonPlace
 from app.link.process import Process
+from app.server.server import PageServer
+from app.server.visit import FIRST_TEXT, Visit
+from browsing.wire import Wire, eventually
+from lessons.course import COURSE, heading, load_lesson
 from lessons.scenes.run_spec import RunSpec
 from robots import InputError
 
@@ -43,7 +51,7 @@ from browsing.wire import Wire, eventually
 running = PageServer(SceneChoice(RunSpec("{scene}")), port=0, class_names={named})
 try:
     with Wire(running.guest_link) as page:
-        assert eventually(lambda: page.shows("RUNNING"), 110.0)
+        assert eventually(lambda: page.shows("Running"), 110.0)
     print(*sorted({"numba", "matplotlib"} & set(sys.modules)))
 finally:
     running.close()
@@ -107,10 +115,58 @@ class Unborn(Process):
 
     @property
     def preparing(self) -> str:
-        return "compiling the controllers, only this time: 3 of 40 functions"
+        return "compiling the controllers, only this time, for about a minute: 3 of 40 functions"
 
 
 def test_a_page_says_at_once_what_is_compiled() -> None:
     trouble = trouble_of(Unborn(), loading=False, quiet=0.1)
     assert trouble is not None and trouble.offer is None
-    assert "3 of 40 functions" in trouble.sentence
+    assert "about a minute: 3 of 40 functions, 0 s so far" in trouble.sentence
+
+
+class First(Wire):
+    """A browser that keeps the scripts and the labels of the panel that it was sent."""
+
+    def __init__(self, url: str) -> None:
+        self.scripts: list[str] = []
+        self.labels: list[str] = []
+        super().__init__(url)
+
+    def _take(self, message: dict[str, Any]) -> None:
+        if message["type"] == "RunJavascriptMessage":
+            self.scripts.append(message["source"])
+        if message["type"] == "SetGuiPanelLabelMessage":
+            self.labels.append(message["label"])
+        super()._take(message)
+
+
+def test_the_first_frame_is_the_labs_own_and_goes_when_the_page_is_there(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A browser gets the lab's panel before its visit begins: what all browsers get, not only this one."""
+    arrive, wait = Visit.arrive, threading.Event()
+
+    async def late(visit: Visit) -> None:
+        await asyncio.to_thread(wait.wait, 40.0)
+        await arrive(visit)
+
+    monkeypatch.setattr(Visit, "arrive", late)
+    running = PageServer(SceneChoice.opening("two-tasks"), port=0)
+    try:
+        with First(running.link) as page:
+            assert eventually(lambda: page.shows("Starting the robot …"))
+            assert page.shows("<b>Lesson 4 · Two tasks, one arm</b>") and "himpc-lab" in page.labels
+            assert not any(FIRST_TEXT in each for each in page.scripts)
+            wait.set()
+            assert eventually(lambda: any(FIRST_TEXT in each for each in page.scripts), 60.0)
+    finally:
+        wait.set()
+        running.close()
+
+
+def test_a_lesson_opens_by_its_title() -> None:
+    for words in ("A redundant arm", "a redundant ARM", "a-redundant-arm"):
+        assert SceneChoice.opening(words).exercise == LessonPlace("a-redundant-arm")
+    assert {heading(name) for name in COURSE} == {
+        (card.title, card.question) for card in (load_lesson(name).card for name in COURSE)
+    }

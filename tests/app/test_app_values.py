@@ -77,7 +77,7 @@ def assert_is_alive(page: Wire, learner: Any, runs: bool) -> None:
     playback = page.find("Playback")
     assert playback is not None
     page.write(playback, value="Step")
-    assert eventually(lambda: page.shows("PAUSED"))
+    assert eventually(lambda: page.shows("Paused"))
     if runs:
         assert eventually(lambda: learner.status.ticks != before)
     speed = page.find("Speed")

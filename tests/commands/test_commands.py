@@ -167,8 +167,9 @@ def test_run_writes_files(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> 
 def test_run_shows_a_table(capfd: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "planar3-hold", "--duration", "0.05"]) == 0
     out = capfd.readouterr().out
-    for word in ("position", "posture", "RMSE", "unsolved 0", "real time", "completed"):
+    for word in ("position", "posture", "RMSE", "unsolved 0", "real time", "completed", "mm", "0.00"):
         assert word in out
+    assert not re.search(r"e-\d|-0\b", re.sub(r"residual \S+", "", out)), "rounding errors are no results"
 
 
 def test_disabled_levels_and_many_sets_go_together(capfd: pytest.CaptureFixture[str]) -> None:

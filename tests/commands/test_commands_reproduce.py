@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -118,6 +119,7 @@ def test_a_sweep_without_a_folder_has_one_of_its_own(
         said = capsys.readouterr()
         assert f"2 cells, {held} of them already in out/sweeps/planar3-circle-Q-" in said.err
         assert "results: out/sweeps/planar3-circle-Q-" in said.out
+        assert re.search(r"smallest tasks\.position\.rmse: [\d.]+ mm at Q = ", said.out)
     folders = list((tmp_path / "out" / "sweeps").iterdir())
     assert len(folders) == 2 and all((each / "results.json").exists() for each in folders)
 

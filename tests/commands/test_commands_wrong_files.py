@@ -189,10 +189,10 @@ def test_a_wrong_file_is_a_sentence(
     # None of these files harms the process that loads it; the tests below have files that do.
     monkeypatch.setattr(judge, "isolated", lambda function, source, **_: function(source))
     assert main(LINES[kind]) == 2
-    said = capsys.readouterr().err.strip()
+    said, *shown = capsys.readouterr().err.strip().split("\n")
     assert words in said
     assert name in said
-    assert "\n" not in said
+    assert not shown or (len(shown) == 2 and shown[1].endswith("^")), "a wrong line, with a caret below"
 
 
 @pytest.mark.parametrize("kind", ["scene", "task"])

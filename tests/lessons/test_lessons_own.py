@@ -98,7 +98,10 @@ FAULTS = {
     "no text": (b"\xff\xfe\x00torque", "UTF-8"),
     "empty": ("", "defines neither"),
     "two things": ("TASK = 1\nSCENE = 2\n", "defines a scene and a task"),
-    "syntax": ("def torque(now)\n    return 1\n", r"mine.py, line 1: expected ':'"),
+    "syntax": (
+        "def torque(now)\n    return 1\n",
+        r"mine.py, line 1: expected ':'\n  def torque\(now\)\n {17}\^",
+    ),
     "indentation": ("def torque(now):\nreturn 1\n", r"mine.py, line 2"),
     "missing name at import": ("x = nothing\n", r"mine.py, line 1: NameError"),
     "missing module": ("import no_such_module\n", r"mine.py, line 1: ModuleNotFoundError"),
@@ -156,8 +159,9 @@ def test_own_controller_that_is_wrong_is_one_sentence(what: str, tmp_path: Path)
     with pytest.raises(InputError, match=words) as caught:
         run(prepared(load_scene("planar3-hold"), str(path), ()), 0.05)
     said = str(caught.value)
-    assert str(path) in said
-    assert "\n" not in said
+    sentence, *shown = said.split("\n")
+    assert str(path) in sentence
+    assert not shown or (len(shown) == 2 and shown[1].endswith("^")), "a wrong line, with a caret below"
 
 
 def test_own_call_may_wait_for_a_core_but_not_sleep(file, monkeypatch) -> None:

@@ -6,13 +6,25 @@ import math
 
 from app.html.glossary import STYLE
 from app.html.markdown import rendered, rendered_line
-from app.html.palette import BAD, BOUND, GOOD, LEVELS, RGB, css, ink, on
-from app.html.text import badge, bar, block, esc, figure
-from app.link.exercise import Lecture, LessonPlace, SignalCurve, parts_of, signals_of
-from app.panels.lesson.drawing import Bound, chart
+from app.html.palette import BAD, BOUND, GHOST, GOOD, LEVELS, RGB, css, ink, on
+from app.html.text import badge, bar, block, esc, figure, joints_named
+from app.link.exercise import Lecture, LessonPlace, parts_of, signals_of
+from app.panels.lesson.drawing import TRUTH, Bound, Line, chart
 from lessons.course import COURSE
+from lessons.events import (
+    Appear,
+    InsertTask,
+    MoveLevel,
+    MoveTarget,
+    Push,
+    Release,
+    RemoveTask,
+    Reset,
+    Set,
+)
 from lessons.teaching.challenge import Challenge
 from lessons.teaching.claim import Claim
+from lessons.teaching.control import Script
 from lessons.teaching.lesson import Step
 from lessons.teaching.measure import Signal
 
@@ -42,7 +54,7 @@ def idea(part: Part, opened: bool) -> str:
     """Returns the text of the idea; it is folded after the run, so that the results come first."""
     words = rendered(part.text)
     if isinstance(part, Step) and part.ghost is not None:
-        words += f'<p style="opacity:0.8">Ghost, the dashed grey curve: <b>{esc(part.ghost.words)}</b>.</p>'
+        words += f'<p style="opacity:0.8">Ghost, violet and dashed: <b>{esc(part.ghost.words)}</b>.</p>'
     title = "The task" if isinstance(part, Challenge) else "The idea"
     return block(f"<details{' open' if opened else ''}><summary><b>{title}</b></summary>{words}</details>")
 
@@ -60,13 +72,18 @@ def state(part: Part, lecture: Lecture, best: float | None) -> str:
     return html
 
 
-def after(part: Part, lecture: Lecture) -> str:
-    """Returns the explanation of the result, and what to do now."""
+def why(part: Part) -> str:
+    """Returns the explanation of the result."""
     if isinstance(part, Challenge):
         return ""
-    return block(
-        f"<b>Why</b>{rendered(part.why)}", f"border-left:3px solid {css(LEVELS[2])};margin:0.3em 0"
-    ) + block(f'<b>Now you:</b> {rendered_line(part.do)}<div style="opacity:0.75">{_free(lecture)}</div>')
+    return block(f"<b>Why</b>{rendered(part.why)}", f"border-left:3px solid {css(LEVELS[2])};margin:0.3em 0")
+
+
+def now_you(part: Part, lecture: Lecture) -> str:
+    """Returns what the learner can do now."""
+    if isinstance(part, Challenge):
+        return ""
+    return block(f'<b>Now you:</b> {rendered_line(part.do)}<div style="opacity:0.75">{_free(lecture)}</div>')
 
 
 def _free(lecture: Lecture) -> str:
@@ -111,8 +128,8 @@ def _claim(claim: Claim, place: int, lecture: Lecture) -> str:
     holds = lecture.holds[place] if place < len(lecture.holds) else None
     value = lecture.values[place] if place < len(lecture.values) else math.nan
     sign, word, colour = _SIGNS[holds]
-    if lecture.phase == "running" and holds is not None:
-        word += " so far"
+    if lecture.phase == "running" and holds is not None:  # more of the run may turn it around
+        sign, word, colour = "…", "so far", BOUND
     unit = claim.measure.unit
     measured = (
         ""
@@ -149,29 +166,53 @@ def _points(challenge: Challenge, lecture: Lecture, best: float | None) -> str:
 
 
 def pictures(part: Part, lecture: Lecture) -> str:
-    """Returns the signals of the step, plotted over the run."""
+    """Returns the signals of the step, plotted over the run: the predicted one first, and large."""
     if not lecture.curves:
-        return block("The curves of the run appear here: run this step (key P) to see them.")
+        return block("The curves of the run appear here: run this step to see them.")
     claims = part.goals if isinstance(part, Challenge) else part.claims
+    ghost = part.ghost.words if isinstance(part, Step) and part.ghost is not None else ""
+    signals = signals_of(part)
+    asked = part.prediction.measure.signal if isinstance(part, Step) and part.prediction is not None else None
+    marks = _happenings(part.events)
     drawn = ""
-    for k, signal in enumerate(signals_of(part)):
-        ghost = lecture.ghosts[k] if k < len(lecture.ghosts) else None
+    for k in sorted(range(len(signals)), key=lambda k: signals[k] != asked):
+        own = lecture.curves[k]
+        beside = lecture.ghosts[k] if k < len(lecture.ghosts) and len(lecture.ghosts[k].t) else None
+        lines = [Line("robot" if beside is not None else "", TRUTH, own)]
+        if beside is not None:
+            lines.append(Line(f"ghost: {ghost}", GHOST, beside, "5 4"))
         drawn += chart(
-            signal.words,
-            _unit(signal),
-            lecture.curves[k],
-            _whole(ghost),
-            _bounds(claims, signal),
+            joints_named(signals[k].words),
+            _unit(signals[k]),
+            lines,
+            _bounds(claims, signals[k]),
+            [(t, "" if drawn else words) for t, words in marks],  # the first chart says what happens
             part.duration,
+            _SMALL if drawn else _LARGE,
         )
-    legend = "measured"
-    if lecture.ghosts:
-        legend += ", dashed grey: the ghost"
-    return block(f'{drawn}<div style="opacity:0.7">Blue: {legend}; green dots: the bound of a claim.</div>')
+    return block(drawn)
 
 
-def _whole(curve: SignalCurve | None) -> SignalCurve | None:
-    return curve if curve is not None and len(curve.t) else None
+_LARGE, _SMALL = 220, 140
+_WORDS: dict[type, str] = {
+    MoveTarget: "target moves",
+    Push: "push",
+    Set: "setting changes",
+    MoveLevel: "order changes",
+    Release: "release",
+    InsertTask: "new task",
+    RemoveTask: "task removed",
+    Appear: "obstacle appears",
+    Reset: "reset",
+}
+
+
+def _happenings(script: Script) -> list[tuple[float, str]]:
+    """Returns the times of a script, s, with what happens."""
+    found: dict[float, list[str]] = {}
+    for t, event in script:
+        found.setdefault(t, []).append(_WORDS[type(event)])
+    return [(t, ", ".join(dict.fromkeys(words))) for t, words in found.items()]
 
 
 def _unit(signal: Signal) -> str:
@@ -181,7 +222,13 @@ def _unit(signal: Signal) -> str:
 def _bounds(claims: tuple[Claim, ...], signal: Signal) -> list[Bound]:
     """Returns the bounds in claims about the largest or the last value of the signal itself."""
     return [
-        Bound(claim.bound, claim.text)
+        Bound(
+            claim.bound,
+            f"{_RELATIONS[claim.relation]} {figure(claim.bound, claim.measure.unit)}",
+            claim.text,
+            claim.measure.after,
+            claim.measure.until,
+        )
         for claim in claims
         if claim.measure.signal == signal
         and not claim.measure.over_ghost

@@ -9,11 +9,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from app.html.palette import BOUND, GOOD, LEVELS, RGB, css, ink
+from app.html.curves import decades, path_through, tick_label, ticks
+from app.html.palette import BOUND, DARK_PAGE, GOOD, LEVELS, LIGHT_PAGE, RGB, css, ink
 from app.html.text import esc, figure
 from app.link.exercise import SignalCurve
 
 _W = 360  # width of every picture in its own units; a picture is scaled to the panel
+_WIDE, _LINE = 6.2, 12.0  # width of a letter and height of a line
+_PAGE = f"light-dark({css(LIGHT_PAGE)},{css(DARK_PAGE)})"
 GUESS, TRUTH = LEVELS[0], LEVELS[1]
 
 
@@ -43,44 +46,72 @@ def scale(low: float, high: float, guess: float | None, truth: float | None, fac
 
 
 @dataclass(frozen=True)
+class Line:
+    """A curve of a chart. name: what is written at its end; "" for nothing."""
+
+    name: str
+    colour: RGB
+    curve: SignalCurve
+    dashes: str = "none"
+
+
+@dataclass(frozen=True)
 class Bound:
-    """A horizontal reference line for a curve, in the curve's unit."""
+    """A horizontal line in a chart, in the unit of its curves.
+
+    Attributes:
+        value: its height.
+        label: what is written at its right end.
+        words: its explanation.
+        after, until: the part of the run for which it holds, s.
+    """
 
     value: float
+    label: str
     words: str
+    after: float = 0.0
+    until: float = math.inf
 
 
 def chart(
     words: str,
     unit: str,
-    curve: SignalCurve,
-    ghost: SignalCurve | None,
+    lines: Sequence[Line],
     bounds: Sequence[Bound],
+    marks: Sequence[tuple[float, str]],
     until: float,
+    height: int,
 ) -> str:
-    """Returns the chart of a signal over the run, with the ghost's curve (dashed) and reference lines
-    (dotted)."""
-    shown = [curve.values, *([ghost.values] if ghost is not None else [])]
-    values = np.concatenate([each[np.isfinite(each)] for each in shown])
+    """Returns the chart of a signal over the run; "" if there is nothing to draw. The last line is drawn
+    first.
+
+    Args:
+        words, unit: the title.
+        lines: the curves.
+        bounds: horizontal lines.
+        marks: times, s, at which something happens, and what happens.
+        until: the end of the time axis, s.
+        height: of the chart, in units of which `_W` are the width.
+    """
+    values = np.concatenate([line.curve.values[np.isfinite(line.curve.values)] for line in lines])
     if not values.size:
         return ""
-    marks = [bound.value for bound in bounds if math.isfinite(bound.value)]
-    axis = _axis(values, marks)
-    frame = _Frame(axis, until, height=92, top=18, left=54)
+    bounds = [bound for bound in bounds if math.isfinite(bound.value)]
+    axis = _axis(values, [bound.value for bound in bounds])
+    frame = _Frame(axis, until, height, top=34 if any(words for _, words in marks) else 22, left=40)
     log = " · logarithmic" if axis[2] else ""
-    parts = [
-        _text(frame.left, 11, f"{words}{f' [{unit}]' if unit else ''}{log}", bold=True),
-        *frame.axes(_end(axis, 0), _end(axis, 1)),
-    ]
-    for value, bound in zip(marks, bounds, strict=False):
-        y = frame.y(value)
+    parts = [_text(0, 14, f"{words}{f' [{unit}]' if unit else ''}{log}", bold=True), *frame.axes()]
+    parts += frame.marks(marks)
+    for bound in bounds:
+        y, left, right = frame.y(bound.value), frame.x(bound.after), frame.x(min(bound.until, until))
         parts.append(
-            f'<line x1="{frame.left}" x2="{_W - 6}" y1="{y:.1f}" y2="{y:.1f}" stroke="{css(GOOD)}" '
+            f'<line x1="{left:.1f}" x2="{right:.1f}" y1="{y:.1f}" y2="{y:.1f}" stroke="{css(GOOD)}" '
             f'stroke-width="1.5" stroke-dasharray="2 3"><title>{esc(bound.words)}</title></line>'
         )
-    if ghost is not None:
-        parts.append(frame.line(ghost, BOUND, "5 4"))
-    return _svg(frame.height, [*parts, frame.line(curve, TRUTH)], f"{words} over time")
+    parts += [frame.line(line.curve, line.colour, line.dashes) for line in reversed(lines)]
+    named = [(frame.y(bound.value) - 4, bound.label, GOOD) for bound in bounds]
+    named += [(frame.end(line.curve) - 5, line.name, line.colour) for line in lines if line.name]
+    return _svg(height, [*parts, *frame.names(named)], f"{words} over time")
 
 
 def sketch(
@@ -92,10 +123,11 @@ def sketch(
     unit: str,
 ) -> str:
     """Returns the curve that the learner draws, with the measured curve over it."""
-    frame = _Frame((low, high, False), until, height=130, top=16, left=40)
+    frame = _Frame((low, high, False), until, height=150, top=18, left=40)
     times, values = (np.array(column, float) for column in zip(*points, strict=True))
     parts = [
-        *frame.axes(figure(low), figure(high, unit)),
+        *frame.axes(),
+        _text(0, 11, f"[{unit}]" if unit else "", bold=True),
         _text(frame.left, 11, "your sketch", GUESS, bold=True),
         frame.line(SignalCurve(times, values), GUESS, "6 3"),
         *(
@@ -131,29 +163,71 @@ class _Frame(NamedTuple):
         low, high, log = self.axis
         value = math.log10(max(value, 10.0 ** (low - 1))) if log else value
         share = (value - low) / (high - low)
-        return self.height - 14 - (self.height - 14 - self.top) * min(max(share, 0.0), 1.0)
+        return self._floor - (self._floor - self.top) * min(max(share, 0.0), 1.0)
 
-    def axes(self, low: str, high: str) -> list[str]:
-        """Returns the axes, with the labels of their ends."""
-        corner = f"M{self.left} {self.top}V{self.height - 14}H{_W - 6}"
-        return [
-            f'<path d="{corner}" stroke="{css(BOUND)}" fill="none"/>',
-            _text(self.left - 4, self.height - 12, low, anchor="end"),
-            _text(self.left - 4, self.top + 8, high, anchor="end"),
-            _text(_W - 6, self.height - 2, f"{self.until:g} s", anchor="end"),
+    @property
+    def _floor(self) -> float:
+        return self.height - 16
+
+    def axes(self) -> list[str]:
+        """Returns the two axes with their ticks, and a light grid."""
+        low, high, log = self.axis
+        levels = decades(10.0**low, 10.0**high) if log else ticks(low, high)
+        seconds = ticks(0.0, self.until, 5)
+        grid = "".join(f"M{self.left} {self.y(level):.1f}H{_W - 6}" for level in levels)
+        grid += "".join(f"M{self.x(t):.1f} {self.top}V{self._floor}" for t in seconds)
+        parts = [
+            f'<path d="{grid}" stroke="{css(BOUND, 0.25)}"/>',
+            f'<path d="M{self.left} {self.top}V{self._floor}H{_W - 6}" stroke="{css(BOUND)}" fill="none"/>',
         ]
+        for level in levels:
+            parts.append(_text(self.left - 4, self.y(level) + 4, tick_label(level, log), anchor="end"))
+        for t in seconds:
+            last = t == seconds[-1]
+            words = f"{tick_label(t, False)}{' s' if last else ''}"
+            parts.append(_text(self.x(t), self.height - 3, words, anchor="middle"))
+        return parts
+
+    def marks(self, marks: Sequence[tuple[float, str]]) -> list[str]:
+        """Returns a vertical line at each time, with what happens above it as far as there is room."""
+        parts, free = [], -math.inf
+        for t, words in marks:
+            x = self.x(t)
+            parts.append(
+                f'<line x1="{x:.1f}" x2="{x:.1f}" y1="{self.top}" y2="{self._floor}" stroke="{css(BOUND)}" '
+                f'stroke-dasharray="4 3"/>'
+            )
+            width = _WIDE * (len(words) + 2)
+            left = min(x - 4, _W - 4 - width)
+            if words and left > free:
+                parts.append(_text(left, self.top - 4, f"▾ {words}"))
+                free = left + width + 12
+        return parts
+
+    def end(self, curve: SignalCurve) -> float:
+        """Returns the height at which the known part of a curve ends."""
+        known = np.flatnonzero(np.isfinite(curve.values))
+        return self.y(float(curve.values[known[-1]])) if known.size else self._floor
+
+    def names(self, named: Sequence[tuple[float, str, RGB]]) -> list[str]:
+        """Returns names at the right end, each at its height or as close to it as there is room."""
+        parts, free = [], -math.inf
+        below = sorted(named)
+        for k, (y, words, colour) in enumerate(below):
+            # The names below this one need room as well.
+            y = max(min(y, self._floor - 4 - _LINE * (len(below) - 1 - k)), free, self.top + 9)
+            parts.append(_text(_W - 8, y, words, colour, "end", bold=True, halo=True))
+            free = y + _LINE
+        return parts
 
     def line(self, curve: SignalCurve, colour: RGB, dashes: str = "none") -> str:
         """Returns a curve, with gaps where it is not finite."""
-        pieces, pen = [], "M"
-        for t, value in zip(curve.t.tolist(), curve.values.tolist(), strict=True):
-            if not math.isfinite(value):
-                pen = "M"
-                continue
-            pieces.append(f"{pen}{self.x(t):.1f} {self.y(value):.1f}")
-            pen = "L"
+        points = path_through(
+            (self.x(t), self.y(value)) if math.isfinite(value) else None
+            for t, value in zip(curve.t.tolist(), curve.values.tolist(), strict=True)
+        )
         return (
-            f'<path d="{"".join(pieces)}" stroke="{css(colour)}" stroke-width="2" fill="none" '
+            f'<path d="{points}" stroke="{css(colour)}" stroke-width="2" fill="none" '
             f'stroke-linejoin="round" stroke-dasharray="{dashes}"/>'
         )
 
@@ -174,10 +248,6 @@ def _axis(values: np.ndarray, marks: list[float]) -> Axis:
     return (low if low == 0 else low - room), high + room, False
 
 
-def _end(axis: Axis, which: int) -> str:
-    return figure(10.0 ** axis[which] if axis[2] else float(f"{axis[which]:.2g}"))
-
-
 def _pointer(x: float, tip: float, foot: float, colour: RGB) -> str:
     d = 5 if foot > tip else -5
     return (
@@ -187,14 +257,23 @@ def _pointer(x: float, tip: float, foot: float, colour: RGB) -> str:
 
 
 def _text(
-    x: float, y: float, words: str, colour: RGB | None = None, anchor: str = "start", bold: bool = False
+    x: float,
+    y: float,
+    words: str,
+    colour: RGB | None = None,
+    anchor: str = "start",
+    bold: bool = False,
+    halo: bool = False,
 ) -> str:
-    # A centred label near an edge would be cut off.
-    half = 3.1 * len(words)
+    """halo: whether the words have a rim in the colour of the page, so that they can be read on a curve."""
+    half = 0.5 * _WIDE * len(words)  # a centred label near an edge would be cut off
     x = min(max(x, half + 2), _W - half - 2) if anchor == "middle" else x
     weight = ' font-weight="600"' if bold else ""
     fill = "currentColor" if colour is None else ink(colour)
-    return f'<text x="{x:.1f}" y="{y}" fill="{fill}" text-anchor="{anchor}"{weight}>{esc(words)}</text>'
+    rim = f' stroke="{_PAGE}" stroke-width="3" paint-order="stroke"' if halo else ""
+    return (
+        f'<text x="{x:.1f}" y="{y:.1f}" fill="{fill}" text-anchor="{anchor}"{weight}{rim}>{esc(words)}</text>'
+    )
 
 
 def _svg(height: float, parts: Sequence[str], words: str) -> str:

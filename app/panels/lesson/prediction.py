@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import viser
 
+from app.adapter.names import BUTTON_INNER, BUTTON_LABEL
+from app.adapter.private import dom_id
 from app.html.markdown import rendered_line
-from app.html.palette import BAD, GOOD, LEVELS, css
+from app.html.palette import BAD, BOUND, GOOD, LEVELS, button, css
 from app.html.text import badge, block, figure, readable
 from app.link.exercise import Answer, Lecture
 from app.panels.lesson.drawing import scale, sketch
@@ -27,10 +30,10 @@ class Asking:
     def __init__(self, gui: viser.GuiApi, prediction: Prediction, predict: Callable[[Answer], None]) -> None:
         self._prediction, self._predict = prediction, predict
         self._mine: Answer | None = None
-        self._shown = ""
         self._picture = gui.add_html("")
         self._inputs: list[Any] = []
-        self._style: viser.GuiHtmlHandle | None = None
+        self._options: list[viser.GuiButtonHandle] = []
+        self._style = gui.add_html("")
         match prediction:
             case Choice():
                 self._offer(gui, prediction)
@@ -38,16 +41,16 @@ class Asking:
                 self._weigh(gui, prediction)
             case Sketch():
                 self._draw(gui, prediction)
+        self._verdict = gui.add_html("", visible=False)
         self._write(None)
 
     # ---------------------------------------------------------------- asking
 
     def _offer(self, gui: viser.GuiApi, choice: Choice) -> None:
-        letters = tuple(_LETTERS[: len(choice.options)])
-        buttons = gui.add_button_group("I expect", letters)
-        self._inputs.append(buttons)
-
-        on_click(buttons, lambda: self._say(letters.index(str(buttons.value))))
+        for k in range(len(choice.options)):
+            option = gui.add_button(_label(choice, k, None, math.nan))
+            on_click(option, partial(self._say, k))
+            self._options.append(option)
 
     def _weigh(self, gui: viser.GuiApi, value: Value) -> None:
         slider = gui.add_slider(
@@ -59,7 +62,7 @@ class Asking:
             marks=((0, figure(value.low)), (STEPS, figure(value.high))),
             hint="A logarithmic slider; the arrow keys also move it",
         )
-        self._style = gui.add_html(only_track(slider))
+        self._style.content = only_track(slider)
         self._inputs.append(slider)
 
         @slider.on_update
@@ -112,8 +115,9 @@ class Asking:
             self._recall(lecture.answer)
         before = lecture.phase in ("waiting", "preparing") and lecture.grade is None
         for each in self._inputs:
-            if each.visible != before:
-                each.visible = before
+            _put(each, "visible", before)
+        for each in self._options:
+            _put(each, "disabled", not before)
         self._write(lecture)
 
     def _recall(self, answer: Answer) -> None:
@@ -125,37 +129,30 @@ class Asking:
             slider.value = place_of(answer, self._prediction.low, self._prediction.high)
 
     def _write(self, lecture: Lecture | None) -> None:
-        known = lecture is not None and lecture.grade is not None
-        html = f"<b>{'You predicted' if known else 'Predict'}:</b> {rendered_line(self._prediction.question)}"
-        if lecture is not None and lecture.grade is not None:
-            grade = lecture.grade
+        known = lecture if lecture is not None and lecture.grade is not None else None
+        html = f"<b>{'Predict' if known is None else 'You predicted'}:</b> "
+        html += rendered_line(self._prediction.question) + self._pictured(known)
+        _put(self._picture, "content", _ruled(html))
+        _put(self._verdict, "visible", known is not None)
+        if known is not None and known.grade is not None:
+            score = known.grade.score
             word, colour = (
-                ("RIGHT", GOOD)
-                if grade.score >= 0.999
-                else ("NEARLY", LEVELS[1])
-                if grade.score > 0
-                else ("NOT SO", BAD)
+                ("RIGHT", GOOD) if score >= 0.999 else ("NEARLY", LEVELS[1]) if score > 0 else ("NOT SO", BAD)
             )
-            html += (
-                self._pictured(lecture)
-                + f"<div>{badge(word, colour)} {rendered_line(readable(grade.words))}</div>"
-            )
-        else:
-            html += self._pictured(None)
-        html = block(html, f"border-left:3px solid {css(LEVELS[0])};margin:0.3em 0")
-        if html != self._shown:
-            self._shown = html
-            self._picture.content = html
+            told = f"{badge(word, colour)} {rendered_line(readable(known.grade.words))}"
+            _put(self._verdict, "content", _ruled(told))
 
     def _pictured(self, lecture: Lecture | None) -> str:
-        """Returns the picture of the prediction.
+        """Returns the picture of the prediction. The options of a choice, which are buttons, are updated
+        instead.
 
         lecture: the graded run, which contains no answer that came too late; None before the run is graded.
         """
         truth, mine = (math.nan, self._mine) if lecture is None else (lecture.truth, lecture.answer)
         match self._prediction:
             case Choice() as choice:
-                return _options(choice, mine, truth)
+                self._mark(choice, mine, truth)
+                return ""
             case Value() as value:
                 guess = mine if isinstance(mine, (int, float)) else self.suggested
                 assert isinstance(guess, (int, float))
@@ -166,19 +163,45 @@ class Asking:
                 curve = None if lecture is None else lecture.sketched
                 return sketch(wanted.low, wanted.high, wanted.until, points, curve, wanted.signal.unit)
 
+    def _mark(self, choice: Choice, mine: Answer | None, truth: float) -> None:
+        """Marks the chosen option, and the right one after the run, with words and colours."""
+        right = choice.right(truth)
+        rules = _OPTIONS.format(", ".join(f'[id="{dom_id(each)}"]' for each in self._options))
+        for k, option in enumerate(self._options):
+            _put(option, "label", _label(choice, k, mine, truth))
+            if k in (mine, right):
+                filled = css(button(GOOD if k == right else BAD)) if right is not None else css(_CHOSEN, 0.18)
+                rules += _COLOURED.format(
+                    dom_id(option), filled, "#fff" if right is not None else "inherit", css(_CHOSEN)
+                )
+        _put(self._style, "content", f"<style>{rules}</style>")
 
-def _options(choice: Choice, picked: Answer | None, truth: float) -> str:
+
+def _label(choice: Choice, place: int, mine: Answer | None, truth: float) -> str:
+    """Returns the words on the button of an option."""
     right = choice.right(truth)
-    rows = ""
-    for k, option in enumerate(choice.options):
-        mine = k == picked
-        note = ""
-        if right is not None:
-            note = " <b>✓ measured</b>" if k == right else " <b>✗ not measured</b>" if mine else ""
-        colour = css(GOOD, 0.2) if k == right else css(LEVELS[0], 0.18) if mine else "transparent"
-        rows += (
-            f'<div style="background:{colour};border-radius:4px;padding:0.1em 0.4em">'
-            f"{'●' if mine else '○'} <b>{_LETTERS[k]}</b> {rendered_line(option.text)}"
-            f"{' <i>(your answer)</i>' if mine else ''}{note}</div>"
-        )
-    return rows
+    marks = [] if right is None or place not in (mine, right) else ["✓" if place == right else "✗"]
+    marks += ["your answer"] if place == mine else ["measured"] if place == right else []
+    return f"{_LETTERS[place]}   {choice.options[place].text}" + (f"   ({' '.join(marks)})" if marks else "")
+
+
+_CHOSEN = LEVELS[1]
+# Mantine centres the label, cuts it off, and makes a disabled button pale.
+_OPTIONS = (
+    ":is({0}){{height:auto!important;min-height:2.4em;padding:0.35em 0.8em;opacity:1;text-align:left;"
+    f"background:transparent;color:inherit;border:1px solid {css(BOUND)}}}}}"
+    ":is({0}):not(:disabled):hover{{" + f"background:{css(_CHOSEN, 0.12)}}}}}"
+    f":is({{0}}) {BUTTON_INNER}{{{{justify-content:flex-start}}}}"
+    f":is({{0}}) {BUTTON_LABEL}{{{{white-space:normal;height:auto;font-weight:500}}}}"
+)
+_COLOURED = '[id="{0}"],[id="{0}"]:hover{{background:{1}!important;color:{2}!important;border-color:{3}}}'
+
+
+def _ruled(html: str) -> str:
+    return block(html, f"border-left:3px solid {css(LEVELS[0])};margin:0.3em 0")
+
+
+def _put(handle: Any, name: str, value: object) -> None:
+    """Sets an attribute of a control if it differs: viser would send it again."""
+    if getattr(handle, name) != value:
+        setattr(handle, name, value)

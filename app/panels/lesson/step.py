@@ -16,7 +16,7 @@ from app.link.choice import SceneChoice
 from app.link.exercise import Lecture, LessonPlace, parts_of
 from app.link.messages import Post, Predict, ResetAll, RunStep
 from app.panels.lesson.cards import belonging_to
-from app.panels.lesson.claims import after, heading, idea, pictures, state
+from app.panels.lesson.claims import heading, idea, now_you, pictures, state, why
 from app.panels.lesson.prediction import Asking
 from app.panels.widgets.command import add_command, on_click
 from app.panels.widgets.controls import add_control
@@ -50,7 +50,7 @@ class LessonPanel:
         self._gui, self._tab, self._pictures, self._loop = gui, tab, pictures, loop
         self._learner, self._send, self._choose = learner, learner.send, choose
         self._all_lessons, self._notebook, self._settings = all_lessons, notebook, settings
-        self._fast = self._beside = False
+        self._fast, self._beside = False, learner.shows_ghosts
         self._turn_to(exercise)
         for label, key, does in (
             ("Lesson: run this step", "P", self.run),
@@ -67,6 +67,7 @@ class LessonPanel:
     def _turn_to(self, exercise: LessonPlace) -> None:
         self._exercise, self._part = exercise, exercise.part
         self._lecture: Lecture | None = None
+        self._arrived = True
         last = exercise.place + 1 >= len(parts_of(exercise.whole))
         self._exercises = belonging_to(exercise.lesson) if last else ""
         self._shown: dict[str, str] = {}
@@ -91,8 +92,8 @@ class LessonPanel:
             "As fast as possible", self._fast, hint="Faster than real time, if you have seen the run before"
         )
         self._state = gui.add_html("")
-        self._after = gui.add_html("")
-        self._next = gui.add_button(self._next_label(), color=button(LEVELS[2]), visible=False, hint="Key N")
+        self._why = gui.add_html("")
+        self._now_you = gui.add_html("")
         self._free = gui.add_folder("Controls of this step", visible=False)
         with self._free:
             if isinstance(part, Step):
@@ -105,6 +106,7 @@ class LessonPanel:
             visible=isinstance(part, Step) and part.ghost is not None,
             hint="Shows the second robot, translucent, in the same scene. Both robots start again together.",
         )
+        self._next = gui.add_button(self._next_label(), color=button(LEVELS[2]), visible=False, hint="Key N")
         self._where = gui.add_button_group("Lesson", (_BACK, _SKIP, _ALL), hint="Keys B, N and L")
         self._listen()
 
@@ -134,8 +136,14 @@ class LessonPanel:
             lambda: {_BACK: self.back, _SKIP: self.next, _ALL: self._all_lessons}[str(self._where.value)](),
         )
 
+    def _begin_with_ghost(self, lecture: Lecture) -> None:
+        """Starts or stops the ghost when the learner comes to a step. A ghost that starts later would put the
+        robot back to its start."""
+        if lecture.phase == "waiting" and self._learner.shows_ghosts:
+            threading.Thread(target=self._show_ghost, daemon=True).start()
+
     def _show_ghost(self) -> None:
-        """Starts the ghost of this step in the scene if the learner has chosen it; otherwise stops the
+        """Starts the ghost of this step in the scene if the learner has not hidden it; otherwise stops the
         ghost."""
         ghost = self._part.ghost if isinstance(self._part, Step) else None
         if ghost is not None and self._beside:
@@ -190,8 +198,9 @@ class LessonPanel:
             self._bindings.close()
             self._all.remove()
             self._turn_to(lecture.exercise)
-            if self._beside:
-                threading.Thread(target=self._show_ghost, daemon=True).start()
+        if self._arrived:
+            self._arrived = False
+            self._begin_with_ghost(lecture)
         if lecture is not self._lecture:
             self._lecture = lecture
             self._note(lecture)
@@ -238,7 +247,8 @@ class LessonPanel:
         self._put("idea", self._idea, heading(self._exercise) + idea(self._part, opened=not seen))
         self._put("state", self._state, state(self._part, lecture, best))
         self._put("pictures", self._pictures, pictures(self._part, lecture))
-        self._put("after", self._after, after(self._part, lecture) + self._exercises if over else "")
+        self._put("why", self._why, why(self._part) if over else "")
+        self._put("now you", self._now_you, now_you(self._part, lecture) + self._exercises if over else "")
 
     def _put(self, name: str, handle: viser.GuiHtmlHandle, html: str) -> None:
         if self._shown.get(name) != html:

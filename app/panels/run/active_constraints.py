@@ -5,7 +5,7 @@ from __future__ import annotations
 import viser
 
 from app.html.palette import BOUND, RGB
-from app.html.text import block, esc, swatch
+from app.html.text import block, esc, joints_named, swatch
 from app.panels.widgets.snapshot import SessionSnapshot
 from himpc.limits import CONSTRAINTS
 from lessons.settings.settings import SceneSettings
@@ -49,7 +49,9 @@ class BindingPanel:
         shown = [place for place in range(now.bound_seconds.shape[1])
                  if place < _ALWAYS or now.bound_seconds[:, place].any()]  # fmt: skip
         spent = "".join(
-            f"<tr><td>{esc(name)}</td>" + "".join(f"<td>{s:.2f} s</td>" for s in seconds[shown]) + "</tr>"
+            f"<tr><td>{esc(readable(name))}</td>"
+            + "".join(f"<td>{s:.2f} s</td>" for s in seconds[shown])
+            + "</tr>"
             for name, seconds in zip(robot.joint_names, now.bound_seconds, strict=True)
             if seconds.any()
         )
@@ -58,9 +60,8 @@ class BindingPanel:
 
 
 def readable(pair: str) -> str:
-    """Returns the names of a pair as words: "link 5 – table" for "link_5 – table". A joint's name is not
-    changed."""
-    return pair.replace("_", " ") if " – " in pair else pair
+    """Returns the names of a pair as words, "link 5 – table" for "link_5 – table", or that of a joint."""
+    return pair.replace("_", " ") if " – " in pair else joints_named(pair)
 
 
 def _table(titles: tuple[str, ...], rows: str) -> str:

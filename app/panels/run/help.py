@@ -42,7 +42,7 @@ _MARKS = (
         "HTMPC: the amount by which lower levels may enlarge a higher level's error, up to |e*| + δ",
     ),
     ("window", "HTMPC: the mission's tasks that the controller performs now, highest priority first"),
-    ("CAPPED", "this computer cannot keep up: simulated time runs slower, no tick is skipped"),
+    ("slower than real time", "this computer cannot keep up; no tick is skipped"),
 )
 _DRAWN = (
     (
@@ -50,6 +50,7 @@ _DRAWN = (
         "the target that you can drag: its arrows move it along the world's axes; its rings turn it while "
         "the orientation level is on",
     ),
+    ("line to the ball", "the way that the hand still has to its target, with its length"),
     ("small frame with a ball", "the filtered target for the controller (limited speed and acceleration)"),
     ("large thin frame", "the actual pose of the hand"),
     ("line behind the hand", "the path of the hand in the last seconds"),

@@ -12,7 +12,7 @@ import viser
 
 from app.client.decimated import PlotWindow
 from app.html.palette import BAD, BOUND, GOOD, ink, joint_colour, joint_dash
-from app.html.text import block
+from app.html.text import block, joints_named
 from app.panels.widgets.chart import Chart, ChartLine, of_ghost
 from app.panels.widgets.in_view import InView
 from robots import Robot
@@ -67,7 +67,7 @@ class JointPlots:
         self._joint: int | None = None
         self._built: tuple[int | None, bool] | None = None
         self._charts: list[Chart] = []
-        options = (_ALL, *robot.joint_names)
+        options = (_ALL, *map(joints_named, robot.joint_names))
         choice = gui.add_dropdown("Joints", options, initial_value=_ALL)
         self._place = gui.add_folder(None)
         gui.add_html(
@@ -181,7 +181,7 @@ class JointPlots:
         )
 
     def _one(self, title: str, kind: int, joint: int, ghost: bool) -> Chart:
-        line = ChartLine(self._robot.joint_names[joint], joint_colour(joint), width=2.0)
+        line = ChartLine(joints_named(self._robot.joint_names[joint]), joint_colour(joint), width=2.0)
         return Chart(
             self._gui,
             self._in_view,
@@ -216,4 +216,5 @@ def _sheet(robot: Robot, driven: Input) -> tuple[tuple[np.ndarray, np.ndarray], 
 
 
 def _short(name: str, index: int) -> str:
+    name = joints_named(name)
     return name if len(name) <= 8 else f"joint {index + 1}"

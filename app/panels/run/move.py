@@ -10,6 +10,7 @@ import viser
 
 from app.client.pending_edit import HOLD
 from app.panels.widgets.command import on_click
+from app.panels.widgets.controls import in_colours_of_axes
 from app.view.drag_target import Movable
 
 _STEPS = {"1 mm": 1e-3, "1 cm": 1e-2, "5 cm": 5e-2}
@@ -50,6 +51,7 @@ class MovePanel:
             self._turn = gui.add_button_group(
                 "Turn", tuple(_TURNS), hint=f"By {_ANGLE:g}° about a world axis through the target"
             )
+            gui.add_html(in_colours_of_axes(self._turn))
         for field in self._fields:
 
             @field.on_update

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from app.html.text import quantity
+from app.html.text import joints_named, quantity
 
 if TYPE_CHECKING:  # for types only, as the server listens before it loads modules that compute
     from app.panels.widgets.snapshot import SessionSnapshot
@@ -89,7 +89,7 @@ class Narration:
         if not self._waiting or self._clock() < self._next:
             return ""
         self._next = self._clock() + AT_MOST_EVERY
-        said = "; ".join(self._waiting[-4:])
+        said = joints_named("; ".join(self._waiting[-4:]))
         self._waiting.clear()
         return said[0].upper() + said[1:] + "."
 

@@ -14,9 +14,9 @@ from app.adapter.removed_handle_errors import unless_removed
 from app.client.pending_edit import HOLD, PendingEdit
 from app.client.simulation import Trouble
 from app.client.simulation_client import SimulationClient
-from app.html.palette import GOOD, LEVELS
-from app.html.text import badge, block, in_trouble
-from app.link.messages import Play, Post, Speed, StepTicks
+from app.html.palette import LEVELS, ink
+from app.html.text import block, esc, in_trouble
+from app.link.messages import Play, Post, Speed, Status, StepTicks
 from app.panels.widgets.command import add_command, on_click
 from app.panels.widgets.mirror import on_scale
 from app.panels.widgets.snapshot import SessionSnapshot
@@ -24,6 +24,10 @@ from lessons.events import Reset
 from lessons.settings.settings import SceneSettings
 
 _PAUSE, _RUN, _STEP, _RESET, _RESET_ALL = "Pause", "Run", "Step", "Reset", "Reset all"
+
+
+_KEPT = 0.9
+"""The share of the speed that was set with which simulated time counts as on time."""
 
 
 class PlaybackPanel:
@@ -110,15 +114,29 @@ class PlaybackPanel:
         if self._buttons.options[0] != first:
             self._buttons.options = (first, _STEP, _RESET, _RESET_ALL)
         self._loop.call_soon_threadsafe(unless_removed, self._show_speed, status.speed)
-        state = badge("RUNNING", GOOD) if status.running else badge("PAUSED", (139, 149, 161))
-        if status.capped:
-            why = "This computer cannot keep up: simulated time runs slower, no control tick is skipped."
-            state += f' <span title="{why}">{badge("CAPPED", LEVELS[0])}</span>'
-        factor = f"{status.real_time_factor:.2f} × real time" if status.running else f"tick {status.ticks}"
-        share = 100 * status.over_budget / max(status.ticks, 1)
-        budget = 1e3 * now.settings.T_s
-        ticks = "1 tick" if status.over_budget == 1 else f"{status.over_budget} ticks"
-        self._status.content = block(
-            f"{state} &nbsp;t = {status.t:.2f} s &nbsp;·&nbsp; {factor}"
-            f"<br>{ticks} over the {budget:g} ms budget ({share:.1f} %)"
-        )
+        self._status.content = headline(status, now.settings.T_s)
+
+
+def headline(status: Status, T_s: float) -> str:
+    """Returns the line that says whether the simulation runs, the simulated time, and its speed. Its tooltip
+    has the ticks and how many of them took longer than T_s, s."""
+    share, many = 100 * status.over_budget / max(status.ticks, 1), status.over_budget != 1
+    told = (
+        f"tick {status.ticks} at t = {status.t:.3f} s; {status.over_budget} tick{'s' * many} over the "
+        f"{1e3 * T_s:g} ms budget ({share:.1f} %)"
+    )
+    words = [f"<b>{'Running' if status.running else 'Paused'}</b>"]
+    words.append(f"{status.t:.1f} s" if status.running else f"{status.t:.3f} s")
+    if status.running:
+        words.append(_pace(status.real_time_factor, status.speed, status.capped))
+    return block(f'<span title="{esc(told)}" tabindex="0">{" &nbsp;·&nbsp; ".join(words)}</span>')
+
+
+def _pace(factor: float, speed: float, capped: bool) -> str:
+    """Returns the speed of simulated time. It is only a complaint if the computer cannot keep up with the
+    speed that was set."""
+    if capped and factor < _KEPT * min(speed, 1.0):
+        why = "This computer cannot keep up: simulated time runs slower, no control tick is skipped."
+        words = f"slower than real time ({factor:.1g} ×)"
+        return f'<span title="{why}" style="color:{ink(LEVELS[0])}">{words}</span>'
+    return "real time" if abs(factor - 1.0) < 1.0 - _KEPT else f"{factor:.1f} × real time"

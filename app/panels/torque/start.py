@@ -8,10 +8,11 @@ import numpy as np
 import viser
 
 from app.client.pending_edit import Send
-from app.html.palette import BAD, BOUND, GOOD, RGB, ink
-from app.html.text import block, esc, quantity, swatch
+from app.html.palette import BAD, BOUND, GOOD, RGB, TARGET, ink
+from app.html.text import block, esc, joints_named, quantity, swatch
 from app.link.messages import Ready, TaskView
 from app.panels.widgets.command import add_command, on_click
+from app.panels.widgets.controls import in_colours_of_axes
 from app.panels.widgets.snapshot import SessionSnapshot
 from app.view.coordinates import draggable
 from app.view.reachability import Reachability
@@ -20,12 +21,12 @@ from lessons.events import Push, Set
 from lessons.settings.torque import TorqueSettings
 
 _DIRECTIONS = {
-    "→ +x": (1, 0, 0),
-    "← −x": (-1, 0, 0),
+    "+x": (1, 0, 0),
+    "−x": (-1, 0, 0),
     "+y": (0, 1, 0),
     "−y": (0, -1, 0),
-    "↑ +z": (0, 0, 1),
-    "↓ −z": (0, 0, -1),
+    "+z": (0, 0, 1),
+    "−z": (0, 0, -1),
 }
 PUSH_SECONDS = 0.1
 _LOAD = 3.0  # kg
@@ -51,14 +52,14 @@ def guide(
 
 
 def _first(position: TaskView, places: Mapping[str, int], colours: Mapping[str, RGB]) -> tuple[str, str]:
-    ball = f"The arrows are at the {swatch(colours.get(position.level, BOUND))}ball"
+    ball = f"The arrows are at the {swatch(TARGET)}ball, the target"
     if position.level not in places:
-        return _DRAG, f"{ball}. The ball's level is switched off: switch it on in <b>Tasks</b>."
+        return _DRAG, f"{ball}. Its level is switched off: switch it on in <b>Tasks</b>."
     own = places[position.level]
     axes = " and ".join(position.axes) if position.axes != "xyz" else ""
     told = [
         f"{ball}, and the robot follows{f' in {axes}' if axes else ''}: this is "
-        f"the task of {_name(position.level, own)}."
+        f"the task of {swatch(colours.get(position.level, BOUND))}{_name(position.level, own)}."
     ]
     above = {name: place for name, place in places.items() if place < own}
     below = {name: place for name, place in places.items() if place > own}
@@ -106,7 +107,7 @@ def _listed(places: Mapping[str, int]) -> str:
 
 def spoken(level: str) -> str:
     """Returns the name of a level as words."""
-    return level.replace("+", " and ").replace("_", " ")
+    return joints_named(level).replace("+", " and ").replace("_", " ")
 
 
 def _paragraph(head: str, rest: str) -> str:
@@ -146,8 +147,11 @@ class StartPanel:
             body = gui.add_dropdown("Body", bodies, initial_value=bodies[-1])
             force = gui.add_slider("Force [N]", min=5.0, max=100.0, step=5.0, initial_value=30.0)
             buttons = gui.add_button_group(
-                "Push", tuple(_DIRECTIONS), hint=f"Along a world axis, for {PUSH_SECONDS:g} s"
+                "Push",
+                tuple(_DIRECTIONS),
+                hint=f"Along the target's arrow of this colour, or against it, for {PUSH_SECONDS:g} s",
             )
+            gui.add_html(in_colours_of_axes(buttons))
             self.pull = gui.add_checkbox(
                 "Pull by hand",
                 False,

@@ -12,6 +12,7 @@ from viser import uplot
 
 from app.adapter import private
 from app.client.decimated import BUCKETS, WINDOW, PlotWindow, decimate
+from app.html.curves import round_step
 from app.html.palette import RGB, css
 from app.html.text import block
 from app.panels.widgets.in_view import InView
@@ -174,7 +175,7 @@ def _axis(span: tuple[float, float], log: bool) -> uplot.Axis:
     """Returns an axis with about five ticks, at powers of ten or at round numbers. The `span` of a
     logarithmic axis consists of exponents."""
     low, high = span
-    every = max(1.0, round((high - low) / _TICKS)) if log else _round((high - low) / _TICKS)
+    every = max(1.0, round((high - low) / _TICKS)) if log else round_step((high - low) / _TICKS)
     places = [every * k for k in range(math.ceil(low / every - 1e-9), math.floor(high / every + 1e-9) + 1)]
     labels = tuple(_power(place) if log else f"{place:.6g}" for place in places)
     splits = tuple(_TOP * (place - low) / (high - low) for place in places)
@@ -183,12 +184,6 @@ def _axis(span: tuple[float, float], log: bool) -> uplot.Axis:
 
 def _power(exponent: float) -> str:
     return f"{10.0**exponent:g}" if -4 < exponent < 4 else f"1e{exponent:g}"
-
-
-def _round(step: float) -> float:
-    """Returns the next larger number of the form 1, 2 or 5 times a power of ten."""
-    scale = 10.0 ** math.floor(math.log10(step))
-    return next(scale * digit for digit in (1.0, 2.0, 5.0, 10.0) if scale * digit >= step - 1e-12 * scale)
 
 
 def _series(line: ChartLine) -> uplot.Series:

@@ -10,8 +10,9 @@ from typing import Any, Generic, TypeVar
 
 import viser
 
-from app.adapter.names import NUMBER_BOX, SLIDER_LABEL
+from app.adapter.names import NUMBER_BOX, ROW, SLIDER_LABEL
 from app.adapter.private import dom_id
+from app.html.palette import AXES, css, ink
 from app.html.text import figure
 from app.panels.widgets.mirror import Bindings, scalar
 from lessons.events import Set
@@ -42,6 +43,18 @@ def only_track(slider: viser.GuiSliderHandle[Any]) -> str:
     """Returns a style that hides the number box of a slider whose number is only a position."""
     here = f'[id="{dom_id(slider)}"]'
     return f"<style>{here} + {NUMBER_BOX},{here} {SLIDER_LABEL}{{display:none}}</style>"
+
+
+def in_colours_of_axes(buttons: viser.GuiButtonGroupHandle) -> str:
+    """Returns a style that gives the buttons of a group, such as "+x", the colours of the arrows in the
+    scene."""
+    group = f'{ROW}:has(> * > * > label[for="{dom_id(buttons)}"])'
+    rules = (
+        f"{group} button:nth-of-type({k}){{color:{ink(axis)};border-color:{css(axis)}}}"
+        for k, option in enumerate(buttons.options, start=1)
+        for axis in [AXES["xyz".index(str(option)[-1])]]
+    )
+    return f"<style>{''.join(rules)}</style>"
 
 
 class Controls(Generic[S]):

@@ -2,7 +2,7 @@
 continues.
 """
 
-from lessons.experiments.sweep.cells import Cell, best_cell, check_metric, metrics
+from lessons.experiments.sweep.cells import Cell, best_cell, check_metric, metrics, unit_of
 from lessons.experiments.sweep.folder import carry_on, finished_cells, usual_folder
 from lessons.experiments.sweep.grid import Axis, Sweep, make_sweep
 from lessons.experiments.sweep.picture import draw_sweep
@@ -18,5 +18,6 @@ __all__ = [
     "finished_cells",
     "make_sweep",
     "metrics",
+    "unit_of",
     "usual_folder",
 ]

@@ -89,6 +89,16 @@ def perform_cell(spec: RunSpec) -> dict[str, Any]:
     return _without_timing(summary(run(spec.prepared(), None, spec.seed)))
 
 
+def unit_of(cells: Sequence[Cell], metric: str) -> str:
+    """Returns the unit of a metric of a task; "" for other metrics, whose names contain their unit if they
+    have one."""
+    kind, _, rest = metric.partition(".")
+    found = next((cell.summary for cell in cells if cell.summary), None)
+    if kind == "tasks" and found is not None:
+        return next(task["unit"] for task in found["tasks"] if rest.startswith(f"{task['name']}."))
+    return ""
+
+
 def best_cell(cells: Sequence[Cell], metric: str) -> Cell | None:
     """Returns the cell with the least value of a metric; None if no cell has a value."""
     known = [cell for cell in cells if math.isfinite(cell.value(metric))]

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, Locator, Page, expect
 
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace, parts_of
@@ -46,7 +47,7 @@ def learner_page(browser: Browser, school: PageServer) -> Iterator[Page]:
 def test_a_page_can_open_at_a_lesson(learner_page: Page) -> None:
     lesson = load_lesson(COURSE[0])
     expect_part(learner_page, lesson, lesson.steps[1])
-    expect(learner_page.get_by_text("PAUSED", exact=True).first).to_be_visible()
+    expect(learner_page.get_by_text("Paused", exact=True).first).to_be_visible()
     key(learner_page, "p")
     expect(learner_page.get_by_text("Make a prediction first:")).to_be_visible()
     key(learner_page, "b")
@@ -99,9 +100,26 @@ def walk(page: Page, school: PageServer, lesson: Lesson) -> None:
         expect(marks(page, "✓")).to_have_count(len(part.claims))
         expect(marks(page, "✗")).to_have_count(0)
         expect(page.get_by_text("You predicted:")).to_have_count(int(part.prediction is not None))
-        expect(page.get_by_text("Now you:")).to_be_visible()
+        drawn = page.get_by_role("img", name=re.compile("over time$")).first.bounding_box()
+        assert drawn is not None and drawn["height"] >= 200
+        assert_order(page.get_by_text("Now you:"), page.get_by_text("Controls of this step"), next_of(page))
         if part is not parts_of(lesson)[-1]:
-            page.get_by_role("button", name="Next: ").click()
+            next_of(page).click()
+
+
+def next_of(page: Page) -> Locator:
+    return page.get_by_role("button", name="Next: ")
+
+
+def assert_order(*shown: Locator) -> None:
+    """Checks that the page shows these one below the other."""
+    tops = []
+    for each in shown:
+        expect(each).to_be_visible()
+        box = each.bounding_box()
+        assert box is not None
+        tops.append(box["y"])
+    assert tops == sorted(tops)
 
 
 def kept(page: Page) -> dict[str, Any]:
@@ -141,4 +159,4 @@ def test_the_cards_show_what_was_done(learner_page: Page) -> None:
     assert eventually(page, lambda: page.get_by_text("✓ DONE", exact=True).count() == len(walked))
     press(page, "Go to the laboratory")
     expect(page.get_by_text("Drag the target by its arrows")).to_be_visible()
-    expect(page.get_by_text("RUNNING", exact=True).first).to_be_visible()
+    expect(page.get_by_text("Running", exact=True).first).to_be_visible()

@@ -86,5 +86,7 @@ def test_keys_move_the_target_and_a_line_says_what_happened(page: Page) -> None:
     key(page, "1")
     line = page.locator(f"#{LINE}")
     expect(line).to_contain_text("level 1, position, switched off", ignore_case=True)
+    box = line.bounding_box()
+    assert box is not None and box["width"] <= 1, "nothing on the screen by default"
     assert line.get_attribute("role") == "status" and line.get_attribute("aria-live") == "polite"
     key(page, "1")

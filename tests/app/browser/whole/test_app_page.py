@@ -62,7 +62,7 @@ def error(learner: SimulationClient, task: str) -> float:
 
 def test_the_page_invites_and_holds(page: Page, learner: SimulationClient) -> None:
     expect(page.get_by_text("Drag the target by its arrows")).to_be_visible()
-    expect(page.get_by_text("RUNNING", exact=True).first).to_be_visible()
+    expect(page.get_by_text("Running", exact=True).first).to_be_visible()
     assert eventually(page, lambda: learner.status is not None and learner.status.t > 0.5)
     assert error(learner, "position") < 1e-3
 
@@ -166,7 +166,7 @@ def test_pause_step_reset(page: Page, learner: SimulationClient) -> None:
     assert eventually(page, lambda: position(page, "/actual")[1] > 0.05)
     assert target_position(page)[1] > 0.1
     key(page, "Space")
-    expect(page.get_by_text("PAUSED", exact=True).first).to_be_visible()
+    expect(page.get_by_text("Paused", exact=True).first).to_be_visible()
     assert learner.status is not None
     ticks = learner.status.ticks
     press(page, "Step")
@@ -177,14 +177,14 @@ def test_pause_step_reset(page: Page, learner: SimulationClient) -> None:
     assert eventually(page, lambda: abs(position(page, "/actual")[1]) < 0.01)
     assert eventually(page, lambda: abs(target_position(page)[1]) < 0.01)
     press(page, "Run")
-    expect(page.get_by_text("RUNNING", exact=True).first).to_be_visible()
+    expect(page.get_by_text("Running", exact=True).first).to_be_visible()
 
 
 def test_paused_edits_show_at_once(page: Page, learner: SimulationClient) -> None:
     """While the simulation is paused, panel, order of the stack and gauge show the edited settings at
     once."""
     key(page, "Space")
-    expect(page.get_by_text("PAUSED", exact=True).first).to_be_visible()
+    expect(page.get_by_text("Paused", exact=True).first).to_be_visible()
     assert learner.status is not None
     t = learner.status.t
     tab(page, "Tasks")
@@ -283,7 +283,7 @@ def test_a_killed_child_is_shown_and_reset_recovers(page: Page, learner: Simulat
     expect(page.get_by_text("ended from outside")).to_be_visible()
     expect(page.get_by_role("button", name="Start again")).to_be_visible()
     press(page, "Reset")
-    expect(page.get_by_text("RUNNING", exact=True).first).to_be_visible()
+    expect(page.get_by_text("Running", exact=True).first).to_be_visible()
     assert learner.pid != pid
     wait_for_scene(page)
     page.wait_for_timeout(500)
