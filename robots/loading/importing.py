@@ -20,7 +20,7 @@ from robots.plant import Plant
 from robots.report import Finding, ImportReport
 from robots.robot import Robot
 from robots.urdf import UNBOUNDED, Canonical, canonicalise
-from robots.urdf.read import Refusal, named, root_tag
+from robots.urdf.read import Refusal, root_tag
 
 _TRIAL = 5  # number of periods of 1 ms
 _SLOW = 3.0  # 1/s: a robot with less bandwidth needs seconds to reach a target
@@ -127,8 +127,8 @@ def _robot(canonical: Canonical) -> Robot | None:
 
 def _rotors_of(canonical: Canonical) -> np.ndarray:
     """Returns the rotor inertias, (n,) kg·m² or kg, that a canonical description gives; 0: none."""
-    joints = named(etree.fromstring(canonical.text), "joint")
-    given = [joints[name].find("dynamics") for name in canonical.model.names[1:]]
+    joints = {each.get("name"): each for each in etree.fromstring(canonical.text).iterfind("{*}joint")}
+    given = [joints[name].find("{*}dynamics") for name in canonical.model.names[1:]]
     return np.array([0.0 if each is None else float(each.get("armature", "0")) for each in given])
 
 

@@ -127,6 +127,7 @@ def _drop_namespace(root: Element, source: str, findings: list[Finding]) -> None
         return
     for element in root.iter(f"{{{space}}}*"):
         element.tag = etree.QName(element).localname
+    etree.cleanup_namespaces(root)
     findings.append(Finding("note", source, f"its default namespace '{shortened(space)}' was left out"))
 
 

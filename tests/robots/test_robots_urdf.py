@@ -146,7 +146,7 @@ def test_massless_links_fixed_to_heavy_ones_are_fine() -> None:
 REFUSED = {
     "not XML": ("<robot><link", "well-formed"),
     "empty": ("", "well-formed"),
-    "wrong root": ("<mujoco/>", "<robot>"),
+    "wrong root": ("<sdf/>", "<robot>"),
     "doctype": ('<!DOCTYPE r [<!ENTITY x "y">]><robot name="a">&x;</robot>', "DOCTYPE"),
     "xacro": (
         '<robot name="a" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:include filename="b"/></robot>',
