@@ -212,8 +212,9 @@ def test_check_urdf_reads_files(tmp_path: Path) -> None:
     assert report.joints == ("j1", "j2")
     with pytest.raises(InputError, match="Cannot read"):
         check_urdf(tmp_path / "none.urdf")
-    with pytest.raises(InputError, match="folder"):
-        check_urdf(tmp_path)
+    assert check_urdf(tmp_path).joints == report.joints
+    with pytest.raises(InputError, match="has no robot description"):
+        check_urdf(Path(__file__).parents[1] / "commands")
 
 
 def test_a_missing_mesh_is_a_note() -> None:
