@@ -66,7 +66,7 @@ def test_one_joint_holds_is_dragged_and_runs(
     home = joint(learner)
     assert abs(home) < 1e-3
     before = np.array(target_position(page))
-    drag_target(page, axis=1, along=ALONG, arm=0.08)
+    drag_target(page, axis=1, along=ALONG, arm=0.042)
     moved = np.array(target_position(page)) - before
     assert moved[1] == pytest.approx(ALONG, abs=0.02) and np.abs(moved[[0, 2]]).max() < 0.02
     there *= float(moved[1]) / ALONG  # a drag in the browser is not exact
