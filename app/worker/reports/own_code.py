@@ -49,7 +49,8 @@ class File:
                 raise InputError(fault)
             session.renew()
         except InputError as error:
-            self._fault = f"{error}. The previous code continues to run."
+            # A notification of the page keeps no columns: the wrong line with its caret is left out.
+            self._fault = f"{str(error).partition(chr(10))[0]}. The previous code continues to run."
         else:
             self._fault = None
             self._saves, self._taken_at = self._saves + 1, session.t
