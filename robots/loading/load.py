@@ -93,6 +93,8 @@ def import_file(
     its import. The arguments and the exceptions are those of `load_robot` and `check_urdf`."""
     source = shortened(str(path), 100)
     packed = next((place for place in (path, *path.parents) if place.suffix.lower() == ".zip"), None)
+    if not _exists(path) and (packed is None or not _exists(packed)):
+        load_bytes(path)  # it says why there is no such file
     _check_inside(path, within)
 
     def choose(name: str) -> str:
@@ -217,5 +219,5 @@ def _catalog_robot(entry: CatalogEntry) -> Robot:
 def _exists(path: Path) -> bool:
     try:
         return path.exists()
-    except OSError:
+    except (OSError, ValueError):  # a name that is too long, or that no file can have
         return False
