@@ -19,7 +19,7 @@ def test_a_ghost_a_look_back_and_a_file(page: Page, server: PageServer) -> None:
     press(page, "Start the ghost")
     expect(page.get_by_text("Choose another controller or a setting")).to_be_attached()
     pick(page, "Difference 1", "M̄ scale")
-    expect(page.get_by_text("for example 4")).to_be_visible()  # the choice has arrived
+    expect(page.get_by_role("textbox", name="its value")).to_have_value("4")  # the choice has arrived
     press(page, "Start the ghost")
 
     assert eventually(page, lambda: learner.ghost is not None and learner.ghost.status is not None)

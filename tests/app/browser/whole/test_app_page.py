@@ -288,6 +288,8 @@ def test_a_killed_child_is_shown_and_reset_recovers(page: Page, learner: Simulat
     wait_for_scene(page)
     page.wait_for_timeout(500)
     assert np.allclose(camera(page), view, atol=1e-3)  # the view is the same as before
+    # The page is built again for the new process; the next test must not press what is removed then.
+    assert eventually(page, lambda: learner.status is not None and learner.status.t > 3.0)
 
 
 def test_wrong_robots_are_one_sentence_and_uploads_work(
