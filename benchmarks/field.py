@@ -16,7 +16,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from robots.urdf.read import root_tag
+from robots.loading.archive import is_description
 
 
 @dataclass(frozen=True)
@@ -50,11 +50,6 @@ def tried(path: Path, name: str, seconds: float) -> Tried:
     return Tried(name, True, follows, (str(len(told["joints"])), told["tip"], motion["text"]))
 
 
-def is_robot(path: Path) -> bool:
-    """Returns whether a file is a URDF, or a MuJoCo model by its root element."""
-    return path.suffix == ".urdf" or (path.suffix == ".xml" and root_tag(path.read_bytes()) == "mujoco")
-
-
 def files_in(places: list[str]) -> list[tuple[Path, str]]:
     """Returns every robot file of the folders, with its path in the folder, without links to the same
     file."""
@@ -62,7 +57,7 @@ def files_in(places: list[str]) -> list[tuple[Path, str]]:
     for place in map(Path, places):
         inside = sorted(place.rglob("*")) if place.is_dir() else [place]
         for path in inside:
-            if path.is_file() and is_robot(path):
+            if path.is_file() and is_description(path):
                 found.setdefault(
                     path.resolve(), str(path.relative_to(place)) if place.is_dir() else path.name
                 )

@@ -68,8 +68,8 @@ class SimulationClient(Simulation):
         self.coming: Coming | None = None  # the class's step, until the robot has loaded it
         self._behind: int | None = None  # the process with the lower priority
         self._rest = Rest()
-        self._questions = RunRequests()
-        self._unheard: RequestedScene | None = None
+        self._run_requests = RunRequests()
+        self._requested: RequestedScene | None = None
         super().__init__(spares)
         self.send(Load(choice))
 
@@ -143,7 +143,7 @@ class SimulationClient(Simulation):
             if ended and self.trouble() is not None:
                 self.restart(choice)
                 return
-            self._unheard = RequestedScene(choice, -1 if self.status is None else self.status.resets)
+            self._requested = RequestedScene(choice, -1 if self.status is None else self.status.resets)
             self.send(command)
 
     def restart(self, choice: SceneChoice | None = None) -> None:
@@ -154,8 +154,8 @@ class SimulationClient(Simulation):
                 return
             before, ghost = self._process, self.ghost
             mute = super().trouble() is not None
-            self.failure = self._unheard = self.coming = None
-            self._questions.forget()
+            self.failure = self._requested = self.coming = None
+            self._run_requests.forget()
             self._start()
             self.send(Load((choice or self.choice).admitting(self._start_choice)))
             if ghost is not None:
@@ -187,24 +187,24 @@ class SimulationClient(Simulation):
         if process is not self._process:
             return
         with self._lock:
-            self._unheard = None if self._unheard is None else self._unheard.after(report)
+            self._requested = None if self._requested is None else self._requested.after(report)
         match report:
             case Status(lecture=Lecture() as lecture):
                 self.lecture = lecture
                 self._rest.stir()
                 self.choice = self.choice.at(lecture.exercise)
                 with self._lock:
-                    if self._unheard is None and self.coming is not None and self.coming.is_at(lecture):
+                    if self._requested is None and self.coming is not None and self.coming.is_at(lecture):
                         self.coming = None
             case LoadRefused():
                 self.coming = None
             case RunDescription():
-                self._questions.answer(report)
+                self._run_requests.answer(report)
             case SimulationFailed(_, died):
                 with self._lock:
-                    self._questions.forget()
-                    if died and self._unheard is not None and process is self._process:
-                        self.restart(self._unheard.choice)
+                    self._run_requests.forget()
+                    if died and self._requested is not None and process is self._process:
+                        self.restart(self._requested.choice)
             case Script():
                 ghost = self.ghost
                 if ghost is not None:
@@ -228,7 +228,7 @@ class SimulationClient(Simulation):
         """Requests the run so far; returns None if the simulation does not answer within `timeout` seconds.
         This call blocks: do not call it on the page's loop or on viser's."""
         with self._lock:
-            answer = self._questions.ask(self._process)
+            answer = self._run_requests.ask(self._process)
         try:
             return None if answer is None else answer.get(timeout=timeout)
         except Empty:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from app.commands.robots import RobotFile
+from app.commands.robots import HeldJoints, RobotFile
 from robots import InputError
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ def export(
     out: str,
     urdf: RobotFile = None,
     tip: str | None = None,
-    hold: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="PATTERN")] = (),
+    hold: HeldJoints = (),
     controller: str | None = None,
     stack: str | None = None,
     set: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="PATH=VALUE")] = (),

@@ -12,11 +12,13 @@ from app.commands.output import print_table, write_json
 
 RobotFile = Annotated[str | None, tyro.conf.arg(aliases=("--robot",), metavar="FILE")]
 """The option that names a robot."""
+HeldJoints = Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="PATTERN")]
+"""The option that holds joints."""
 
 
 def robots(
     check: str | None = None,
-    hold: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="PATTERN")] = (),
+    hold: HeldJoints = (),
     json: str | None = None,
 ) -> int:
     """List the robots of the catalog, or check a robot's file. The check prints every repair, default value

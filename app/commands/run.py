@@ -9,7 +9,7 @@ import tyro
 
 from app.commands.output import check_file, figure, print_table, readable_unit, write_file, write_json
 from app.commands.progress import progress_bar
-from app.commands.robots import RobotFile
+from app.commands.robots import HeldJoints, RobotFile
 from robots import InputError
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ def run(
     scene: tyro.conf.Positional[str | None] = None,
     urdf: RobotFile = None,
     tip: str | None = None,
-    hold: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="PATTERN")] = (),
+    hold: HeldJoints = (),
     controller: str | None = None,
     task: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="FILE.py")] = (),
     duration: float | None = None,

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import tyro
 
-from app.commands.robots import RobotFile
+from app.commands.robots import HeldJoints, RobotFile
 from robots import InputError
 
 
@@ -17,7 +17,7 @@ def serve(
     scene: str | None = None,
     urdf: RobotFile = None,
     tip: str | None = None,
-    hold: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="PATTERN")] = (),
+    hold: HeldJoints = (),
     controller: str | None = None,
     task: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="FILE.py")] = (),
     state: str | None = None,

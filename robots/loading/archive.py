@@ -119,16 +119,21 @@ def _descriptions(folder: Path, source: str) -> Iterator[Path]:
         if seen > _MAX_FILES:
             raise InputError(f"{source} has more than {_MAX_FILES} files: give the path of the description.")
         for name in sorted(files):
-            path = Path(place, name)
-            if path.suffix.lower() == ".urdf" or (
-                path.suffix.lower() == ".xml" and root_tag(_beginning(path)) in ("robot", "mujoco")
-            ):
-                yield path
+            if is_description(Path(place, name)):
+                yield Path(place, name)
+
+
+def is_description(path: Path) -> bool:
+    """Returns whether a file is a URDF by its name, or a URDF or MuJoCo model by its root element."""
+    kind = path.suffix.lower()
+    return kind == ".urdf" or (kind == ".xml" and root_tag(_beginning(path)) in ("robot", "mujoco"))
 
 
 def _beginning(path: Path) -> bytes:
     try:
+        if not path.is_file():  # opening a named pipe would wait
+            return b""
         with path.open("rb") as file:
-            return file.read(_CHUNK) if path.is_file() else b""
+            return file.read(_CHUNK)
     except OSError:
         return b""

@@ -156,7 +156,7 @@ def test_a_question_to_who_dies_is_answered_at_once(start: Start) -> None:
     answers: list[RunDescription | None] = []
     asking = threading.Thread(target=lambda: answers.append(learner.ask(10 * LONG)))
     asking.start()
-    assert wait_until(lambda: bool(learner._questions._waiting), LONG)
+    assert wait_until(lambda: bool(learner._run_requests._waiting), LONG)
     os.kill(pid, signal.SIGKILL)
     asking.join(LONG)
     assert answers == [None]
