@@ -4,6 +4,7 @@ and writes nothing outside its own folder."""
 from __future__ import annotations
 
 import io
+import os
 import pickle
 import stat
 import time
@@ -109,6 +110,15 @@ def test_one_of_several_descriptions_is_chosen(here: Path) -> None:
     with pytest.raises(InputError, match=r"mine.zip/\.\./.* is not in the folder"):
         load_robot(here / "mine.zip" / ".." / ".." / "mine" / "a" / "nowhere.urdf")
     assert check_urdf(here / "one.zip").usable
+
+
+def test_a_named_pipe_in_a_folder_is_not_opened(here: Path) -> None:
+    """Opening it would wait until somebody writes to it."""
+    folder = here / "with_a_pipe"
+    folder.mkdir()
+    os.mkfifo(folder / "a.xml")
+    (folder / "arm.urdf").write_text(two_joint_arm())
+    assert load_robot(folder).n == 2
 
 
 def test_a_zip_stays_in_the_folder_whose_files_may_be_opened(here: Path) -> None:
