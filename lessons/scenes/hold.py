@@ -23,6 +23,9 @@ DRAGGED = Limits(stall_guard=True, avoidance=Avoidance(on=True))
 scenes of the papers have the printed rows alone."""
 PLANAR3_PLANT = replace(TOUCHING, armature=(0.05, 0.05, 0.03))
 """The paper's M̄ = 0.033 requires geared motors: without armature the loop would be unstable."""
+_HEAVY = 1.0  # kg·m²
+"""Largest element of M̄ up to which R weighs torques, as printed. Q weighs m/s², so for a robot of two tonnes
+R = 10 of its N·m would outweigh Q, and the robot would swing."""
 
 
 def hold_of(name: str) -> TorqueScene:
@@ -77,7 +80,13 @@ def _hold(robot: Robot, plant: PlantSettings) -> TorqueScene:
         name="hold",
         title=f"{robot.name}: drag the target; position, then orientation, then posture",
         robot=robot,
-        settings=TorqueSettings(stack=tuple(levels), M_bar=tuple(robot.M_bar), limits=DRAGGED, plant=plant),
+        settings=TorqueSettings(
+            stack=tuple(levels),
+            M_bar=tuple(robot.M_bar),
+            R_on="torque" if robot.M_bar.max() <= _HEAVY else "acceleration",
+            limits=DRAGGED,
+            plant=plant,
+        ),
         references=lambda robot, stack: {},
         q_0=robot.home,
         v_0=np.zeros(robot.n),

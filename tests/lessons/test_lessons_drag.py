@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from app.__main__ import main
-from lessons.experiments.drag import Motion, target
-from robots import load_robot
+from lessons.experiments.drag import Motion, dragged, target
+from lessons.scenes.hold import hold_robot
+from robots import load_robot, load_urdf_text
 
 FIELD = Path(__file__).parents[1] / "robots" / "field"
 
@@ -47,6 +48,25 @@ def test_the_drag_stays_within_reach_and_above_the_floor() -> None:
     lamp = load_robot(FIELD / "limits_in_degrees.urdf")
     low = target(lamp, 0.1, floor=True)
     assert low is not None and low[2] > 0.04
+
+
+def test_a_robot_of_two_tonnes_follows_and_a_small_one_keeps_the_printed_weights() -> None:
+    """In the units of a heavy robot, R = 10 per (N m)^2 would outweigh Q = 200 per (m/s^2)^2."""
+    parts = ['<link name="l0"/>']
+    for k, axis in enumerate(("0 0 1", "0 1 0", "0 1 0", "0 1 0")):
+        parts.append(
+            f'<link name="l{k + 1}"><inertial><origin xyz="0.5 0 0"/><mass value="500"/><inertia ixx="20" '
+            f'iyy="50" izz="50" ixy="0" ixz="0" iyz="0"/></inertial></link><joint name="j{k}" '
+            f'type="revolute"><parent link="l{k}"/><child link="l{k + 1}"/><origin xyz="{min(k, 1)} 0 0"/>'
+            f'<axis xyz="{axis}"/><limit lower="-2" upper="2" velocity="2" effort="0"/></joint>'
+        )
+    parts.append('<link name="tool0"/><joint name="at" type="fixed"><parent link="l4"/>')
+    parts.append('<child link="tool0"/><origin xyz="1 0 0"/></joint>')
+    robot = load_urdf_text(f'<robot name="heavy">{"".join(parts)}</robot>')
+    motion = dragged(robot)
+    assert motion.follows and motion.rest and motion.torque < 0.9, str(motion)
+    assert hold_robot(robot).settings.R_on == "acceleration"
+    assert hold_robot(load_robot("panda")).settings.R_on == "torque"
 
 
 def test_what_is_not_good_is_said() -> None:
