@@ -3,6 +3,7 @@ given to the compiler, and only files that the import may read."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
@@ -16,6 +17,10 @@ from robots.report import Finding
 from robots.urdf.read import MAX_BYTES, Refusal, load_bytes, parser
 
 _INCLUDES = 100
+_TURNS = 4.0 * math.pi  # rad
+_RADIANS = (
+    'its ranges look like radians, and no <compiler> says so: MuJoCo would read degrees; add angle="radian"'
+)
 _MESHES = 200_000_000  # bytes
 _UNUSED = (
     *("texture", "layer", "hfield", "skin", "visual", "statistic", "size", "contact", "sensor", "keyframe"),
@@ -56,6 +61,9 @@ def compiled_mjcf(
     for geom in [*root.iter("geom")]:
         if geom.get("hfield") is not None or geom.get("mesh") in missing:
             _remove(geom)
+    turns = _in_radians(root)
+    if turns:
+        etree.SubElement(root, "compiler", angle="radian")
     # A body that had its mass from a mesh that is missing gets the mass that the import of a URDF gives it.
     least = {"boundmass": "1e-9", "boundinertia": "1e-14"} if missing else {}
     etree.SubElement(root, "compiler", **least, discardvisual="false", fusestatic="false")
@@ -65,9 +73,10 @@ def compiled_mjcf(
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
         reason = shortened(" ".join(str(error).split()), 150)
         raise Refusal(source, f"MuJoCo cannot compile it ({reason}); correct it or give another") from None
+    found = (Finding("repaired", source, _RADIANS),) if turns else ()
     text = f"{len(missing)} mesh file(s) not found ({listed(missing.values())})"
     text += "" if folder else "; a zip of the robot's folder brings them along"
-    found = (Finding("note", "meshes", text),) if missing else ()
+    found = (*found, Finding("note", "meshes", text)) if missing else found
     return Compiled(spec.modelname, model, meshes, found)
 
 
@@ -98,6 +107,23 @@ def _include(root: Element, source: str, folder: Path | None, within: Path | Non
             raise Refusal(source, f"the included file '{shortened(name)}' {hint}")
         parent[parent.index(element) : parent.index(element) + 1] = [*_parsed(load_bytes(path), source)]
     raise Refusal(source, f"it includes more than {_INCLUDES} files, or a file includes itself")
+
+
+def _in_radians(root: Element) -> bool:
+    """Whether the angles are in radians although no compiler says so: parts of models that are completed by a
+    program leave it out. In degrees, no joint would turn further than two turns of radians have numbers."""
+    if any(compiler.get("angle") for compiler in root.iter("compiler")):
+        return False
+    try:
+        turns = [
+            abs(float(number))
+            for joint in root.iter("joint")
+            if joint.get("type", "hinge") == "hinge"
+            for number in joint.get("range", "").split()
+        ]
+    except ValueError:  # MuJoCo's compiler names the fault
+        return False
+    return 0.0 < max(turns, default=0.0) <= _TURNS
 
 
 def _meshes(

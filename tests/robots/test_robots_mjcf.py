@@ -269,6 +269,20 @@ def test_a_hostile_model_runs_or_is_refused_in_one_sentence(old: str, new: str) 
             assert np.isfinite(values).all()
 
 
+def test_ranges_in_radians_without_a_word_of_it() -> None:
+    """Models that a program completes leave the compiler's options to it."""
+    text = ARM.replace('angle="degree" ', "").replace("-170 170", "-3 3").replace("-90 120", "-1.5 2.1")
+    part = text.replace(' ref="20"', "").replace('euler="10 20 30"', 'euler="0.2 0.3 0.5"')
+    robot = loaded(part)
+    assert robot.q_upper[:2] == pytest.approx([3.0, 2.1])
+    assert [each.where for each in robot.report.of_kind("repaired")] == ["arm.xml"]
+    radians = part.replace("<compiler", '<compiler angle="radian"')
+    same_mechanics(robot, mujoco.MjModel.from_xml_string(radians))
+    told = loaded(part.replace("<compiler", '<compiler angle="degree"'))
+    assert told.q_upper[:2] == pytest.approx(np.radians([3.0, 2.1]))
+    assert not told.report.of_kind("repaired")
+
+
 def test_a_model_that_grows_without_end_is_refused() -> None:
     many = '<replicate count="100000" offset="0 0 1"><body><joint/><geom size="0.1"/></body></replicate>'
     with pytest.raises(InputError):
