@@ -38,6 +38,9 @@ class Refusal(Exception):
         self.finding = Finding("refused", where, text)
 
 
+_LISTS = ("xyz", "rpy", "size", "scale", "rgba")
+
+
 def parse(data: bytes, source: str) -> tuple[Element, list[Finding]]:
     """Returns the root element `robot` of a URDF document, and what had to be repaired or left out. Comments
     and foreign sections are removed.
@@ -61,6 +64,15 @@ def parse(data: bytes, source: str) -> tuple[Element, list[Finding]]:
     for child in list(root):
         if child.tag not in ("link", "joint", "material"):
             root.remove(child)
+    for each in root.iter():
+        for key in [key for key in each.attrib if ":" in str(key) and not str(key).startswith("{")]:
+            del each.attrib[key]  # its prefix is not declared, so the document could not be read again
+    lists = [(each, key) for each in root.iter() for key in _LISTS if "," in each.get(key, "")]
+    for element, key in lists:
+        element.set(key, element.get(key, "").replace(",", " "))
+    if lists:
+        text = f"{len(lists)} list(s) of numbers had commas, which were read as spaces"
+        findings.append(Finding("repaired", source, text))
     if not root.get("name", "").strip():
         root.set("name", "robot")
         findings.append(Finding("filled", source, "<robot> has no name; the name 'robot' was used"))

@@ -48,12 +48,17 @@ def test_files_of_other_people_load_with_a_finding(name: str, words: str) -> Non
     [
         ("<robot", "\n <!-- made by hand -->\n<?xml version='1.0'?>\n<robot", ""),
         ("<link", "<!-- a -- b --><link", "Double hyphen"),
+        ('"0.3 0 0.1"', '"0.3, 0 0.1"', "1 list(s) of numbers had commas"),
         ("</robot>", "<gazebo a='1' b=2><sensor:x/>a & b</gazebo></robot>", "not well-formed"),
     ],
-    ids=["before the declaration", "hyphens", "gazebo"],
+    ids=["before the declaration", "hyphens", "commas", "gazebo"],
 )
 def test_xml_that_other_readers_accept(before: str, after: str, words: str) -> None:
     assert words in findings(ARM.replace(before, after, 1))
+
+
+def test_an_attribute_with_an_undeclared_prefix_is_left_out() -> None:
+    assert load(ARM.replace("<limit", '<limit drake:acceleration="15"')).n == 2
 
 
 def test_latin_1_without_saying_so() -> None:
