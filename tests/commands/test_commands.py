@@ -255,6 +255,21 @@ def test_deadlines_are_counted(capfd: pytest.CaptureFixture[str]) -> None:
         assert json.loads(capfd.readouterr().out)["late_ticks"] == late
 
 
+def test_a_period_with_which_the_robot_swings_is_named(capfd: pytest.CaptureFixture[str]) -> None:
+    """With 4 ms, a drag of 160 mm stays 26 mm away, and more with lower gains. A model has no such lag."""
+    for given, words in (
+        (("T_s=0.004",), "T_s = 4 ms is too long for panda: "),
+        (("T_s=0.002",), ""),
+        (("T_s=0.004", "controller=osf"), ""),
+    ):
+        options = [word for each in given for word in ("--set", each)]
+        assert main(["run", "panda-hold", *options, "--duration", "0.02"]) == 0
+        last = capfd.readouterr().out.strip().splitlines()[-1]
+        assert last.startswith(words) and ("too long" in last) == bool(words)
+    assert main(["run", "panda-hold", "--set", "T_s=0.02", "--duration", "0.02", "--json", "-"]) == 0
+    assert "Choose at most 2.1 ms" in json.loads(capfd.readouterr().out)["period_too_long"]
+
+
 @pytest.mark.parametrize("command", COMMANDS)
 def test_no_flag_says_no_twice(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     """No flag begins with --no-no-, and no flag is listed together with its opposite."""
