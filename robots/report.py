@@ -28,13 +28,18 @@ class Finding:
 
 @dataclass(frozen=True)
 class ImportReport:
-    """All findings of one import, in the order in which they were made."""
+    """All findings of one import, in the order in which they were made.
+
+    Attributes:
+        tips: frames that are as likely as the tip.
+    """
 
     source: str
     findings: tuple[Finding, ...] = ()
     name: str = ""
     joints: tuple[str, ...] = ()
     tip: str = ""
+    tips: tuple[str, ...] = ()
 
     @property
     def usable(self) -> bool:

@@ -72,7 +72,7 @@ def canonicalise(
         lambda tree: normalise_joints(tree, held_by_name(tree, hold)),
     ):
         return None, _report(source, findings)
-    chosen, told = _tip(root, tip)
+    chosen, alike, told = _tip(root, tip)
     if refused_by(
         lambda _: told,
         lambda tree: hold_what_does_not_move(tree, chosen),
@@ -89,7 +89,9 @@ def canonicalise(
     except Refusal as refusal:
         return None, _report(source, [*findings, refusal.finding])
     name = shortened(root.get("name", "").strip())
-    report = replace(_report(source, findings), name=name, joints=tuple(model.names)[1:], tip=chosen)
+    report = replace(
+        _report(source, findings), name=name, joints=tuple(model.names)[1:], tip=chosen, tips=alike
+    )
     text = etree.tostring(root, encoding="unicode", pretty_print=True)
     return Canonical(name, text, model, report), report
 
@@ -104,19 +106,21 @@ def _report(source: str, findings: list[Finding]) -> ImportReport:
     return ImportReport(source, tuple(findings))
 
 
-def _tip(root: Element, asked: str | None) -> tuple[str, tuple[Finding, ...]]:
-    """Returns the tip, and a note of the frames that are as likely if nobody has named it."""
-    if asked is not None:
-        links = named(root, "link")
-        if asked not in links:
-            name = shortened(root.get("name", "").strip())
-            raise unknown_name(f"frame of robot '{name}' called", asked, links)
-        return asked, ()
+def _tip(root: Element, asked: str | None) -> tuple[str, tuple[str, ...], tuple[Finding, ...]]:
+    """Returns the tip, the frames that are as likely, and a note of them if nobody has named the tip."""
+    links = named(root, "link")
+    if asked is not None and asked not in links:
+        name = shortened(root.get("name", "").strip())
+        raise unknown_name(f"frame of robot '{name}' called", asked, links)
     chosen, alike = choose_tip(root)
+    if asked is not None:
+        likely = (chosen, *alike)
+        return asked, tuple(name for name in likely if name != asked) if asked in likely else (), ()
     if not alike:
-        return chosen, ()
+        return chosen, (), ()
     names = ", ".join(shortened(name) for name in alike[:_ALIKE]) + ", …" * (len(alike) > _ALIKE)
-    return chosen, (Finding("note", "tip", f"'{shortened(chosen)}' was chosen; as likely: {names} (--tip)"),)
+    note = Finding("note", "tip", f"'{shortened(chosen)}' was chosen; as likely: {names} (--tip)")
+    return chosen, alike, (note,)
 
 
 def _check_freedom(root: Element, source: str) -> Iterator[Finding]:

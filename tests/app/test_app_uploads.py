@@ -106,6 +106,24 @@ def test_a_zip_brings_its_meshes(server: PageServer) -> None:
         assert eventually(lambda: page.shows("The zip cannot be read"), LONG)
 
 
+def test_the_robot_tab_asks_for_the_hand_and_shows_how_the_robot_follows(server: PageServer) -> None:
+    """A robot whose last body carries two frames; the target is dragged in a process of its own."""
+    text = CATALOG["planar3"].path.read_text().replace('robot name="planar3"', 'robot name="mine"')
+    last = CATALOG["planar3"].tip
+    frames = "".join(
+        f'<link name="ee_{k}"/><joint name="to_{k}" type="fixed"><parent link="{last}"/>'
+        f'<child link="ee_{k}"/></joint>'
+        for k in "ab"
+    )
+    with Wire(server.link) as page:
+        upload(page, "mine", text.replace("</robot>", f"{frames}</robot>").encode())
+        assert eventually(lambda: page.find("Hand") is not None, LONG), page.notices
+        assert eventually(lambda: page.shows("findings</b> · follows within "), 2 * LONG)
+        assert page.shows("hand at <b>ee</b>")
+        page.write(page.find("Hand") or "", value="ee_a")
+        assert eventually(lambda: page.shows("hand at <b>ee_a</b>"), LONG), page.notices
+
+
 def test_a_file_for_what_was_replaced_is_told(server: PageServer) -> None:
     with Wire(server.link) as page:
         assert eventually(lambda: page.find("Upload a URDF") is not None, LONG)

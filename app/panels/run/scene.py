@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from threading import Thread
 
 import viser
 
+from app.adapter.removed_handle_errors import unless_removed
 from app.html.palette import BAD, DAMPING, GOOD, LEVELS, css
 from app.html.text import badge, block, esc
 from app.link.choice import SceneChoice
 from app.link.messages import Ready
 from app.panels.widgets.command import on_click
+from lessons.experiments.verdict import verdict
 from lessons.own.files import is_file, is_lesson
 from lessons.own.folder import Folder
 from lessons.scenes.run_spec import RunSpec
@@ -44,6 +47,8 @@ class RobotPanel:
                 f"scene <b>{esc(ready.choice.run.scene)}</b>"
             )
         )
+        self._ask_tip(gui, ready)
+        self._add_verdict(gui, ready)
         for sentence in ready.left_out:
             words = (
                 f"{badge('LEFT OUT', LEVELS[1])} One of your tasks does not fit this robot. {esc(sentence)}"
@@ -118,6 +123,37 @@ class RobotPanel:
         async def _(_: object) -> None:
             self._uploaded(of_urdf, upload.value.content, asked())
 
+    def _ask_tip(self, gui: viser.GuiApi, ready: Ready) -> None:
+        """Offers the frames that are as likely as the hand of a robot from a file."""
+        robot, current = ready.robot, ready.choice
+        likely = (robot.tip, *robot.report.tips)
+        if len(likely) < 2 or current.exercise is not None or current.run.scene != "hold":
+            return
+        frame = gui.add_dropdown("Hand", likely, hint="Frames that may be the hand; its name did not decide")
+        answer = _answer(gui)
+
+        @frame.on_update
+        async def _(_: object) -> None:
+            self._wait(answer)
+            self._choose(replace(current, run=replace(current.run, tip=str(frame.value))))
+
+    def _add_verdict(self, gui: viser.GuiApi, ready: Ready) -> None:
+        """Adds the number of findings and how a robot from a file follows a dragged target. The drag is
+        computed in a process of its own; the card says so until it ends."""
+        robot = ready.robot
+        if ready.choice.run.scene != "hold" or robot.name in CATALOG:
+            return
+        count = len(robot.report.findings)
+        found = f"<b>{count} finding{'' if count == 1 else 's'}</b> · "
+        card = gui.add_html(block(f"{found}its target is being dragged …"))
+
+        def drag() -> None:
+            text = verdict(robot)
+            colour = GOOD if text.startswith("follows") else LEVELS[1]
+            unless_removed(setattr, card, "content", block(f"{found}{esc(text)}", _edge(colour)))
+
+        Thread(target=drag, daemon=True).start()
+
     def _add_file(self, gui: viser.GuiApi, current: SceneChoice, own_files: Folder) -> None:
         with gui.add_folder("A file of your own"):
             gui.add_html(block(_FILES))
@@ -184,9 +220,7 @@ class RobotPanel:
         request came from this panel."""
         waited, self._waits = self._waits, False
         if waited and self._answer is not None:
-            self._answer.content = block(
-                f"{badge('NOT LOADED', BAD)} {esc(sentence)}", f"border-left:3px solid {css(BAD)}"
-            )
+            self._answer.content = block(f"{badge('NOT LOADED', BAD)} {esc(sentence)}", _edge(BAD))
         return waited
 
     def _report(self, gui: viser.GuiApi, ready: Ready) -> None:
@@ -199,6 +233,10 @@ class RobotPanel:
                 gui.add_html(block(f"{kind} <b>{esc(finding.where)}</b>: {esc(finding.text)}"))
             if len(report.findings) > 60:
                 gui.add_html(block(f"… and {len(report.findings) - 60} more."))
+
+
+def _edge(colour: tuple[int, int, int]) -> str:
+    return f"border-left:3px solid {css(colour)}"
 
 
 def _answer(gui: viser.GuiApi) -> viser.GuiHtmlHandle:
