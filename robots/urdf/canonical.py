@@ -16,9 +16,9 @@ from robots.errors import shortened, unknown_name
 from robots.meshes.files import localise
 from robots.report import Finding, ImportReport
 from robots.urdf.hold import MAX_JOINTS, held_by_name, hold_what_does_not_move
-from robots.urdf.inertials import repair_inertials
+from robots.urdf.inertials import ASSUMED, repair_inertials
 from robots.urdf.joints import normalise_joints
-from robots.urdf.limits import fill_efforts, fill_speeds
+from robots.urdf.limits import fill_efforts, fill_speeds, fit_masses
 from robots.urdf.read import Refusal, named, parse, without_shapes
 from robots.urdf.shapes import remove_unusable_shapes
 from robots.urdf.structure import check_structure, movable_joints
@@ -84,6 +84,9 @@ def canonicalise(
         return None, _report(source, findings)
     findings.extend(localise(root, folder, within))
     try:
+        findings.extend(fit_masses(root, _model(root)))
+        for inertial in root.iterfind("link/inertial"):
+            inertial.attrib.pop(ASSUMED, None)
         model = _model(root)
         findings.extend(fill_efforts(root, model))
     except Refusal as refusal:

@@ -21,6 +21,8 @@ _FILL_MASS = 0.1  # kg: mass that a moving body without mass, shapes and length 
 _SLENDER = 8.0  # length of a limb divided by its radius
 _HEAVIEST = 1e4  # kg: a heavier solid means that the shape has another unit
 _MARGIN = 1e-9  # distance of a repaired inertia from the limit of physical inertias, as a share of the trace
+ASSUMED = "assumed"
+"""Attribute of an inertia that the file does not give; the canonical form does not have it."""
 _KEYS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
@@ -53,6 +55,15 @@ def repair_inertials(root: Element) -> Iterator[Finding]:
                 f"the body moved by {label(joint)} has no mass; {solid} of {found.mass:.3g} kg was put there"
             )
             yield Finding("filled", label(links[carried]), text)
+
+
+def lighten(root: Element, share: float) -> None:
+    """Multiplies the masses and inertias that the file does not give."""
+    for inertial in root.iterfind(f"link/inertial[@{ASSUMED}]"):
+        for tag, keys in (("mass", ("value",)), ("inertia", _KEYS)):
+            for element in inertial.findall(tag):
+                for key in keys:
+                    element.set(key, repr(share * float(element.get(key, "0"))))
 
 
 def _from_shapes(root: Element, carried: str) -> tuple[pin.Inertia, str]:
@@ -171,7 +182,7 @@ def _sphere(mass: float) -> float:
 
 
 def _write(link: Element, found: pin.Inertia) -> None:
-    inertial = etree.SubElement(link, "inertial")
+    inertial = etree.SubElement(link, "inertial", {ASSUMED: "true"})
     etree.SubElement(inertial, "origin", xyz=" ".join(repr(float(value)) for value in found.lever))
     etree.SubElement(inertial, "mass", value=repr(float(found.mass)))
     _write_inertia(inertial, found.inertia)

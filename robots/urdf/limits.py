@@ -11,6 +11,7 @@ from lxml.etree import _Element as Element
 
 from robots.inertia import largest_loads
 from robots.report import Finding
+from robots.urdf.inertials import ASSUMED, lighten
 from robots.urdf.joints import finite_bounds
 from robots.urdf.read import Refusal, label, limit_value
 from robots.urdf.structure import movable_joints
@@ -44,6 +45,21 @@ def fill_speeds(root: Element) -> Iterator[Finding]:
                 limit.set("effort", "0")
         except Refusal as refusal:
             yield refusal.finding
+
+
+def fit_masses(root: Element, model: pin.Model) -> Iterator[Finding]:
+    """Makes the masses that the file does not give lighter if its effort limits could not move them: shapes
+    are often drawn thicker than the robot, and a motor carries its arm."""
+    if root.find(f"link/inertial[@{ASSUMED}]") is None:
+        return
+    gravity, _ = _loads(model)
+    places = {joint: model.getJointId(joint.get("name", "")) - 1 for joint in movable_joints(root)}
+    loads = [gravity[place] / effort for joint, place in places.items() if (effort := _effort(joint)) > 0.0]
+    share = 1.0 / (_LEVER * float(max(loads, default=0.0)) + 1e-12)
+    if share < 1.0:
+        lighten(root, share)
+        text = f"masses that were put there are multiplied by {share:.2g}: the effort limits carry no more"
+        yield Finding("filled", "masses", text)
 
 
 def fill_efforts(root: Element, model: pin.Model) -> Iterator[Finding]:

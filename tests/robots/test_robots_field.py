@@ -121,6 +121,20 @@ def test_an_effort_that_cannot_hold_the_arm_is_reported_and_kept() -> None:
     np.testing.assert_array_equal(weak.tau_limit, 0.1)
 
 
+def test_masses_that_are_put_there_are_not_heavier_than_the_motors_carry() -> None:
+    """Shapes are often drawn thicker than the robot; the effort limits of the file are known."""
+    thick = '<collision><geometry><cylinder radius="0.2" length="0.6"/></geometry></collision>'
+    text = two_joint_arm(j2=joint("j2", "l1", "l2"), l2=link("l2", thick)).replace(
+        link("l1"), link("l1", thick)
+    )
+    arm = load(text)
+    assert "masses that were put there are multiplied by" in " | ".join(map(str, arm.report.findings))
+    assert "holding the robot takes" not in " | ".join(map(str, arm.report.findings))
+    assert 0.1 < arm.model.inertias[1].mass < 30.0
+    weak = load(text.replace('effort="50"', 'effort="0"'))
+    assert weak.model.inertias[1].mass == pytest.approx(1000.0 * np.pi * 0.04 * 0.6)
+
+
 def test_position_limits_that_nobody_filled_in() -> None:
     """If most joints have lower = upper = 0, they are unbounded. A single one is held."""
     every = ARM.replace('lower="-2" upper="2"', 'lower="0" upper="0"')
