@@ -68,6 +68,33 @@ def run(page: Page, button: str = "Run this step") -> None:
     expect(page.get_by_text("DONE", exact=True)).to_be_visible(timeout=RUN)
 
 
+_TEXTS = """() => {
+  const seen = [], formulas = new Set(), all = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  while (all.nextNode()) {
+    const node = all.currentNode, around = node.parentElement, formula = around.closest("math");
+    if (!node.textContent.trim() || around.closest("style, script, .mantine-Notifications-root")) continue;
+    const range = document.createRange();
+    range.selectNodeContents(node);
+    const drawn = [...range.getClientRects()].some((box) => {
+      const x = box.left + box.width / 2, y = box.top + box.height / 2;
+      if (box.width < 2 || box.height < 2) return false;
+      const top = document.elementFromPoint(x, y);  // null outside of the window
+      return top && (around.contains(top) || top.contains(around));
+    });
+    if (!drawn || formulas.has(formula)) continue;
+    if (formula) formulas.add(formula);
+    seen.push(formula ? "formula" : node.textContent);
+  }
+  return seen;
+}"""
+
+
+def words_in_view(page: Page) -> int:
+    """Returns the number of words on the screen, with the names of tabs, buttons and curves: of every text
+    that is drawn and not covered or scrolled away, the pieces with a letter. A formula is one word."""
+    return sum(any(map(str.isalpha, word)) for text in page.evaluate(_TEXTS) for word in text.split())
+
+
 def marks(page: Page, sign: str) -> Locator:
     """Returns the claims or goals with a mark: "✓", "✗" or "…"."""
     return page.get_by_text(sign, exact=True)

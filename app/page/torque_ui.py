@@ -17,7 +17,7 @@ from app.page.scene_ui import Context
 from app.panels.inside.inside import InsidePanel
 from app.panels.run.joints import JointPlots
 from app.panels.run.move import MovePanel
-from app.panels.torque.controller import ControllerPanel
+from app.panels.torque.controller import ControllerPanel, HorizonPanel
 from app.panels.torque.plant import add_plant
 from app.panels.torque.plots import LevelPlots
 from app.panels.torque.start import StartPanel
@@ -49,31 +49,36 @@ class TorqueFace:
 
     # ---------------------------------------------------------------- building
 
-    def add_tabs(self, gui: viser.GuiApi, tabs: viser.GuiTabGroupHandle) -> None:
+    def add_start(self, gui: viser.GuiApi) -> None:
         context = self._context
-        ready, bindings, settings = context.ready, context.bindings, context.settings
-        with tabs.add_tab("Start"):
-            self._start = StartPanel(gui, context.post, ready, settings, context.colours, context.dark)
-            self._move = MovePanel(gui, self._movables)
-        with tabs.add_tab("Tasks"):
-            self._tasks = TasksPanel(
-                gui,
-                bindings,
-                context.loop,
-                ready.robot,
-                context.colours,
-                lambda: self._context.settings,
-                self._targets_now,
-                in_lesson=ready.choice.exercise is not None,
-            )
-        with tabs.add_tab("Control"):
-            self._controller = ControllerPanel(
-                context.client, context.in_view, bindings, settings, ready.robot
-            )
-        with tabs.add_tab("Plant"):
-            add_plant(gui, bindings, settings, ready.robot)
+        self._start = StartPanel(
+            gui, context.post, context.ready, context.settings, context.colours, context.dark
+        )
+        self._move = MovePanel(gui, self._movables)
         self._start.on_theme = context.theme
         self._start.on_recall = self._recall
+
+    def add_tasks(self, gui: viser.GuiApi) -> None:
+        context, ready = self._context, self._context.ready
+        self._tasks = TasksPanel(
+            gui,
+            context.bindings,
+            context.loop,
+            ready.robot,
+            context.colours,
+            lambda: self._context.settings,
+            self._targets_now,
+            in_lesson=ready.choice.exercise is not None,
+        )
+        self._horizon = HorizonPanel(
+            context.client, context.in_view, context.bindings, context.settings, ready.robot
+        )
+
+    def add_control(self, gui: viser.GuiApi) -> None:
+        self._controller = ControllerPanel(gui, self._context.bindings, self._context.settings)
+
+    def add_plant(self, gui: viser.GuiApi) -> None:
+        add_plant(gui, self._context.bindings, self._context.settings, self._context.ready.robot)
 
     def open_plots(self, plots: viser.PanelHandle | viser.GuiTabGroupHandle) -> None:
         # If the horizon has one knot, the QP is small enough for beginners, and its tab comes first.
@@ -104,7 +109,7 @@ class TorqueFace:
                 context.colours,
                 context.post,
                 context.learner.send,
-                self._controller.spectrum,
+                self._horizon.spectrum,
             )
 
     def recompose(self, ready: Ready) -> None:
@@ -224,6 +229,7 @@ class TorqueFace:
         self._context.loop.call_soon_threadsafe(unless_removed, self._move.update)
         self._tasks.update(now)
         self._controller.update(now)
+        self._horizon.update(now)
         self._inside.write(now.status, now.settings)
 
     def close(self) -> None:

@@ -148,11 +148,11 @@ def test_the_options_are_the_buttons_and_say_what_was_right() -> None:
     assert [each.label for each in options] == [
         "A   one or two   (✗ your answer)",
         "B   three or four",
-        "C   five or more   (✓ measured)",
+        "C   five or more   (✓ measured: 7)",
     ]
     assert all(each.disabled for each in options)
     asking.show(graded(prediction, 2, 7.0))
-    assert options[2].label == "C   five or more   (✓ your answer)"
+    assert options[2].label == "C   five or more   (✓ your answer measured: 7)"
 
 
 def test_a_claim_has_no_verdict_before_the_run_has_ended() -> None:

@@ -83,7 +83,9 @@ def _following(tasks: tuple[TaskView, ...], places: Mapping[str, int]) -> tuple[
 
 
 def _next(places: Mapping[str, int]) -> tuple[str, str]:
-    rest = "drag the target out of reach, push the robot below, or put 5 kg on its hand in <b>Plant</b>."
+    rest = (
+        "drag the target out of reach, push the robot below, or put 5 kg on its hand in <b>Robot</b>, Plant."
+    )
     if len(places) < 2:
         return "Now add a task.", f"Add a level in the tab <b>Tasks</b>, {rest}"
     (top, first), (lower, place), *_ = places.items()

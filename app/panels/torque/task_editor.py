@@ -79,7 +79,7 @@ class AddTask:
     ) -> None:
         """own: tasks of the user's own files, by path."""
         self._post, self._own = post, own
-        with gui.add_folder("Add a task", expand_by_default=False, order=-1.0):
+        with gui.add_folder("Add a task", expand_by_default=False, order=899.0):
             self._kind = gui.add_dropdown("Kind", (*KINDS, *own), initial_value="position")
             self._says = gui.add_html("")
             with gui.add_folder(None):

@@ -72,7 +72,7 @@ def test_a_task_is_added_dragged_moved_reduced_merged_passed_on_and_removed(
     press(page, "Add")
     assert eventually(page, lambda: levels(learner) == ["position", "elbow", "orientation", "posture"])
     assert eventually(page, lambda: is_drawn(page, "/targets/elbow/control"))
-    expect(page.get_by_text("gets 2 of 3 directions", exact=False).first).to_be_visible()
+    expect(page.get_by_text("2 of 3 free", exact=False).first).to_be_visible()
     assert error(learner, "position") < 1e-3
     expect(page.get_by_text("elbow [mm]", exact=True).first).to_be_visible()  # the curve of the new task
 
@@ -83,7 +83,7 @@ def test_a_task_is_added_dragged_moved_reduced_merged_passed_on_and_removed(
     assert eventually(page, lambda: error(learner, "position") < 2e-3)
     assert now(learner, "priority_leak") < 1e-6  # the elbow's level does not disturb the level above
 
-    page.get_by_role("button", name="▲ Up", exact=True).nth(1).click()
+    page.get_by_role("button", name="▲", exact=True).nth(1).click()
     assert eventually(page, lambda: levels(learner)[:2] == ["elbow", "position"])
     expect(page.get_by_text("1 · elbow", exact=True)).to_be_visible()
     unfold(page, "Change")
@@ -116,6 +116,7 @@ def test_a_task_is_added_dragged_moved_reduced_merged_passed_on_and_removed(
     assert axes(learner, "forearm") == "x"
     assert eventually(page, lambda: error(learner, "position") < 2e-3)
 
+    tab(page, "More")
     tab(page, "Export")
     press(page, "Write it down")
     code = row(page, "Code").locator("textarea").input_value()
