@@ -12,6 +12,7 @@ import viser
 from app.adapter.removed_handle_errors import unless_removed
 from app.client.moment import Moment
 from app.html.palette import LEVELS
+from app.link.exercise import signals_of
 from app.link.messages import Ready, Status
 from app.page.scene_ui import Context
 from app.panels.inside.inside import InsidePanel
@@ -31,6 +32,7 @@ from app.view.pull import Pull
 from app.view.robot import CoverView, LinkPicker, RobotView, gizmo_size
 from app.view.targets import Targets
 from app.view.trails import Trails
+from app.view.turns import JointTurns
 from app.view.world import ContactView, WorldView
 from lessons.events import Set
 from lessons.settings.torque import TorqueSettings
@@ -133,6 +135,11 @@ class TorqueFace:
         self._links = LinkPicker(robot, ready.robot, self._tasks.choose)
         self._ellipsoids = EllipsoidView(scene, ready.robot, context.colours)
         self._cover = CoverView(scene, ready.robot)
+        exercise = ready.choice.exercise
+        asked = exercise is not None and any(
+            each.name == "joints moved" for each in signals_of(exercise.part)
+        )
+        self._turns = JointTurns(scene, ready.robot.n) if asked else None
         self._world, self._contacts = WorldView(scene, ready.world), ContactView(scene)
         self._pull = Pull(scene, robot, ready.robot, context.post)
         curves = [(task.path, context.colours[task.level]) for task in ready.tasks if task.path is not None]
@@ -216,6 +223,8 @@ class TorqueFace:
         self._joint_plots.draw(moment.window, beside)
         self._inside.draw(moment)
         q = moment.latest[context.ready.layout.fields["q"]]
+        if self._turns is not None:
+            self._turns.draw(moment.t, q, moment.poses)
         self._ellipsoids.draw(bool(self._start.ellipsoids.value), q, context.settings.levels)
         self._cover.draw(bool(self._start.cover.value))
 

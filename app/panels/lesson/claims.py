@@ -52,9 +52,9 @@ def heading(exercise: LessonPlace) -> str:
     )
 
 
-_BEFORE, _AFTER, _WHY = 62, 98, 60
-"""Words of a step's own texts that are in view before and after its run, and at most those of its reason. The
-other words of the page are the names of tabs, buttons and curves."""
+_BEFORE, _AFTER, _WHY, _SLIDERS = 62, 104, 60, 10
+"""Words of a step's own texts that are in view before and after its run, at most those of its reason, and
+those of the sliders of a guess. The page's other words are the names of tabs and buttons."""
 
 
 def idea(part: Part, opened: bool) -> str:
@@ -66,19 +66,29 @@ def idea(part: Part, opened: bool) -> str:
         title = "The task" if isinstance(part, Challenge) else "The idea"
         shown = " open" if opened else ""
         return block(f"<details{shown}><summary><b>{title}</b></summary>{rendered(words)}{beside}</details>")
-    first, rest = split(words, _BEFORE - asked_words(part) - word_count("" if ghost is None else ghost.words))
+    first, rest = split(
+        words, _BEFORE - _asked_words(part) - word_count("" if ghost is None else ghost.words)
+    )
     return block(rendered(first) + beside + _more(rest))
 
 
-def asked_words(part: Step, shown: int | None = None) -> int:
-    """Returns the number of words of the question and of its options; `shown`: how many options, the longest
+def _asked_words(part: Step, shown: int | None = None) -> int:
+    """Returns the number of words of the question and its answers; `shown`: how many options, the longest
     ones, are counted."""
     prediction = part.prediction
     if prediction is None:
         return 0
     options = prediction.options if isinstance(prediction, Choice) else ()
     counts = sorted((word_count(option.text) for option in options), reverse=True)
-    return word_count(prediction.question) + sum(counts[:shown])
+    return word_count(prediction.question) + (sum(counts[:shown]) if options else _SLIDERS)
+
+
+def _result_words(part: Step) -> int:
+    """Returns the number of words that stand beside the reason: the question, its answers, the first claim,
+    the knobs and the curves."""
+    told = [part.do, *(control.words for control in part.controls), *(plot.words for plot in part.plots)]
+    told += [claim.text for claim in part.claims[:1]] + ([part.ghost.words] if part.ghost else [])
+    return _asked_words(part, 2) + sum(map(word_count, told))
 
 
 def _more(rest: str) -> str:
@@ -103,9 +113,7 @@ def why(part: Part) -> str:
     """Returns the explanation of the result."""
     if isinstance(part, Challenge):
         return ""
-    claimed = part.claims[0].text if part.claims else ""
-    beside = asked_words(part, 2) + word_count(claimed) + word_count(part.do)
-    first, rest = split(part.why, min(_WHY, _AFTER - beside))
+    first, rest = split(part.why, min(_WHY, _AFTER - _result_words(part)))
     return block(
         f"<b>Why</b>{rendered(first)}{_more(rest)}", f"border-left:3px solid {css(LEVELS[2])};margin:0.3em 0"
     )
@@ -225,9 +233,10 @@ def pictures(part: Part, lecture: Lecture) -> str:
     for k in sorted(range(len(signals)), key=lambda k: signals[k] != asked):
         own = lecture.curves[k]
         beside = lecture.ghosts[k] if k < len(lecture.ghosts) and len(lecture.ghosts[k].t) else None
-        lines = [Line("robot" if beside is not None else "", TRUTH, own)]
+        named = beside is not None and not drawn  # the first chart names the curves
+        lines = [Line("robot" if named else "", TRUTH, own)]
         if beside is not None:
-            lines.append(Line(f"ghost: {ghost}", GHOST, beside, "5 4"))
+            lines.append(Line(f"ghost: {ghost}" if named else "", GHOST, beside, "5 4"))
         drawn += chart(
             joints_named(signals[k].words),
             _unit(signals[k]),

@@ -252,7 +252,8 @@ class LessonPanel:
         best = self._notebook.progress.best.get(self._exercise.lesson)
         self._put("idea", self._idea, idea(self._part, opened=not seen))
         self._put("state", self._state, state(self._part, lecture, best))
-        self._put("pictures", self._pictures, pictures(self._part, lecture))
+        if self._far is not None or lecture.curves:
+            self._put("pictures", self._pictures, pictures(self._part, lecture))
         self._put("why", self._why, why(self._part) if over else "")
         self._put("now you", self._now_you, now_you(self._part, lecture) + self._exercises if over else "")
 

@@ -7,7 +7,7 @@ from collections import deque
 import viser
 
 from app.html.palette import BAD, GOOD
-from app.html.text import bar, block, esc, formula
+from app.html.text import bar, block, esc, formula, joint_labels
 from app.panels.inside.spectrum import SpectrumPicture
 from app.panels.widgets.controls import Controls
 from app.panels.widgets.in_view import InView
@@ -67,7 +67,7 @@ class HorizonPanel:
             controls.add_group("Horizon")
             controls.add_group("Inertia estimate M̄")
             self._gauge = gui.add_html("")
-            controls.add_elements("M_bar", robot.joint_names, "Per joint, kg·m²")
+            controls.add_elements("M_bar", joint_labels(robot.joint_names), "Per joint, kg·m²")
             with gui.add_folder("Why M̄ matters", expand_by_default=False):
                 self._norm = gui.add_html("")
                 self.spectrum = SpectrumPicture(client, in_view)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from app.client.pending_edit import PendingEdit
 from app.html.palette import BOUND, DAMPING, RGB
-from app.html.text import block, esc, formula, swatch
+from app.html.text import block, esc, formula, joints_named, swatch
 from app.panels.torque.task_editor import AddTask, TaskEditor
 from app.panels.widgets.controls import Controls
 from app.panels.widgets.level_row import DOWN, MORE, OFF, ON, UP, LevelRow, error_in_words
@@ -129,7 +129,8 @@ def add_joint_targets(
         for task in tasks:
             wish: PendingEdit[tuple[float, ...]] = PendingEdit()
             for place, joint in enumerate(task.coordinates(robot)):
-                label = joint if len(tasks) == 1 else f"{task.name}: {joint}"
+                name = joints_named(joint)
+                label = name if len(tasks) == 1 else f"{task.name}: {name}"
                 with gui.add_folder(None):
                     _add_slider(gui, bindings, label, robot, joint, task.name, place, wish, targets)
 
