@@ -7,7 +7,8 @@ import re
 from playwright.sync_api import Locator, Page, expect
 
 from app.link.exercise import parts_of
-from browsing.browser_actions import BETWEEN, key, row
+from app.panels.lesson.cards import GROUPS
+from browsing.browser_actions import BETWEEN, key, row, unfold
 from lessons.course import COURSE
 from lessons.teaching.challenge import Challenge
 from lessons.teaching.lesson import Lesson, Step
@@ -20,7 +21,14 @@ def open_lesson(page: Page, lesson: Lesson) -> None:
     """Opens a lesson: clicks on its card in the list of all lessons."""
     label = f"{COURSE.index(lesson.name) + 1} · {lesson.card.title}"
     key(page, "l")
-    page.locator(".mantine-Modal-content").get_by_role("button", name=label).click()
+    window = page.locator(".mantine-Modal-content")
+    expect(window).to_be_visible()
+    button = window.get_by_role("button", name=label)
+    if not button.is_visible():
+        unfold(
+            page, next(f"Lessons: {title}" for title, (_, names) in GROUPS.items() if lesson.name in names)
+        )
+    button.click()
     expect(page.get_by_text(f"Lesson {COURSE.index(lesson.name) + 1}: {lesson.card.title}")).to_be_visible()
     expect_part(page, lesson, lesson.steps[0])
 
@@ -72,7 +80,7 @@ _TEXTS = """() => {
   const seen = [], formulas = new Set(), all = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
   while (all.nextNode()) {
     const node = all.currentNode, around = node.parentElement, formula = around.closest("math");
-    if (!node.textContent.trim() || around.closest("style, script, .mantine-Notifications-root")) continue;
+    if (!node.textContent.trim() || !around.checkVisibility() || around.closest("style, script, .mantine-Notifications-root")) continue;
     const range = document.createRange();
     range.selectNodeContents(node);
     const drawn = [...range.getClientRects()].some((box) => {

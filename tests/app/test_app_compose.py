@@ -116,7 +116,7 @@ def test_where_a_posture_wants_the_joints_is_set_by_sliders(server: PageServer) 
             status = learner.status
             return np.zeros(7) if status is None else np.degrees(status.targets["posture"])
 
-        first, second = (shown(wire, f"joint_{number}, °") for number in (1, 2))
+        first, second = (shown(wire, f"joint {number}, °") for number in (1, 2))
         assert [wire.controls[first]["props"][end] for end in ("min", "max")] == [-170.0, 170.0]
         assert wait_until(lambda: learner.status is not None, LONG)
         before = target()

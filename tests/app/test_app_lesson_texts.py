@@ -14,10 +14,11 @@ import pytest
 
 from app.client.progress import Notebook
 from app.html.glossary import explained, words
-from app.html.markdown import rendered, rendered_line
+from app.html.markdown import rendered, rendered_line, split, word_count
 from app.html.palette import GHOST
 from app.html.text import figure, joints_named, readable
 from app.link.exercise import Lecture, LessonPlace, SignalCurve
+from app.panels.lesson.cards import GROUPS, PATHS
 from app.panels.lesson.claims import pictures, state
 from app.panels.lesson.drawing import TRUTH, Bound, Line, chart, scale, sketch
 from app.panels.lesson.prediction import Asking
@@ -56,6 +57,27 @@ def test_progress_survives_the_browser_and_whatever_stands_there() -> None:
         assert progress_from(text) == LearnerProgress()
     hostile = '{"seen": {"deadlines": [0, "1", -2, 1e9, true], "<b>": [1]}, "best": {"deadlines": 1e400}}'
     assert progress_from(hostile) == LearnerProgress({"deadlines": frozenset({0})})
+
+
+def test_every_lesson_is_in_one_group_and_the_paths_fit_their_time() -> None:
+    grouped = [name for _, names in GROUPS.values() for name in names]
+    assert sorted(grouped) == sorted(COURSE) and all(names for _, names in GROUPS.values())
+    minutes = {words: sum(load_lesson(name).card.minutes for name in names) for words, names in PATHS.items()}
+    assert minutes["Ten minutes"] <= 10 and minutes["An hour"] <= 60
+
+
+def test_a_text_is_split_after_a_sentence() -> None:
+    text = "The *hand* follows $x = f(q). T$ (2). It stays within 1.5 mm.\n\n$$y. Z$$\n\nThen it rests!"
+    assert split(text, 1) == (
+        "The *hand* follows $x = f(q). T$ (2).",
+        "It stays within 1.5 mm.\n\n$$y. Z$$\n\nThen it rests!",
+    )
+    assert split(text, 8) == split(text, 1) and split(text, 100) == (text, "")  # a formula is not cut off
+    assert word_count(text) == 12
+    for name in COURSE:
+        for step in load_lesson(name).steps:
+            first, rest = split(step.why, 60)
+            assert word_count(first) + word_count(rest) == word_count(step.why) and word_count(first) <= 60
 
 
 def test_a_notebook_saves_only_what_is_new() -> None:

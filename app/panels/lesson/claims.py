@@ -52,7 +52,7 @@ def heading(exercise: LessonPlace) -> str:
     )
 
 
-_BEFORE, _AFTER, _WHY, _SLIDERS = 62, 104, 60, 10
+_BEFORE, _AFTER, _WHY, _SLIDERS = 64, 108, 60, 10
 """Words of a step's own texts that are in view before and after its run, at most those of its reason, and
 those of the sliders of a guess. The page's other words are the names of tabs and buttons."""
 
@@ -123,10 +123,7 @@ def now_you(part: Part, lecture: Lecture) -> str:
     """Returns what the learner can do now."""
     if isinstance(part, Challenge):
         return ""
-    lost = lecture.lost_at is not None
-    return block(
-        f"<b>Now you:</b> {rendered_line(part.do)}{' The robot lost control: run again.' if lost else ''}"
-    )
+    return block(f"<b>Now you:</b> {rendered_line(part.do)}")
 
 
 def _progress(lecture: Lecture) -> str:
@@ -143,10 +140,7 @@ def _progress(lecture: Lecture) -> str:
         case "done":
             words = f'<span title="judged on the first {lecture.t:.3g} s">{badge("DONE", LEVELS[1])}</span>'
     if lecture.lost_at is not None:
-        words += (
-            f"<br>{badge('LOST', BAD)} The robot went out of control at t = {lecture.lost_at:.2f} s, "
-            "and the run ends there."
-        )
+        words += f"<br>{badge('LOST', BAD)} The robot went out of control at {lecture.lost_at:.2f} s."
     if lecture.changed:
         words += f"<br><i>{esc(lecture.changed)}</i>"
     return block(words + ("" if lecture.phase == "done" else bar(share, LEVELS[1])))
