@@ -80,7 +80,8 @@ _TEXTS = """() => {
   const seen = [], formulas = new Set(), all = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
   while (all.nextNode()) {
     const node = all.currentNode, around = node.parentElement, formula = around.closest("math");
-    if (!node.textContent.trim() || !around.checkVisibility() || around.closest("style, script, .mantine-Notifications-root")) continue;
+    if (!node.textContent.trim() || !around.checkVisibility()) continue;
+    if (around.closest("style, script, .mantine-Notifications-root")) continue;
     const range = document.createRange();
     range.selectNodeContents(node);
     const drawn = [...range.getClientRects()].some((box) => {

@@ -133,6 +133,7 @@ def test_pictures_show_numbers_for_people_and_survive_bad_ones() -> None:
     lines, bounds = [Line("robot", TRUTH, curve), Line("<i>", GHOST, curve)], [Bound(1.0, "≤ 1 mm", "<b>")]
     drawn = chart("error", "mm", lines, bounds, [(0.5, "push")], 1.0, 220)
     assert "nan" not in drawn and "<b>" not in drawn and "<i>" not in drawn and ">≤ 1 mm<" in drawn
+    assert ">0.51 s: –, ghost –<" in drawn and ">0.99 s: 3 mm, ghost 3 mm<" in drawn  # under the mouse
     nothing = SignalCurve(np.array([0.0]), np.array([math.nan]))
     assert chart("error", "mm", [Line("", TRUTH, nothing)], [], [], 1.0, 220) == ""
     assert "measured" in sketch(0.0, 6.0, 1.2, [(0.0, 1.0), (1.2, 2.0)], curve, "mm")

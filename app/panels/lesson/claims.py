@@ -239,6 +239,7 @@ def pictures(part: Part, lecture: Lecture) -> str:
             [(t, "" if drawn else words) for t, words in marks],  # the first chart says what happens
             part.duration,
             _SMALL if drawn else _LARGE,
+            lecture.phase == "done",
         )
     return block(drawn)
 

@@ -111,6 +111,32 @@ def walk(page: Page, school: PageServer, lesson: Lesson) -> None:
             next_of(page).click()
 
 
+def test_a_phone_asks_first_then_plots(browser: Browser) -> None:
+    server = PageServer(SceneChoice.of_lesson(LessonPlace(COURSE[0])), port=0, max_sessions=1)
+    page = open_page(browser, server.link, 390, 844)
+    try:
+        part = load_lesson(COURSE[0]).steps[0]
+        assert part.prediction is not None
+        expect(page.get_by_role("tab")).to_have_text(["Learn", "Tasks", "More"])
+        option = page.get_by_role("button", name=re.compile("one or two"))
+        go, idea = (
+            page.get_by_role("button", name="Run (answer first)"),
+            page.get_by_text("seven joints").last,
+        )
+        assert_order(page.get_by_text("Predict:"), option, go, idea, page.get_by_text("Paused", exact=True))
+        box = go.bounding_box()
+        assert box is not None and box["y"] + box["height"] < 844, "the answers are in view"
+        predict(page, part.prediction)
+        hurry(page)
+        run(page)
+        drawn = page.get_by_role("img", name=re.compile("over time$")).first
+        assert_order(option, drawn, page.get_by_text("Why", exact=True))
+        expect(page.get_by_text("press P", exact=False)).to_have_count(0)
+    finally:
+        page.context.close()
+        server.close()
+
+
 def next_of(page: Page) -> Locator:
     return page.get_by_role("button", name="Next: ")
 
