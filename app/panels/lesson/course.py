@@ -40,7 +40,7 @@ class Course:
         self._panel: LessonPanel | None = None
         if exercise is None:
             add_invitation(gui, notebook, choose)
-            on_click(gui.add_button("All lessons", color="gray", hint="Key L"), self._list.open)
+            on_click(gui.add_button("All lessons", hint="Key L"), self._list.open)
             return
         pictures = None
         if plots is not None:
