@@ -52,7 +52,7 @@ def heading(exercise: LessonPlace) -> str:
     )
 
 
-_BEFORE, _AFTER, _WHY, _SLIDERS = 64, 108, 60, 10
+_BEFORE, _AFTER, _WHY, _SLIDERS = 64, 104, 60, 10
 """Words of a step's own texts that are in view before and after its run, at most those of its reason, and
 those of the sliders of a guess. The page's other words are the names of tabs and buttons."""
 
