@@ -116,7 +116,7 @@ def chart(
     named = [(frame.y(bound.value) - 4, bound.label, GOOD) for bound in bounds]
     named += [(frame.end(line.curve) - 5, line.name, line.colour) for line in lines if line.name]
     readings = frame.readings(lines, unit) if over else []
-    return _svg(height, [*parts, *frame.names(named)] + readings, f"{words} over time")
+    return _svg(height, [*parts, *frame.names(named), *readings], f"{words} over time")
 
 
 def sketch(
