@@ -47,7 +47,7 @@ ANSWER = 60.0
 _PATIENCE = 1_500
 """Time, ms, for an element to accept a click; a covered or removed element is not clicked."""
 _HOTKEYS = ("Space", "?", "Escape", "ArrowLeft", "ArrowRight", *"123nbrsdltjk")
-_PANELS = ("Start", "Tasks", "Control", "Plant", "Robot", "Help", "Errors", "Joints", "Who binds")
+_PANELS = ("Learn", "Tasks", "Control", "Robot", "More", "Errors", "Joints", "Who binds")
 
 
 class Monkey:

@@ -147,7 +147,7 @@ def _lecture(
 
 def _ready(page: Learner) -> bool:
     """Returns whether the page shows a step that was not run yet and that has a button to run it."""
-    labels = ("Run this step", "Run (first say what you expect)")
+    labels = ("Run this step", "Run (answer first)")
     return any(page.find(label) for label in labels) and not page.shows("DONE")
 
 

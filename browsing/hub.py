@@ -159,6 +159,7 @@ def run_first_step(page: Page) -> Lesson:
 
 def hand_in(page: Page) -> str:
     """Returns the text that the page writes for the learner to hand in."""
+    tab(page, "More")
     tab(page, "Export")
     page.get_by_text("Hand in your progress").click()
     press(page, "Write the text")

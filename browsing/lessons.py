@@ -7,7 +7,8 @@ import re
 from playwright.sync_api import Locator, Page, expect
 
 from app.link.exercise import parts_of
-from browsing.browser_actions import BETWEEN, key, row
+from app.panels.lesson.cards import GROUPS
+from browsing.browser_actions import BETWEEN, key, row, unfold
 from lessons.course import COURSE
 from lessons.teaching.challenge import Challenge
 from lessons.teaching.lesson import Lesson, Step
@@ -20,7 +21,14 @@ def open_lesson(page: Page, lesson: Lesson) -> None:
     """Opens a lesson: clicks on its card in the list of all lessons."""
     label = f"{COURSE.index(lesson.name) + 1} · {lesson.card.title}"
     key(page, "l")
-    page.locator(".mantine-Modal-content").get_by_role("button", name=label).click()
+    window = page.locator(".mantine-Modal-content")
+    expect(window).to_be_visible()
+    button = window.get_by_role("button", name=label)
+    if not button.is_visible():
+        unfold(
+            page, next(f"Lessons: {title}" for title, (_, names) in GROUPS.items() if lesson.name in names)
+        )
+    button.click()
     expect(page.get_by_text(f"Lesson {COURSE.index(lesson.name) + 1}: {lesson.card.title}")).to_be_visible()
     expect_part(page, lesson, lesson.steps[0])
 
@@ -66,6 +74,34 @@ def run(page: Page, button: str = "Run this step") -> None:
     """Presses a button that starts a run, and waits until the run has ended."""
     page.get_by_role("button", name=button, exact=True).click()
     expect(page.get_by_text("DONE", exact=True)).to_be_visible(timeout=RUN)
+
+
+_TEXTS = """() => {
+  const seen = [], formulas = new Set(), all = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  while (all.nextNode()) {
+    const node = all.currentNode, around = node.parentElement, formula = around.closest("math");
+    if (!node.textContent.trim() || !around.checkVisibility()) continue;
+    if (around.closest("style, script, .mantine-Notifications-root")) continue;
+    const range = document.createRange();
+    range.selectNodeContents(node);
+    const drawn = [...range.getClientRects()].some((box) => {
+      const x = box.left + box.width / 2, y = box.top + box.height / 2;
+      if (box.width < 2 || box.height < 2) return false;
+      const top = document.elementFromPoint(x, y);  // null outside of the window
+      return top && (around.contains(top) || top.contains(around));
+    });
+    if (!drawn || formulas.has(formula)) continue;
+    if (formula) formulas.add(formula);
+    seen.push(formula ? "formula" : node.textContent);
+  }
+  return seen;
+}"""
+
+
+def words_in_view(page: Page) -> int:
+    """Returns the number of words on the screen, with the names of tabs, buttons and curves: of every text
+    that is drawn and not covered or scrolled away, the pieces with a letter. A formula is one word."""
+    return sum(any(map(str.isalpha, word)) for text in page.evaluate(_TEXTS) for word in text.split())
 
 
 def marks(page: Page, sign: str) -> Locator:

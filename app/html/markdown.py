@@ -17,6 +17,24 @@ _MARKDOWN = MarkdownIt("commonmark", {"html": False})
 _EQUATION = re.compile(r"\$\$(.+?)\$\$([.,;]?)|\$(.+?)\$", re.S)
 _ALONE = re.compile(r"<p>(\ue000\d+\ue001)</p>")
 _PLACE = re.compile(r"\ue000(\d+)\ue001")
+_SENTENCE = re.compile(r"[.!?][*_`\")”$]*\s+(?=[^a-z\s$]|\$[^$])")
+
+
+def word_count(text: str) -> int:
+    """Returns the number of words of a text. An equation counts as one word, a number as none."""
+    return sum(any(map(str.isalpha, word)) for word in _EQUATION.sub("equation", text).split())
+
+
+def split(text: str, most: int) -> tuple[str, str]:
+    """Returns the first sentences of a text, at least one and at most `most` words, and the rest."""
+    inside = [found.span() for found in _EQUATION.finditer(text)]
+    ends = [
+        found.end()
+        for found in _SENTENCE.finditer(text)
+        if not any(low < found.start() < high - 1 for low, high in inside)
+    ] + [len(text)]
+    end = max((end for end in ends if word_count(text[:end]) <= most), default=ends[0])
+    return text[:end].rstrip(), text[end:]
 
 
 @lru_cache(maxsize=256)

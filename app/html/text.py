@@ -115,6 +115,12 @@ def joints_named(words: str) -> str:
     return _JOINT.sub(r"joint \1", words)
 
 
+def joint_labels(names: Sequence[str]) -> tuple[str, ...]:
+    """Returns the names of a robot's joints as the page writes them; as they are if two would be equal."""
+    labels = tuple(map(joints_named, names))
+    return labels if len(set(labels)) == len(labels) else tuple(names)
+
+
 _JOINT = re.compile(r"\b(?:joint_?|q)(\d+)\b")
 _DEGREES = re.compile(r" deg\b")
 _EXPONENT = re.compile(r"-?\d+(?:\.\d+)?e[+-]\d+")

@@ -118,26 +118,43 @@ class Stage:
         narrow: bool,
     ) -> None:
         gui.add_html(_PHONE)
-        self._playback = PlaybackPanel(gui, self._learner, loop, self._face.fastest)
-        self._time_line = TimeLine(gui, self._learner, loop)
         exercise = self._learner.choice_of(self._ready).exercise
-        self._course = Course(gui, self._learner, exercise, notebook, choose, self._settings, loop)
-        tabs = gui.add_tab_group()
-        plots = tabs if narrow else gui.add_panel()
+        # On a phone, time and speed come after the question.
+        with gui.add_folder(None, order=math.inf if narrow else -1.0):
+            brief = exercise is not None
+            self._playback = PlaybackPanel(gui, self._learner, loop, self._face.fastest, brief)
+            self._time_line = TimeLine(gui, self._learner, loop)
+        tabs = gui.add_tab_group(order=0.0)
+        learn, tasks = tabs.add_tab("Learn"), tabs.add_tab("Tasks")
+        places = [] if narrow else [tabs.add_tab("Control"), tabs.add_tab("Robot")]
+        with tabs.add_tab("More"):
+            more = gui.add_tab_group()
+        control, robot = places or [more.add_tab("Control"), more.add_tab("Robot")]
+        plots = more if narrow else gui.add_panel()
         if not narrow:
             self._face.open_plots(plots)
-        self._course.add_first_tabs(tabs, plots)
-        self._face.add_tabs(gui, tabs)
-        self._course.add_last_tab(tabs)
-        with tabs.add_tab("Compare"):
+        with learn:
+            beside = None if narrow else plots
+            self._course = Course(
+                gui, self._learner, exercise, notebook, choose, self._settings, loop, beside
+            )
+        with learn if exercise is None else robot:
+            self._face.add_start(gui)
+        with tasks:
+            self._face.add_tasks(gui)
+        with control:
+            self._face.add_control(gui)
+        with robot:
+            self._robot_panel = RobotPanel(gui, self._ready, scenes, choose, own_files)
+            with gui.add_folder("Plant", expand_by_default=False):
+                self._face.add_plant(gui)
+        with more.add_tab("Compare"):
             self._compare = ComparePanel(gui, self._learner, self._settings(), self._colours)
-        with tabs.add_tab("Export"):
+        with more.add_tab("Export"):
             ExportPanel(gui, self._learner, self._settings)
             SharePanel(gui, self._learner, choose)
             add_hand_in(gui, self._learner, notebook)
-        with tabs.add_tab("Robot"):
-            self._robot_panel = RobotPanel(gui, self._ready, scenes, choose, own_files)
-        with tabs.add_tab("Help"):
+        with more.add_tab("Help"):
             self._comfort.add_switch(gui)
             self._help = HelpPanel(gui)
         for place, key in enumerate(_HOTKEYS):  # hotkeys also for levels that may be added later

@@ -61,14 +61,27 @@ class Context:
 
 
 class Face(Protocol):
-    """The user interface of a kind of scene. It is built by `open_plots`, `add_tabs`, `add_plots` and
-    `add_scene`, in this order. `follow` is called for every frame."""
+    """The user interface of a kind of scene. It is built by `open_plots`, `add_start`, `add_tasks`,
+    `add_control`, `add_plant`, `add_plots` and `add_scene`, in this order. `follow` is called for every
+    frame."""
 
     fastest: ClassVar[float]
     """The highest useful speed of the simulation, simulated seconds per second."""
 
-    def add_tabs(self, gui: viser.GuiApi, tabs: viser.GuiTabGroupHandle) -> None:
-        """Adds the tabs of this kind, beginning with the first tab."""
+    def add_start(self, gui: viser.GuiApi) -> None:
+        """Adds what to try first: the target, pushes, what is drawn."""
+        ...
+
+    def add_tasks(self, gui: viser.GuiApi) -> None:
+        """Adds the levels and what stands with them."""
+        ...
+
+    def add_control(self, gui: viser.GuiApi) -> None:
+        """Adds the settings of the controller."""
+        ...
+
+    def add_plant(self, gui: viser.GuiApi) -> None:
+        """Adds the settings of the plant."""
         ...
 
     def open_plots(self, plots: viser.PanelHandle | viser.GuiTabGroupHandle) -> None:

@@ -12,12 +12,13 @@ import viser
 from app.adapter.removed_handle_errors import unless_removed
 from app.client.moment import Moment
 from app.html.palette import LEVELS
+from app.link.exercise import signals_of
 from app.link.messages import Ready, Status
 from app.page.scene_ui import Context
 from app.panels.inside.inside import InsidePanel
 from app.panels.run.joints import JointPlots
 from app.panels.run.move import MovePanel
-from app.panels.torque.controller import ControllerPanel
+from app.panels.torque.controller import ControllerPanel, HorizonPanel
 from app.panels.torque.plant import add_plant
 from app.panels.torque.plots import LevelPlots
 from app.panels.torque.start import StartPanel
@@ -31,6 +32,7 @@ from app.view.pull import Pull
 from app.view.robot import CoverView, LinkPicker, RobotView, gizmo_size
 from app.view.targets import Targets
 from app.view.trails import Trails
+from app.view.turns import JointTurns
 from app.view.world import ContactView, WorldView
 from lessons.events import Set
 from lessons.settings.torque import TorqueSettings
@@ -49,31 +51,36 @@ class TorqueFace:
 
     # ---------------------------------------------------------------- building
 
-    def add_tabs(self, gui: viser.GuiApi, tabs: viser.GuiTabGroupHandle) -> None:
+    def add_start(self, gui: viser.GuiApi) -> None:
         context = self._context
-        ready, bindings, settings = context.ready, context.bindings, context.settings
-        with tabs.add_tab("Start"):
-            self._start = StartPanel(gui, context.post, ready, settings, context.colours, context.dark)
-            self._move = MovePanel(gui, self._movables)
-        with tabs.add_tab("Tasks"):
-            self._tasks = TasksPanel(
-                gui,
-                bindings,
-                context.loop,
-                ready.robot,
-                context.colours,
-                lambda: self._context.settings,
-                self._targets_now,
-                in_lesson=ready.choice.exercise is not None,
-            )
-        with tabs.add_tab("Control"):
-            self._controller = ControllerPanel(
-                context.client, context.in_view, bindings, settings, ready.robot
-            )
-        with tabs.add_tab("Plant"):
-            add_plant(gui, bindings, settings, ready.robot)
+        self._start = StartPanel(
+            gui, context.post, context.ready, context.settings, context.colours, context.dark
+        )
+        self._move = MovePanel(gui, self._movables)
         self._start.on_theme = context.theme
         self._start.on_recall = self._recall
+
+    def add_tasks(self, gui: viser.GuiApi) -> None:
+        context, ready = self._context, self._context.ready
+        self._tasks = TasksPanel(
+            gui,
+            context.bindings,
+            context.loop,
+            ready.robot,
+            context.colours,
+            lambda: self._context.settings,
+            self._targets_now,
+            in_lesson=ready.choice.exercise is not None,
+        )
+        self._horizon = HorizonPanel(
+            context.client, context.in_view, context.bindings, context.settings, ready.robot
+        )
+
+    def add_control(self, gui: viser.GuiApi) -> None:
+        self._controller = ControllerPanel(gui, self._context.bindings, self._context.settings)
+
+    def add_plant(self, gui: viser.GuiApi) -> None:
+        add_plant(gui, self._context.bindings, self._context.settings, self._context.ready.robot)
 
     def open_plots(self, plots: viser.PanelHandle | viser.GuiTabGroupHandle) -> None:
         # If the horizon has one knot, the QP is small enough for beginners, and its tab comes first.
@@ -104,7 +111,7 @@ class TorqueFace:
                 context.colours,
                 context.post,
                 context.learner.send,
-                self._controller.spectrum,
+                self._horizon.spectrum,
             )
 
     def recompose(self, ready: Ready) -> None:
@@ -128,6 +135,11 @@ class TorqueFace:
         self._links = LinkPicker(robot, ready.robot, self._tasks.choose)
         self._ellipsoids = EllipsoidView(scene, ready.robot, context.colours)
         self._cover = CoverView(scene, ready.robot)
+        exercise = ready.choice.exercise
+        asked = exercise is not None and any(
+            each.name == "joints moved" for each in signals_of(exercise.part)
+        )
+        self._turns = JointTurns(scene, ready.robot.n) if asked else None
         self._world, self._contacts = WorldView(scene, ready.world), ContactView(scene)
         self._pull = Pull(scene, robot, ready.robot, context.post)
         curves = [(task.path, context.colours[task.level]) for task in ready.tasks if task.path is not None]
@@ -211,6 +223,8 @@ class TorqueFace:
         self._joint_plots.draw(moment.window, beside)
         self._inside.draw(moment)
         q = moment.latest[context.ready.layout.fields["q"]]
+        if self._turns is not None:
+            self._turns.draw(moment.t, q, moment.poses)
         self._ellipsoids.draw(bool(self._start.ellipsoids.value), q, context.settings.levels)
         self._cover.draw(bool(self._start.cover.value))
 
@@ -224,6 +238,7 @@ class TorqueFace:
         self._context.loop.call_soon_threadsafe(unless_removed, self._move.update)
         self._tasks.update(now)
         self._controller.update(now)
+        self._horizon.update(now)
         self._inside.write(now.status, now.settings)
 
     def close(self) -> None:

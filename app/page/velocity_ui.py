@@ -56,37 +56,41 @@ class VelocityFace:
 
     # ---------------------------------------------------------------- building
 
-    def add_tabs(self, gui: viser.GuiApi, tabs: viser.GuiTabGroupHandle) -> None:
+    def add_start(self, gui: viser.GuiApi) -> None:
         context = self._context
-        ready, bindings, colours = context.ready, context.bindings, context.colours
-        with tabs.add_tab("Start"):
-            roles = [level.name for level in context.settings.levels]
-            self._begin = BeginPanel(
-                gui, ready.choice.run.scene, roles, colours, bool(self._base), context.dark
-            )
-            self._move = MovePanel(gui, self._movables)
-        with tabs.add_tab("Mission"):
-            self._mission = MissionPanel(
-                gui,
-                self._points,
-                colours,
-                context.post,
-                self._status,
-                lambda: self._goals.places,
-                Controls(gui, bindings, context.settings),
-                context.settings.options,
-            )
-        with tabs.add_tab("Tasks"):
-            self._roles = RolesPanel(gui, bindings, context.settings, colours, self._settings)
-        with tabs.add_tab("Control"):
-            self._controller = HtmpcPanel(gui, bindings, context.settings, ready.robot, self._settings)
-        with tabs.add_tab("Plant"):
-            add_servo_plant(gui, bindings, context.settings)
+        roles = [level.name for level in context.settings.levels]
+        self._begin = BeginPanel(
+            gui, context.ready.choice.run.scene, roles, context.colours, bool(self._base), context.dark
+        )
+        self._move = MovePanel(gui, self._movables)
         self._begin.on_theme = context.theme
         self._begin.on_swap = self._swap
         self._begin.on_look = self._look
         self._begin.on_obstacle = self._add_obstacle
         self._begin.on_clear = self._clear_ball
+
+    def add_tasks(self, gui: viser.GuiApi) -> None:
+        context, settings, colours = self._context, self._context.settings, self._context.colours
+        self._roles = RolesPanel(gui, context.bindings, settings, colours, self._settings)
+        self._mission = MissionPanel(
+            gui,
+            self._points,
+            colours,
+            context.post,
+            self._status,
+            lambda: self._goals.places,
+            Controls(gui, context.bindings, settings),
+            settings.options,
+        )
+
+    def add_control(self, gui: viser.GuiApi) -> None:
+        context = self._context
+        self._controller = HtmpcPanel(
+            gui, context.bindings, context.settings, context.ready.robot, self._settings
+        )
+
+    def add_plant(self, gui: viser.GuiApi) -> None:
+        add_servo_plant(gui, self._context.bindings, self._context.settings)
 
     def open_plots(self, plots: viser.PanelHandle | viser.GuiTabGroupHandle) -> None:
         pass

@@ -16,7 +16,7 @@ import viser
 from viser import _messages
 
 from app.client.pending_edit import PendingEdit
-from app.panels.torque.controller import ControllerPanel
+from app.panels.torque.controller import ControllerPanel, HorizonPanel
 from app.panels.torque.plant import add_plant
 from app.panels.velocity.controller import HtmpcPanel
 from app.panels.velocity.plant import add_servo_plant
@@ -197,7 +197,8 @@ def test_controls_open_on_whatever_is_set(viser_server: viser.ViserServer) -> No
         far = far.changed(path, value)
     loop = viser_server.get_event_loop()
     bindings: Bindings[TorqueSettings] = Bindings(lambda _: None, loop)
-    ControllerPanel(MagicMock(gui=viser_server.gui), MagicMock(), bindings, far, scene.robot)
+    ControllerPanel(viser_server.gui, bindings, far)
+    HorizonPanel(MagicMock(gui=viser_server.gui), MagicMock(), bindings, far, scene.robot)
     values = {handle.value for handle in viser_server.gui._gui_input_handle_from_uuid.values()}
     assert {0.04, 9.0, 0.01, 60, 1e-8} <= values
 
@@ -216,7 +217,7 @@ def test_menus_offer_every_word_a_setting_may_hold(
     for word in words:
         viser_server.gui.reset()
         changed = scene.settings.changed(path, word)
-        ControllerPanel(MagicMock(gui=viser_server.gui), MagicMock(), bindings, changed, scene.robot)
+        ControllerPanel(viser_server.gui, bindings, changed)
         handles = viser_server.gui._gui_input_handle_from_uuid.values()
         menus = [each for each in handles if isinstance(each, viser.GuiDropdownHandle)]
         assert any(menu.options == words and menu.value == word for menu in menus)
@@ -232,7 +233,8 @@ def test_a_setting_that_names_a_group_has_a_control(name: str) -> None:
         add_servo_plant(MagicMock(), bound, settings)
     else:
         assert isinstance(settings, TorqueSettings)
-        ControllerPanel(MagicMock(), MagicMock(), bound, settings, robot)
+        ControllerPanel(MagicMock(), bound, settings)
+        HorizonPanel(MagicMock(), MagicMock(), bound, settings, robot)
         add_plant(MagicMock(), bound, settings, robot)
     paths = {call.args[2](1).path for call in bound.bind.call_args_list}
     assert {each.path for each in settings.table().values() if each.shown.group} <= paths

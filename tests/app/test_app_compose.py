@@ -76,7 +76,7 @@ def test_a_task_is_added_moved_reduced_merged_split_and_removed(server: PageServ
         press(wire, "Add")
         assert are("position", "elbow", "orientation", "posture")
         shown(wire, "Remove elbow")
-        assert wait_until(lambda: wire.shows("gets 2 of 3 directions"), LONG)
+        assert wait_until(lambda: wire.shows("2 of 3 free"), LONG)
 
         wire.press_key("4")  # before, this key belonged to no level
         assert wait_until(lambda: not settings(learner).levels[3].enabled, LONG)
@@ -86,8 +86,8 @@ def test_a_task_is_added_moved_reduced_merged_split_and_removed(server: PageServ
 
         choose(wire, "Axes", "y", at=1)
         assert wait_until(lambda: axes(learner, "elbow") == "y", LONG)
-        assert wait_until(lambda: wire.shows("gets 1 of 1 directions"), LONG)
-        choose(wire, "Priority", "▲ Up", at=1)
+        assert wait_until(lambda: wire.shows("1 of 1 free"), LONG)
+        choose(wire, "Level elbow", "▲")
         assert are("elbow", "position", "orientation", "posture")
         before = settings(learner)
         assert decode(encode(state_of(RunSpec("iiwa14-hold"), before))).run.prepared().settings == before
@@ -116,7 +116,7 @@ def test_where_a_posture_wants_the_joints_is_set_by_sliders(server: PageServer) 
             status = learner.status
             return np.zeros(7) if status is None else np.degrees(status.targets["posture"])
 
-        first, second = (shown(wire, f"joint_{number}, °") for number in (1, 2))
+        first, second = (shown(wire, f"joint {number}, °") for number in (1, 2))
         assert [wire.controls[first]["props"][end] for end in ("min", "max")] == [-170.0, 170.0]
         assert wait_until(lambda: learner.status is not None, LONG)
         before = target()

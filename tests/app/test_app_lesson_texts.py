@@ -14,10 +14,11 @@ import pytest
 
 from app.client.progress import Notebook
 from app.html.glossary import explained, words
-from app.html.markdown import rendered, rendered_line
+from app.html.markdown import rendered, rendered_line, split, word_count
 from app.html.palette import GHOST
 from app.html.text import figure, joints_named, readable
 from app.link.exercise import Lecture, LessonPlace, SignalCurve
+from app.panels.lesson.cards import GROUPS, PATHS
 from app.panels.lesson.claims import pictures, state
 from app.panels.lesson.drawing import TRUTH, Bound, Line, chart, scale, sketch
 from app.panels.lesson.prediction import Asking
@@ -56,6 +57,27 @@ def test_progress_survives_the_browser_and_whatever_stands_there() -> None:
         assert progress_from(text) == LearnerProgress()
     hostile = '{"seen": {"deadlines": [0, "1", -2, 1e9, true], "<b>": [1]}, "best": {"deadlines": 1e400}}'
     assert progress_from(hostile) == LearnerProgress({"deadlines": frozenset({0})})
+
+
+def test_every_lesson_is_in_one_group_and_the_paths_fit_their_time() -> None:
+    grouped = [name for _, names in GROUPS.values() for name in names]
+    assert sorted(grouped) == sorted(COURSE) and all(names for _, names in GROUPS.values())
+    minutes = {words: sum(load_lesson(name).card.minutes for name in names) for words, names in PATHS.items()}
+    assert minutes["Ten minutes"] <= 10 and minutes["An hour"] <= 60
+
+
+def test_a_text_is_split_after_a_sentence() -> None:
+    text = "The *hand* follows $x = f(q). T$ (2). It stays within 1.5 mm.\n\n$$y. Z$$\n\nThen it rests!"
+    assert split(text, 1) == (
+        "The *hand* follows $x = f(q). T$ (2).",
+        "It stays within 1.5 mm.\n\n$$y. Z$$\n\nThen it rests!",
+    )
+    assert split(text, 8) == split(text, 1) and split(text, 100) == (text, "")  # a formula is not cut off
+    assert word_count(text) == 12
+    for name in COURSE:
+        for step in load_lesson(name).steps:
+            first, rest = split(step.why, 60)
+            assert word_count(first) + word_count(rest) == word_count(step.why) and word_count(first) <= 60
 
 
 def test_a_notebook_saves_only_what_is_new() -> None:
@@ -111,6 +133,7 @@ def test_pictures_show_numbers_for_people_and_survive_bad_ones() -> None:
     lines, bounds = [Line("robot", TRUTH, curve), Line("<i>", GHOST, curve)], [Bound(1.0, "≤ 1 mm", "<b>")]
     drawn = chart("error", "mm", lines, bounds, [(0.5, "push")], 1.0, 220)
     assert "nan" not in drawn and "<b>" not in drawn and "<i>" not in drawn and ">≤ 1 mm<" in drawn
+    assert ">0.51 s: –, ghost –<" in drawn and ">0.99 s: 3 mm, ghost 3 mm<" in drawn  # under the mouse
     nothing = SignalCurve(np.array([0.0]), np.array([math.nan]))
     assert chart("error", "mm", [Line("", TRUTH, nothing)], [], [], 1.0, 220) == ""
     assert "measured" in sketch(0.0, 6.0, 1.2, [(0.0, 1.0), (1.2, 2.0)], curve, "mm")
@@ -148,11 +171,11 @@ def test_the_options_are_the_buttons_and_say_what_was_right() -> None:
     assert [each.label for each in options] == [
         "A   one or two   (✗ your answer)",
         "B   three or four",
-        "C   five or more   (✓ measured)",
+        "C   five or more   (✓ measured: 7)",
     ]
     assert all(each.disabled for each in options)
     asking.show(graded(prediction, 2, 7.0))
-    assert options[2].label == "C   five or more   (✓ your answer)"
+    assert options[2].label == "C   five or more   (✓ your answer measured: 7)"
 
 
 def test_a_claim_has_no_verdict_before_the_run_has_ended() -> None:

@@ -291,7 +291,7 @@ def test_a_level_has_its_name_on_the_page_as_it_is(
     monkeypatch.setattr("app.panels.velocity.tasks.Controls", MagicMock())
     RolesPanel(gui, MagicMock(), named, dict.fromkeys(("<ee>", "<base>"), (0, 0, 0)), lambda: settings)
     labels = [call.args[0] for call in gui.add_folder.call_args_list if call.args[0]]
-    assert labels == ["1 · <ee>", "2 · <base>"]
+    assert labels == ["Settings of <ee>", "Settings of <base>"]
 
 
 def history_times(body: SimulationRunner) -> np.ndarray:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import viser
 
 from app.html.palette import BAD, BOUND, LEVELS, css, ink
-from app.html.text import block, esc, figure
+from app.html.text import block, esc, figure, joint_labels
 from app.link.inside import Inside
 from app.panels.widgets.in_view import InView
 from app.panels.widgets.picture import SvgPicture
@@ -31,7 +31,7 @@ class MatrixPanel:
         self, client: viser.ClientHandle, in_view: InView, robot: Robot, levels: Sequence[str]
     ) -> None:
         """levels: names, highest priority first."""
-        self._names = robot.joint_names
+        self._names = joint_labels(robot.joint_names)
         self._level = client.gui.add_dropdown("Level", tuple(levels), initial_value=levels[0])
         self._picture = SvgPicture(
             client, in_view, TITLE, SIZE, "Run (Space), or take one tick (T), to see H."

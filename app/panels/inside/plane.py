@@ -13,7 +13,7 @@ import viser
 from app.client.moment import Moment
 from app.client.pending_edit import Send
 from app.html.palette import BAD, BOUND, GHOST, RGB, css, ink
-from app.html.text import block, esc, figure, swatch
+from app.html.text import block, esc, figure, joint_labels, swatch
 from app.link.inside import Inside, InsideRequest
 from app.panels.widgets.command import on_click
 from app.panels.widgets.in_view import InView
@@ -314,11 +314,11 @@ class PlanePanel:
     ) -> None:
         """levels: names, highest priority first; post: posts an event to the session."""
         gui = client.gui
-        self._robot, self._colours = robot, colours
+        self._colours = colours
         self._half: float | None = None
+        self._names = joint_labels(robot.joint_names)
         self._pairs = {
-            f"{robot.joint_names[a]}, {robot.joint_names[b]}": (a, b)
-            for a, b in combinations(range(robot.n), 2)
+            f"{self._names[a]}, {self._names[b]}": (a, b) for a, b in combinations(range(robot.n), 2)
         }
         self._picture = SvgPicture(client, in_view, TITLE, SIZE, _EMPTY)
         self._words = gui.add_html("")
@@ -368,7 +368,7 @@ class PlanePanel:
         if plane is None or not self._picture.in_view:
             return
         self._half = half_width(plane, self._half)
-        names = [self._robot.joint_names[joint] for joint in plane.joints]
+        names = [self._names[joint] for joint in plane.joints]
         self._picture.paint(parts(plane, self._half, self._colours, names))
 
     def write(self, inside: Inside | None, settings: TorqueSettings) -> None:

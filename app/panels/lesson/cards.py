@@ -29,26 +29,48 @@ LABORATORY = SceneChoice(RunSpec("iiwa14-hold"))
 """The scene with which the free laboratory begins."""
 
 
+GROUPS: dict[str, tuple[str, tuple[str, ...]]] = {
+    "Foundations": (
+        "One arm, several tasks: what a hierarchy does, and how it is computed.",
+        ("a-redundant-arm", "one-task", "no-model-needed", "two-tasks", "swap-the-priorities",
+         "when-tasks-fight", "inside-the-qp", "your-robot"),
+    ),
+    "Limits": (
+        "Torque, speed, range, time and a wrong model: what a real robot cannot do.",
+        ("stretched-out", "torque-has-a-limit", "stopping-takes-distance", "how-far-ahead", "deadlines",
+         "sensors-are-coarse", "the-model-is-wrong"),
+    ),
+    "Contact": ("Things in the way, seen and unseen.", ("a-blind-arm", "keeping-clear")),
+    "Mobile": (
+        "An arm that drives: tasks one after the other.",
+        ("first-hold-then-reach", "how-strict-is-strict", "seeing-ahead", "deliveries", "told-wrong"),
+    ),
+}  # fmt: skip
+"""The groups of the course: what each is about, and its lessons. Its picture is that of its first lesson."""
+PATHS: dict[str, tuple[str, ...]] = {
+    "Ten minutes": ("a-redundant-arm",),
+    "An hour": ("a-redundant-arm", "two-tasks", "swap-the-priorities", "torque-has-a-limit", "a-blind-arm"),
+    "The whole course": COURSE,
+}
+"""Lessons for the time that a learner has."""
+
+
 def add_cards(gui: viser.GuiApi, notebook: Notebook, choose: Choose) -> None:
-    """Adds the cards to the current container; every button can be reached by the keyboard."""
+    """Adds the paths and the cards to the current container; every button can be reached by the keyboard."""
     progress = notebook.progress
-    done = sum(name in progress.seen for name in COURSE)
-    gui.add_html(
-        block(
-            f"<b>{len(COURSE)} lessons</b>, each with a question, a robot and a measurement: predict, run, "
-            f"compare. You have begun {done} of them. Your progress is stored in this browser."
-        )
-    )
-    for number, name in enumerate(COURSE, start=1):
-        lesson = load_lesson(name)
-        gui.add_html(_card(number, lesson, progress))
-        word, place = _offer(lesson, progress)
-        _button(
-            gui,
-            f"{word} {number} · {lesson.card.title}",
-            SceneChoice.of_lesson(LessonPlace(name, place)),
-            choose,
-        )
+    gui.add_html(block("<b>How much time do you have?</b> Your progress is stored in this browser."))
+    for words, names in PATHS.items():
+        name, place = _unfinished(names, progress)
+        numbers = ", ".join(str(COURSE.index(each) + 1) for each in names)
+        listed = f"{len(names)} lessons" if names == COURSE else f"lesson{'s' * (len(names) > 1)} {numbers}"
+        _button(gui, f"{words}: {listed}", SceneChoice.of_lesson(LessonPlace(name, place)), choose, LEVELS[1])
+    for title, (about, names) in GROUPS.items():
+        done = sum(_offer(load_lesson(name), progress)[0] == "Again" for name in names)
+        count = f"{len(names)} lessons, {done} done"
+        gui.add_html(_framed(glyph(names[0]), f"<b>{title}</b> · {count}<br>{esc(about)}"))
+        with gui.add_folder(f"Lessons: {title}", expand_by_default=False):
+            for name in names:
+                _add_card(gui, COURSE.index(name) + 1, load_lesson(name), progress, choose)
     gui.add_html(
         _framed(
             glyph("laboratory"),
@@ -58,13 +80,27 @@ def add_cards(gui: viser.GuiApi, notebook: Notebook, choose: Choose) -> None:
     _button(gui, "Go to the laboratory", LABORATORY, choose)
 
 
+def _add_card(
+    gui: viser.GuiApi, number: int, lesson: Lesson, progress: LearnerProgress, choose: Choose
+) -> None:
+    gui.add_html(_card(number, lesson, progress))
+    word, place = _offer(lesson, progress)
+    choice = SceneChoice.of_lesson(LessonPlace(lesson.name, place))
+    _button(gui, f"{word} {number} · {lesson.card.title}", choice, choose)
+
+
+def _unfinished(names: Sequence[str], progress: LearnerProgress) -> tuple[str, int]:
+    """Returns the first lesson that is not finished, and the step to open; the first one if all are."""
+    offers = {name: _offer(load_lesson(name), progress) for name in names}
+    name = next((name for name, (word, _) in offers.items() if word != "Again"), names[0])
+    return name, offers[name][1]
+
+
 def add_invitation(gui: viser.GuiApi, notebook: Notebook, choose: Choose) -> None:
     """Adds a button that leads to the next lesson or step, depending on the learner's progress."""
-    progress = notebook.progress
-    unfinished = [name for name in COURSE if _offer(load_lesson(name), progress)[0] != "Again"]
-    name = unfinished[0] if unfinished else COURSE[0]
+    name, place = _unfinished(COURSE, notebook.progress)
     lesson, number = load_lesson(name), COURSE.index(name) + 1
-    word, place = _offer(lesson, progress)
+    word, _ = _offer(lesson, notebook.progress)
     label = f"{word} lesson {number}: {lesson.card.title}"
     _button(gui, label, SceneChoice.of_lesson(LessonPlace(name, place)), choose, LEVELS[1])
 
@@ -141,7 +177,8 @@ def exercise_cards() -> str:
 
 def belonging_to(lesson: str) -> str:
     """Returns the cards of the exercises that belong to a lesson; "" if there are none."""
-    return "".join(block(f"<b>Write it yourself.</b> {card(each)}") for each in exercises_of(lesson))
+    cards = "".join(card(each) for each in exercises_of(lesson))
+    return cards and block(f"<details><summary><b>Write it yourself</b></summary>{cards}</details>")
 
 
 def card(exercise: Exercise) -> str:

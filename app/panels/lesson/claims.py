@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from app.html.glossary import STYLE
-from app.html.markdown import rendered, rendered_line
+from app.html.markdown import rendered, rendered_line, split, word_count
 from app.html.palette import BAD, BOUND, GHOST, GOOD, LEVELS, RGB, css, ink, on
 from app.html.text import badge, bar, block, esc, figure, joints_named
 from app.link.exercise import Lecture, LessonPlace, parts_of, signals_of
@@ -27,6 +28,7 @@ from lessons.teaching.claim import Claim
 from lessons.teaching.control import Script
 from lessons.teaching.lesson import Step
 from lessons.teaching.measure import Signal
+from lessons.teaching.prediction import Choice
 
 Part = Step | Challenge
 
@@ -50,13 +52,47 @@ def heading(exercise: LessonPlace) -> str:
     )
 
 
+_BEFORE, _AFTER, _WHY, _SLIDERS = 64, 104, 60, 10
+"""Words of a step's own texts that are in view before and after its run, at most those of its reason, and
+those of the sliders of a guess. The page's other words are the names of tabs and buttons."""
+
+
 def idea(part: Part, opened: bool) -> str:
-    """Returns the text of the idea; it is folded after the run, so that the results come first."""
-    words = rendered(part.text)
-    if isinstance(part, Step) and part.ghost is not None:
-        words += f'<p style="opacity:0.8">Ghost, violet and dashed: <b>{esc(part.ghost.words)}</b>.</p>'
-    title = "The task" if isinstance(part, Challenge) else "The idea"
-    return block(f"<details{' open' if opened else ''}><summary><b>{title}</b></summary>{words}</details>")
+    """Returns the text of the idea. Before the run it shows the sentences for which there is room, and the
+    rest on request; after the run all of it on request, so that the results come first."""
+    words, ghost = part.text, part.ghost if isinstance(part, Step) else None
+    beside = "" if ghost is None else f'<p style="opacity:0.8">Ghost, dashed: <b>{esc(ghost.words)}</b></p>'
+    if isinstance(part, Challenge) or not opened:
+        title = "The task" if isinstance(part, Challenge) else "The idea"
+        shown = " open" if opened else ""
+        return block(f"<details{shown}><summary><b>{title}</b></summary>{rendered(words)}{beside}</details>")
+    first, rest = split(
+        words, _BEFORE - _asked_words(part) - word_count("" if ghost is None else ghost.words)
+    )
+    return block(rendered(first) + beside + _more(rest))
+
+
+def _asked_words(part: Step, shown: int | None = None) -> int:
+    """Returns the number of words of the question and its answers; `shown`: how many options, the longest
+    ones, are counted."""
+    prediction = part.prediction
+    if prediction is None:
+        return 0
+    options = prediction.options if isinstance(prediction, Choice) else ()
+    counts = sorted((word_count(option.text) for option in options), reverse=True)
+    return word_count(prediction.question) + (sum(counts[:shown]) if options else _SLIDERS)
+
+
+def _result_words(part: Step) -> int:
+    """Returns the number of words that stand beside the reason: the question, its answers, the first claim,
+    the knobs and the curves."""
+    told = [part.do, *(control.words for control in part.controls), *(plot.words for plot in part.plots)]
+    told += [claim.text for claim in part.claims[:1]] + ([part.ghost.words] if part.ghost else [])
+    return _asked_words(part, 2) + sum(map(word_count, told))
+
+
+def _more(rest: str) -> str:
+    return f"<details><summary>More</summary>{rendered(rest)}</details>" if rest else ""
 
 
 def state(part: Part, lecture: Lecture, best: float | None) -> str:
@@ -64,9 +100,10 @@ def state(part: Part, lecture: Lecture, best: float | None) -> str:
     challenge = isinstance(part, Challenge)
     claims = part.goals if isinstance(part, Challenge) else part.claims
     html = "" if lecture.phase == "waiting" and not challenge else _progress(lecture)
-    if lecture.attempt or challenge:
-        title = "Goals" if challenge else "What it shows"
-        html += block(f"<b>{title}</b>{''.join(_claim(c, k, lecture) for k, c in enumerate(claims))}")
+    if challenge:
+        html += block(f"<b>Goals</b>{''.join(_claim(c, k, lecture) for k, c in enumerate(claims))}")
+    elif lecture.attempt:
+        html += block(_claims(claims, lecture))
     if isinstance(part, Challenge):
         html += _points(part, lecture, best)
     return html
@@ -76,21 +113,17 @@ def why(part: Part) -> str:
     """Returns the explanation of the result."""
     if isinstance(part, Challenge):
         return ""
-    return block(f"<b>Why</b>{rendered(part.why)}", f"border-left:3px solid {css(LEVELS[2])};margin:0.3em 0")
+    first, rest = split(part.why, min(_WHY, _AFTER - _result_words(part)))
+    return block(
+        f"<b>Why</b>{rendered(first)}{_more(rest)}", f"border-left:3px solid {css(LEVELS[2])};margin:0.3em 0"
+    )
 
 
 def now_you(part: Part, lecture: Lecture) -> str:
     """Returns what the learner can do now."""
     if isinstance(part, Challenge):
         return ""
-    return block(f'<b>Now you:</b> {rendered_line(part.do)}<div style="opacity:0.75">{_free(lecture)}</div>')
-
-
-def _free(lecture: Lecture) -> str:
-    judged = "your last run" if lecture.changed else "the scripted run"
-    if lecture.lost_at is not None:
-        return f"The robot lost control and stopped: run again. The marks above judge {judged}."
-    return f"You can move the robot now; the marks above judge {judged}."
+    return block(f"<b>Now you:</b> {rendered_line(part.do)}")
 
 
 def _progress(lecture: Lecture) -> str:
@@ -105,15 +138,12 @@ def _progress(lecture: Lecture) -> str:
                 f"{badge('RUNNING', GOOD)} {lecture.t:.2f} of {lecture.duration:g} s, judged during the run"
             )
         case "done":
-            words = f"{badge('DONE', LEVELS[1])} judged on the first {lecture.t:.3g} s of the run"
+            words = f'<span title="judged on the first {lecture.t:.3g} s">{badge("DONE", LEVELS[1])}</span>'
     if lecture.lost_at is not None:
-        words += (
-            f"<br>{badge('LOST', BAD)} The robot went out of control at t = {lecture.lost_at:.2f} s, "
-            "and the run ends there."
-        )
+        words += f"<br>{badge('LOST', BAD)} The robot went out of control at {lecture.lost_at:.2f} s."
     if lecture.changed:
         words += f"<br><i>{esc(lecture.changed)}</i>"
-    return block(words + bar(share, LEVELS[1]))
+    return block(words + ("" if lecture.phase == "done" else bar(share, LEVELS[1])))
 
 
 _RELATIONS = {"at most": "≤", "at least": "≥"}
@@ -124,25 +154,44 @@ _SIGNS: dict[bool | None, tuple[str, str, RGB]] = {
 }
 
 
-def _claim(claim: Claim, place: int, lecture: Lecture) -> str:
+def _claims(claims: Sequence[Claim], lecture: Lecture) -> str:
+    """Returns the first claim in words, and of the others the numbers, with their words on request."""
+    first, *others = (_claim(claim, k, lecture) for k, claim in enumerate(claims))
+    if not others:
+        return first
+    numbers = " &nbsp; ".join(
+        f"{_judged(k, lecture)[0]} {_figure(claim, k, lecture)}" for k, claim in enumerate(claims) if k > 0
+    )
+    missed = " open" if lecture.phase == "done" and False in lecture.holds[1:] else ""
+    return f"{first}<details{missed}><summary>{numbers}</summary>{''.join(others)}</details>"
+
+
+def _judged(place: int, lecture: Lecture) -> tuple[str, str, RGB]:
+    """Returns the sign, the word and the colour of a claim."""
     holds = lecture.holds[place] if place < len(lecture.holds) else None
-    value = lecture.values[place] if place < len(lecture.values) else math.nan
-    sign, word, colour = _SIGNS[holds]
     if lecture.phase == "running" and holds is not None:  # more of the run may turn it around
-        sign, word, colour = "…", "so far", BOUND
-    unit = claim.measure.unit
-    measured = (
-        ""
-        if holds is None
-        else f"{figure(value, unit)}, must be {_RELATIONS[claim.relation]} {figure(claim.bound, unit)}"
+        return "…", "so far", BOUND
+    return _SIGNS[holds]
+
+
+def _figure(claim: Claim, place: int, lecture: Lecture) -> str:
+    value = lecture.values[place] if place < len(lecture.values) else math.nan
+    return figure(value, claim.measure.unit)
+
+
+def _claim(claim: Claim, place: int, lecture: Lecture) -> str:
+    sign, word, colour = _judged(place, lecture)
+    wanted = f"must be {_RELATIONS[claim.relation]} {figure(claim.bound, claim.measure.unit)}"
+    value = _figure(claim, place, lecture)
+    measured = {"true": f"<b>{value}</b>", "nothing to measure yet": f"<b>{word}</b>"}.get(
+        word, f'<b style="color:{ink(colour)}">{word}</b> {value}, {wanted}'
     )
     return (
         f'<div style="display:flex;gap:0.5em;margin:0.25em 0"><div style="flex:0 0 1.3em;height:1.3em;'
         f"border-radius:50%;text-align:center;font-weight:700;color:{css(on(colour))};"
         f'line-height:1.3;background:{css(colour)}">'
-        f'{sign}</div><div style="min-width:0">{esc(claim.text)}'
-        f'<div style="opacity:0.8" title="{esc(claim.measure.words)}">'
-        f'<b style="color:{ink(colour)}">{word}</b> {measured}</div></div></div>'
+        f'{sign}</div><div style="min-width:0" title="{esc(claim.measure.words)}: {wanted}">'
+        f"{esc(claim.text)} {measured}</div></div>"
     )
 
 
@@ -168,7 +217,7 @@ def _points(challenge: Challenge, lecture: Lecture, best: float | None) -> str:
 def pictures(part: Part, lecture: Lecture) -> str:
     """Returns the signals of the step, plotted over the run: the predicted one first, and large."""
     if not lecture.curves:
-        return block("The curves of the run appear here: run this step to see them.")
+        return block("The curves of the run appear here.")
     claims = part.goals if isinstance(part, Challenge) else part.claims
     ghost = part.ghost.words if isinstance(part, Step) and part.ghost is not None else ""
     signals = signals_of(part)
@@ -178,9 +227,10 @@ def pictures(part: Part, lecture: Lecture) -> str:
     for k in sorted(range(len(signals)), key=lambda k: signals[k] != asked):
         own = lecture.curves[k]
         beside = lecture.ghosts[k] if k < len(lecture.ghosts) and len(lecture.ghosts[k].t) else None
-        lines = [Line("robot" if beside is not None else "", TRUTH, own)]
+        named = beside is not None and not drawn  # the first chart names the curves
+        lines = [Line("robot" if named else "", TRUTH, own)]
         if beside is not None:
-            lines.append(Line(f"ghost: {ghost}", GHOST, beside, "5 4"))
+            lines.append(Line(f"ghost: {ghost}" if named else "", GHOST, beside, "5 4"))
         drawn += chart(
             joints_named(signals[k].words),
             _unit(signals[k]),
@@ -189,6 +239,7 @@ def pictures(part: Part, lecture: Lecture) -> str:
             [(t, "" if drawn else words) for t, words in marks],  # the first chart says what happens
             part.duration,
             _SMALL if drawn else _LARGE,
+            lecture.phase == "done",
         )
     return block(drawn)
 

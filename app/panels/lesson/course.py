@@ -1,4 +1,4 @@
-"""The lessons in one page: the tab of the active step, the invitation, and the list of lessons."""
+"""The lessons in one page: the active step, the invitation, and the list of lessons."""
 
 from __future__ import annotations
 
@@ -13,13 +13,14 @@ from app.link.choice import SceneChoice
 from app.link.exercise import Lecture, LessonPlace
 from app.panels.lesson.cards import add_cards, add_invitation, exercise_cards
 from app.panels.lesson.step import LessonPanel
+from app.panels.widgets.command import on_click
 from app.panels.widgets.window import PopupWindow
 from lessons.settings.settings import SceneSettings
 
 
 class Course:
-    """The lessons of a page, built anew for every scene. The tab of a lesson comes first, since the learner
-    opened the page for this lesson."""
+    """The lessons of a page, built anew for every scene. In a lesson the first tab has its step, otherwise a
+    button that leads to the next lesson."""
 
     def __init__(
         self,
@@ -30,44 +31,25 @@ class Course:
         choose: Callable[[SceneChoice], None],
         settings: Callable[[], SceneSettings],
         loop: asyncio.AbstractEventLoop,
+        plots: viser.PanelHandle | viser.GuiTabGroupHandle | None,
     ) -> None:
-        """exercise: the active step, if there is one."""
-        self._gui, self._learner, self._notebook = gui, learner, notebook
-        self._exercise = exercise
-        self._choose, self._settings, self._loop = choose, settings, loop
+        """exercise: the active step, if there is one; plots: gets a tab with the curves of the step. If it
+        is None, the curves are in the panel of the step."""
+        self._gui, self._notebook, self._choose = gui, notebook, choose
         self._list = PopupWindow(gui, "All lessons", "L", self._fill)
         self._panel: LessonPanel | None = None
         if exercise is None:
             add_invitation(gui, notebook, choose)
-
-    def add_first_tabs(
-        self, tabs: viser.GuiTabGroupHandle, plots: viser.PanelHandle | viser.GuiTabGroupHandle
-    ) -> None:
-        """Adds the tab of the active step, and its curves to the plots."""
-        gui, exercise = self._gui, self._exercise
-        if exercise is None:
+            on_click(gui.add_button("All lessons", hint="Key L"), self._list.open)
             return
-        lesson = tabs.add_tab("Lesson")
-        with plots.add_tab("This step"):
-            pictures = gui.add_html("")
+        pictures = None
+        if plots is not None:
+            with plots.add_tab("This step"):
+                pictures = gui.add_html("")
+        tab = gui.add_folder(None)
         self._panel = LessonPanel(
-            gui,
-            lesson,
-            pictures,
-            exercise,
-            self._learner,
-            self._choose,
-            self._list.open,
-            self._notebook,
-            self._settings,
-            self._loop,
+            gui, tab, pictures, exercise, learner, choose, self._list.open, notebook, settings, loop
         )
-
-    def add_last_tab(self, tabs: viser.GuiTabGroupHandle) -> None:
-        """Adds the list of lessons, if no lesson is active."""
-        if self._panel is None:
-            with tabs.add_tab("Lessons"):
-                self._fill()
 
     def _fill(self) -> None:
         add_cards(self._gui, self._notebook, self._leave_for)

@@ -17,6 +17,8 @@ from app.link.exercise import SignalCurve
 _W = 360  # width of every picture in its own units; a picture is scaled to the panel
 _WIDE, _LINE = 6.2, 12.0  # width of a letter and height of a line
 _PAGE = f"light-dark({css(LIGHT_PAGE)},{css(DARK_PAGE)})"
+_STRIPS = 60
+_AT = "<style>.hl-at>g{display:none}.hl-at:hover>g{display:inline}</style>"
 GUESS, TRUTH = LEVELS[0], LEVELS[1]
 
 
@@ -81,6 +83,7 @@ def chart(
     marks: Sequence[tuple[float, str]],
     until: float,
     height: int,
+    over: bool = True,
 ) -> str:
     """Returns the chart of a signal over the run; "" if there is nothing to draw. The last line is drawn
     first.
@@ -92,6 +95,7 @@ def chart(
         marks: times, s, at which something happens, and what happens.
         until: the end of the time axis, s.
         height: of the chart, in units of which `_W` are the width.
+        over: whether the run is over, so that values can be read with the mouse.
     """
     values = np.concatenate([line.curve.values[np.isfinite(line.curve.values)] for line in lines])
     if not values.size:
@@ -111,7 +115,8 @@ def chart(
     parts += [frame.line(line.curve, line.colour, line.dashes) for line in reversed(lines)]
     named = [(frame.y(bound.value) - 4, bound.label, GOOD) for bound in bounds]
     named += [(frame.end(line.curve) - 5, line.name, line.colour) for line in lines if line.name]
-    return _svg(height, [*parts, *frame.names(named)], f"{words} over time")
+    readings = frame.readings(lines, unit) if over else []
+    return _svg(height, [*parts, *frame.names(named), *readings], f"{words} over time")
 
 
 def sketch(
@@ -218,6 +223,29 @@ class _Frame(NamedTuple):
             y = max(min(y, self._floor - 4 - _LINE * (len(below) - 1 - k)), free, self.top + 9)
             parts.append(_text(_W - 8, y, words, colour, "end", bold=True, halo=True))
             free = y + _LINE
+        return parts
+
+    def readings(self, lines: Sequence[Line], unit: str) -> list[str]:
+        """Returns vertical strips. While the mouse is over a strip, it shows its time and the values of the
+        curves."""
+        parts, wide = [_AT], (_W - self.left - 6) / _STRIPS
+        known = [line for line in lines if len(line.curve.t)]
+        for k in range(_STRIPS):
+            t, x = (k + 0.5) * self.until / _STRIPS, self.left + k * wide
+            found = [line.curve.values[np.abs(line.curve.t - t).argmin()] for line in known]
+            if not known or t > max(line.curve.t[-1] for line in known):
+                break
+            values = ", ghost ".join(figure(float(value), unit) for value in found)
+            words = f"{t:.2f} s: {values}"
+            half = 0.5 * _WIDE * len(words)
+            left = min(max(x - half, self.left), _W - 6 - 2 * half)
+            area = f'y="{self.top}" width="{wide:.1f}" height="{self._floor - self.top}"'
+            middle = f"M{x + wide / 2:.1f} {self.top}V{self._floor}"
+            parts.append(
+                f'<g class="hl-at"><rect x="{x:.1f}" {area} fill="transparent"/><g>'
+                f'<path d="{middle}" stroke="currentColor"/>'
+                f"{_text(left, self.top + 11, words, bold=True, halo=True)}</g></g>"
+            )
         return parts
 
     def line(self, curve: SignalCurve, colour: RGB, dashes: str = "none") -> str:

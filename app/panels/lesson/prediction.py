@@ -116,9 +116,17 @@ class Asking:
         before = lecture.phase in ("waiting", "preparing") and lecture.grade is None
         for each in self._inputs:
             _put(each, "visible", before)
-        for each in self._options:
+        for k, each in enumerate(self._options):
             _put(each, "disabled", not before)
+            _put(each, "visible", lecture.grade is None or k in self._compared(lecture))
         self._write(lecture)
+
+    def _compared(self, lecture: Lecture) -> tuple[object, ...]:
+        """Returns the options that stay after the run: the learner's and the right one, or all if none is
+        right."""
+        assert isinstance(self._prediction, Choice)
+        right = self._prediction.right(lecture.truth)
+        return (lecture.answer, right) if right is not None else tuple(range(len(self._options)))
 
     def _recall(self, answer: Answer) -> None:
         """Restores the prediction after a page was reloaded."""
@@ -133,14 +141,16 @@ class Asking:
         html = f"<b>{'Predict' if known is None else 'You predicted'}:</b> "
         html += rendered_line(self._prediction.question) + self._pictured(known)
         _put(self._picture, "content", _ruled(html))
-        _put(self._verdict, "visible", known is not None)
-        if known is not None and known.grade is not None:
+        choice = self._prediction if isinstance(self._prediction, Choice) else None
+        told = choice is not None and known is not None and choice.right(known.truth) is not None
+        _put(self._verdict, "visible", known is not None and not told)  # the buttons tell it
+        if known is not None and known.grade is not None and not told:
             score = known.grade.score
             word, colour = (
                 ("RIGHT", GOOD) if score >= 0.999 else ("NEARLY", LEVELS[1]) if score > 0 else ("NOT SO", BAD)
             )
-            told = f"{badge(word, colour)} {rendered_line(readable(known.grade.words))}"
-            _put(self._verdict, "content", _ruled(told))
+            words = f"{badge(word, colour)} {rendered_line(readable(known.grade.words))}"
+            _put(self._verdict, "content", _ruled(words))
 
     def _pictured(self, lecture: Lecture | None) -> str:
         """Returns the picture of the prediction. The options of a choice, which are buttons, are updated
@@ -181,7 +191,8 @@ def _label(choice: Choice, place: int, mine: Answer | None, truth: float) -> str
     """Returns the words on the button of an option."""
     right = choice.right(truth)
     marks = [] if right is None or place not in (mine, right) else ["✓" if place == right else "✗"]
-    marks += ["your answer"] if place == mine else ["measured"] if place == right else []
+    marks += ["your answer"] if place == mine else []
+    marks += [f"measured: {figure(truth, choice.measure.unit)}"] if place == right else []
     return f"{_LETTERS[place]}   {choice.options[place].text}" + (f"   ({' '.join(marks)})" if marks else "")
 
 

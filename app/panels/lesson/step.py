@@ -26,7 +26,7 @@ from lessons.settings.settings import SceneSettings
 from lessons.teaching.challenge import Challenge
 from lessons.teaching.lesson import Step
 
-_AGAIN, _MINE, _RESET = "Run again", "Run with my settings", "Reset this step"
+_AGAIN, _MINE, _RESET = "Run again", "With my knobs", "Reset"
 _BACK, _SKIP, _ALL = "◀ Back", "Skip ▶", "All lessons"
 
 
@@ -36,8 +36,8 @@ class LessonPanel:
     def __init__(
         self,
         gui: viser.GuiApi,
-        tab: viser.GuiTabHandle,
-        pictures: viser.GuiHtmlHandle,
+        tab: viser.GuiFolderHandle,
+        pictures: viser.GuiHtmlHandle | None,
         exercise: LessonPlace,
         learner: SimulationClient,
         choose: Callable[[SceneChoice], None],
@@ -46,8 +46,9 @@ class LessonPanel:
         settings: Callable[[], SceneSettings],
         loop: asyncio.AbstractEventLoop,
     ) -> None:
-        """pictures: the container in which the curves of the run are drawn."""
-        self._gui, self._tab, self._pictures, self._loop = gui, tab, pictures, loop
+        """pictures: where the curves of the run are drawn. If it is None, as on a phone, they are drawn here
+        below the answers, and the idea follows."""
+        self._gui, self._tab, self._far, self._loop = gui, tab, pictures, loop
         self._learner, self._send, self._choose = learner, learner.send, choose
         self._all_lessons, self._notebook, self._settings = all_lessons, notebook, settings
         self._fast, self._beside = False, learner.shows_ghosts
@@ -79,7 +80,9 @@ class LessonPanel:
 
     def _build(self) -> None:
         gui, part = self._gui, self._part
-        self._idea = gui.add_html("")
+        self._heading = gui.add_html(heading(self._exercise))
+        if self._far is not None:
+            self._idea = gui.add_html("")
         prediction = part.prediction if isinstance(part, Step) else None
         self._asking = None if prediction is None else Asking(gui, prediction, self._predict)
         self._knobs_first = gui.add_folder("Your knobs") if isinstance(part, Challenge) else None
@@ -91,17 +94,22 @@ class LessonPanel:
         self._hurry = gui.add_checkbox(
             "As fast as possible", self._fast, hint="Faster than real time, if you have seen the run before"
         )
+        self._pictures = self._far or gui.add_html("")
+        if self._far is None:
+            self._idea = gui.add_html("")
         self._state = gui.add_html("")
         self._why = gui.add_html("")
         self._now_you = gui.add_html("")
-        self._free = gui.add_folder("Controls of this step", visible=False)
+        self._free = gui.add_folder("Your knobs", visible=False)
         with self._free:
             if isinstance(part, Step):
                 for control in part.controls:
                     add_control(gui, self._bindings, control, self._settings())
-            self._rerun = gui.add_button_group("The script", (_AGAIN, _MINE, _RESET))
+            self._rerun = gui.add_button_group(
+                "Script", (_AGAIN, _MINE, _RESET), hint="The run of this step, with its own settings or yours"
+            )
         self._second = gui.add_checkbox(
-            "Ghost in the scene",
+            "Ghost",
             self._beside,
             visible=isinstance(part, Step) and part.ghost is not None,
             hint="Shows the second robot, translucent, in the same scene. Both robots start again together.",
@@ -227,9 +235,7 @@ class LessonPanel:
         if self._asking is not None:
             self._asking.show(lecture)
         ready = self._asking is None or lecture.answer is not None or self._asking.suggested is not None
-        label = (
-            "Start the run" if challenge else "Run this step" if ready else "Run (first say what you expect)"
-        )
+        label = "Start the run" if challenge else "Run this step" if ready else "Run (answer first)"
         if self._run.label != label:
             self._run.label = label
         for handle, shown in (
@@ -244,9 +250,10 @@ class LessonPanel:
         if self._run.disabled != (busy or not ready):
             self._run.disabled = busy or not ready
         best = self._notebook.progress.best.get(self._exercise.lesson)
-        self._put("idea", self._idea, heading(self._exercise) + idea(self._part, opened=not seen))
+        self._put("idea", self._idea, idea(self._part, opened=not seen))
         self._put("state", self._state, state(self._part, lecture, best))
-        self._put("pictures", self._pictures, pictures(self._part, lecture))
+        if self._far is not None or lecture.curves:
+            self._put("pictures", self._pictures, pictures(self._part, lecture))
         self._put("why", self._why, why(self._part) if over else "")
         self._put("now you", self._now_you, now_you(self._part, lecture) + self._exercises if over else "")
 

@@ -22,7 +22,7 @@ _KEYS = (
     ("Ctrl K", "every command, searchable"),
     (
         "↑ ↓ in a field",
-        "move a target, goal or obstacle by one step: see Move a target by keys in the tab Start",
+        "move a target, goal or obstacle by one step: see Move a target by keys in the tab Learn",
     ),
     ("W A S D Q E", "the camera goes forward, left, back, right, down, up; the arrow keys turn it"),
     ("", "a field or checkbox that you have used receives all keys until you click beside it"),

@@ -6,6 +6,7 @@ from __future__ import annotations
 import asyncio
 import math
 import time
+from contextlib import nullcontext
 from functools import partial
 
 import viser
@@ -34,29 +35,39 @@ class PlaybackPanel:
     """Buttons and a status line."""
 
     def __init__(
-        self, gui: viser.GuiApi, learner: SimulationClient, loop: asyncio.AbstractEventLoop, fastest: float
+        self,
+        gui: viser.GuiApi,
+        learner: SimulationClient,
+        loop: asyncio.AbstractEventLoop,
+        fastest: float,
+        brief: bool,
     ) -> None:
-        """fastest: the highest selectable speed, simulated seconds per second."""
+        """fastest: the highest selectable speed, simulated seconds per second; brief: whether the controls
+        that a lesson does not need are folded."""
         self._learner, self._loop = learner, loop
         self._running: PendingEdit[bool] = PendingEdit()
-        self._closed = False
+        self._closed, self._brief = False, brief
         self._trouble = gui.add_html("", visible=False)
         self._again = gui.add_button("Start again", visible=False)
         self._status = gui.add_html(block("Starting the simulation …"))
         self._buttons = gui.add_button_group(
             "Playback",
-            (_PAUSE, _STEP, _RESET, _RESET_ALL),
+            self._choices(True),
             hint="Space: run or pause · T: one control tick · R: robot back to its start. "
             "Reset all also restores every setting.",
         )
-        self._speed = gui.add_slider(
-            "Speed",
-            min=0.1,
-            max=fastest,
-            step=0.1,
-            initial_value=1.0,
-            hint="Simulated seconds per second",
-        )
+        with gui.add_folder("Time", expand_by_default=False) if brief else nullcontext():
+            self._speed = gui.add_slider(
+                "Speed",
+                min=0.1,
+                max=fastest,
+                step=0.1,
+                initial_value=1.0,
+                hint="Simulated seconds per second",
+            )
+            if brief:
+                seldom = gui.add_button_group("Also", (_STEP, _RESET_ALL))
+                on_click(seldom, lambda: self._click(str(seldom.value)))
         self._touched = -math.inf
 
         on_click(self._buttons, lambda: self._click(str(self._buttons.value)))
@@ -74,6 +85,10 @@ class PlaybackPanel:
             ("Single control tick", "T", _STEP),
         ):
             add_command(gui, label, key, partial(self._click, choice))
+
+    def _choices(self, running: bool) -> tuple[str, ...]:
+        first = _PAUSE if running else _RUN
+        return (first, _RESET) if self._brief else (first, _STEP, _RESET, _RESET_ALL)
 
     def _click(self, choice: str) -> None:
         learner = self._learner
@@ -110,9 +125,9 @@ class PlaybackPanel:
 
     def update(self, now: SessionSnapshot[SceneSettings]) -> None:
         status = now.status
-        first = _PAUSE if status.running else _RUN
-        if self._buttons.options[0] != first:
-            self._buttons.options = (first, _STEP, _RESET, _RESET_ALL)
+        choices = self._choices(status.running)
+        if self._buttons.options != choices:
+            self._buttons.options = choices
         self._loop.call_soon_threadsafe(unless_removed, self._show_speed, status.speed)
         self._status.content = headline(status, now.settings.T_s)
 

@@ -1,4 +1,4 @@
-"""The settings of the controller: its kind, horizon, M̄ with its gauge, time step, limits and solver."""
+"""The settings of the controller: its kind, deadline, limits and solver; its horizon and M̄ with a gauge."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections import deque
 import viser
 
 from app.html.palette import BAD, GOOD
-from app.html.text import bar, block, esc, formula
+from app.html.text import bar, block, esc, formula, joint_labels
 from app.panels.inside.spectrum import SpectrumPicture
 from app.panels.widgets.controls import Controls
 from app.panels.widgets.in_view import InView
@@ -21,7 +21,34 @@ _LOOKS = 9
 
 
 class ControllerPanel:
-    """All settings of the controller that can be changed while it runs.
+    """The settings of the controller that can be changed while it runs, except the horizon and M̄."""
+
+    def __init__(
+        self, gui: viser.GuiApi, bindings: Bindings[TorqueSettings], settings: TorqueSettings
+    ) -> None:
+        controls = Controls(gui, bindings, settings)
+        with gui.add_folder("Which controller"):
+            controls.add("controller")
+            self._what = gui.add_html(block(esc(settings.controllers[settings.controller]), lines=2))
+        self._shown = settings.controller
+        self._deadline = DeadlineFolder(gui, controls)
+        with gui.add_folder("Limits"):
+            controls.add("limits.torque", "limits.velocity")
+            controls.add_group("Limits")
+        with gui.add_folder("Distances", expand_by_default=False):
+            controls.add_group("Distances")
+        with gui.add_folder("Solver", expand_by_default=False):
+            controls.add_group("Solver")
+
+    def update(self, now: SessionSnapshot[TorqueSettings]) -> None:
+        self._deadline.update(now)
+        if now.settings.controller != self._shown:
+            self._shown = now.settings.controller
+            self._what.content = block(esc(now.settings.controllers[self._shown]), lines=2)
+
+
+class HorizonPanel:
+    """The horizon and M̄, which stand below the rows of the levels.
 
     spectrum: the picture of the eigenvalues, beside the controls of M̄.
     """
@@ -36,48 +63,32 @@ class ControllerPanel:
     ) -> None:
         gui = client.gui
         controls = Controls(gui, bindings, settings)
-        with gui.add_folder("Which controller"):
-            controls.add("controller")
-            self._what = gui.add_html(block(esc(settings.controllers[settings.controller]), lines=2))
-        self._shown = settings.controller
-        with gui.add_folder("Horizon"):
+        with gui.add_folder("Horizon and inertia estimate M̄", order=1.0):
             controls.add_group("Horizon")
-        self._deadline = DeadlineFolder(gui, controls)
-        with gui.add_folder("Inertia estimate M̄"):
-            self._gauge = gui.add_html("")
             controls.add_group("Inertia estimate M̄")
-            self.spectrum = SpectrumPicture(client, in_view)
-            controls.add_elements("M_bar", robot.joint_names, "Per joint, kg·m²")
-        with gui.add_folder("Limits"):
-            controls.add("limits.torque", "limits.velocity")
-            controls.add_group("Limits")
-        with gui.add_folder("Distances", expand_by_default=False):
-            controls.add_group("Distances")
-        with gui.add_folder("Solver", expand_by_default=False):
-            controls.add_group("Solver")
-        with gui.add_folder("Why M̄ matters", expand_by_default=False):
-            gui.add_html(
-                formula(r"\tau = \tau_0 + \bar M (\ddot q - \ddot q_0)")
-                + block("Time-delay estimation: torque and acceleration of the previous tick replace a model "
-                        "of the whole dynamics, and M̄ replaces the inertia. The estimation error decays to "
-                        "zero if")
-                + formula(r"\rho(I - M^{-1} \bar M) < 1")
-            )  # fmt: skip
+            self._gauge = gui.add_html("")
+            controls.add_elements("M_bar", joint_labels(robot.joint_names), "Per joint, kg·m²")
+            with gui.add_folder("Why M̄ matters", expand_by_default=False):
+                self._norm = gui.add_html("")
+                self.spectrum = SpectrumPicture(client, in_view)
+                gui.add_html(
+                    formula(r"\tau = \tau_0 + \bar M (\ddot q - \ddot q_0)")
+                    + block("Time-delay estimation: torque and acceleration of the previous tick replace a "
+                            "model of the whole dynamics, and M̄ replaces the inertia. The estimation error "
+                            "decays to zero if the radius is below 1, as it is if the norm is.")
+                    + formula(r"\rho(I - M^{-1} \bar M) < 1")
+                )  # fmt: skip
 
     def update(self, now: SessionSnapshot[TorqueSettings]) -> None:
-        self._deadline.update(now)
-        if now.settings.controller != self._shown:
-            self._shown = now.settings.controller
-            self._what.content = block(esc(now.settings.controllers[self._shown]), lines=2)
-        norm, radius = now.number("gauge_norm"), now.number("gauge_radius")
-        self._gauge.content = block(
-            f"spectral radius of I − M⁻¹M̄: <b>{radius:.3f}</b>{_verdict(radius)}"
-            f"{bar(radius / 2, GOOD if radius < 1 else BAD, 0.5)}"
-            f"norm ‖I − M⁻¹M̄‖₂: <b>{norm:.3f}</b>{_verdict(norm)}"
-            f"{bar(norm / 2, GOOD if norm < 1 else BAD, 0.5)}"
-            "The line marks 1. The estimation error decays to zero if the radius is below 1; a norm below 1 "
-            "implies a radius below 1."
-        )
+        self._gauge.content = _measured("spectral radius of I − M⁻¹M̄", now.number("gauge_radius"))
+        self._norm.content = _measured("norm ‖I − M⁻¹M̄‖₂", now.number("gauge_norm"))
+
+
+def _measured(name: str, value: float) -> str:
+    """Returns a number that should be below 1, with a gauge whose line marks 1."""
+    return block(
+        f"{name}: <b>{value:.3f}</b>{_verdict(value)}{bar(value / 2, GOOD if value < 1 else BAD, 0.5)}"
+    )
 
 
 def _verdict(value: float) -> str:

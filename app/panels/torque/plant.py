@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import viser
 
-from app.html.text import block
+from app.html.text import block, joint_labels
 from app.panels.widgets.controls import Controls
 from app.panels.widgets.mirror import Bindings
 from lessons.settings.torque import TorqueSettings
@@ -20,4 +20,4 @@ def add_plant(
     )
     # One factor per link, named by the joint that moves the link.
     links = {"plant.mass_scale": "Mass of each link", "plant.inertia_scale": "Inertia of each link"}
-    Controls(gui, bindings, settings).add_group("Plant", links, robot.joint_names)
+    Controls(gui, bindings, settings).add_group("Plant", links, joint_labels(robot.joint_names))

@@ -9,7 +9,7 @@ import viser
 
 from app.client.pending_edit import Send
 from app.html.palette import BAD, BOUND, GOOD, RGB, TARGET, ink
-from app.html.text import block, esc, joints_named, quantity, swatch
+from app.html.text import block, esc, joint_labels, joints_named, quantity, swatch
 from app.link.messages import Ready, TaskView
 from app.panels.widgets.command import add_command, on_click
 from app.panels.widgets.controls import in_colours_of_axes
@@ -83,7 +83,9 @@ def _following(tasks: tuple[TaskView, ...], places: Mapping[str, int]) -> tuple[
 
 
 def _next(places: Mapping[str, int]) -> tuple[str, str]:
-    rest = "drag the target out of reach, push the robot below, or put 5 kg on its hand in <b>Plant</b>."
+    rest = (
+        "drag the target out of reach, push the robot below, or put 5 kg on its hand in <b>Robot</b>, Plant."
+    )
     if len(places) < 2:
         return "Now add a task.", f"Add a level in the tab <b>Tasks</b>, {rest}"
     (top, first), (lower, place), *_ = places.items()
@@ -143,8 +145,9 @@ class StartPanel:
             )
             recall = gui.add_button("Bring the target to the hand")
         with gui.add_folder("Push the robot"):
-            bodies = ready.robot.joint_names
-            body = gui.add_dropdown("Body", bodies, initial_value=bodies[-1])
+            names = ready.robot.joint_names
+            bodies = dict(zip(joint_labels(names), names, strict=True))
+            body = gui.add_dropdown("Joint", tuple(bodies), initial_value=tuple(bodies)[-1])
             force = gui.add_slider("Force [N]", min=5.0, max=100.0, step=5.0, initial_value=30.0)
             buttons = gui.add_button_group(
                 "Push",
@@ -182,7 +185,7 @@ class StartPanel:
         async def _(_: object) -> None:
             direction = np.array(_DIRECTIONS[str(buttons.value)], float)
             vector = tuple(float(x) for x in force.value * direction)
-            post(Push(str(body.value), vector, (0.0, 0.0, 0.0), PUSH_SECONDS))
+            post(Push(bodies[str(body.value)], vector, (0.0, 0.0, 0.0), PUSH_SECONDS))
 
         add_command(gui, "Turn pulling links by hand on or off", "G", self._grab)
 

@@ -10,7 +10,7 @@ import viser
 
 from app.client.pending_edit import Send
 from app.html.palette import BAD, RGB, button
-from app.html.text import block, esc
+from app.html.text import block, esc, joint_labels
 from app.panels.widgets.mirror import Bindings
 from himpc.stack import Stack
 from himpc.tasks import KINDS, Task
@@ -79,7 +79,8 @@ class AddTask:
     ) -> None:
         """own: tasks of the user's own files, by path."""
         self._post, self._own = post, own
-        with gui.add_folder("Add a task", expand_by_default=False, order=-1.0):
+        self._joints = dict(zip(joint_labels(robot.joint_names), robot.joint_names, strict=True))
+        with gui.add_folder("Add a task", expand_by_default=False, order=899.0):
             self._kind = gui.add_dropdown("Kind", (*KINDS, *own), initial_value="position")
             self._says = gui.add_html("")
             with gui.add_folder(None):
@@ -104,7 +105,7 @@ class AddTask:
             with gui.add_folder(None):
                 self._normal = gui.add_dropdown("Plane across", tuple(_NORMALS))
             with gui.add_folder(None):
-                self._joint = gui.add_dropdown("Of joint", tuple(robot.joint_names))
+                self._joint = gui.add_dropdown("Of joint", tuple(self._joints))
             with gui.add_folder(None):
                 self._level = gui.add_dropdown("On level", _places(stack), initial_value=_places(stack)[1])
             with gui.add_folder(None):
@@ -152,7 +153,7 @@ class AddTask:
             "axes": self._axes.value,
             "axis": self._axis.value,
             "normal": list(_NORMALS[self._normal.value]),
-            "joints": [self._joint.value],
+            "joints": [self._joints[self._joint.value]],
         }
         wish: dict[str, Any] = {"task": self._kind.value}
         wish |= {field: value for field, value in given.items() if field in needs}

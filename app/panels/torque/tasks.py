@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Mapping
+from functools import partial
 
 import numpy as np
 import viser
 from numpy.typing import NDArray
 
 from app.client.pending_edit import PendingEdit
-from app.html.palette import BAD, BOUND, DAMPING, RGB, css
-from app.html.text import badge, block, esc, formula, quantity, swatch
+from app.html.palette import BOUND, DAMPING, RGB
+from app.html.text import block, esc, formula, joints_named, swatch
 from app.panels.torque.task_editor import AddTask, TaskEditor
 from app.panels.widgets.controls import Controls
+from app.panels.widgets.level_row import DOWN, MORE, OFF, ON, UP, LevelRow, error_in_words
 from app.panels.widgets.mirror import Bindings
 from app.panels.widgets.snapshot import SessionSnapshot
 from himpc.stack import Level
@@ -24,9 +26,6 @@ from lessons.settings.torque import TorqueSettings
 from robots import Robot
 from robots.truth import joint_axis
 
-UP, DOWN = "▲ Up", "▼ Down"
-LINES = 3
-"""Number of lines of the longest usual text about a level, in a panel of the usual width."""
 Targets = Mapping[str, NDArray[np.float64]]
 """The raw targets that can be moved, by task."""
 
@@ -35,7 +34,7 @@ _TURN, _WAY = np.pi, 2.0
 
 
 class LevelCard:
-    """The folder of one level."""
+    """The row of one level, with its settings."""
 
     def __init__(
         self,
@@ -48,26 +47,32 @@ class LevelCard:
         robot: Robot,
         targets: Callable[[], Targets],
         moves: Bindings[Targets],
-        shift: Callable[[str, int], None],
+        press: Callable[[str, str], None],
+        opened: bool,
         unfolded: bool,
     ) -> None:
-        """targets: returns the present targets, which `moves` shows; shift: moves the level with this name by
-        a number of places; unfolded: whether the controls that edit the tasks are unfolded."""
+        """targets: returns the present targets, which `moves` shows; press: called with the name of the level
+        and the button that was pressed; opened: whether its settings are open; unfolded: whether the controls
+        that edit the tasks are unfolded."""
         name = self.name = level.name
-        self._colour = colours.get(name, BOUND)
-        self._folder = gui.add_folder(_title(place, name), order=float(place))
-        with self._folder:
-            self._live = gui.add_html(block("", lines=LINES))
-            on = gui.add_checkbox("Enabled", level.enabled, hint=f"Key {place + 1}")
-            move = gui.add_button_group("Priority", (UP, DOWN))
+        hint = f"On or off: key {place + 1}. ▲ ▼: priority. ⋯: gains, weights and tasks of this level"
+        self._row = LevelRow(
+            gui,
+            name,
+            colours.get(name, BOUND),
+            (ON if level.enabled else OFF, UP, DOWN),
+            hint,
+            partial(press, name),
+            opened or unfolded,
+        )
+        with self._row.details:
+            controls = Controls(gui, bindings, settings)
+            controls.add(f"levels.{name}.Q", f"levels.{name}.R")
+            for task in level.tasks:
+                if len(level.tasks) > 1:
+                    gui.add_html(block(f"<b>{esc(task.name)}</b>"))
+                controls.add(f"tasks.{task.name}.K_p", f"tasks.{task.name}.K_v")
             add_joint_targets(gui, moves, level, robot, targets)
-            with gui.add_folder("Gains and weights", expand_by_default=False):
-                controls = Controls(gui, bindings, settings)
-                for task in level.tasks:
-                    if len(level.tasks) > 1:
-                        gui.add_html(block(f"<b>{esc(task.name)}</b>"))
-                    controls.add(f"tasks.{task.name}.K_p", f"tasks.{task.name}.K_v")
-                controls.add(f"levels.{name}.Q", f"levels.{name}.R")
             with gui.add_folder("Change", expand_by_default=unfolded):
                 for task in level.tasks:
                     TaskEditor(gui, bindings, task, robot, alone=len(level.tasks) == 1)
@@ -75,39 +80,22 @@ class LevelCard:
                     above = settings.levels[place - 1].name
                     merge = gui.add_button("Merge with the level above")
                     merge.on_click(lambda _: bindings.post(Set("stack.merge", [name, above])))
-        bindings.bind(
-            on,
-            lambda s: any(each.enabled for each in s.levels if each.name == name),
-            lambda value: Set(f"levels.{name}.enabled", bool(value)),
-        )
-
-        @move.on_click
-        async def _(_: object) -> None:
-            shift(name, -1 if move.value == UP else 1)
 
     def update(self, now: SessionSnapshot[TorqueSettings], level: Level, place: int) -> None:
-        title = _title(place, level.name)
-        if self._folder.label != title:
-            self._folder.label = title
-            self._folder.order = float(place)
-        errors = ", ".join(
-            (f"{esc(task.name)} " if len(level.tasks) > 1 else "")
-            + f"error <b>{quantity(now.error(task.name), task.unit)}</b>"
-            for task in level.tasks
-        )
-        notes = "" if level.enabled else " " + badge("OFF", DAMPING)
+        errors = [(task.name, now.error(task.name), task.unit) for task in level.tasks]
         fallback = now.number(f"rung/{level.name}")
-        if level.enabled and fallback == fallback and fallback > 0:
-            notes += " " + badge(FALLBACKS[int(fallback)], BAD)
-        self._live.content = block(
-            f"{swatch(self._colour)}{errors}{notes}{_rank(now.status.ranks.get(level.name))}",
-            f"border-left:3px solid {css(self._colour)}",
-            LINES,
+        failed = level.enabled and fallback == fallback and fallback > 0
+        found = now.status.ranks.get(level.name)
+        self._row.update(
+            place,
+            f"{place + 1} · {level.name}",
+            level.enabled,
+            max((value for _, value, _ in errors), default=0.0),
+            error_in_words(errors),
+            "" if found is None or not level.enabled else f"{found[0]} of {found[1]} free",
+            _rank(found),
+            FALLBACKS[int(fallback)] if failed else "",
         )
-
-
-def _title(place: int, name: str) -> str:
-    return f"{place + 1} · {name}"
 
 
 def _rank(found: tuple[int, int] | None) -> str:
@@ -118,7 +106,7 @@ def _rank(found: tuple[int, int] | None) -> str:
     short = (
         "" if rank == rows else ": the levels above use the other directions, or the arm cannot move in them"
     )
-    return f"<br>gets {rank} of {rows} directions{short}"
+    return f"This level gets {rank} of {rows} directions{short}"
 
 
 def add_joint_targets(
@@ -141,7 +129,8 @@ def add_joint_targets(
         for task in tasks:
             wish: PendingEdit[tuple[float, ...]] = PendingEdit()
             for place, joint in enumerate(task.coordinates(robot)):
-                label = joint if len(tasks) == 1 else f"{task.name}: {joint}"
+                name = joints_named(joint)
+                label = name if len(tasks) == 1 else f"{task.name}: {name}"
                 with gui.add_folder(None):
                     _add_slider(gui, bindings, label, robot, joint, task.name, place, wish, targets)
 
@@ -197,7 +186,7 @@ def _inside(low: float, factor: float, digits: int) -> float:
 
 
 class TasksPanel:
-    """One folder per level, in the order of priority. Another stack needs other folders: see `rebuild`."""
+    """One row per level, in the order of priority. Another stack needs other folders: see `rebuild`."""
 
     def __init__(
         self,
@@ -216,13 +205,8 @@ class TasksPanel:
         self._current, self._targets = current, targets
         self._robot, self._in_lesson = robot, in_lesson
         self._post, self._edited = bindings.post, ""
-        gui.add_html(
-            block(
-                "The level with the highest priority is first. Each level gets the freedom that the levels "
-                "above leave."
-            ),
-            order=-1.0,
-        )
+        self._open: set[str] = set()
+        gui.add_html(block("Each level gets the freedom that the levels above leave."), order=-1.0)
         self._place = gui.add_folder(None, order=0.0)
         self._build(current())
         with gui.add_folder("Last level: damping", order=900.0):
@@ -263,7 +247,8 @@ class TasksPanel:
                     self._robot,
                     self._targets,
                     self._moves,
-                    self._move,
+                    self._press,
+                    opened=level.name in self._open,
                     unfolded=any(task.name == self._edited for task in level.tasks),
                 )
                 for place, level in enumerate(settings.levels)
@@ -307,9 +292,25 @@ class TasksPanel:
         names = self._order.now(tuple(levels))
         if place >= len(names) or names[place] not in levels:
             return None
-        name = names[place]
+        return self._switch(names[place])
+
+    def _switch(self, name: str) -> Set | None:
+        levels = {level.name: level for level in self._current().levels}
+        if name not in levels:
+            return None
         wish = self._enabled.setdefault(name, PendingEdit())
         return Set(f"levels.{name}.enabled", wish.ask(not wish.now(levels[name].enabled)))
+
+    def _press(self, name: str, button: str) -> None:
+        """Called when a button of the row of a level was pressed."""
+        if button == MORE:
+            self._open ^= {name}
+        elif button in (UP, DOWN):
+            self._move(name, -1 if button == UP else 1)
+        else:
+            event = self._switch(name)
+            if event is not None:
+                self._post(event)
 
     def _move(self, name: str, by: int) -> None:
         """Moves a level one place up (−1) or down (+1), if possible."""

@@ -145,12 +145,12 @@ _FIRST = {
         "Watch the robot avoid a crate that is not there.",
         "For a while the controller gets a wrong report: the outline shows the reported place of the crate. "
         "The hand ({ee}) and the base ({base}) move along straight paths. You set the report and its time in "
-        "the tab <b>Mission</b>.",
+        "the tab <b>Tasks</b>.",
     ),
 }
 _WATCH = (
     "Watch the robot begin the next task while it finishes the present task.",
-    "The tab <b>Mission</b> lists the tasks. The tasks in the window (▶ first, ▷ second) are the levels. "
+    "The tab <b>Tasks</b> lists the tasks. The tasks in the window (▶ first, ▷ second) are the levels. "
     "Drag the ball or the disc: the present task of hand or base gets this goal at the next control step.",
 )
 _NEXT_DRAG = (
@@ -160,7 +160,7 @@ _NEXT_DRAG = (
 )
 _NEXT_MISSION = (
     "Now change the mission.",
-    "In the tab <b>Mission</b> you can change the order of the tasks, and remove or add tasks. The button "
+    "In the tab <b>Tasks</b> you can change the order of the tasks, and remove or add tasks. The button "
     "<b>Release</b> ends a task that lasts until it is released.",
 )
 _FIRST_ARM = (

@@ -1,5 +1,4 @@
-"""The levels of a velocity-level controller: the point that each level moves, and the level's switch, Q,
-error and bound."""
+"""The levels of a velocity-level controller: a row for the point that each level moves."""
 
 from __future__ import annotations
 
@@ -8,9 +7,10 @@ from collections.abc import Callable
 import viser
 
 from app.client.pending_edit import PendingEdit
-from app.html.palette import BAD, DAMPING, RGB, css
-from app.html.text import badge, block, quantity, swatch
+from app.html.palette import RGB
+from app.html.text import block, quantity
 from app.panels.widgets.controls import Controls
+from app.panels.widgets.level_row import MORE, OFF, ON, LevelRow
 from app.panels.widgets.mirror import Bindings
 from app.panels.widgets.snapshot import SessionSnapshot
 from himpc.stack import Level
@@ -20,7 +20,7 @@ from lessons.settings.velocity import VelocitySettings
 
 
 class RolesPanel:
-    """One folder per role, in the order of the mission's window."""
+    """One row per role, in the order of the mission's window."""
 
     def __init__(
         self,
@@ -33,12 +33,9 @@ class RolesPanel:
         self._current = current
         self._order = tuple(level.name for level in settings.levels)
         self._enabled: dict[str, PendingEdit[bool]] = {name: PendingEdit() for name in self._order}
-        gui.add_html(
-            block("The levels have the order of the tasks in the mission's window, which you can change in "
-                  "the tab <b>Mission</b>. The number of a level is the key that switches it on or off.")
-        )  # fmt: skip
+        gui.add_html(block("The mission below sets the order of the levels."), order=-1.0)
         self._cards = [
-            _Card(gui, bindings, settings, level, colours[level.name], place)
+            _Card(gui, bindings, settings, level, colours[level.name], place, self._switch)
             for place, level in enumerate(settings.levels)
         ]
 
@@ -46,7 +43,9 @@ class RolesPanel:
         """Returns the event for the hotkey of an index (0-based); None if there is no such level."""
         if place >= len(self._order):
             return None
-        name = self._order[place]
+        return self._switch(self._order[place])
+
+    def _switch(self, name: str) -> Set:
         enabled = next(level.enabled for level in self._current().levels if level.name == name)
         wish = self._enabled[name]
         return Set(f"levels.{name}.enabled", wish.ask(not wish.now(enabled)))
@@ -61,7 +60,7 @@ class RolesPanel:
 
 
 class _Card:
-    """The controls of one role."""
+    """The row of one role."""
 
     def __init__(
         self,
@@ -71,42 +70,31 @@ class _Card:
         level: Level,
         colour: RGB,
         place: int,
+        switch: Callable[[str], Set],
     ) -> None:
         name = self.name = level.name
-        self._colour = colour
-        self._folder = gui.add_folder(_title(place, name), order=float(place + 1))
-        with self._folder:
-            self._live = gui.add_html(block("", lines=2))
-            on = gui.add_checkbox("Enabled", level.enabled, hint=f"Key {place + 1}")
-            Controls(gui, bindings, settings).add(f"levels.{name}.Q")
-        bindings.bind(
-            on, lambda s: _find(s, name).enabled, lambda value: Set(f"levels.{name}.enabled", bool(value))
+
+        def press(button: str) -> None:
+            if button != MORE:
+                bindings.post(switch(name))
+
+        self._row = LevelRow(
+            gui, name, colour, (ON if level.enabled else OFF,), "⋯: the weight of this level", press
         )
+        with self._row.details:
+            Controls(gui, bindings, settings).add(f"levels.{name}.Q")
 
     def update(self, now: SessionSnapshot[VelocitySettings], level: Level, place: int, inside: bool) -> None:
-        title = _title(place, level.name)
-        if self._folder.label != title:
-            self._folder.label = title
-            self._folder.order = float(place + 1)
         task = level.tasks[0]
-        text = f"error <b>{quantity(now.error(task.name), task.unit)}</b>"
-        bound = now.number(f"bound/{level.name}")
-        if bound == bound:
-            text += f", levels below may increase it to {quantity(bound, task.unit)}"
-        notes = "" if level.enabled else " " + badge("OFF", DAMPING)
-        if not inside:
-            text, notes = "has no task in the window", ""
+        error, bound = now.error(task.name), now.number(f"bound/{level.name}")
         fallback = now.number(f"rung/{level.name}")
-        if fallback == fallback and fallback > 0:
-            notes += " " + badge(FALLBACKS[int(fallback)], BAD)
-        self._live.content = block(
-            f"{swatch(self._colour)}{text}{notes}", f"border-left:3px solid {css(self._colour)}", lines=2
+        self._row.update(
+            place + 1,
+            f"{place + 1} · {level.name}",
+            level.enabled,
+            error if inside else 0.0,
+            f"<b>{quantity(error, task.unit)}</b>" if inside else "no task now",
+            f"≤ {quantity(bound, task.unit)}" if inside and bound == bound else "",
+            "Levels below may increase the error of this level to this bound",
+            FALLBACKS[int(fallback)] if inside and fallback == fallback and fallback > 0 else "",
         )
-
-
-def _title(place: int, name: str) -> str:
-    return f"{place + 1} · {name}"
-
-
-def _find(settings: VelocitySettings, name: str) -> Level:
-    return next(level for level in settings.levels if level.name == name)

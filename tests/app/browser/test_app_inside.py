@@ -17,7 +17,7 @@ from app.panels.inside.matrix import TITLE as HESSIAN
 from app.panels.inside.plane import TITLE as PLANE
 from app.panels.inside.spectrum import TITLE as SPECTRUM
 from app.server.server import PageServer
-from browsing.browser_actions import drag_target, eventually, often, open_page, press, set_number, tab
+from browsing.browser_actions import drag_target, eventually, often, open_page, press, set_number, tab, unfold
 from browsing.scene_switch import show_scene
 from lessons.events import MoveLevel, Set
 from lessons.geometry.plane import Plane
@@ -204,13 +204,14 @@ def test_eigenvalues_move_with_M_bar(sheet: Page, drawing: PageServer) -> None:
         )
         return min(found, default=float("nan"))
 
-    tab(sheet, "Control")
+    tab(sheet, "Tasks")
+    unfold(sheet, "Why M̄ matters")
     sheet.locator(f'[data-chart="{SPECTRUM}"]').scroll_into_view_if_needed()
     assert eventually(sheet, lambda: farthest() == farthest())
     before = farthest()
     set_number(sheet, "M̄ scale", 2.0)
     assert eventually(sheet, lambda: farthest() < before - 0.1)
-    tab(sheet, "Start")
+    tab(sheet, "Learn")
 
 
 def test_one_knot_is_a_click_away(shared: Page, drawing: PageServer) -> None:

@@ -16,7 +16,7 @@ from app.link.exercise import LessonPlace, parts_of
 from app.link.messages import Post
 from app.server.server import PageServer
 from browsing.browser_actions import eventually, key, open_page, press
-from browsing.lessons import expect_part, hurry, marks, open_lesson, predict, run
+from browsing.lessons import expect_part, hurry, marks, open_lesson, predict, run, words_in_view
 from lessons.authoring.lesson import lesson_named
 from lessons.authoring.new import text_of
 from lessons.course import COURSE, load_lesson
@@ -26,6 +26,8 @@ from lessons.teaching.challenge import Challenge
 from lessons.teaching.lesson import Lesson
 
 pytestmark = pytest.mark.usefixtures("one_fork_server")
+BEFORE, AFTER = 120, 180
+"""Largest number of words on the screen in a step, before and after its run."""
 UNSEEN = 1500
 """Time between two pictures, ms: these tests read the panel and never look at the 3D view."""
 
@@ -39,7 +41,7 @@ def school() -> Iterator[PageServer]:
 
 @pytest.fixture(scope="module")
 def learner_page(browser: Browser, school: PageServer) -> Iterator[Page]:
-    opened = open_page(browser, school.link, 1000, 700, rest=UNSEEN)
+    opened = open_page(browser, school.link, 1440, 900, rest=UNSEEN)
     yield opened
     opened.context.close()
 
@@ -78,7 +80,7 @@ def test_a_lesson_of_ones_own_is_walked_through(browser: Browser, tmp_path: Path
     file = tmp_path / "mine.md"
     file.write_text(text_of("lesson", None, "mine.md"))
     server = PageServer(SceneChoice.opening(str(file)), port=0, max_sessions=1)
-    page = open_page(browser, server.link, 1000, 700)
+    page = open_page(browser, server.link, 1440, 900)
     try:
         walk(page, server, lesson_named(str(file)))
     finally:
@@ -93,6 +95,7 @@ def walk(page: Page, school: PageServer, lesson: Lesson) -> None:
         if isinstance(part, Challenge):
             take_challenge(page, school, part)
             continue
+        assert eventually(page, lambda: words_in_view(page) <= BEFORE), words_in_view(page)
         if part.prediction is not None:
             predict(page, part.prediction)
         hurry(page)
@@ -100,11 +103,38 @@ def walk(page: Page, school: PageServer, lesson: Lesson) -> None:
         expect(marks(page, "✓")).to_have_count(len(part.claims))
         expect(marks(page, "✗")).to_have_count(0)
         expect(page.get_by_text("You predicted:")).to_have_count(int(part.prediction is not None))
+        assert eventually(page, lambda: words_in_view(page) <= AFTER), words_in_view(page)
         drawn = page.get_by_role("img", name=re.compile("over time$")).first.bounding_box()
         assert drawn is not None and drawn["height"] >= 200
-        assert_order(page.get_by_text("Now you:"), page.get_by_text("Controls of this step"), next_of(page))
+        assert_order(page.get_by_text("Now you:"), page.get_by_text("Your knobs"), next_of(page))
         if part is not parts_of(lesson)[-1]:
             next_of(page).click()
+
+
+def test_a_phone_asks_first_then_plots(browser: Browser) -> None:
+    server = PageServer(SceneChoice.of_lesson(LessonPlace(COURSE[0])), port=0, max_sessions=1)
+    page = open_page(browser, server.link, 390, 844)
+    try:
+        part = load_lesson(COURSE[0]).steps[0]
+        assert part.prediction is not None
+        expect(page.get_by_role("tab")).to_have_text(["Learn", "Tasks", "More"])
+        option = page.get_by_role("button", name=re.compile("one or two"))
+        go, idea = (
+            page.get_by_role("button", name="Run (answer first)"),
+            page.get_by_text("seven joints").last,
+        )
+        assert_order(page.get_by_text("Predict:"), option, go, idea, page.get_by_text("Paused", exact=True))
+        box = go.bounding_box()
+        assert box is not None and box["y"] + box["height"] < 844, "the answers are in view"
+        predict(page, part.prediction)
+        hurry(page)
+        run(page)
+        drawn = page.get_by_role("img", name=re.compile("over time$")).first
+        assert_order(option, drawn, page.get_by_text("Why", exact=True))
+        expect(page.get_by_text("press P", exact=False)).to_have_count(0)
+    finally:
+        page.context.close()
+        server.close()
 
 
 def next_of(page: Page) -> Locator:

@@ -58,7 +58,7 @@ def shared_page(browser: Browser, server: PageServer) -> Iterator[Page]:
 def page(shared_page: Page, server: PageServer) -> Page:
     """Returns the page after a reset, in the same state for each test."""
     assert eventually(shared_page, lambda: bool(server.sessions.learners))
-    tab(shared_page, "Start")
+    tab(shared_page, "Learn")
     reset_all(shared_page, server.sessions.learners[0])
     return shared_page
 
@@ -145,7 +145,7 @@ def test_the_camera_goes_along_with_the_base(page: Page, learner: SimulationClie
     """The camera moves by the same distance as the base, although a browser without a graphics card reports
     its camera late."""
     load(page, learner, "ridgeback-ur10-drag")
-    tab(page, "Start")
+    tab(page, "Learn")
     unfold(page, "Show")
     along = row(page, "Camera follows the base").locator("input")
     along.click()
@@ -172,7 +172,7 @@ def test_a_mission_runs_to_its_end_though_a_task_is_moved_meanwhile(
     set_number(page, "Speed", 0.1)
     assert eventually(page, lambda: learner.status is not None and learner.status.speed == 0.1)
     press(page, "Reset")
-    tab(page, "Mission")
+    tab(page, "Tasks")
     expect(page.get_by_text("0 of 2 done")).to_be_visible()
     drag_target(page, axis=1, along=-0.5, node="/goal/base", arm=0.5)
 
@@ -209,7 +209,7 @@ def test_tasks_are_added_released_and_settings_changed(page: Page, learner: Simu
     assert eventually(page, adopted)
     set_number(page, "Speed", 0.5)
     press(page, "Reset")  # the scene's own script also releases it, after 14 s
-    tab(page, "Mission")
+    tab(page, "Tasks")
     page.get_by_role("button", name="Release ee 1").click()
     assert eventually(page, lambda: mission(learner).rows[1].state == "done")
     assert eventually(page, lambda: mission(learner).people[0].balls == 1)
@@ -250,7 +250,7 @@ def test_obstacles_are_moved_by_hand_and_put_in_the_way(page: Page, learner: Sim
     unfold(page, "Show")
     row(page, "Arrows of obstacles").locator("input").click()
     assert eventually(page, lambda: not is_drawn(page, f"/obstacle_arrows/{place}"))
-    tab(page, "Start")
+    tab(page, "Learn")
     reset_all(page, learner)
     assert eventually(page, lambda: obstacles() == before)
 
@@ -263,7 +263,7 @@ def test_a_crate_is_outlined_where_it_is_reported(page: Page, learner: Simulatio
     assert eventually(page, lambda: is_drawn(page, "/reported/0"))
     for node, place in {"/reported/0": (1.9, 0.3, 0.25), "/obstacle/0": (1.9, 1.4, 0.25)}.items():
         assert eventually(page, lambda at=place, of=node: np.allclose(position(page, of), at, atol=1e-6))
-    tab(page, "Mission")
+    tab(page, "Tasks")
     row(page, "Reported wrongly").locator("input").click()
     assert eventually(page, lambda: not is_drawn(page, "/reported/0"))
     assert eventually(page, lambda: latest(learner, "clearance") == latest(learner, "clearance_reported"))

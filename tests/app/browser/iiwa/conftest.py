@@ -45,6 +45,6 @@ def page(shared_page: Page, server: PageServer) -> Page:
     learner = server.sessions.learners[0]
     show_scene(shared_page, learner, CHOICE)
     tab(shared_page, "Errors")
-    tab(shared_page, "Start")
+    tab(shared_page, "Learn")
     reset_all(shared_page, learner)
     return shared_page

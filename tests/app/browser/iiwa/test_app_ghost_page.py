@@ -15,6 +15,7 @@ from lessons.events import MoveTarget
 
 def test_a_ghost_a_look_back_and_a_file(page: Page, server: PageServer) -> None:
     learner = server.sessions.learners[0]
+    tab(page, "More")
     tab(page, "Compare")
     press(page, "Start the ghost")
     expect(page.get_by_text("Choose another controller or a setting")).to_be_attached()
@@ -54,6 +55,7 @@ def test_a_ghost_a_look_back_and_a_file(page: Page, server: PageServer) -> None:
     press(page, "Back to now")
     assert eventually(page, shows_now)
 
+    tab(page, "More")
     tab(page, "Export")
     with page.expect_download() as download:
         press(page, "Rows as .csv")
@@ -62,6 +64,7 @@ def test_a_ghost_a_look_back_and_a_file(page: Page, server: PageServer) -> None:
     assert len(lines) > 100 and float(lines[-1]["t"]) > 1.5
     assert download.value.suggested_filename == "iiwa14-hold-himpc.csv"
 
+    tab(page, "More")
     tab(page, "Compare")
     press(page, "Remove the ghost")
     assert eventually(page, lambda: learner.ghost is None and not is_drawn(page, "/ghost"))

@@ -22,9 +22,10 @@ def horizon(learner: SimulationClient) -> int:
 def test_a_code_brings_the_setting_back_and_a_script_repeats_the_run(page: Page, server: PageServer) -> None:
     learner = server.sessions.learners[0]
     before = horizon(learner)
-    tab(page, "Control")
+    tab(page, "Tasks")
     set_number(page, "N", before + 2)
     assert eventually(page, lambda: horizon(learner) == before + 2)
+    tab(page, "More")
     tab(page, "Export")
     press(page, "Write it down")
     line, code = (row(page, label).locator("textarea") for label in ("Command line", "Code"))
@@ -39,9 +40,10 @@ def test_a_code_brings_the_setting_back_and_a_script_repeats_the_run(page: Page,
     compile(text, "iiwa14-hold.py", "exec")
     assert f"Set('horizon', {before + 2})" in text
 
-    tab(page, "Start")
+    tab(page, "Learn")
     reset_all(page, learner)
     assert eventually(page, lambda: horizon(learner) == before)
+    tab(page, "More")
     tab(page, "Export")
     write(page, "Somebody's code", given[:-3])
     press(page, "Open it")

@@ -72,7 +72,7 @@ def test_a_task_is_added_dragged_moved_reduced_merged_passed_on_and_removed(
     press(page, "Add")
     assert eventually(page, lambda: levels(learner) == ["position", "elbow", "orientation", "posture"])
     assert eventually(page, lambda: is_drawn(page, "/targets/elbow/control"))
-    expect(page.get_by_text("gets 2 of 3 directions", exact=False).first).to_be_visible()
+    expect(page.get_by_text("2 of 3 free", exact=False).first).to_be_visible()
     assert error(learner, "position") < 1e-3
     expect(page.get_by_text("elbow [mm]", exact=True).first).to_be_visible()  # the curve of the new task
 
@@ -83,22 +83,25 @@ def test_a_task_is_added_dragged_moved_reduced_merged_passed_on_and_removed(
     assert eventually(page, lambda: error(learner, "position") < 2e-3)
     assert now(learner, "priority_leak") < 1e-6  # the elbow's level does not disturb the level above
 
-    page.get_by_role("button", name="▲ Up", exact=True).nth(1).click()
+    page.get_by_role("button", name="▲", exact=True).nth(1).click()
     assert eventually(page, lambda: levels(learner)[:2] == ["elbow", "position"])
     expect(page.get_by_text("1 · elbow", exact=True)).to_be_visible()
+    open_level(page, 0)
     unfold(page, "Change")
     pick(page, "Axes", "x")
     assert eventually(page, lambda: axes(learner, "elbow") == "x")
-    expect(page.get_by_text("gets 1 of 1 directions", exact=False).first).to_be_visible()
+    expect(page.get_by_text("1 of 1 free", exact=False).first).to_be_visible()
     assert eventually(page, lambda: error(learner, "elbow") < 2e-3)
 
     expect(row(page, "Axes").locator("input").first).to_be_visible()  # the task stays unfolded
+    open_level(page, 1)
     unfold(page, "Change", 1)
     page.get_by_role("button", name="Merge with the level above", exact=True).first.click()
     assert eventually(page, lambda: levels(learner) == ["elbow+position", "orientation", "posture"])
-    expect(page.get_by_text("gets 4 of 4 directions", exact=False).first).to_be_visible()
+    expect(page.get_by_text("4 of 4 free", exact=False).first).to_be_visible()
     assert eventually(page, lambda: error(learner, "position") < 2e-3)
 
+    open_level(page, 0)
     unfold(page, "Change")
     press(page, "Own level for elbow")
     assert eventually(page, lambda: levels(learner) == ["position", "elbow", "orientation", "posture"])
@@ -116,6 +119,7 @@ def test_a_task_is_added_dragged_moved_reduced_merged_passed_on_and_removed(
     assert axes(learner, "forearm") == "x"
     assert eventually(page, lambda: error(learner, "position") < 2e-3)
 
+    tab(page, "More")
     tab(page, "Export")
     press(page, "Write it down")
     code = row(page, "Code").locator("textarea").input_value()
@@ -135,6 +139,12 @@ def test_a_task_is_added_dragged_moved_reduced_merged_passed_on_and_removed(
     assert status is not None
     assert eventually(page, lambda: learner.status is not None and learner.status.t > status.t + 0.1)
     assert eventually(page, lambda: error(learner, "position") < 2e-3)
+
+
+def open_level(page: Page, place: int) -> None:
+    """Opens the settings of a level, by its index."""
+    page.get_by_role("button", name="⋯", exact=True).nth(place).click()
+    page.wait_for_timeout(BETWEEN)
 
 
 def axes(learner: SimulationClient, name: str) -> str:

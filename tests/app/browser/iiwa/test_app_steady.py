@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 from playwright.sync_api import Page, expect
 
-from browsing.browser_actions import pick, row, tab
+from browsing.browser_actions import pick, tab
 from lessons.scenes.names import SCENES
 
 
@@ -28,14 +30,16 @@ def test_a_description_of_a_scene_moves_no_button(page: Page) -> None:
 
 
 def test_a_level_that_is_off_moves_no_button(page: Page) -> None:
-    """A level that is off has a text of one line; the lowest level has one of three."""
+    """Each level is one row of about 40 px, with its buttons at the right of its text."""
     tab(page, "Tasks")
-    expect(page.get_by_text("gets 1 of 7 directions", exact=False)).to_be_visible()
-    first = "The level with the highest priority is first."
-    before = [below(page, "▼ Down", first, place) for place in range(3)]
-    box = row(page, "Enabled").get_by_role("checkbox")
-    box.click()
-    expect(page.get_by_text("OFF", exact=True)).to_be_visible()
-    assert [below(page, "▼ Down", first, place) for place in range(3)] == before
-    box.click()
-    expect(page.get_by_text("OFF", exact=True)).to_be_hidden()
+    expect(page.get_by_text("1 of 7 free")).to_be_visible()
+    first = "Each level gets the freedom"
+    before = [below(page, "▼", first, place) for place in range(3)]
+    assert all(30 <= after - above <= 46 for above, after in pairwise(before)), before
+    name, button = page.get_by_text("1 · position").bounding_box(), below(page, "▼", "1 · position")
+    assert name is not None and abs(button) < name["height"]
+    page.get_by_role("button", name="on", exact=True).first.click()
+    expect(page.get_by_role("button", name="off", exact=True)).to_be_visible()
+    assert [below(page, "▼", first, place) for place in range(3)] == before
+    page.get_by_role("button", name="off", exact=True).click()
+    expect(page.get_by_role("button", name="off", exact=True)).to_be_hidden()

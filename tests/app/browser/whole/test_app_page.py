@@ -115,7 +115,7 @@ def test_a_level_switched_off_lets_go_and_level_1_does_not(page: Page, learner: 
     tab(page, "Tasks")
     key(page, "2")
     assert eventually(page, lambda: learner.settings is not None and not learner.settings.levels[1].enabled)
-    expect(page.get_by_text("OFF", exact=True).first).to_be_visible()
+    expect(page.get_by_role("button", name="off", exact=True)).to_be_visible()
     drag_target(page, axis=2, along=0.2)
     assert eventually(page, lambda: error(learner, "orientation") > np.radians(3.0))
     assert eventually(page, lambda: error(learner, "position") < 2e-3)
@@ -126,10 +126,10 @@ def test_a_level_switched_off_lets_go_and_level_1_does_not(page: Page, learner: 
 
 def test_levels_move_and_gains_change(page: Page, learner: SimulationClient) -> None:
     tab(page, "Tasks")
-    unfold(page, "Gains and weights")
+    page.get_by_role("button", name="⋯").first.click()
     set_number(page, "Q", 300)
     assert eventually(page, lambda: learner.settings is not None and learner.settings.levels[0].Q == 300)
-    page.get_by_role("button", name="▼ Down").nth(1).click()
+    page.get_by_role("button", name="▼").nth(1).click()
     assert eventually(
         page,
         lambda: (
@@ -144,7 +144,7 @@ def test_levels_move_and_gains_change(page: Page, learner: SimulationClient) -> 
 
 
 def test_N_and_M_bar_change_while_it_runs(page: Page, learner: SimulationClient) -> None:
-    tab(page, "Control")
+    tab(page, "Tasks")
     set_number(page, "N", 10)
     set_number(page, "M̄ scale", 1.5)
     settings = learner.settings
@@ -155,7 +155,8 @@ def test_N_and_M_bar_change_while_it_runs(page: Page, learner: SimulationClient)
     )
     assert settings is not None and learner.failure is None
     expect(page.get_by_text("spectral radius")).to_be_visible()
-    tab(page, "Plant")
+    tab(page, "Robot")
+    unfold(page, "Plant")
     set_number(page, "Payload [kg]", 2)
     assert eventually(page, lambda: learner.settings is not None and learner.settings.plant.payload_kg == 2)
     assert eventually(page, lambda: error(learner, "position") < 2e-3)
@@ -188,9 +189,8 @@ def test_paused_edits_show_at_once(page: Page, learner: SimulationClient) -> Non
     assert learner.status is not None
     t = learner.status.t
     tab(page, "Tasks")
-    page.get_by_role("button", name="▼ Down").first.click()
+    page.get_by_role("button", name="▼").first.click()
     expect(page.get_by_text("1 · orientation")).to_be_visible()
-    tab(page, "Control")
     page.wait_for_timeout(500)
     before = page.get_by_text("spectral radius").text_content()
     set_number(page, "M̄ scale", 3)
@@ -208,7 +208,7 @@ def test_keys_are_for_the_page_or_for_the_field(page: Page, learner: SimulationC
     page.wait_for_timeout(500)
     assert learner.status is not None and learner.status.running
     assert learner.settings is not None and learner.settings.levels[1].enabled
-    tab(page, "Start")
+    tab(page, "Learn")
     for name in ("Space", "Space", "2", "2", "3"):
         key(page, name)
     assert eventually(page, lambda: learner.settings is not None and not learner.settings.levels[2].enabled)
@@ -243,13 +243,13 @@ def test_the_browser_tells_which_charts_it_shows(
 
 
 def test_a_reload_resumes(page: Page, server: PageServer, learner: SimulationClient) -> None:
-    tab(page, "Control")
+    tab(page, "Tasks")
     set_number(page, "N", 7)
     assert eventually(page, lambda: learner.settings is not None and learner.settings.horizon == 7)
     page.reload(wait_until="commit")
     wait_for_scene(page)
     assert learner in server.sessions.learners and learner.attached
-    tab(page, "Control")
+    tab(page, "Tasks")
     assert eventually(page, lambda: number(page, "N") == 7)
 
 
@@ -335,6 +335,7 @@ def test_other_scenes_and_the_phone(browser: Browser, server: PageServer) -> Non
     expect(phone.get_by_text("Drag the target by its arrows")).to_be_visible()
     left, right = sheet(phone)
     assert left < 1 and 389 <= right <= 391  # the sheet has the width of the screen
+    tab(phone, "More")
     tab(phone, "Robot")
     phone.get_by_role("button", name="Load robot").scroll_into_view_if_needed()
     learner.send(Load(SceneChoice(RunSpec("iiwa14-circle"))))
