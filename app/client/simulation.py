@@ -14,11 +14,10 @@ from app.client.decimated import History
 from app.client.pose_history import Frame, PoseHistory
 from app.client.rows import RowHistory
 from app.client.run_statistics import RunStatistics
-from app.link.forkserver import FIRST_PATIENCE
+from app.link.fork_server import FIRST_PATIENCE
 from app.link.messages import Command, Loading, LoadRefused, Ready, Report, SimulationFailed, Status
-from app.link.process import Process
+from app.link.process import Process, Spares
 from app.link.ring import Block
-from app.link.spares import Spares
 
 if TYPE_CHECKING:
     from lessons.settings.settings import SceneSettings
@@ -236,4 +235,4 @@ def aside(end: Callable[[], None]) -> None:
 def _discard(report: Report) -> None:
     """Frees the memory of a scene that was loaded too late to be used."""
     if isinstance(report, Ready):
-        os.close(report.block.number)
+        os.close(report.block)

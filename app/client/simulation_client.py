@@ -33,8 +33,7 @@ from app.link.messages import (
     Status,
     WaitAt,
 )
-from app.link.process import Process
-from app.link.spares import Spares
+from app.link.process import Process, Spares
 
 if TYPE_CHECKING:
     from lessons.teaching import lesson

@@ -14,7 +14,7 @@ from typing import ClassVar
 
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
-from app.link.spares import Spares
+from app.link.process import Spares
 from app.server.malloc_tuning import give_back
 
 WORKER = "app.worker.entry"

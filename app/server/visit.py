@@ -19,7 +19,7 @@ from app.adapter.removed_handle_errors import print_exception
 from app.client.progress import Notebook
 from app.client.simulation_client import SimulationClient
 from app.html.text import block
-from app.link.children import why_not
+from app.link.process import why_not
 from app.page.comfort import ASK_MOTION, ASK_WINDOW, MOTION, REDUCED, Comfort, window_size
 from app.page.inlet import Inlet
 from app.page.page import Page
