@@ -17,7 +17,7 @@ from app.jupyter.frame import here
 from app.link.choice import SceneChoice
 from app.link.messages import Post, Ready
 from app.link.process import wait_until
-from app.server.server import PageServer
+from app.web.server import PageServer
 from lessons.events import MoveTarget, Set
 from lessons.recording.arrays import named
 from lessons.scenes.run_spec import RunSpec

@@ -12,7 +12,7 @@ from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.fork_server import SERVER
 from app.link.process import Spares
-from app.server.sessions import WORKER
+from app.web.sessions import WORKER
 from lessons.scenes.run_spec import RunSpec
 
 

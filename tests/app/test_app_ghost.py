@@ -19,8 +19,8 @@ from app.link.connection import receive, send
 from app.link.exercise import LessonPlace
 from app.link.messages import Lead, Load, Play, Post, ResetAll, Script, WaitAt
 from app.link.process import Spares, wait_until
-from app.server.server import PageServer
-from app.server.sessions import WORKER
+from app.web.server import PageServer
+from app.web.sessions import WORKER
 from app.worker.ghost import GhostBody
 from app.worker.simulation import SimulationRunner
 from browsing.wire import Wire, eventually

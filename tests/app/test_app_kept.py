@@ -15,7 +15,7 @@ from app.adapter import private
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
-from app.server.server import PageServer
+from app.web.server import PageServer
 from app.worker.simulation import SimulationRunner
 from benchmarks.learners import Viewers
 from browsing.wire import Wire
@@ -131,8 +131,8 @@ def test_memory_is_given_back_after_the_last_page(monkeypatch: pytest.MonkeyPatc
     given: list[int] = []
     server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=2, grace=0.1)
     sessions = server.sessions
-    monkeypatch.setattr("app.server.sessions.give_back", lambda: given.append(len(sessions.learners)))
-    monkeypatch.setattr("app.server.sessions._TIDY", LONG)
+    monkeypatch.setattr("app.web.sessions.give_back", lambda: given.append(len(sessions.learners)))
+    monkeypatch.setattr("app.web.sessions._TIDY", LONG)
     try:
         with Wire(server.guest_link):
             with Wire(server.guest_link):

@@ -20,7 +20,7 @@ from app.link.exercise import LessonPlace
 from app.link.fork_server import SERVER
 from app.link.messages import Load, Play, Post, SimulationFailed, Speed, StepTicks
 from app.link.process import Process, Spares, wait_until
-from app.server.sessions import WORKER, Sessions
+from app.web.sessions import WORKER, Sessions
 from lessons.events import MoveTarget, Set
 from lessons.scenes.run_spec import RunSpec
 

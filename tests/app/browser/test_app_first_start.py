@@ -10,8 +10,8 @@ from playwright.sync_api import Browser
 
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
-from app.server.opening import opened_in_a_browser
-from app.server.server import PageServer
+from app.web.server import PageServer
+from app.web.serving import opened_in_a_browser
 from browsing.browser_actions import SLOW, eventually, new_page
 from lessons.scenes.run_spec import RunSpec
 

@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 from app.link.choice import SceneChoice
-from app.server.server import PageServer
+from app.web.server import PageServer
 from browsing.browser_actions import eventually, open_page, tab
 from browsing.scene_switch import reset_all, show_scene
 from lessons.own.folder import Folder

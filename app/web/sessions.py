@@ -15,7 +15,7 @@ from typing import ClassVar
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.process import Spares
-from app.server.malloc_tuning import give_back
+from app.web.malloc_tuning import give_back
 
 WORKER = "app.worker.entry"
 """The name of the module that a simulation process runs. The server never imports this module."""
