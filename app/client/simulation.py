@@ -128,6 +128,11 @@ class Simulation(ABC):
         """Time since the last report of the process, s."""
         return time.monotonic() - self._process.heard_at
 
+    @property
+    def compiles(self) -> bool:
+        """Whether the controllers are being compiled, as at the first start."""
+        return bool(self._process.preparing)
+
     def trouble(self) -> Trouble | None:
         """Returns the problem that the page should show; None if there is none."""
         if self.failure is not None:
