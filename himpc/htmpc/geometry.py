@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.htmpc.kernel.kinematics import frame_along, place_all
+from himpc.htmpc.kernel.kinematics import frame_along
 from himpc.kinematics.geometry import Geometry, geometry
-from himpc.tick.kernel.kinematics import ORIENTATION, POSITION
+from himpc.tick.kernel.kinematics import ORIENTATION, POSITION, place_all
 from robots import Robot
 from robots.per_robot import per_robot
 

@@ -7,7 +7,6 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from himpc.constants import PROGRESS, WITHIN
@@ -23,8 +22,8 @@ from himpc.tick.kernel.distance_rows import (
     ROOM,
     distance_rows,
     nearest,
-    place_joints,
 )
+from himpc.tick.kernel.kinematics import place_all
 from himpc.tick.kernel.near import near
 from robots import Robot
 from robots.collision import Surroundings
@@ -60,18 +59,22 @@ class _Pairs:
     def __init__(self, tree: Geometry, around: Surroundings) -> None:
         self._tree, self.around = tree, around
         S, most = len(around.radius), int(around.meets.sum()) + 1
+        self._joints = tree.parent, tree.is_revolute, tree.rotation, tree.translation, tree.axis
+        self._q = np.empty((1, tree.moves.shape[1]))
+        self._placed = np.empty((1, len(tree.parent), 12)), np.empty((1, len(tree.parent), 3))
         self._scratch = np.empty((1, S, 3)), np.empty((1, S, 3))
         self._knot, self.sphere, self.shape = np.zeros((3, most), np.intp)
         self._share, self.distance = np.empty(most), np.empty(most)
         self.normal, self.slopes = np.empty((most, 3)), np.empty((most, tree.moves.shape[1]))
         self.count = 0
 
-    def find(self, placed: Array, z: Array, within: float) -> None:
-        """Finds the pairs nearer than `within`, m, for placements and axes of the joints, (1, n+1, 12) and
-        (1, n+1, 3), as in `forward_kinematics`."""
+    def find(self, q: Array, within: float) -> None:
+        """Finds the pairs nearer than `within`, m, at the positions q, (n,)."""
         around, tree = self.around, self._tree
+        self._q[0] = q
+        place_all(*self._joints, self._q, *self._placed)
         self.count = near(
-            *(placed, z, tree.is_revolute, tree.moves, around.joint, around.centre, around.span),
+            *(*self._placed, tree.is_revolute, tree.moves, around.joint, around.centre, around.span),
             *(around.radius, around.kind, around.carrier, around.turn, around.middle, around.half),
             *(around.thickness, around.meets, within, *self._scratch),
             *(self._knot, self.sphere, self.shape, self._share, self.distance, self.normal, self.slopes),
@@ -90,11 +93,7 @@ class _Links(NamedTuple):
 def _links(robot: Robot) -> _Links:
     """Returns all pairs of `cover_surroundings`, except links with at most two joints between them that are
     never nearer than _NEVER. With rows for such links, pairs that can touch would get fewer rows."""
-    tree, around, data = (
-        geometry(robot),
-        cover_surroundings(robot, cover_of(robot), ()),
-        robot.model.createData(),
-    )
+    tree, around = geometry(robot), cover_surroundings(robot, cover_of(robot), ())
     between: dict[tuple[int, ...], list[tuple[int, int]]] = {}
     for o, s in np.argwhere(around.meets).tolist():
         joints = np.flatnonzero(tree.moves[around.joint[o]] != tree.moves[around.joint[s]])
@@ -109,23 +108,14 @@ def _links(robot: Robot) -> _Links:
         found, close, q = _Pairs(tree, around._replace(meets=only)), np.zeros_like(meets), robot.home.copy()
         for values in product(*(np.linspace(low[j], high[j], _GRID) for j in joints)):
             q[list(joints)] = values
-            found.find(*_placements(robot, data, q), _NEVER)
+            found.find(q, _NEVER)
             close[found.shape[: found.count], found.sphere[: found.count]] = True
         meets &= ~only | close
     kept, found = np.full(meets.shape, np.inf), _Pairs(tree, around._replace(meets=meets))
-    found.find(*_placements(robot, data, robot.home), WITHIN)
+    found.find(robot.home, WITHIN)
     at = found.shape[: found.count], found.sphere[: found.count]
     kept[at] = _AT_HOME * np.maximum(found.distance[: found.count], 0.0)
     return _Links(meets, kept)
-
-
-def _placements(robot: Robot, data: pin.Data, q: Array) -> tuple[Array, Array]:
-    """Returns the placements and axes of the joints at q, (1, n+1, 12) and (1, n+1, 3), see
-    `forward_kinematics`."""
-    pin.forwardKinematics(robot.model, data, q)
-    placed = np.array([[*each.rotation.ravel(), *each.translation] for each in data.oMi])
-    z = [each.rotation @ axis for each, axis in zip(data.oMi, geometry(robot).axis, strict=True)]
-    return placed[None], np.array(z)[None]
 
 
 def carried(robot: Robot) -> NDArray[np.bool_]:
@@ -143,7 +133,7 @@ class Distances:
     """
 
     def __init__(self, robot: Robot, avoidance: Avoidance) -> None:
-        self._robot, self._avoidance, self._data = robot, avoidance, robot.model.createData()
+        self._robot, self._avoidance = robot, avoidance
         self._chosen = np.zeros(row_count(robot.n), np.intp)
         self._links, self._others = np.full((2, len(self._chosen)), -1)
         self._moving, self._share = np.zeros(len(self._chosen)), np.ones(len(self._chosen))
@@ -195,10 +185,10 @@ class Distances:
         self._links[:], self._named = -1, ("",) * self._robot.n
         self._names = [[f"{link} – {name}" for link in around.links] for name in around.names]
 
-    def _find(self, placed: Array, z: Array) -> int:
-        """Chooses the nearest pairs; returns their number."""
+    def _find(self, q: Array) -> int:
+        """Chooses the nearest pairs at the positions q; returns their number."""
         pairs, velocity = self._pairs, self._observed.velocity
-        pairs.find(placed, z, WITHIN)
+        pairs.find(q, WITHIN)
         count = nearest(
             *(pairs.count, pairs.distance, pairs.sphere, pairs.shape, pairs.normal, pairs.slopes),
             *(self._shares, _STILL if velocity is None else velocity, self._fastest),
@@ -214,7 +204,7 @@ class Distances:
     def at(self, q: Array, observed: Observed) -> Near:
         """Returns the nearest pairs at the positions q, (n,)."""
         self.observe(observed)
-        count = self._find(*_placements(self._robot, self._data, q))
+        count = self._find(q)
         pairs, chosen = self._pairs, self._chosen[:count]
         moving, share = self._moving[:count].copy(), self._share[:count].copy()
         return Near(pairs.distance[chosen], pairs.slopes[chosen], moving, share, self._named[:count])
@@ -226,8 +216,7 @@ class Distances:
         block: index of the set of directions for distances.
         """
         pairs = self._pairs
-        place_joints(*arena.arguments)
-        count = self._find(arena.f["placed"][None], arena.f["axis_now"][None])
+        count = self._find(arena.f["q"])
         distance_rows(
             *(*arena.arguments, block, count, self._chosen, pairs.distance, pairs.slopes),
             *(self._moving, self._share, self._numbers),

@@ -1,4 +1,4 @@
-"""Compiled positions and orientations of joints and frames along a plan."""
+"""Compiled positions and orientations of frames along a plan."""
 
 from __future__ import annotations
 
@@ -7,29 +7,10 @@ from numpy.typing import NDArray
 
 from himpc.compilation.compiled import INDICES, MATRICES, MATRIX, TABLE, kernel
 from himpc.compilation.views import borrowed
-from himpc.tick.kernel.kinematics import forward_kinematics, jacobian, points, rotation_of_frame
+from himpc.tick.kernel.kinematics import jacobian, points, rotation_of_frame
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
-
-
-@kernel(INDICES, INDICES, MATRICES, MATRIX, MATRIX, MATRIX, MATRICES, MATRICES)
-def place_all(
-    parent: Indices,
-    is_revolute: Indices,
-    rotation: Array,
-    translation: Array,
-    axis: Array,
-    q: Array,
-    placed: Array,
-    z: Array,
-) -> None:
-    """Applies `forward_kinematics` to configurations q (K, n). Results: placed (K, n+1, 12) and z
-    (K, n+1, 3)."""
-    rotation, translation, axis, q = borrowed(rotation), borrowed(translation), borrowed(axis), borrowed(q)
-    placed, z = borrowed(placed), borrowed(z)
-    for k in range(len(q)):
-        forward_kinematics(q[k], parent, is_revolute, rotation, translation, axis, placed[k], z[k])
 
 
 @kernel(

@@ -37,7 +37,7 @@ class TickArrays(NamedTuple):
         "n",
         "rad",
         "kinematics tick → "
-        "distance_rows fallbacks finish_tick linearize python_bounds python_rows solve_level",
+        "distances fallbacks finish_tick linearize python_bounds python_rows solve_level",
     ]
     v: Annotated[
         Array,
@@ -96,9 +96,9 @@ class TickArrays(NamedTuple):
         "distance_rows fallbacks linearize python_bounds",
     ]
     # The robot.
-    rotation: Annotated[Array, "J 3 3", "1", "configure → distance_rows linearize"]
-    translation: Annotated[Array, "J 3", "m", "configure → distance_rows linearize"]
-    axis: Annotated[Array, "J 3", "1", "configure → distance_rows linearize"]
+    rotation: Annotated[Array, "J 3 3", "1", "configure → linearize"]
+    translation: Annotated[Array, "J 3", "m", "configure → linearize"]
+    axis: Annotated[Array, "J 3", "1", "configure → linearize"]
     frame_rotation: Annotated[Array, "F 3 3", "1", "configure → linearize"]
     frame_translation: Annotated[Array, "F 3", "m", "configure → linearize"]
     # The results of a tick. They are adjacent: a plan copies them in one operation.
@@ -136,8 +136,8 @@ class TickArrays(NamedTuple):
     time_us: Annotated[Array, "r", "µs", "control_period fallbacks → gather problems tick"]
     nothing: Annotated[Array, "1", "1", "configure → gather"]
     # Scratch.
-    placed: Annotated[Array, "J 12", "1, m", "distance_rows linearize → distances"]
-    axis_now: Annotated[Array, "J 3", "1", "distance_rows linearize → distances"]
+    placed: Annotated[Array, "J 12", "1, m", "linearize → itself"]
+    axis_now: Annotated[Array, "J 3", "1", "linearize → itself"]
     point: Annotated[Array, "F 3", "m", "linearize → itself"]
     x_dot: Annotated[Array, "M", "m/s", "linearize → finish_tick"]
     B: Annotated[
@@ -196,8 +196,8 @@ class TickArrays(NamedTuple):
     bit: Annotated[Whole, "b", "1", "configure problems → finish_tick"]
     level: Annotated[Whole, "r 8", "1", "tables → fallbacks finish_tick solve_level"]
     # The robot.
-    parent: Annotated[Whole, "J", "1", "configure → distance_rows linearize"]
-    is_revolute: Annotated[Whole, "J", "1", "configure → distance_rows linearize"]
+    parent: Annotated[Whole, "J", "1", "configure → linearize"]
+    is_revolute: Annotated[Whole, "J", "1", "configure → linearize"]
     frame_joint: Annotated[Whole, "F", "1", "configure → linearize"]
     # Further results of a tick.
     active_row: Annotated[Whole, "r k", "1", "solve_level → finish_tick problems"]

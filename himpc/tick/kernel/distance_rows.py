@@ -9,14 +9,6 @@ from himpc.compilation.compiled import INDICES, MATRIX, NUMBER, VECTOR, WHOLE, i
 from himpc.compilation.views import borrowed
 from himpc.constants import FADE, RETREAT, RETURN_RATE, WITHIN
 from himpc.tick.kernel.arrays import DIRECTED, PERIOD, T_S, Array, Whole, arrays_of
-from himpc.tick.kernel.kinematics import forward_kinematics
-
-
-@kernel(VECTOR, INDICES, INDICES, INDICES)
-def place_joints(data: Any, where: Whole, whole: Whole, whole_where: Whole) -> None:
-    """Computes the placements of the joints at the measured positions into `placed` and `axis_now`."""
-    t = arrays_of(data, where, whole, whole_where)
-    forward_kinematics(t.q, t.parent, t.is_revolute, t.rotation, t.translation, t.axis, t.placed, t.axis_now)
 
 
 @inline_kernel
