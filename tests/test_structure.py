@@ -455,6 +455,22 @@ def test_what_needs_no_picture_knows_no_viser(folder: str) -> None:
     assert not {name for path in sources(f"app/{folder}") for name in imports(path) if within(name, "viser")}
 
 
+THREADS = "app/link/threads.py"
+
+
+def test_a_function_that_runs_on_a_thread_of_its_own_says_so() -> None:
+    """Threads are started by `on_thread`, and a function that is written for a thread says so by its name.
+    Other functions, such as another object's `close`, may run on any thread."""
+    files = sources("app")
+    assert {str(path.relative_to(ROOT)) for path in files if "Thread(" in path.read_text()} == {THREADS}
+    for path in files:
+        for node in ast.walk(tree(path)):
+            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "on_thread":
+                function = ast.unparse(node.args[1])
+                own = function.startswith("self.") or "." not in function
+                assert function.endswith("_on_thread") or not own, f"{path.name} runs {function} on a thread"
+
+
 PRIVATE = "app/adapter/private.py"
 
 

@@ -232,11 +232,6 @@ class Simulation(ABC):
             self._free()
 
 
-def aside(end: Callable[[], None]) -> None:
-    """Runs a task that may take some time on a separate thread."""
-    threading.Thread(target=end, daemon=True).start()
-
-
 def _discard(report: Report) -> None:
     """Frees the memory of a scene that was loaded too late to be used."""
     if isinstance(report, Ready):

@@ -18,12 +18,13 @@ import time
 from collections.abc import Callable, Iterator
 from importlib import import_module
 from importlib.machinery import ModuleSpec
-from multiprocessing import forkserver, spawn
+from multiprocessing import forkserver, resource_tracker, spawn
 from multiprocessing.connection import Client, Connection, Listener
 from multiprocessing.context import BaseContext
 from multiprocessing.process import BaseProcess
 from typing import Any, final
 
+from app.link.threads import on_thread
 from robots.processes.isolation import is_stopped, threads, waited
 from robots.processes.orphans import end_with
 
@@ -111,11 +112,16 @@ class ForkServer:
     def _ensure_running(self) -> None:
         if self._listener is None:
             self._listener = Listener(family="AF_UNIX")
-            threading.Thread(target=self._accept, args=(self._listener,), daemon=True).start()
+            on_thread("fork servers", self._accept_on_thread, self._listener)
         path = os.pathsep.join(filter(None, sys.path))
         forkserver.set_forkserver_preload([_PRELOADED])
+        resource_tracker.ensure_running()  # otherwise the next call starts it, and lets Ctrl-C through
         with _environment({_LINE: str(self._listener.address), "PYTHONPATH": path}):
-            forkserver.ensure_running()
+            before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+            try:
+                forkserver.ensure_running()
+            finally:
+                signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
     def _kill(self) -> None:
         pid = self.pid
@@ -126,12 +132,12 @@ class ForkServer:
 
     # ---------------------------------------------------------------- the line to the server
 
-    def _accept(self, listener: Listener) -> None:
+    def _accept_on_thread(self, listener: Listener) -> None:
         while True:
             with contextlib.suppress(OSError, EOFError):  # a server that has ended at once
-                threading.Thread(target=self._hear, args=(listener.accept(),), daemon=True).start()
+                on_thread("fork server", self._hear_on_thread, listener.accept())
 
-    def _hear(self, line: Connection) -> None:
+    def _hear_on_thread(self, line: Connection) -> None:
         pid = None
         with contextlib.suppress(OSError, EOFError), line:
             data = spawn.get_preparation_data("")
@@ -213,8 +219,12 @@ def prepare() -> None:
     if address is None:
         return
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the page handles Ctrl-C
-    _line = line = Client(address)
-    worker, main, path = line.recv()
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    try:
+        _line = line = Client(address)
+        worker, main, path = line.recv()
+    except (OSError, EOFError):
+        os._exit(0)  # the page has ended already
     if path is None:
         del os.environ["PYTHONPATH"]  # the page's, see `_ensure_running`
     else:

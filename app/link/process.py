@@ -21,6 +21,7 @@ from app.link import fork_server
 from app.link.connection import hang_up, receive
 from app.link.fork_server import SERVER
 from app.link.messages import Command, Quit, Report, SimulationFailed
+from app.link.threads import on_thread
 from robots.processes.orphans import end_with_parent
 
 _END = 1.0  # s within which a process must end by itself
@@ -51,8 +52,7 @@ class Process:
         self.heard_at = time.monotonic()
         """Time of the child's last report or of its start."""
         self._outbox = Outbox(self._page)
-        self._hearing = threading.Thread(target=self._hear, args=(worker, theirs), daemon=True)
-        self._hearing.start()
+        self._hearing = on_thread("hearing", self._hear_on_thread, worker, theirs)
 
     @property
     def preparing(self) -> str | None:
@@ -100,7 +100,7 @@ class Process:
 
     # ---------------------------------------------------------------- the thread
 
-    def _hear(self, worker: str, theirs: Connection) -> None:
+    def _hear_on_thread(self, worker: str, theirs: Connection) -> None:
         try:
             child = SERVER.start(_run, worker, theirs)
         except OSError as error:
@@ -163,8 +163,7 @@ class Outbox:
         self._bytes = 0
         self._closed = False
         self._news = threading.Condition()
-        self._writer = threading.Thread(target=self._write, daemon=True)
-        self._writer.start()
+        self._writer = on_thread("writing", self._write_on_thread)
 
     def put(self, command: object) -> bool:
         """Adds a command; returns whether there was room for it. Later changes of the object do not change
@@ -191,7 +190,7 @@ class Outbox:
         ended."""
         self._writer.join()
 
-    def _write(self) -> None:
+    def _write_on_thread(self) -> None:
         while True:
             with self._news:
                 self._news.wait_for(lambda: self._waiting or self._closed)

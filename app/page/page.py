@@ -22,6 +22,7 @@ from app.client.simulation_client import SimulationClient
 from app.html.text import block, esc, in_trouble
 from app.link.choice import SceneChoice
 from app.link.messages import Ready
+from app.link.threads import on_thread
 from app.page.comfort import Comfort
 from app.page.lesson_file import LessonFile
 from app.panels.widgets.command import add_command
@@ -118,7 +119,7 @@ class Page:
         self._recorded: RecordedRun | None = None
         self._again: viser.GuiButtonHandle | None = None
         self._closed = threading.Event()
-        self._thread = threading.Thread(target=self._loop, daemon=True)
+        self._thread: threading.Thread | None = None
 
     def start(self) -> None:
         camera = self._client.camera
@@ -128,11 +129,11 @@ class Page:
         lay_out(gui)
         self._theme(self._dark)
         self._waiting = gui.add_html(starting(self.learner.choice))
-        self._thread.start()
+        self._thread = on_thread("page's loop", self._loop_on_thread)
 
     def close(self) -> None:
         self._closed.set()
-        if self._thread.ident is not None and self._thread is not threading.current_thread():
+        if self._thread is not None and self._thread is not threading.current_thread():
             self._thread.join(2.0)
         if self._stage is not None:
             self._stage.close()
@@ -144,7 +145,7 @@ class Page:
 
     # ---------------------------------------------------------------- loop
 
-    def _loop(self) -> None:
+    def _loop_on_thread(self) -> None:
         while not self._closed.is_set():
             began = time.perf_counter()
             try:

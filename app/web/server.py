@@ -14,6 +14,7 @@ import viser
 from app.adapter import private
 from app.classes.words import TEACHER
 from app.link.choice import SceneChoice
+from app.link.threads import on_thread
 from app.page.page import lay_out, starting
 from app.web.address import LOOPBACK, address_in_use, check_address, local_url, seen_from_outside
 from app.web.classroom import Classroom
@@ -151,8 +152,7 @@ class PageServer:
             self.guard.open(door, self.sessions, refers)
         else:
             self._open_class(door, refers, self.hall)
-        self._loading = threading.Thread(target=_load, args=(choice,), daemon=True)
-        self._loading.start()
+        self._loading = on_thread("loading", _load_on_thread, choice)
 
     @property
     def loading(self) -> bool:
@@ -283,7 +283,7 @@ def _check_choice(choice: SceneChoice) -> None:
         start(choice.scene(), choice.run.seed)
 
 
-def _load(choice: SceneChoice) -> None:
+def _load_on_thread(choice: SceneChoice) -> None:
     """Loads the data of pages while the first page connects: the panels, then the meshes, whose
     simplification takes some time."""
     import_module("app.page.layout")

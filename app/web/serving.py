@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.classes.words import ONLY_HERE
+from app.link.threads import on_thread
 from app.web.address import seen_from_outside
 from app.web.classroom import Classroom
 from app.web.server import PageServer
@@ -84,7 +85,7 @@ def opened_in_a_browser(link: str) -> Iterator[None]:
         file = Path(folder) / "open.html"
         with open(os.open(file, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600), "w", encoding="utf-8") as text:
             text.write(_LEADING.format(escape(link)))
-        threading.Thread(target=webbrowser.open, args=(file.as_uri(),), daemon=True).start()
+        on_thread("browser", webbrowser.open, file.as_uri())
         yield
 
 

@@ -31,7 +31,7 @@ from app.link.choice import SceneChoice
 from lessons.scenes.run_spec import RunSpec
 from app.web import server
 from browsing.wire import let_in
-server._load = lambda choice: None  # what follows once it listens
+server._load_on_thread = lambda choice: None  # what follows once it listens
 running = server.PageServer({{choice}}, port=0)
 try:
     page = urllib.request.Request(running.url, headers={{"Cookie": let_in(running.link)}})
