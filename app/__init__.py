@@ -1,12 +1,12 @@
 """The page: one simulation process per browser, the 3D view and the panels. No other package imports viser.
 
 The path of a dragged target from the browser to the tick:
-1. The browser sends the pose of the gizmo. `server/guard` counts the bytes, `page/inlet` refuses values that
+1. The browser sends the pose of the gizmo. `web/guard` counts the bytes, `web/inlet` refuses values that
    a control cannot have, and viser calls back on its loop, in `view/drag`.
 2. `view/reachability`, on a thread of its own, computes the nearest pose that the robot can reach;
    `view/drag` posts a `MoveTarget`.
-3. `client/simulation_client` puts the message into `link/outbox`, which never waits. The outbox's thread
-   writes to `link/wire`.
+3. `client/simulation_client` puts the message into the outbox of `link/process`, which never waits. A thread
+   sends it.
 4. `worker/main` reads the message and passes it to `worker/simulation`, which puts it into the session's
    mailbox.
 5. The session (`lessons/session/session.py`) empties its mailbox when the next tick begins.
@@ -19,7 +19,8 @@ The path of a row of telemetry from the tick to the browser:
    time.
 4. `page/layout` gives the moment to `page/torque_ui` or `velocity_ui`, which draws the panels' curves.
 5. viser sends the changes. Data that need not be sent every tick (settings, notices, the progress of a
-   lesson) are sent ten times a second as a `Status` over `link/wire`; `client/simulation` receives them.
+   lesson) are sent ten times a second as a `Status` over `link/connection`; `client/simulation` receives
+   them.
 """
 
 import os

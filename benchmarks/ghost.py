@@ -25,7 +25,7 @@ from app.client.simulation import Simulation
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
-from app.server.server import PageServer
+from app.web.server import PageServer
 from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.lesson import Ghost
 

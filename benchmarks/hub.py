@@ -21,7 +21,7 @@ from urllib.parse import urlsplit
 
 from playwright.sync_api import Page, sync_playwright
 
-from app.server.passes import HEADER, QUERY, USER_HEADER
+from app.web.passes import HEADER, QUERY, USER_HEADER
 from browsing.browser_actions import CHROMIUM_ARGS, find_chromium
 from browsing.hub import LESSON, find_proxy, hand_in, hub, log_in, open_lab, port_of_lab, run_first_step
 from lessons.replay.progress import read_handed_in

@@ -26,7 +26,7 @@ import psutil
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
-from app.server.server import PageServer
+from app.web.server import PageServer
 from benchmarks.client import PATIENCE
 from lessons.scenes.run_spec import RunSpec
 

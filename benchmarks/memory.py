@@ -23,7 +23,7 @@ import psutil
 from playwright.sync_api import Page, expect, sync_playwright
 
 from app.link.choice import SceneChoice
-from app.server.server import PageServer
+from app.web.server import PageServer
 from browsing.browser_actions import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, open_page
 from browsing.lessons import open_lesson
 from lessons.course import COURSE, load_lesson

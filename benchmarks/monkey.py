@@ -28,7 +28,7 @@ from app.client.decimated import History
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.ring import Block
-from app.server.server import PageServer
+from app.web.server import PageServer
 from benchmarks.findings import Findings, StandardError
 from benchmarks.roam import roam
 from browsing.browser_actions import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, load, open_page, tab

@@ -26,7 +26,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
 from app.link.process import wait_until
-from app.server.server import PageServer
+from app.web.server import PageServer
 from lessons.scenes.run_spec import RunSpec
 
 LONG = 120.0  # s

@@ -16,7 +16,7 @@ import psutil
 
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
-from app.server.server import PageServer
+from app.web.server import PageServer
 from lessons.replay.progress import read_key
 
 KEY = "a key of a rehearsal"

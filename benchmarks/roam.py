@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from app.server.server import PageServer
+from app.web.server import PageServer
 from benchmarks.findings import Findings
 from benchmarks.hostile import HostileUser
 from browsing.wire import Wire, eventually

@@ -33,7 +33,7 @@ from websockets.exceptions import ConnectionClosed
 
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
-from app.server.server import PageServer
+from app.web.server import PageServer
 from browsing.wire import Wire, eventually, let_in
 from lessons.scenes.run_spec import RunSpec
 

@@ -38,7 +38,7 @@ from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.messages import Speed
 from app.link.process import wait_until
-from app.server.server import PageServer
+from app.web.server import PageServer
 from benchmarks.learners import LONG, Viewers, simulated
 from lessons.scenes.run_spec import RunSpec
 

@@ -32,7 +32,7 @@ from websockets.sync.client import connect
 
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
-from app.server.server import PageServer
+from app.web.server import PageServer
 from browsing.browser_actions import CHROMIUM_ARGS, find_chromium
 from browsing.wire import camera, let_in, messages_of, nothing_kept, pack
 from lessons.scenes.run_spec import RunSpec

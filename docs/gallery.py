@@ -15,7 +15,7 @@ from playwright.sync_api import Page, expect, sync_playwright
 
 from app.link.choice import SceneChoice
 from app.link.exercise import parts_of
-from app.server.server import PageServer
+from app.web.server import PageServer
 from browsing.browser_actions import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, open_page
 from browsing.lessons import expect_part, hurry, open_lesson, predict, run, title_of
 from lessons.course import COURSE, load_lesson

@@ -13,7 +13,7 @@ from playwright.sync_api import Page, expect, sync_playwright
 
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
-from app.server.server import PageServer
+from app.web.server import PageServer
 from browsing.browser_actions import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, key, open_page, press
 from browsing.lessons import expect_part, predict, run
 from lessons.teaching.lesson import Step

@@ -1,7 +1,8 @@
 """Runs every step of every lesson once and stores the site's curves: `python -m docs.record [NAME …]`.
 
 docs/site/recorded/NAME.json contains the plotted curves of each step, for the run and for its ghost. It also
-contains the robot's motion in one step of the lesson.
+contains the robot's motion in one step of the lesson. The page shows the motion of the first lesson while the
+controllers are compiled (app/view/recorded.json).
 """
 
 from __future__ import annotations
@@ -21,7 +22,8 @@ from lessons.recording.recording import Recording
 from lessons.recording.run import run
 from lessons.teaching.lesson import Lesson, Step
 
-FOLDER = Path(__file__).parents[1] / "docs" / "site" / "recorded"
+ROOT = Path(__file__).parents[1]
+FOLDER, OPENING = ROOT / "docs" / "site" / "recorded", ROOT / "app" / "view" / "recorded.json"
 RATE = 25.0
 """The largest number of stored configurations per second of a motion."""
 PLAYED = {"a-redundant-arm": 1, "no-model-needed": 1, "one-task": 1, "swap-the-priorities": 2, "two-tasks": 1}
@@ -103,12 +105,23 @@ def write(name: str, folder: Path = FOLDER) -> Path:
     return path
 
 
+def opening(path: Path) -> dict[str, Any]:
+    """Returns what a page shows of the recorded lesson: the robot, its motion, and the period in s."""
+    motion = json.loads(path.read_text("utf-8"))["motion"]
+    robot = (
+        load_lesson(path.stem).run_of(load_lesson(path.stem).steps[motion["step"]]).scene.partition("-")[0]
+    )
+    return {"robot": robot, "period": motion["period"], "q": motion["q"][0]}
+
+
 def main() -> None:
     """Records the lessons that the command line names."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("names", nargs="*", default=list(COURSE))
     for name in parser.parse_args().names:
         path = write(name)
+        if name == COURSE[0]:
+            OPENING.write_text(json.dumps(opening(path)) + "\n", "utf-8")
         print(f"{name}: {path.stat().st_size / 1000:.0f} kB", file=sys.stderr, flush=True)
 
 

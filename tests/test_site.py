@@ -17,7 +17,7 @@ from app.__main__ import main
 from browsing.browser_actions import SLOW, eventually
 from docs.further import further
 from docs.pages.lessons import MEASURED, measured
-from docs.record import FOLDER, plot, runs_of
+from docs.record import FOLDER, OPENING, opening, plot, runs_of
 from lessons.course import COURSE, load_lesson
 
 ROOT = Path(__file__).parents[1]
@@ -104,6 +104,10 @@ def test_every_claim_on_a_page_has_been_measured(site: Path) -> None:
     for name in COURSE:
         for step in load_lesson(name).steps:
             assert all(told[name][step.title, claim.text]["sound"] for claim in step.claims), name
+
+
+def test_a_page_that_waits_shows_the_recorded_run_of_the_first_lesson() -> None:
+    assert json.loads(OPENING.read_text(encoding="utf-8")) == opening(FOLDER / f"{COURSE[0]}.json")
 
 
 def test_what_is_recorded_is_of_the_lessons_as_they_are() -> None:

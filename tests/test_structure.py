@@ -105,9 +105,9 @@ def test_himpc_is_tested_without_lessons_and_app() -> None:
 
 
 APP = {
-    "commands": ("server", "html", "link", "__main__"),
-    "jupyter": ("server", "client", "link"),
-    "server": ("classes", "page", "panels", "client", "html", "link", "worker", "adapter"),
+    "commands": ("web", "html", "link", "__main__"),
+    "jupyter": ("web", "client", "link"),
+    "web": ("classes", "page", "panels", "client", "html", "link", "worker", "adapter"),
     "classes": ("client", "html", "link"),
     "page": ("panels", "view", "client", "html", "link", "adapter"),
     "panels": ("view", "client", "html", "link", "adapter"),
@@ -455,12 +455,28 @@ def test_what_needs_no_picture_knows_no_viser(folder: str) -> None:
     assert not {name for path in sources(f"app/{folder}") for name in imports(path) if within(name, "viser")}
 
 
+THREADS = "app/link/threads.py"
+
+
+def test_a_function_that_runs_on_a_thread_of_its_own_says_so() -> None:
+    """Threads are started by `on_thread`, and a function that is written for a thread says so by its name.
+    Other functions, such as another object's `close`, may run on any thread."""
+    files = sources("app")
+    assert {str(path.relative_to(ROOT)) for path in files if "Thread(" in path.read_text()} == {THREADS}
+    for path in files:
+        for node in ast.walk(tree(path)):
+            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "on_thread":
+                function = ast.unparse(node.args[1])
+                own = function.startswith("self.") or "." not in function
+                assert function.endswith("_on_thread") or not own, f"{path.name} runs {function} on a thread"
+
+
 PRIVATE = "app/adapter/private.py"
 
 
 def test_one_file_touches_private_names_of_viser() -> None:
     """A private name, with one leading underscore, is used only by its own class or in the one file that
-    checks it before the server starts."""
+    has them all, see tests/app/test_app_viser.py."""
     files = sources(*(f"app/{folder}" for folder in APP if folder not in NO_PICTURE))
     touching: dict[str, set[str]] = {}
     ours = {"_exit"}  # `_exit` is a public name of os
@@ -484,7 +500,7 @@ def test_one_file_touches_private_names_of_viser() -> None:
 
 
 def test_one_file_has_the_names_of_visers_page() -> None:
-    """Scripts and styles use the constants of one module, which are checked before the server starts."""
+    """Scripts and styles use the constants of one module, which tests/app/test_app_viser.py checks."""
     name = re.compile(r"__viser\w|mantine-[A-Z]|\.uplot|\.u-\w|20em")
     files = {str(path.relative_to(ROOT)) for path in sources("app") if name.search(path.read_text())}
     assert files == {"app/adapter/names.py"}

@@ -1,8 +1,5 @@
-"""All uses of viser's private names, which `names` lists. `self_test` checks each name before the server
-starts.
-
-If a name is missing, the server does not start and prints one clear sentence.
-"""
+"""All uses of viser's private names. A test (tests/app/test_app_viser.py) checks that viser has them, and
+`pyproject.toml` admits only versions that have them. docs/house.md says what viser could offer instead."""
 
 from __future__ import annotations
 
@@ -15,6 +12,7 @@ import uuid
 import warnings
 from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from http import HTTPStatus
 from typing import Any, Literal
 
 import numpy as np
@@ -22,10 +20,9 @@ import rich
 import viser
 import websockets.asyncio.server as web
 from websockets.asyncio.server import ServerConnection
+from websockets.http11 import Request, Response
 
 from app.adapter.fast_messages import fast
-from app.adapter.names import OF_A_SERVER, check_names
-from app.adapter.probe import answer, reaches, refuse, require
 from app.adapter.removed_handle_errors import call
 from app.adapter.thread_safe_event import ThreadSafeEvent
 from robots import InputError
@@ -51,17 +48,19 @@ that are seconds old."""
 
 def open_server(host: str, port: int, guard: Guard) -> viser.ViserServer:
     """Starts a viser server that checks every connection with `guard` and opens no public tunnel. Its senders
-    always wake up. If `guard` cannot be installed, the server does not listen, and InputError is raised."""
-    self_test(guard)
+    always wake up. If `guard` cannot be installed, the server refuses every request and ends, and InputError
+    is raised."""
     # Malformed requests of unknown clients are not logged on the terminal.
     warnings.filterwarnings("ignore", r"\[viser\]", UserWarning)
     # viser would print its own greeting, but the command prints exactly one line.
     with _silent(), _guarded(guard) as served:
         server = viser.ViserServer(host=host, port=port, label="himpc-lab", verbose=False)
     try:
-        require(bool(served) and all(served), "how it serves")  # several entries if viser tried more ports
-        for path in OF_A_SERVER:
-            require(reaches(server, path), path)
+        if not served or not all(served):  # several entries if viser tried more ports
+            raise InputError(
+                f"viser {viser.__version__} does not fit this page (how it serves has changed). The page is "
+                "not served, as requests without permission could not be refused. Install viser 1.1."
+            )
         handlers = server._websock_server
         # These handlers would let any client request a public tunnel to this machine, even if viser does not
         # show the button for it.
@@ -92,21 +91,6 @@ def _silent() -> Iterator[None]:
         console.quiet = before
 
 
-def self_test(guard: Guard) -> None:
-    """Checks that viser has all private names used here, and that a guard which is not yet open refuses
-    requests. The test uses a temporary server on this machine that serves no page. Raises InputError if a
-    check fails."""
-    check_names()
-    with _silent(), _guarded(guard) as served:
-        bare = infra.WebsockServer("127.0.0.1", 0, message_class=_messages.Message, verbose=False)
-        bare.start()
-        try:
-            refused = answer(bare._port).startswith(b"HTTP/1.1 503")
-        finally:
-            bare.stop()
-    require(served == [True] and refused, "how it serves")
-
-
 @contextlib.contextmanager
 def _guarded(guard: Guard) -> Iterator[list[bool]]:
     """Within this context viser starts servers that check every connection with `guard`. Yields a list with
@@ -124,7 +108,7 @@ def _guarded(guard: Guard) -> Iterator[list[bool]]:
             changed = guard({**keywords, "handler": handler})
         except Exception:
             served.append(False)
-            return plain(*given, **{**keywords, "process_request": refuse})
+            return plain(*given, **{**keywords, "process_request": _refuse})
         served.append(True)
         return plain(changed.pop("handler"), *place, **changed)
 
@@ -134,6 +118,11 @@ def _guarded(guard: Guard) -> Iterator[list[bool]]:
             yield served
         finally:
             web.serve = plain
+
+
+def _refuse(connection: ServerConnection, _: Request) -> Response:
+    """Refuses every request with status 503."""
+    return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, "")
 
 
 def _keep_awake(server: viser.ViserServer) -> None:

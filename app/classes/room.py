@@ -15,6 +15,7 @@ from app.classes.queue import BuildQueue
 from app.classes.seats import Seats
 from app.client.simulation_client import SimulationClient
 from app.link.exercise import Lecture, Predict
+from app.link.threads import on_thread
 from robots import InputError
 
 RATE = 5.0
@@ -51,17 +52,17 @@ class Room(ABC):
         self.seats = Seats(vote)
         self._hear: Callable[[], object] = _nothing
         self._closed = threading.Event()
-        self._thread = threading.Thread(target=self._follow, daemon=True, name="class")
+        self._thread: threading.Thread | None = None
 
     def start(self, hear: Callable[[], object]) -> None:
         """Begins to follow the class. hear: called after every check of the learners."""
         self._hear = hear
-        self._thread.start()
+        self._thread = on_thread("class", self._follow_on_thread)
 
     def close(self) -> None:
         """Ends the thread. The robots end with their sessions."""
         self._closed.set()
-        if self._thread.ident is not None:
+        if self._thread is not None:
             self._thread.join()
 
     @property
@@ -140,7 +141,7 @@ class Room(ABC):
         if lecture is not None and lecture.exercise == place and lecture.attempt == 0:
             begin(learner, lecture, self._state)
 
-    def _follow(self) -> None:
+    def _follow_on_thread(self) -> None:
         due = time.monotonic()
         while not self._closed.wait(min(_TURN, max(0.02, due - time.monotonic()))):
             self._build()

@@ -8,8 +8,7 @@ from typing import final
 
 from app.client.simulation import Simulation
 from app.link.messages import FollowLeader, LoadRefused, Reached, Report, Script, SimulationFailed
-from app.link.process import Process
-from app.link.spares import Spares
+from app.link.process import Process, Spares
 
 LEAD = 0.2
 """Largest simulated time, s, by which the robot may be ahead of its ghost. If the ghost is too slow, both

@@ -14,11 +14,10 @@ from app.client.decimated import History
 from app.client.pose_history import Frame, PoseHistory
 from app.client.rows import RowHistory
 from app.client.run_statistics import RunStatistics
-from app.link.forkserver import FIRST_PATIENCE
+from app.link.fork_server import FIRST_PATIENCE
 from app.link.messages import Command, Loading, LoadRefused, Ready, Report, SimulationFailed, Status
-from app.link.process import Process
+from app.link.process import Process, Spares
 from app.link.ring import Block
-from app.link.spares import Spares
 
 if TYPE_CHECKING:
     from lessons.settings.settings import SceneSettings
@@ -129,6 +128,11 @@ class Simulation(ABC):
         """Time since the last report of the process, s."""
         return time.monotonic() - self._process.heard_at
 
+    @property
+    def compiles(self) -> bool:
+        """Whether the controllers are being compiled, as at the first start."""
+        return bool(self._process.preparing)
+
     def trouble(self) -> Trouble | None:
         """Returns the problem that the page should show; None if there is none."""
         if self.failure is not None:
@@ -228,12 +232,7 @@ class Simulation(ABC):
             self._free()
 
 
-def aside(end: Callable[[], None]) -> None:
-    """Runs a task that may take some time on a separate thread."""
-    threading.Thread(target=end, daemon=True).start()
-
-
 def _discard(report: Report) -> None:
     """Frees the memory of a scene that was loaded too late to be used."""
     if isinstance(report, Ready):
-        os.close(report.block.number)
+        os.close(report.block)

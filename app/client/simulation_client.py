@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple, final
 
 from app.client.ghost import GhostClient
 from app.client.in_class import Coming, Rest
-from app.client.simulation import DEADLINE, Simulation, Trouble, aside
+from app.client.simulation import DEADLINE, Simulation, Trouble
 from app.link.choice import SceneChoice
 from app.link.exercise import Lecture, LessonPlace, Predict, RunStep
 from app.link.messages import (
@@ -33,8 +33,8 @@ from app.link.messages import (
     Status,
     WaitAt,
 )
-from app.link.process import Process
-from app.link.spares import Spares
+from app.link.process import Process, Spares
+from app.link.threads import on_thread
 
 if TYPE_CHECKING:
     from lessons.teaching import lesson
@@ -160,7 +160,7 @@ class SimulationClient(Simulation):
             self.send(Load((choice or self.choice).admitting(self._start_choice)))
             if ghost is not None:
                 self.send(Lead(True))
-        aside(lambda: before.close(0.0 if mute else 1.0))
+        on_thread("ending", before.close, 0.0 if mute else 1.0)
         if ghost is not None and ghost.trouble() is not None:
             self._replace_ghost(ghost.words, ghost.own)
 
@@ -251,7 +251,7 @@ class SimulationClient(Simulation):
                 words, own, self._spares, lambda until: self.send(WaitAt(until)), self._lost_ghost
             )
         if before is not None:
-            aside(before.close)
+            on_thread("ending", before.close)
         self.send(Lead(True))
 
     def stop_ghost(self) -> None:
@@ -260,7 +260,7 @@ class SimulationClient(Simulation):
             before, self.ghost = self.ghost, None
         self.send(Lead(False))
         if before is not None:
-            aside(before.close)
+            on_thread("ending", before.close)
 
     def _lost_ghost(self, ghost: GhostClient, sentence: str) -> None:
         if ghost is self.ghost:

@@ -10,6 +10,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from app.link.threads import on_thread
+
 if TYPE_CHECKING:
     from sys import UnraisableHookArgs
     from types import FrameType
@@ -72,15 +74,14 @@ def _deadline() -> Iterator[None]:
     os.set_blocking(told, False)
     done = threading.Event()
 
-    def watch() -> None:
+    def watch_on_thread() -> None:
         while number := os.read(heard, 1):
             if number[0] in (signal.SIGINT, signal.SIGTERM):
                 if not done.wait(PATIENCE):
                     os._exit(130)
                 return
 
-    watcher = threading.Thread(target=watch, daemon=True)
-    watcher.start()
+    watcher = on_thread("interrupts", watch_on_thread)
     outer = signal.set_wakeup_fd(told, warn_on_full_buffer=False)
     try:
         yield

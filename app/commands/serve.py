@@ -83,9 +83,9 @@ def serve(
         key: file with a key of 16 characters or more, which signs the progress that learners hand in.
     """
     from app.link.choice import SceneChoice
-    from app.server.passes import given_token
-    from app.server.server import FIRST, PageServer
-    from app.server.serving import serve as serve_page
+    from app.web.passes import given_token
+    from app.web.server import FIRST, PageServer
+    from app.web.serving import serve as serve_page
     from lessons.own.folder import Folder
     from lessons.replay.progress import read_key
 
@@ -119,7 +119,7 @@ def serve(
         choice = own
     file = None
     if class_ and not no_names and port:  # at port 0, no address is the same after a new start
-        from app.server.class_file import class_file
+        from app.web.class_file import class_file
 
         file = class_file(host, port, choice, classroom)
     server = PageServer(

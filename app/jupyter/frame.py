@@ -11,7 +11,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from app.server.door import SELF, as_origin
+from app.web.door import SELF, as_origin
 
 _PROXY = "jupyter_server_proxy"
 

@@ -17,7 +17,8 @@ from app.jupyter.frame import here
 from app.link.choice import SceneChoice
 from app.link.messages import Post, Ready
 from app.link.process import wait_until
-from app.server.server import PageServer
+from app.link.threads import on_thread
+from app.web.server import PageServer
 from lessons.events import MoveTarget, Set
 from lessons.recording.arrays import named
 from lessons.scenes.run_spec import RunSpec
@@ -78,8 +79,7 @@ class Lab:
         )
         (self._learner,) = self._server.sessions.learners
         ended = threading.Event()
-        reader = threading.Thread(target=_read, args=(self._learner, ended), daemon=True)
-        reader.start()
+        reader = on_thread("rows", _read_on_thread, self._learner, ended)
         self._end = weakref.finalize(self, _end, self._server, ended, reader)
 
     @property
@@ -179,7 +179,7 @@ def _has(settings: SceneSettings, path: str, value: Any) -> bool:
     return settings.changed(path, value) == settings
 
 
-def _read(learner: SimulationClient, ended: threading.Event) -> None:
+def _read_on_thread(learner: SimulationClient, ended: threading.Event) -> None:
     """Reads the telemetry, also while no page is open."""
     while not ended.wait(_PERIOD):
         learner.look()

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from app.server.passes import HEADER, USER_HEADER, VARIABLE, new_token
+from app.web.passes import HEADER, USER_HEADER, VARIABLE, new_token
 
 OPTIONS = "HIMPC_LAB_OPTIONS"
 """The environment variable with further options of the command."""

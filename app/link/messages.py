@@ -12,7 +12,6 @@ from app.link.exercise import Lecture, Predict, RunStep
 from app.link.inside import Inside, InsideRequest
 from app.link.mission_view import MissionView
 from app.link.own_code import OwnCode
-from app.link.wire import Handle
 
 if TYPE_CHECKING:
     from himpc.plan import Binding
@@ -172,7 +171,7 @@ class Ready:
     user's own tasks that is not offered; world: the objects around the robot."""
 
     choice: SceneChoice
-    block: Handle  # of the shared memory
+    block: int  # the open file of the shared memory, see `app.link.connection`
     robot: Robot
     layout: Layout
     settings: SceneSettings

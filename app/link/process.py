@@ -2,55 +2,62 @@
 
 from __future__ import annotations
 
-import select
-import socket
+import contextlib
+import errno
+import multiprocessing as mp
+import os
+import pickle
+import signal
 import threading
 import time
+from collections import deque
 from collections.abc import Callable
+from importlib import import_module
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
+from typing import Any
 
-from app.link.children import Child, NotStarted, why_not
+from app.link import fork_server
+from app.link.connection import hang_up, receive
+from app.link.fork_server import SERVER
 from app.link.messages import Command, Quit, Report, SimulationFailed
-from app.link.outbox import Outbox
-from app.link.wire import Wire
+from app.link.threads import on_thread
+from robots.processes.orphans import end_with_parent
 
 _END = 1.0  # s within which a process must end by itself
-
-Start = Callable[[socket.socket], Child]
-"""A function that starts a child. Its argument is the child's end of the connection, a socket."""
+MOST = 256
+"""Largest number of commands that wait for a process."""
+MOST_BYTES = 24_000_000
+"""Largest number of bytes of these commands. If none waits, a command of any size is accepted."""
+_UNKNOWN = 255  # what `multiprocessing` says when the fork server, which knew the exit code, has died
 
 
 class Process:
-    """A child process. A thread of this handle receives the reports and passes them to the listener, see
-    `listen`."""
+    """A child process. A thread of this handle starts it, receives its reports, and passes them to the
+    listener, see `listen`."""
 
-    def __init__(self, start: Start, *instead: Start) -> None:
-        """instead: other ways to start the child. They are tried in order if the child's fork server ends
-        before the child has started."""
-        ours, self._theirs = socket.socketpair()
-        self._wire = Wire(ours)
-        self._instead = list(instead)
-        self._failure = ""  # the reason why no child could be started
-        self._child: Child = self._started(start)
-        self._outbox = Outbox(self._wire)
+    def __init__(self, worker: str) -> None:
+        """worker: the module whose function `main(page)` the child runs; `page` is its connection."""
+        ends: tuple[Any, Any] = mp.Pipe()
+        self._page, theirs = ends
         self._lock = threading.Lock()
         self._listener: Callable[[Report], None] | None = None
-        self._unheard: list[Report] = []
+        self._early_reports: list[Report] = []
         self._closed = False
         self._ended = threading.Event()
+        self._end_lock = threading.Lock()
+        self._end: int | None = None  # readable when the child has ended
+        self.pid: int | None = None
+        """None before the process has started."""
         self.heard_at = time.monotonic()
         """Time of the child's last report or of its start."""
-        self._hearing = threading.Thread(target=self._hear, daemon=True)
-        self._hearing.start()
-
-    @property
-    def pid(self) -> int | None:
-        return self._child.pid
+        self._outbox = Outbox(self._page)
+        self._hearing = on_thread("hearing", self._hear_on_thread, worker, theirs)
 
     @property
     def preparing(self) -> str | None:
         """The reason, as a sentence, why the child has not started yet; None afterwards."""
-        child = self._child
-        return child.doing if child.pid is None and not self._ended.is_set() else None
+        return SERVER.doing if self.pid is None and not self._ended.is_set() else None
 
     @property
     def alive(self) -> bool:
@@ -59,8 +66,8 @@ class Process:
     def listen(self, listener: Callable[[Report], None]) -> None:
         """Calls `listener` with each report, and with `SimulationFailed` last if the child ends by itself."""
         with self._lock:
-            unheard, self._unheard = self._unheard, []
-            for report in unheard:
+            early, self._early_reports = self._early_reports, []
+            for report in early:
                 listener(report)
             self._listener = listener
 
@@ -70,95 +77,196 @@ class Process:
         return not self._closed and self._outbox.put(command)
 
     def kill(self) -> None:
-        """Kills the child without waiting for its end."""
+        """Kills the child without waiting for its end. A child that starts later is killed
+        then."""
         self._closed = True
-        self._child.kill()
-        self._wire.hang_up()  # a child that starts later finds the socket closed
+        self._kill()
+        hang_up(self._page)
+
+    def _kill(self) -> None:
+        with self._end_lock, contextlib.suppress(ProcessLookupError):
+            if self._end is not None and self.pid is not None:
+                os.kill(self.pid, signal.SIGKILL)
 
     def close(self, patience: float = _END) -> None:
         """Ends the child. If it does not end by itself within `patience`, s, it is killed."""
-        if self._child.pid is not None and patience and self.send(Quit()):
+        if self.pid is not None and patience and self.send(Quit()):
             self._closed = True
             self._ended.wait(patience)
         self.kill()
         # The last reports of the child must still be read, as they may name shared memory that must be freed.
-        if self._hearing is not threading.current_thread():
+        if self.pid is not None and self._hearing is not threading.current_thread():
             self._hearing.join(2 * _END)
 
     # ---------------------------------------------------------------- the thread
 
-    def _hear(self) -> None:
-        failed = self._follow()
+    def _hear_on_thread(self, worker: str, theirs: Connection) -> None:
+        try:
+            child = SERVER.start(_run, worker, theirs)
+        except OSError as error:
+            failed, why = False, why_not(error)
+        else:
+            theirs.close()  # from now on, the connection is closed when the child ends
+            failed = self._follow(child)
+            why = _obituary(child.exitcode)
         self._ended.set()
         self._outbox.close()
         if not self._closed and not failed:
-            self._pass_on(SimulationFailed(self._failure or _obituary(self._child.exitcode), died=True))
-        self._wire.hang_up()
+            self._pass_on(SimulationFailed(why, died=True))
+        hang_up(self._page)
         self._outbox.join()
-        self._wire.close()
-        self._theirs.close()
-        self._child.close()
+        self._page.close()
+        theirs.close()
 
-    def _started(self, start: Start) -> Child:
-        try:
-            return start(self._theirs)
-        except OSError as error:
-            self._failure = why_not(error)
-            return NotStarted()
-
-    def _follow(self) -> bool:
+    def _follow(self, child: BaseProcess) -> bool:
         """Reads reports until the child has ended; returns whether the last report was a failure."""
-        failed, over = False, 0.0
-        while not self._failure:
-            there, news = self._wait(None if not over else over - time.monotonic())
-            if there and not over:
-                try:
-                    report: Report = self._wire.recv()
-                except (EOFError, OSError):
-                    over = time.monotonic() + _END  # the exit code will arrive shortly
-                else:
-                    failed = isinstance(report, SimulationFailed)
-                    self._pass_on(report)
-                continue
-            if news:
-                if self._look():
-                    return failed
-            elif over and time.monotonic() >= over:
-                self._child.kill()
-                return failed
-        return False
-
-    def _wait(self, timeout: float | None) -> tuple[bool, bool]:
-        """Waits; returns (whether the wire can be read, whether the child has news)."""
-        watched = select.poll()
-        if timeout is None:
-            watched.register(self._wire, select.POLLIN)
-        watched.register(self._child, select.POLLIN)
-        ready = {number for number, _ in watched.poll(None if timeout is None else max(0.0, 1e3 * timeout))}
-        return self._wire.fileno() in ready, self._child.fileno() in ready
-
-    def _look(self) -> bool:
-        ended = self._child.look()
-        if self._child.pid is not None:
-            self._theirs.close()  # from now on, the socket is closed when the child ends
-        elif ended and self._instead and not self._closed:
-            self._child.close()
-            self._child = self._started(self._instead.pop(0))
-            ended = False
-        self.heard_at = time.monotonic()
-        return ended
+        assert child.pid is not None
+        with self._end_lock:
+            self.pid, self.heard_at = child.pid, time.monotonic()
+            # Unlike the child's sentinel, this is not readable when the fork server dies.
+            self._end = _watched(child)
+        if self._closed:
+            self._kill()
+        failed = False
+        while self._page in wait([self._page, self._end]):
+            try:
+                report: Report = receive(self._page)
+            except (EOFError, OSError):
+                break
+            failed = isinstance(report, SimulationFailed)
+            self._pass_on(report)
+        if not wait([self._end], _END):
+            self._kill()
+        child.join(_END)
+        with self._end_lock:
+            end, self._end = self._end, None
+        if end != child.sentinel:
+            os.close(end)
+        return failed
 
     def _pass_on(self, report: Report) -> None:
         self.heard_at = time.monotonic()
         with self._lock:
             if self._listener is None:
-                self._unheard.append(report)
+                self._early_reports.append(report)
                 return
         self._listener(report)
 
 
+class Outbox:
+    """A bounded queue of commands, and the only thread that writes from this queue to the connection. Adding
+    a command never waits."""
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection = connection
+        self._waiting: deque[bytes] = deque()
+        self._bytes = 0
+        self._closed = False
+        self._news = threading.Condition()
+        self._writer = on_thread("writing", self._write_on_thread)
+
+    def put(self, command: object) -> bool:
+        """Adds a command; returns whether there was room for it. Later changes of the object do not change
+        the command."""
+        content = pickle.dumps(command, pickle.HIGHEST_PROTOCOL)
+        with self._news:
+            full = len(self._waiting) >= MOST or self._bytes + len(content) > MOST_BYTES
+            if self._closed or (full and self._waiting):
+                return False
+            self._waiting.append(content)
+            self._bytes += len(content)
+            self._news.notify()
+            return True
+
+    def close(self) -> None:
+        """Discards all commands that still wait."""
+        with self._news:
+            self._closed = True
+            self._waiting.clear()
+            self._news.notify()
+
+    def join(self) -> None:
+        """Waits until the thread has stopped writing. Call this after `close`, when the connection has been
+        ended."""
+        self._writer.join()
+
+    def _write_on_thread(self) -> None:
+        while True:
+            with self._news:
+                self._news.wait_for(lambda: self._waiting or self._closed)
+                if self._closed:
+                    return
+                content = self._waiting.popleft()
+                self._bytes -= len(content)
+            try:
+                self._connection.send_bytes(content)
+            except OSError:
+                return  # the receiver has closed its end; the receiving thread handles this
+
+
+class Spares:
+    """Starts one process in advance, for the next browser."""
+
+    def __init__(self, worker: str) -> None:
+        """worker: the module that a child runs, see `Process` and `ForkServer`."""
+        self._worker = worker
+        self._lock = threading.Lock()
+        self._spare: Process | None = None
+        self._closed = False
+        SERVER.enter(worker)
+
+    def refill(self) -> None:
+        """Starts a spare if there is none."""
+        with self._lock:
+            if not self._closed and (self._spare is None or not self._spare.alive):
+                self._spare = Process(self._worker)
+
+    def take(self) -> Process:
+        """Returns the spare, or a new child."""
+        with self._lock:
+            spare, self._spare = self._spare, None
+        return spare if spare is not None and spare.alive else Process(self._worker)
+
+    def close(self) -> None:
+        """Ends the spare, and the fork server if nobody else uses it."""
+        with self._lock:
+            closed, self._closed = self._closed, True
+            spare, self._spare = self._spare, None
+        if spare is not None:
+            spare.close()
+        if not closed:
+            SERVER.leave()
+
+
+def _run(worker: str, page: Connection) -> None:
+    """The child's main function."""
+    fork_server.hang_up()
+    end_with_parent()
+    import_module(worker).main(page)
+
+
+def _watched(child: BaseProcess) -> int:
+    with contextlib.suppress(AttributeError, OSError):  # another system than Linux, or the child has ended
+        return os.pidfd_open(child.pid or 0)
+    return child.sentinel
+
+
+def why_not(error: OSError) -> str:
+    """Returns a sentence with the limit because of which a process cannot be started."""
+    limit = {
+        errno.EAGAIN: "the limit of processes is reached (ulimit -u, or that of the container)",
+        errno.EMFILE: "the limit of open files is reached (ulimit -n)",
+        errno.ENFILE: "the limit of open files of this computer is reached",
+        errno.ENOMEM: "there is not enough memory",
+    }.get(error.errno or 0, str(error))
+    return (
+        f"No simulation can be started: {limit}. Close pages or end other programs, then try again; the "
+        "person who started himpc-lab can also raise the limit, or lower --max-sessions."
+    )
+
+
 def _obituary(exitcode: int | None) -> str:
-    if exitcode is None:
+    if exitcode is None or exitcode == _UNKNOWN:
         return "The simulation process ended."
     if exitcode < 0:
         return f"The simulation process was ended from outside (signal {-exitcode})."

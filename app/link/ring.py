@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from app.link.wire import Handle
 from robots import InputError
 
 if TYPE_CHECKING:
@@ -35,17 +34,14 @@ class Block:
     position, m, and quaternion wxyz. The memory has no name, so it is freed when the last process that
     uses it ends for any reason."""
 
-    def __init__(self, width: int, bodies: int, handle: Handle | None = None) -> None:
-        """Creates the memory, as large as the machine allows, or attaches to the memory of `handle` and
-        closes the handle. Raises InputError if the memory is too small for MIN_ROWS."""
+    def __init__(self, width: int, bodies: int, file: int | None = None) -> None:
+        """Creates the memory, as large as the machine allows, or attaches to the memory of an
+        open file and closes the file. Raises InputError if the memory is too small for MIN_ROWS."""
         row, rest = 8 * width, _HEAD + 8 * 7 * bodies
-        if handle is None:
-            self._file = _allocated(row, rest)
-        else:
-            self._file = handle.number
+        self._file = _allocated(row, rest) if file is None else file
         self._memory = mmap.mmap(self._file, 0)
         self.rows = (len(self._memory) - rest) // row
-        if handle is not None:
+        if file is not None:
             self._close_file()
         self._head = np.ndarray((8,), np.int64, self._memory)
         self._time = np.ndarray((1,), np.float64, self._memory, 56)
@@ -53,13 +49,13 @@ class Block:
         self._poses = np.ndarray((bodies, 7), np.float64, self._memory, _HEAD + row * self.rows)
 
     @classmethod
-    def for_robot(cls, robot: Robot, width: int, handle: Handle | None = None) -> Block:
-        return cls(width, robot.n + 1, handle)
+    def for_robot(cls, robot: Robot, width: int, file: int | None = None) -> Block:
+        return cls(width, robot.n + 1, file)
 
     @property
-    def handle(self) -> Handle:
-        """The handle for the other process. Only the process that created the memory has this handle."""
-        return Handle(self._file)
+    def file(self) -> int:
+        """The open file for the other process. Only the process that created the memory has it."""
+        return self._file
 
     @property
     def count(self) -> int:

@@ -22,6 +22,7 @@ from app.client.simulation_client import SimulationClient
 from app.html.text import block, esc, in_trouble
 from app.link.choice import SceneChoice
 from app.link.messages import Ready
+from app.link.threads import on_thread
 from app.page.comfort import Comfort
 from app.page.lesson_file import LessonFile
 from app.panels.widgets.command import add_command
@@ -31,6 +32,7 @@ from lessons.scenes.names import ALL_SCENES
 
 if TYPE_CHECKING:
     from app.page.layout import Stage
+    from app.view.recorded import RecordedRun
 
 NARROW = 1000  # px: a narrower window, as in the cell of a notebook, has no room for panels at both sides
 _BROKEN = (
@@ -38,6 +40,10 @@ _BROKEN = (
     "the page and choose another scene."
 )
 
+_RECORDED = (
+    "The robot plays a recorded run of this lesson. You can move it yourself as soon as the controllers are "
+    "compiled."
+)
 _NOT_ITS_FILE = "This page may not open files of the machine that himpc-lab runs on."
 POSES, PLOTS, TEXTS = 30.0, 12.0, 3.75  # Hz, while simulated time is as fast as real time
 CALM = 6.0  # Hz, the rate of poses, plots and texts when the robot has stood still for STILL
@@ -56,6 +62,11 @@ def lay_out(gui: viser.GuiApi) -> None:
 def starting(choice: SceneChoice) -> str:
     """Returns what a page shows until its robot is there."""
     return block("<b>Starting the robot …</b>") + first_lesson(choice)
+
+
+def opens_first(choice: SceneChoice) -> bool:
+    """Returns whether the first lesson is named on a page that waits for its robot."""
+    return choice.exercise is None or choice.exercise.lesson == COURSE[0]
 
 
 def first_lesson(choice: SceneChoice) -> str:
@@ -105,9 +116,10 @@ class Page:
         self._cadence = Cadence()
         self._saves = 0
         self._waiting: viser.GuiHtmlHandle | None = None
+        self._recorded: RecordedRun | None = None
         self._again: viser.GuiButtonHandle | None = None
         self._closed = threading.Event()
-        self._thread = threading.Thread(target=self._loop, daemon=True)
+        self._thread: threading.Thread | None = None
 
     def start(self) -> None:
         camera = self._client.camera
@@ -117,11 +129,11 @@ class Page:
         lay_out(gui)
         self._theme(self._dark)
         self._waiting = gui.add_html(starting(self.learner.choice))
-        self._thread.start()
+        self._thread = on_thread("page's loop", self._loop_on_thread)
 
     def close(self) -> None:
         self._closed.set()
-        if self._thread.ident is not None and self._thread is not threading.current_thread():
+        if self._thread is not None and self._thread is not threading.current_thread():
             self._thread.join(2.0)
         if self._stage is not None:
             self._stage.close()
@@ -133,7 +145,7 @@ class Page:
 
     # ---------------------------------------------------------------- loop
 
-    def _loop(self) -> None:
+    def _loop_on_thread(self) -> None:
         while not self._closed.is_set():
             began = time.perf_counter()
             try:
@@ -163,6 +175,7 @@ class Page:
         stage = self._stage
         if stage is None:
             self._show_early_trouble()
+            self._play_recorded(now)
             return
         trouble = learner.trouble() or self._own_trouble()
         if trouble != self._trouble:
@@ -231,10 +244,21 @@ class Page:
             if trouble is None
             else in_trouble(trouble.state, trouble.sentence) + first_lesson(self.learner.choice)
         )
+        if self._recorded is not None:
+            self._waiting.content += block(_RECORDED)
         if self._again is None:
             self._again = self._client.gui.add_button("Start again")
             self._again.on_click(lambda _: self.learner.restart())
         self._again.visible = trouble is not None and trouble.offer is not None
+
+    def _play_recorded(self, now: float) -> None:
+        """While the controllers are compiled, the robot of the first lesson plays a recorded run."""
+        if self._recorded is not None:
+            self._recorded.follow(now)
+        elif self._waiting is not None and self.learner.compiles and opens_first(self.learner.choice):
+            from app.view.recorded import RecordedRun
+
+            self._recorded = RecordedRun(self._client, self._phone, now)
 
     def _load(self, choice: SceneChoice) -> None:
         """Loads the scene that a panel requests. Refuses files that this page may not name."""
@@ -250,6 +274,7 @@ class Page:
         from app.view.robot import aim
 
         self._drop_stage()
+        self._recorded = None
         with self._client.atomic():
             self._client.scene.reset()
             self._client.gui.reset()
@@ -303,7 +328,7 @@ class Page:
             return  # the tab was closed, and its panels no longer exist
         traceback.print_exc()
         before, self._stage = self._stage, None
-        self._waiting = self._again = None
+        self._waiting = self._again = self._recorded = None
         with contextlib.suppress(Exception), self._client.atomic():
             self._client.scene.reset()
             self._client.gui.reset()

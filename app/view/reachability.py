@@ -12,6 +12,7 @@ import numpy as np
 import pinocchio as pin
 import scipy.optimize  # noqa: F401  `ReachJudge` needs it: loaded before the server listens, not at the first drag
 
+from app.link.threads import on_thread
 from robots import Robot
 from robots.reach import ReachJudge
 
@@ -61,7 +62,7 @@ class ReachabilityWorker:
         self._wake = threading.Condition()
         self._question: Question | None = None
         self._closed = False
-        threading.Thread(target=self._work, daemon=True).start()
+        on_thread("reachability", self._work_on_thread)
 
     def ask(self, question: Question) -> None:
         with self._wake:
@@ -79,7 +80,7 @@ class ReachabilityWorker:
             question, self._question = self._question, None
             return None if self._closed else question
 
-    def _work(self) -> None:
+    def _work_on_thread(self) -> None:
         q = self._robot.home
         while (question := self._next()) is not None:
             try:

@@ -4,8 +4,7 @@ imports little, so that it can report the progress of the other imports."""
 from __future__ import annotations
 
 from collections.abc import Callable
-
-from app.link.wire import Wire
+from multiprocessing.connection import Connection
 
 
 def warm(say: Callable[[str], None]) -> None:
@@ -23,8 +22,8 @@ def warm(say: Callable[[str], None]) -> None:
     rehearse()
 
 
-def main(wire: Wire) -> None:
+def main(page: Connection) -> None:
     """Runs a simulation until the page sends Quit or ends."""
     from app.worker.main import main as simulate
 
-    simulate(wire)
+    simulate(page)

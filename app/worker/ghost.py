@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from multiprocessing.connection import Connection
 from typing import final
 
 import numpy as np
 
+from app.link.connection import send
 from app.link.messages import Begin, Command, FollowLeader, Loading, LoadRefused, Quit, Reached
-from app.link.wire import Wire
 from app.worker.simulation import SimulationRunner
 from lessons.scenes.catalog import as_torque_scene
 from lessons.session.ghost import GhostDriver, ghost_scene
@@ -47,19 +48,19 @@ class GhostBody:
         return ran
 
 
-def follow(wire: Wire, first: FollowLeader) -> None:
+def follow(page: Connection, first: FollowLeader) -> None:
     """Follows the leader until the page sends Quit; `first` is the message that started this process."""
-    ghost = _hear(wire, None, first)
+    ghost = _hear(page, None, first)
     next_pose = next_reached = next_status = 0.0
     reached = -1.0
     try:
         while True:
-            while wire.poll(None if ghost is None else 0.0):
-                command: Command = wire.recv()
+            while page.poll(None if ghost is None else 0.0):
+                command: Command = page.recv()
                 if isinstance(command, Quit):
                     return
                 if isinstance(command, FollowLeader):
-                    ghost = _hear(wire, ghost, command)
+                    ghost = _hear(page, ghost, command)
                     if command.script.begin is not None:
                         reached = -1.0  # the leader waits for the report that the ghost has started
             if ghost is None:
@@ -67,37 +68,37 @@ def follow(wire: Wire, first: FollowLeader) -> None:
             ran = ghost.catch_up(time.perf_counter() + _CHUNK)
             news = ghost.body.news()
             if news is not None:
-                wire.send(news)
+                send(page, news)
             now = time.perf_counter()
             if now >= next_pose:
                 ghost.body.write_poses()
                 next_pose = now + _POSES
             t = ghost.body.session.t
             if t != reached and now >= next_reached:
-                wire.send(Reached(t))
+                send(page, Reached(t))
                 reached, next_reached = t, now + _REACHED
             if now >= next_status:
-                wire.send(ghost.body.status())
+                send(page, ghost.body.status())
                 next_status = now + _STATUS
             if not ran:
-                wire.poll(_POSES)
+                page.poll(_POSES)
     finally:
         if ghost is not None:
             ghost.body.block.close()
 
 
-def _hear(wire: Wire, ghost: GhostBody | None, command: FollowLeader) -> GhostBody | None:
+def _hear(page: Connection, ghost: GhostBody | None, command: FollowLeader) -> GhostBody | None:
     script = command.script
     if script.begin is not None:
-        wire.send(Loading())
+        send(page, Loading())
         if ghost is not None:
             ghost.body.block.close()
         try:
             ghost = GhostBody(script.begin, command.own)
         except InputError as error:
-            wire.send(LoadRefused(str(error)))
+            send(page, LoadRefused(str(error)))
             return None
-        wire.send(ghost.body.ready())
+        send(page, ghost.body.ready())
     if ghost is not None:
         ghost.driver.hear(script.events, script.t)
     return ghost

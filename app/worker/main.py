@@ -4,15 +4,17 @@ and loads everything that a simulation needs."""
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 import sys
 import time
 import traceback
 from contextlib import suppress
+from multiprocessing.connection import Connection
 
 from app.link.choice import SceneChoice
+from app.link.connection import send
 from app.link.messages import Command, FollowLeader, Load, Loading, LoadRefused, Quit, SimulationFailed
-from app.link.wire import Wire, packed
 from app.worker.ghost import follow
 from app.worker.pacing import Pacer
 from app.worker.simulation import SimulationRunner
@@ -43,24 +45,24 @@ def rehearse() -> None:
     for scene in _USUAL:
         body = SimulationRunner(SceneChoice(RunSpec(scene)))
         body.tick(3)
-        packed(body.ready())
-        packed(body.status())
+        pickle.dumps(body.ready())
+        pickle.dumps(body.status())
         body.close()
 
 
-def main(wire: Wire) -> None:
+def main(page: Connection) -> None:
     """Entry point of the process, called after all imports. Waits for the first scene, then simulates it
     until the page sends Quit or ends."""
     # Ctrl-C in a terminal reaches the whole process group; the page itself ends its children.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     _let_ticks_end()
     try:
-        _serve(wire)
+        _serve(page)
     except (EOFError, BrokenPipeError, ConnectionResetError):
         return  # the page has ended
     except Exception as error:
         traceback.print_exc(file=sys.stderr)
-        wire.send(SimulationFailed(_sentence(error)))
+        send(page, SimulationFailed(_sentence(error)))
 
 
 def _let_ticks_end() -> None:
@@ -71,59 +73,59 @@ def _let_ticks_end() -> None:
             os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
 
 
-def _serve(wire: Wire) -> None:
-    body = _first(wire)
+def _serve(page: Connection) -> None:
+    body = _first(page)
     if isinstance(body, FollowLeader):
-        follow(wire, body)
+        follow(page, body)
         return
     if body is None:
         return
     try:
-        _simulate(wire, body)
+        _simulate(page, body)
     finally:
         body.block.close()
 
 
-def _first(wire: Wire) -> SimulationRunner | FollowLeader | None:
+def _first(page: Connection) -> SimulationRunner | FollowLeader | None:
     while True:
-        command: Command = wire.recv()
+        command: Command = page.recv()
         if isinstance(command, Quit):
             return None
         if isinstance(command, FollowLeader):
             return command
         if isinstance(command, Load):
-            body = _try(wire, command.choice)
+            body = _try(page, command.choice)
             if body is not None:
                 return body
 
 
-def _try(wire: Wire, choice: SceneChoice) -> SimulationRunner | None:
-    wire.send(Loading())
+def _try(page: Connection, choice: SceneChoice) -> SimulationRunner | None:
+    send(page, Loading())
     try:
         body = SimulationRunner(choice)
     except InputError as error:
-        wire.send(LoadRefused(str(error)))
+        send(page, LoadRefused(str(error)))
         return None
-    wire.send(body.ready())
+    send(page, body.ready())
     return body
 
 
-def _simulate(wire: Wire, body: SimulationRunner) -> None:
+def _simulate(page: Connection, body: SimulationRunner) -> None:
     pacer = Pacer(time.perf_counter())
     next_pose = next_status = next_script = next_code = 0.0
     stirred = time.perf_counter()
     while True:
-        while wire.poll():
-            command: Command = wire.recv()
+        while page.poll():
+            command: Command = page.recv()
             stirred, next_status = time.perf_counter(), min(next_status, time.perf_counter() + STATUS_PERIOD)
             if isinstance(command, Quit):
                 return
             if isinstance(command, Load):
-                wire.send(Loading())
+                send(page, Loading())
                 next_code = 0.0
             answer = body.handle(command)
             if answer is not None:
-                wire.send(answer)
+                send(page, answer)
                 pacer.rest(time.perf_counter())
         pacer.speed = body.pace
         now = time.perf_counter()
@@ -137,7 +139,7 @@ def _simulate(wire: Wire, body: SimulationRunner) -> None:
             body.tick(body.take_steps())
         news = body.news()
         if news is not None:
-            wire.send(news)
+            send(page, news)
         now = time.perf_counter()
         if body.busy:
             stirred = now
@@ -149,19 +151,19 @@ def _simulate(wire: Wire, body: SimulationRunner) -> None:
             # A run at full speed never reaches the requested speed, and does not count as slowed down.
             capped = pacer.capped(now) and body.pace == body.speed
             status = body.status(pacer.real_time_factor(now), capped, coded=now >= next_code)
-            wire.send(status)
+            send(page, status)
             if status.code is not None:
                 next_code = now + CODE_PERIOD
             next_status = now + (PULSE if rests else STATUS_PERIOD)
         if now >= next_script:
             script = body.leader.script(body.session)
             if script is not None:
-                wire.send(script)
+                send(page, script)
             next_script = now + SCRIPT_PERIOD
         if rests:
-            wire.poll(max(0.0, next_status - time.perf_counter()))
+            page.poll(max(0.0, next_status - time.perf_counter()))
         elif not behind:
-            wire.poll(_BEAT if body.busy else _IDLE)
+            page.poll(_BEAT if body.busy else _IDLE)
 
 
 def _run(body: SimulationRunner, pacer: Pacer, due: int, until: float) -> int:

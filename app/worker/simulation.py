@@ -335,7 +335,7 @@ class SimulationRunner:
         session = self.session
         return Ready(
             choice=self.choice,
-            block=self.block.handle,
+            block=self.block.file,
             robot=session.robot,
             layout=session.layout,
             settings=session.settings,

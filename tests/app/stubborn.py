@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from multiprocessing.connection import Connection
 
 from app.link.choice import SceneChoice
 from app.link.messages import GetRun, Load, Loading, Quit, RunDescription
-from app.link.wire import Wire
 from lessons.scenes.catalog import load_scene
 from lessons.scenes.run_spec import RunSpec
 
@@ -16,11 +16,11 @@ def warm(say: Callable[[str], None]) -> None:
     say("nothing to be done")
 
 
-def main(wire: Wire) -> None:
+def main(page: Connection) -> None:
     choice = SceneChoice(RunSpec("planar3-hold"))
     settings = load_scene("planar3-hold").settings
     while True:
-        command = wire.recv()
+        command = page.recv()
         match command:
             case Load(choice) if choice.run.scene == "asleep":
                 time.sleep(1e6)
@@ -28,10 +28,10 @@ def main(wire: Wire) -> None:
                 while True:
                     pass
             case Load(choice) if choice.run.scene == "loads":
-                wire.send(Loading())
+                page.send(Loading())
                 time.sleep(1e6)
             case GetRun():
-                wire.send(RunDescription(choice, settings, (), 0.0))
+                page.send(RunDescription(choice, settings, (), 0.0))
             case Quit():
                 return
             case _:

@@ -22,9 +22,9 @@ from app.classes.words import LONGEST, ONLY_HERE
 from app.client.simulation_client import STAYING, SimulationClient
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
-from app.server.greeting import greeting
-from app.server.passes import QUERY
-from app.server.server import PageServer
+from app.web.passes import QUERY
+from app.web.server import PageServer
+from app.web.serving import greeting
 from browsing.wire import Wire, eventually
 from lessons.scenes.run_spec import RunSpec
 
@@ -373,8 +373,8 @@ def test_a_server_without_a_class_has_none_of_its_pages(one_fork_server: None) -
 
 def test_the_command_starts_a_class(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: dict[str, Any] = {}
-    monkeypatch.setattr("app.server.server.PageServer", lambda _, **options: asked.update(options))
-    monkeypatch.setattr("app.server.serving.serve", lambda _, **options: 0)
+    monkeypatch.setattr("app.web.server.PageServer", lambda _, **options: asked.update(options))
+    monkeypatch.setattr("app.web.serving.serve", lambda _, **options: 0)
     for given, names in (([], None), (["--class"], True), (["--class", "--no-names"], False)):
         assert main(["--no-browser", *given]) == 0
         assert asked["class_names"] is names

@@ -17,9 +17,9 @@ from app.classes.gathering import Gathering
 from app.classes.views import for_teacher
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
-from app.server.greeting import greeting
-from app.server.passes import HEADER, QUERY, USER_HEADER
-from app.server.server import PageServer
+from app.web.passes import HEADER, QUERY, USER_HEADER
+from app.web.server import PageServer
+from app.web.serving import greeting
 from browsing.wire import Wire, eventually
 from lessons.scenes.run_spec import RunSpec
 

@@ -21,7 +21,7 @@ from app.client.simulation_client import BEHIND, SimulationClient
 from app.link.choice import SceneChoice
 from app.link.exercise import Lecture, LessonPlace
 from app.link.messages import Play, Post, Ready
-from app.server.server import PageServer
+from app.web.server import PageServer
 from app.worker.simulation import SimulationRunner
 from browsing.wire import Wire, eventually
 from lessons.events import Reset

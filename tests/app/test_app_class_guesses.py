@@ -9,9 +9,9 @@ import pytest
 from test_app_class import LONG, Line, server
 from test_app_load import get
 
-from app.server import guard, wrong_codes
-from app.server.server import PageServer
-from app.server.wrong_codes import ADDRESSES, FORGET, FREE, WAITING, WrongCodes
+from app.web import guard, wrong_codes
+from app.web.server import PageServer
+from app.web.wrong_codes import ADDRESSES, FORGET, FREE, WAITING, WrongCodes
 
 __all__ = ["server"]
 pytestmark = pytest.mark.usefixtures("one_fork_server")

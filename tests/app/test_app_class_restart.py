@@ -21,7 +21,7 @@ from app.classes.gathering import Gathering
 from app.classes.saved import restored, saved
 from app.link.exercise import Lecture, LessonPlace
 from app.link.process import wait_until
-from app.server.class_file import KEPT, ClassFile
+from app.web.class_file import KEPT, ClassFile
 from browsing.wire import Wire, eventually
 from lessons.course import COURSE
 

@@ -13,7 +13,7 @@ from app.link.choice import SceneChoice
 from app.link.messages import Post
 from app.link.process import wait_until
 from app.panels.torque.task_editor import AddTask
-from app.server.server import PageServer
+from app.web.server import PageServer
 from browsing.wire import Wire
 from himpc.tasks.axes import OnAxes
 from lessons.events import MoveTarget, Reset

@@ -17,7 +17,7 @@ from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
 from app.panels.widgets.chart import _TOP, _axis
-from app.server.server import PageServer
+from app.web.server import PageServer
 from benchmarks.client import Second, Viewer
 from lessons.scenes.run_spec import RunSpec
 

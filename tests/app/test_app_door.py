@@ -10,8 +10,9 @@ import viser
 from websockets.datastructures import Headers
 from websockets.http11 import Request
 
-from app.server.door import Answer, Door, as_origin
-from app.server.passes import (
+from app.web.answers import under_its_name
+from app.web.door import Answer, Door, as_origin
+from app.web.passes import (
     HEADER,
     QUERY,
     USER_HEADER,
@@ -21,7 +22,6 @@ from app.server.passes import (
     new_token,
     shared,
 )
-from app.server.prefix import under_its_name
 from robots import InputError
 
 OURS = "127.0.0.1:8080"

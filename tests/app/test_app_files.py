@@ -9,7 +9,7 @@ import pytest
 
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
-from app.server.server import PageServer
+from app.web.server import PageServer
 from browsing.wire import Wire, eventually
 from lessons.authoring.new import text_of
 from lessons.own.folder import Folder

@@ -10,8 +10,8 @@ import pytest
 
 from app.link.choice import SceneChoice
 from app.link.messages import Post
-from app.server.server import PageServer
 from app.view.camera import FollowBase
+from app.web.server import PageServer
 from browsing.wire import Wire, eventually
 from lessons.events import MoveTarget
 from lessons.scenes.run_spec import RunSpec

@@ -5,21 +5,30 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
+from pathlib import Path
 
 import psutil
 import pytest
 from children import LONG, Start, born, gone, running
 
 from app.client.simulation_client import SimulationClient
-from app.link import forkserver
-from app.link.forkserver import ForkServer
+from app.link import fork_server
+from app.link.fork_server import SERVER
 from app.link.process import wait_until
 
+HERE = Path(__file__).parent
 
-def server_of(learner: SimulationClient) -> ForkServer:
-    server = learner._spares.server
-    assert server is not None
-    return server
+
+def parent(learner: SimulationClient) -> int:
+    return psutil.Process(born(learner)).ppid()
+
+
+def server() -> int:
+    assert wait_until(lambda: SERVER.pid is not None, LONG)
+    assert SERVER.pid is not None
+    return SERVER.pid
 
 
 def test_children_are_forked_where_one_thread_lives(start: Start) -> None:
@@ -27,17 +36,16 @@ def test_children_are_forked_where_one_thread_lives(start: Start) -> None:
     locked in the child for ever."""
     learner = start("iiwa14-hold", own_server=True)
     assert wait_until(lambda: running(learner), LONG)
-    server = psutil.Process(server_of(learner).pid)
-    assert psutil.Process(born(learner)).ppid() == server.pid
-    assert server.num_threads() == 1
+    assert parent(learner) == server()
+    assert psutil.Process(server()).num_threads() == 1
     assert psutil.Process(born(learner)).memory_full_info().uss < 25e6  # its own memory, bytes
 
 
 @pytest.mark.parametrize("worker", ["broken", "threaded"])
 def test_without_a_fork_server_children_are_spawned(start: Start, worker: str) -> None:
-    learner = start("planar3-hold", worker)
+    learner = start("planar3-hold", worker, own_server=True)
     assert wait_until(lambda: running(learner), LONG)
-    assert psutil.Process(born(learner)).ppid() == os.getpid()
+    assert parent(learner) == os.getpid()
     another = start("planar3-hold")
     assert wait_until(lambda: running(another), LONG)
 
@@ -45,16 +53,30 @@ def test_without_a_fork_server_children_are_spawned(start: Start, worker: str) -
 def test_a_dead_fork_server_takes_nobody_along(start: Start) -> None:
     learner = start("planar3-hold", own_server=True)
     assert wait_until(lambda: running(learner), LONG)
-    server = server_of(learner)
-    os.kill(server.pid, signal.SIGKILL)
-    assert wait_until(lambda: not server.alive, LONG)
+    before = server()
+    os.kill(before, signal.SIGKILL)
+    assert wait_until(lambda: SERVER.pid is None, LONG)
     another = start("planar3-hold")
     assert wait_until(lambda: running(another), LONG)
-    assert server_of(another) is not server and running(learner)
+    assert parent(another) == server() != before and running(learner)
     os.kill(born(learner), signal.SIGKILL)
     assert wait_until(lambda: learner.failure is not None, LONG)
     learner.reset_all()
     assert wait_until(lambda: running(learner), LONG)
+
+
+def test_a_robot_without_its_fork_server_can_be_ended(start: Start) -> None:
+    """A child whose fork server has died is ended as others are, also if it is stopped."""
+    learner = start("planar3-hold", own_server=True)
+    assert wait_until(lambda: running(learner), LONG)
+    pid = born(learner)
+    os.kill(server(), signal.SIGKILL)
+    assert wait_until(lambda: SERVER.pid is None, LONG)
+    another = start("planar3-hold")
+    assert wait_until(lambda: running(another), LONG)
+    os.kill(pid, signal.SIGSTOP)
+    learner.restart()
+    assert wait_until(lambda: gone(pid) and running(learner), LONG)
 
 
 def test_a_fork_server_that_is_stopped_is_replaced(start: Start) -> None:
@@ -62,22 +84,22 @@ def test_a_fork_server_that_is_stopped_is_replaced(start: Start) -> None:
     server is ended, and its children keep running."""
     learner = start("planar3-hold", own_server=True)
     assert wait_until(lambda: running(learner), LONG)
-    before = server_of(learner)
-    os.kill(before.pid, signal.SIGSTOP)
+    before = server()
+    os.kill(before, signal.SIGSTOP)
     waiting = start("planar3-hold")
-    assert wait_until(lambda: gone(before.pid), LONG)
+    assert wait_until(lambda: gone(before), LONG)
     assert wait_until(lambda: running(waiting), LONG)
     assert waiting.failure is None and running(learner)
-    assert psutil.Process(born(waiting)).ppid() == server_of(waiting).pid != before.pid
+    assert parent(waiting) == server() != before
 
 
 def test_a_fork_server_that_is_stopped_while_it_gets_ready_is_replaced(start: Start) -> None:
-    learner = start("idle", "slow")
-    before = server_of(learner)
-    assert wait_until(lambda: bool(before.doing), LONG)
-    os.kill(before.pid, signal.SIGSTOP)
-    assert wait_until(lambda: gone(before.pid) and learner.pid is not None, LONG)
-    assert psutil.Process(born(learner)).ppid() == server_of(learner).pid != before.pid
+    learner = start("idle", "slow", own_server=True)
+    assert wait_until(lambda: bool(SERVER.doing), LONG)
+    before = server()
+    os.kill(before, signal.SIGSTOP)
+    assert wait_until(lambda: gone(before) and learner.pid is not None, LONG)
+    assert parent(learner) == server() != before
 
 
 def test_a_fork_server_that_says_what_it_does_is_not_stuck(
@@ -85,16 +107,42 @@ def test_a_fork_server_that_says_what_it_does_is_not_stuck(
 ) -> None:
     """The server counts as alive as long as it reports progress, because a slow machine may take minutes to
     compile."""
-    learner = start("idle", "slow")
-    server = server_of(learner)
-    assert wait_until(lambda: bool(server.doing), LONG)
-    monkeypatch.setattr(forkserver, "FIRST_PATIENCE", 3.0)
+    learner = start("idle", "slow", own_server=True)
+    assert wait_until(lambda: bool(SERVER.doing), LONG)
+    before = server()
+    monkeypatch.setattr(fork_server, "FIRST_PATIENCE", 3.0)
     seen: set[str] = set()
 
     def gets_ready() -> bool:
-        seen.add(server.doing)
-        return server.ready or not server.alive or server.stuck
+        seen.add(SERVER.doing)
+        return SERVER.ready or SERVER.pid != before
 
     assert wait_until(gets_ready, LONG)
-    assert server.ready and len(seen) > 2
-    assert psutil.Process(born(learner)).ppid() == server.pid
+    assert SERVER.ready and len(seen) > 2
+    assert parent(learner) == before == server()
+
+
+PROGRAM = """
+import sys
+sys.path[:0] = {paths!r}
+print("runs", flush=True)
+from app.link.fork_server import SERVER
+from app.link.process import Spares, wait_until
+spares = Spares("stubborn")
+process = spares.take()
+assert wait_until(lambda: process.pid is not None, 60.0)
+print(process.pid, flush=True)
+process.close()
+spares.close()
+"""
+
+
+def test_children_do_not_run_the_page_s_program_again(tmp_path: Path) -> None:
+    """A user's program that opens the page may have no `if __name__ == "__main__"`."""
+    program = tmp_path / "mine.py"
+    program.write_text(PROGRAM.format(paths=[str(HERE), str(HERE.parents[1])]))
+    done = subprocess.run(
+        [sys.executable, program], capture_output=True, text=True, timeout=LONG, check=False
+    )
+    assert done.stdout.split()[0] == "runs" and done.stdout.count("runs") == 1, done.stdout
+    assert done.stdout.split()[1].isdigit() and not done.stderr, done.stderr

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import multiprocessing
 import os
-import socket
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import psutil
@@ -14,14 +15,12 @@ import pytest
 
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
+from app.link.connection import receive, send
 from app.link.exercise import LessonPlace
-from app.link.forkserver import ForkServer
 from app.link.messages import Lead, Load, Play, Post, ResetAll, Script, WaitAt
-from app.link.process import wait_until
-from app.link.spares import Spares
-from app.link.wire import Wire as Line
-from app.server.server import PageServer
-from app.server.sessions import WORKER
+from app.link.process import Spares, wait_until
+from app.web.server import PageServer
+from app.web.sessions import WORKER
 from app.worker.ghost import GhostBody
 from app.worker.simulation import SimulationRunner
 from browsing.wire import Wire, eventually
@@ -113,8 +112,8 @@ def test_leading_begins_anew_with_every_fresh_start(body: SimulationRunner) -> N
 
 
 @pytest.fixture
-def start(fork_server: ForkServer | None) -> Iterator[Callable[[str], SimulationClient]]:
-    spares, started = Spares(WORKER, fork_server), list[SimulationClient]()
+def start(one_fork_server: None) -> Iterator[Callable[[str], SimulationClient]]:
+    spares, started = Spares(WORKER), list[SimulationClient]()
 
     def run(scene: str) -> SimulationClient:
         learner = SimulationClient("token", SceneChoice(RunSpec(scene)), spares)
@@ -181,13 +180,14 @@ def test_a_scene_that_comes_too_late_leaves_no_memory(start: Callable[[str], Sim
     learner = start("planar3-hold")
     learner.close()
     late = SimulationRunner(SceneChoice(RunSpec("planar3-hold")))
-    here, there = (Line(end) for end in socket.socketpair())
-    there.send(late.ready())
-    ready = here.recv()
-    assert os.fstat(ready.block.number)
+    ends: tuple[Any, Any] = multiprocessing.Pipe()
+    here, there = ends
+    send(there, late.ready())
+    ready = receive(here)
+    assert os.fstat(ready.block)
     learner._hear(learner._process, ready)
     with pytest.raises(OSError):
-        os.fstat(ready.block.number)
+        os.fstat(ready.block)
     for each in (here, there, late):
         each.close()
 

@@ -18,27 +18,23 @@ from urllib.parse import urlsplit
 
 import msgspec
 import pytest
-import websockets.asyncio.server as web
 from viser import ViserServer, __version__, _messages
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 from websockets.sync.connection import Connection
 
-from app.adapter import names, private
+from app.adapter import private
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
-from app.server import budget
-from app.server.budget import Bucket, Budget
-from app.server.connection_limits import ConnectionLimits
-from app.server.door import Door
-from app.server.guard import FIRST_WORD, ConnectionGuard, GuardedConnection
-from app.server.passes import QUERY
-from app.server.server import PageServer
-from app.server.visit import Visit
+from app.web import limits
+from app.web.guard import FIRST_WORD, GuardedConnection
+from app.web.limits import Bucket, Budget, ConnectionLimits
+from app.web.passes import QUERY
+from app.web.server import PageServer
+from app.web.visit import Visit
 from browsing.wire import camera, let_in, pack
 from lessons.own.folder import Folder
 from lessons.scenes.run_spec import RunSpec
-from robots import InputError
 
 PROTOCOL: Any = [f"viser-v{__version__}"]
 pytestmark = pytest.mark.usefixtures("one_fork_server")
@@ -254,7 +250,7 @@ def test_a_cookie_that_another_user_has_seen_opens_nothing(plain: PageServer) ->
 
 def test_a_message_has_a_size(plain: PageServer) -> None:
     with dial(plain) as page:
-        page.send(bytes(budget.MESSAGE + 1))
+        page.send(bytes(limits.MESSAGE + 1))
         assert closed_with(page) == 1009
     with dial(plain) as page:
         page.send("text")
@@ -323,14 +319,14 @@ def test_who_drags_never_waits_and_who_floods_is_ended() -> None:
     while not spent.spent:
         now[0] += spent.wait(300)
         flooded += 1
-        assert flooded < budget.BURST + 1.5 * budget.PATIENCE * budget.MESSAGES
+        assert flooded < limits.BURST + 1.5 * limits.PATIENCE * limits.MESSAGES
 
 
 def test_files_that_are_complete_hold_nothing() -> None:
     spent = Budget(lambda: 0.0)
-    assert all(spent.uploads(budget.UPLOADS // 5, lambda: 0) for _ in range(20))
+    assert all(spent.uploads(limits.UPLOADS // 5, lambda: 0) for _ in range(20))
     full = Budget(lambda: 0.0)
-    assert not all(full.uploads(budget.UPLOADS // 5, lambda: budget.UPLOADS) for _ in range(6))
+    assert not all(full.uploads(limits.UPLOADS // 5, lambda: limits.UPLOADS) for _ in range(6))
 
 
 def test_the_silent_make_room() -> None:
@@ -350,39 +346,8 @@ def test_the_silent_make_room() -> None:
     assert crowd.comes_from("f", "1")
 
 
-def test_a_seam_that_is_gone_is_a_sentence_and_nothing_is_served(monkeypatch: pytest.MonkeyPatch) -> None:
-    private.self_test(ConnectionGuard(Door()))
-    changed = web.serve
-
-    def without(*given: Any, process_request: object = None, **keywords: Any) -> Any:
-        return changed(*given, **keywords)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(web, "serve", without)  # a version that does not call our function for a request
-        with pytest.raises(InputError, match=r"viser .*how it serves"):
-            private.self_test(ConnectionGuard(Door()))
-    for gone in ("FileTransferPart", "GuiUpdateMessage"):
-        with monkeypatch.context() as patch:
-            patch.delattr(_messages, gone)
-            with pytest.raises(InputError, match=gone):
-                private.open_server("127.0.0.1", 0, ConnectionGuard(Door()))
-    with monkeypatch.context() as patch:
-        patch.setattr(names, "OF_THE_PAGE", (("App.tsx", "w.__viserImmutable"),))
-        with pytest.raises(InputError, match="__viserImmutable"):
-            private.open_server("127.0.0.1", 0, ConnectionGuard(Door()))
-    opened: list[Any] = []
-    with monkeypatch.context() as patch:
-        stop = private.stop
-        patch.setattr(private, "stop", lambda server: (opened.append(server.get_port()), stop(server)))
-        patch.setattr(private, "OF_A_SERVER", ("gui._thread_pool",))
-        with pytest.raises(InputError, match="_thread_pool"):
-            private.open_server("127.0.0.1", 0, ConnectionGuard(Door()))
-    with pytest.raises(urllib.error.URLError):
-        urllib.request.urlopen(f"http://127.0.0.1:{opened[0]}", timeout=5)
-
-
 def test_no_process_stays_if_the_server_cannot_be_made(monkeypatch: pytest.MonkeyPatch) -> None:
-    from app.server import server as module
+    from app.web import server as module
 
     made: list[Any] = []
 
@@ -433,7 +398,7 @@ def test_a_page_that_comes_while_the_server_closes_leaves_no_noise(
         assert ended.wait(LONG)  # without this, the loop may stop while `late` sleeps
         stop(server)
 
-    monkeypatch.setattr("app.server.visit.STORAGE", 10 * LONG)  # a question that is not withdrawn stays open
+    monkeypatch.setattr("app.web.visit.STORAGE", 10 * LONG)  # a question that is not withdrawn stays open
     monkeypatch.setattr(Visit, "arrive", late)
     monkeypatch.setattr(Visit, "leave", leaves)
     monkeypatch.setattr(private, "stop", stops)

@@ -19,7 +19,7 @@ import pytest
 from websockets.exceptions import InvalidStatus
 
 from app.jupyter.launcher import OPTIONS, launcher
-from app.server.passes import HEADER, QUERY, USER_HEADER, VARIABLE
+from app.web.passes import HEADER, QUERY, USER_HEADER, VARIABLE
 from browsing.hub import ROOT, entry_point
 from browsing.wire import Wire, eventually
 

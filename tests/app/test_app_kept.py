@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import ctypes
 import gc
+import pickle
 import re
 import tempfile
 
@@ -14,8 +15,7 @@ from app.adapter import private
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
-from app.link.wire import packed
-from app.server.server import PageServer
+from app.web.server import PageServer
 from app.worker.simulation import SimulationRunner
 from benchmarks.learners import Viewers
 from browsing.wire import Wire
@@ -60,7 +60,7 @@ def test_ticks_keep_nothing(run_spec: RunSpec) -> None:
         for _ in range(TICKS // 20):
             body.tick(20)
             body.write_poses()
-            packed(body.status())
+            pickle.dumps(body.status())
 
     try:
         for _ in range(2):  # after this, the memory for the last seconds is full
@@ -131,8 +131,8 @@ def test_memory_is_given_back_after_the_last_page(monkeypatch: pytest.MonkeyPatc
     given: list[int] = []
     server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=2, grace=0.1)
     sessions = server.sessions
-    monkeypatch.setattr("app.server.sessions.give_back", lambda: given.append(len(sessions.learners)))
-    monkeypatch.setattr("app.server.sessions._TIDY", LONG)
+    monkeypatch.setattr("app.web.sessions.give_back", lambda: given.append(len(sessions.learners)))
+    monkeypatch.setattr("app.web.sessions._TIDY", LONG)
     try:
         with Wire(server.guest_link):
             with Wire(server.guest_link):

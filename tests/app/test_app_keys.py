@@ -11,7 +11,7 @@ import viser
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
 from app.panels.widgets.command import CAMERA_KEYS
-from app.server.server import PageServer
+from app.web.server import PageServer
 from browsing.wire import Wire, eventually
 from lessons.scenes.run_spec import RunSpec
 

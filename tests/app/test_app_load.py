@@ -17,9 +17,9 @@ from websockets.sync.client import connect
 
 from app.link.choice import SceneChoice
 from app.link.messages import Post
-from app.server.load import Load, report
-from app.server.passes import HEADER
-from app.server.server import PageServer
+from app.web.load import Load, report
+from app.web.passes import HEADER
+from app.web.server import PageServer
 from browsing.wire import Wire, eventually
 from lessons.events import Set
 from lessons.replay.state import State, decode, encode

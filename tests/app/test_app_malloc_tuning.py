@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from app.server.malloc_tuning import ARENAS
+from app.web.malloc_tuning import ARENAS
 
 ROOT = Path(__file__).parents[2]
 COUNT = """
 import ctypes, sys, threading
-from app.server.malloc_tuning import few_arenas
+from app.web.malloc_tuning import few_arenas
 
 if {few} and not few_arenas():
     sys.exit(3)
@@ -62,7 +62,7 @@ HOLES = """
 import sys
 import numpy as np
 import psutil
-from app.server.malloc_tuning import few_arenas, large_arrays_apart
+from app.web.malloc_tuning import few_arenas, large_arrays_apart
 
 few_arenas()
 large_arrays_apart()

@@ -13,7 +13,7 @@ from viser import _messages
 from app.link.choice import SceneChoice
 from app.page.comfort import MOTION, REDUCED
 from app.panels.run.narration import AT_MOST_EVERY, Facts, Narration
-from app.server.server import PageServer
+from app.web.server import PageServer
 from browsing.wire import Wire, eventually
 from lessons.scenes.run_spec import RunSpec
 

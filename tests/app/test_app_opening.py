@@ -17,10 +17,9 @@ import pytest
 
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
-from app.server.address import seen_from_outside
-from app.server.greeting import greeting
-from app.server.opening import opened_in_a_browser
-from app.server.server import PageServer
+from app.web.address import seen_from_outside
+from app.web.server import PageServer
+from app.web.serving import greeting, opened_in_a_browser
 from lessons.own.folder import Folder
 from lessons.scenes.run_spec import RunSpec
 

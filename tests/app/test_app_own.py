@@ -14,7 +14,7 @@ import pytest
 from app.link.choice import SceneChoice
 from app.link.messages import Lead, Load, LoadRefused, Post, Ready
 from app.link.process import wait_until
-from app.server.server import PageServer
+from app.web.server import PageServer
 from app.worker.ghost import GhostBody
 from app.worker.reports import own_code
 from app.worker.simulation import SimulationRunner

@@ -14,13 +14,13 @@ import psutil
 import pytest
 
 from app.client.simulation_client import SimulationClient
+from app.link import fork_server
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
-from app.link.forkserver import ForkServer
+from app.link.fork_server import SERVER
 from app.link.messages import Load, Play, Post, SimulationFailed, Speed, StepTicks
-from app.link.process import Process, wait_until
-from app.link.spares import Spares
-from app.server.sessions import WORKER, Sessions
+from app.link.process import Process, Spares, wait_until
+from app.web.sessions import WORKER, Sessions
 from lessons.events import MoveTarget, Set
 from lessons.scenes.run_spec import RunSpec
 
@@ -28,8 +28,8 @@ LONG = 30.0  # s
 
 
 @pytest.fixture
-def spares(fork_server: ForkServer | None) -> Iterator[Spares]:
-    made = Spares(WORKER, fork_server)
+def spares(one_fork_server: None) -> Iterator[Spares]:
+    made = Spares(WORKER)
     yield made
     made.close()
 
@@ -158,19 +158,19 @@ def test_no_child_and_no_memory_is_left(start: Callable[[str], SimulationClient]
     assert rings() == before - 1
 
 
-def test_a_lent_fork_server_outlives_who_used_it(fork_server: ForkServer | None) -> None:
-    if fork_server is None:
-        pytest.skip("processes are not forked here")
+def test_a_fork_server_outlives_who_used_it_first(one_fork_server: None) -> None:
+    parents = set[int]()
     for _ in range(2):
-        spares = Spares(WORKER, fork_server)
+        spares = Spares(WORKER)
         learner = SimulationClient("token", SceneChoice(RunSpec("planar3-hold")), spares)
         assert wait_until(lambda one=learner: ticks(one) > 20, LONG)
         pid = learner.pid
-        assert pid is not None and psutil.Process(pid).ppid() == fork_server.pid
+        assert pid is not None
+        parents.add(psutil.Process(pid).ppid())
         learner.close()
         spares.close()
         assert wait_until(lambda pid=pid: not psutil.pid_exists(pid), LONG)
-    assert fork_server.alive
+    assert len(parents) == 1
 
 
 def rings() -> int:
@@ -199,35 +199,15 @@ def test_sessions_resume_end_and_are_limited(one_fork_server: None) -> None:
     assert not sessions.learners
 
 
-class Dead:
-    """A child whose fork server has ended before it started."""
-
-    doing, exitcode, pid = "", None, None
-
-    def __init__(self, _: object) -> None:
-        self._end, other = os.pipe()
-        os.close(other)
-
-    def fileno(self) -> int:
-        return self._end
-
-    def look(self) -> bool:
-        return True
-
-    def kill(self) -> None:
-        pass
-
-    def close(self) -> None:
-        os.close(self._end)
-
-
-def refused(_: object) -> Any:
+def refused(*_: object) -> Any:
     raise BlockingIOError(errno.EAGAIN, "Resource temporarily unavailable")
 
 
-@pytest.mark.parametrize("ways", [(refused,), (Dead, refused)])
-def test_a_child_that_cannot_be_started_ends_with_a_sentence_that_names_the_limit(ways: Any) -> None:
-    process = Process(*ways)
+def test_a_child_that_cannot_be_started_ends_with_a_sentence_that_names_the_limit(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("app.link.fork_server._started", refused)
+    process = Process(WORKER)
     heard: list[Any] = []
     process.listen(heard.append)
     assert wait_until(lambda: not process.alive and bool(heard), LONG)
@@ -239,20 +219,24 @@ def test_a_child_that_cannot_be_started_ends_with_a_sentence_that_names_the_limi
     process.close()
 
 
-def test_a_fork_server_that_cannot_fork_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    """If no process can be spawned either, the page says why; when there is room again, it gets its robot."""
+def test_after_a_limit_of_processes_a_page_gets_its_robot(monkeypatch: pytest.MonkeyPatch) -> None:
+    """If no process can be started, the page says why; when there is room again, it gets its robot."""
+    SERVER.end()
     spares = Spares("childless")
-    monkeypatch.setattr("app.link.spares.spawned", lambda *_: refused(_))
+    started = fork_server._started
+    monkeypatch.setattr(
+        fork_server, "_started", lambda how, *run: refused() if how._name == "spawn" else started(how, *run)
+    )
     learner = SimulationClient("token", SceneChoice(RunSpec("planar3-hold")), spares)
     try:
         assert wait_until(lambda: learner.failure is not None, LONG)
         assert "No simulation can be started: the limit of processes" in str(learner.failure)
         trouble = learner.trouble()
         assert trouble is not None and trouble.offer is not None
-        assert spares.server is not None and spares.server.alive
         monkeypatch.undo()
         learner.restart()
         assert wait_until(lambda: learner.status is not None, LONG) and learner.failure is None
     finally:
         learner.close()
         spares.close()
+        SERVER.end()

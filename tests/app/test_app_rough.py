@@ -9,7 +9,6 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
 from pathlib import Path
 
 import psutil
@@ -19,29 +18,15 @@ from children import LONG, Start, born, gone, running
 from app.client import simulation
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
-from app.link.forkserver import ForkServer
 from app.link.messages import Load, Play, Post, RunDescription
-from app.link.outbox import MOST
-from app.link.process import wait_until
+from app.link.process import MOST, wait_until
 from app.link.ring import MAX_ROWS, MIN_ROWS, Block
-from app.server.sessions import WORKER
 from benchmarks.rough import treat
 from lessons.events import MoveTarget
 from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.lesson import Ghost
 
 HERE = Path(__file__).parent
-
-
-@pytest.fixture(scope="module")
-def lent(lent: dict[str, ForkServer | None]) -> Iterator[dict[str, ForkServer | None]]:
-    """Returns the fork servers of other tests, and one for the worker `stubborn`."""
-    if lent[WORKER] is None:
-        yield lent
-        return
-    stubborn = ForkServer("stubborn")
-    yield {**lent, "stubborn": stubborn}
-    stubborn.close()
 
 
 # ---------------------------------------------------------------- simulations that do not answer
@@ -170,15 +155,15 @@ sys.path[:0] = {paths!r}
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from lessons.scenes.run_spec import RunSpec
-from app.link.process import wait_until
-from app.link.spares import Spares
+from app.link.fork_server import SERVER
+from app.link.process import Spares, wait_until
 spares = Spares("stubborn")
 if {spawn}:
-    spares._forks = False
+    SERVER._forks = False
 names = ("asleep", "busy", "idle", "stopped")
 learners = [SimulationClient(name, SceneChoice(RunSpec(name)), spares) for name in names]
 assert wait_until(lambda: all(each.pid for each in learners), 60.0)
-print(*(each.pid for each in learners), *([] if {spawn} else [spares.server.pid]), flush=True)
+print(*(each.pid for each in learners), *([] if {spawn} else [SERVER.pid]), flush=True)
 time.sleep(1e6)
 """
 

@@ -17,8 +17,8 @@ from viser import _messages
 
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
-from app.server import server
-from app.server.server import FIRST, PageServer
+from app.web import server
+from app.web.server import FIRST, PageServer
 from browsing.wire import let_in
 from lessons.scenes.run_spec import RunSpec
 from robots import InputError
@@ -76,8 +76,8 @@ def test_a_port_that_was_taken_meanwhile_gives_one_sentence(monkeypatch: pytest.
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_one_line_and_a_clean_end(number: signal.Signals) -> None:
     code = (
-        "import app.commands.early, sys; from app.server.server import FIRST, PageServer; "
-        "from app.server.serving import serve; "
+        "import app.commands.early, sys; from app.web.server import FIRST, PageServer; "
+        "from app.web.serving import serve; "
         "sys.exit(serve(PageServer(FIRST, port=0), open_browser=False))"
     )
     process = subprocess.Popen(

@@ -31,9 +31,9 @@ from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
 from app.link.process import wait_until
-from app.server import place
-from app.server.passes import HEADER, QUERY
-from app.server.server import PageServer
+from app.web import place
+from app.web.passes import HEADER, QUERY
+from app.web.server import PageServer
 from browsing.tab import Storage, opened
 from browsing.wire import Wire, camera, eventually, pack
 from lessons.own.folder import Folder
@@ -479,8 +479,8 @@ def test_a_place_that_cannot_be_read_is_none(text: str) -> None:
 def test_the_command_takes_what_the_page_shows(monkeypatch: pytest.MonkeyPatch) -> None:
     """The command also accepts several proxies."""
     asked: dict[str, Any] = {}
-    monkeypatch.setattr("app.server.server.PageServer", lambda _, **options: asked.update(options))
-    monkeypatch.setattr("app.server.serving.serve", lambda _, **options: 0)
+    monkeypatch.setattr("app.web.server.PageServer", lambda _, **options: asked.update(options))
+    monkeypatch.setattr("app.web.serving.serve", lambda _, **options: 0)
     first, second = "https://lab.example.org", "https://b.example.org"
     assert main(["--no-browser", "--trusted-origin", first, "--trusted-origin", second]) == 0
     assert tuple(asked["trusted_origins"]) == (first, second) and asked["ask_token"]

@@ -15,8 +15,8 @@ from app.client.simulation import trouble_of
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
 from app.link.process import Process
-from app.server.server import PageServer
-from app.server.visit import FIRST_TEXT, Visit
+from app.web.server import PageServer
+from app.web.visit import FIRST_TEXT, Visit
 from browsing.wire import Wire, eventually
 from lessons.course import COURSE, heading, load_lesson
 from lessons.scenes.run_spec import RunSpec
@@ -29,9 +29,9 @@ LISTEN = f"""
 import sys, urllib.request
 from app.link.choice import SceneChoice
 from lessons.scenes.run_spec import RunSpec
-from app.server import server
+from app.web import server
 from browsing.wire import let_in
-server._load = lambda choice: None  # what follows once it listens
+server._load_on_thread = lambda choice: None  # what follows once it listens
 running = server.PageServer({{choice}}, port=0)
 try:
     page = urllib.request.Request(running.url, headers={{"Cookie": let_in(running.link)}})
@@ -46,7 +46,7 @@ SHOWN = """
 import sys
 from app.link.choice import SceneChoice
 from lessons.scenes.run_spec import RunSpec
-from app.server.server import PageServer
+from app.web.server import PageServer
 from browsing.wire import Wire, eventually
 running = PageServer(SceneChoice(RunSpec("{scene}")), port=0, class_names={named})
 try:

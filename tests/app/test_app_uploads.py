@@ -13,7 +13,7 @@ from viser import _messages
 
 from app.adapter import private
 from app.link.choice import SceneChoice
-from app.server.server import PageServer
+from app.web.server import PageServer
 from browsing.wire import Wire, eventually
 from lessons.scenes.run_spec import RunSpec
 from robots import CATALOG

@@ -13,7 +13,7 @@ from viser import _messages
 
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
-from app.server.server import PageServer
+from app.web.server import PageServer
 from browsing.wire import Wire, eventually
 from lessons.scenes.run_spec import RunSpec
 

@@ -17,8 +17,8 @@ from app.link.messages import Play, Post, Ready, ResetAll, Status, StepTicks
 from app.link.mission_view import MissionView
 from app.panels.velocity.plots import TrackingPlots
 from app.panels.velocity.tasks import RolesPanel
-from app.server.server import PageServer
 from app.view.goals import open_row
+from app.web.server import PageServer
 from app.worker.pacing import BACKLOG, Pacer
 from app.worker.simulation import SimulationRunner
 from browsing.wire import Wire, eventually

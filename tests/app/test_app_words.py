@@ -20,10 +20,10 @@ from app.client.decimated import History
 from app.link.choice import SceneChoice
 from app.page.scene_ui import Context
 from app.panels.widgets.mirror import Bindings
-from app.server import words
-from app.server.server import PageServer
 from app.view.camera import look, turn
 from app.view.robot import aim
+from app.web import words
+from app.web.server import PageServer
 from app.worker.simulation import SimulationRunner
 from benchmarks.findings import StandardError
 from benchmarks.roam import roam

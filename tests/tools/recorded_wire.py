@@ -19,7 +19,7 @@ from pathlib import Path
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace, parts_of
 from app.link.messages import Play
-from app.server.server import PageServer
+from app.web.server import PageServer
 from browsing.wire import Wire, eventually
 from lessons.course import COURSE, load_lesson
 from lessons.scenes.names import ALL_SCENES

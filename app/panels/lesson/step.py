@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import threading
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -15,6 +14,7 @@ from app.html.palette import LEVELS, button
 from app.link.choice import SceneChoice
 from app.link.exercise import Lecture, LessonPlace, parts_of
 from app.link.messages import Post, Predict, ResetAll, RunStep
+from app.link.threads import on_thread
 from app.panels.lesson.cards import belonging_to
 from app.panels.lesson.claims import heading, idea, now_you, pictures, state, why
 from app.panels.lesson.prediction import Asking
@@ -130,7 +130,7 @@ class LessonPanel:
         def _(event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:  # on a thread, as it starts processes
             if event.client is not None:
                 self._beside = bool(self._second.value)
-                self._show_ghost()
+                self._show_ghost_on_thread()
 
         on_click(self._next, self.next)
 
@@ -148,9 +148,9 @@ class LessonPanel:
         """Starts or stops the ghost when the learner comes to a step. A ghost that starts later would put the
         robot back to its start."""
         if lecture.phase == "waiting" and self._learner.shows_ghosts:
-            threading.Thread(target=self._show_ghost, daemon=True).start()
+            on_thread("ghost", self._show_ghost_on_thread)
 
-    def _show_ghost(self) -> None:
+    def _show_ghost_on_thread(self) -> None:
         """Starts the ghost of this step in the scene if the learner has not hidden it; otherwise stops the
         ghost."""
         ghost = self._part.ghost if isinstance(self._part, Step) else None

@@ -19,7 +19,6 @@ from app.html.palette import LEVELS, ink
 from app.html.text import block, esc, in_trouble
 from app.link.messages import Play, Post, Speed, Status, StepTicks
 from app.panels.widgets.command import add_command, on_click
-from app.panels.widgets.mirror import on_scale
 from app.panels.widgets.snapshot import SessionSnapshot
 from lessons.events import Reset
 from lessons.settings.settings import SceneSettings
@@ -77,7 +76,7 @@ class PlaybackPanel:
         async def _(event: viser.GuiEvent[viser.GuiSliderHandle[float]]) -> None:
             if event.client is not None:
                 self._touched = time.monotonic()
-                learner.send(Speed(float(on_scale(self._speed))))
+                learner.send(Speed(float(self._speed.value)))
 
         for label, key, choice in (
             ("Run or pause", "space", _RUN),

@@ -72,7 +72,7 @@ class Bindings(Generic[S]):
             if isinstance(handle, (viser.GuiCheckboxHandle, viser.GuiDropdownHandle)):
                 send_again(handle)
                 mirror.sent = mirror.touched
-            self.post(event(on_scale(handle)))
+            self.post(event(handle.value))
 
     def refresh(self, present: S) -> None:
         """Shows the values of the session. Returns at once; the event loop updates the controls."""
@@ -102,16 +102,6 @@ class Bindings(Generic[S]):
                 elif remind or mirror.sent < mirror.touched:
                     send_again(mirror.handle)
                     mirror.sent = now
-
-
-def on_scale(handle: viser.GuiInputHandle[Any]) -> Any:
-    """Returns the control's value. A slider's value is limited to its range, since its number box accepts any
-    number."""
-    value, low, high = handle.value, getattr(handle, "min", None), getattr(handle, "max", None)
-    if not isinstance(handle, viser.GuiSliderHandle) or low is None or high is None:
-        return value
-    # A comparison of NaN with either end is false.
-    return value if low <= value <= high else high if value > high else low
 
 
 def scalar(value: object) -> float:

@@ -12,8 +12,8 @@ from playwright.sync_api import Browser, Page, expect
 
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
-from app.server.classroom import STEERING, Classroom
-from app.server.server import PageServer
+from app.web.classroom import STEERING, Classroom
+from app.web.server import PageServer
 from browsing.browser_actions import open_page, press, write
 from lessons.scenes.run_spec import RunSpec
 

@@ -10,8 +10,8 @@ from playwright.sync_api import Browser
 
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
-from app.server.opening import opened_in_a_browser
-from app.server.server import PageServer
+from app.web.server import PageServer
+from app.web.serving import opened_in_a_browser
 from browsing.browser_actions import SLOW, eventually, new_page
 from lessons.scenes.run_spec import RunSpec
 
@@ -19,8 +19,8 @@ from lessons.scenes.run_spec import RunSpec
 def test_the_page_opens_while_it_is_compiled(
     browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The file that the browser opens first redirects to the page, and the page counts the compiled
-    functions."""
+    """The file that the browser opens first redirects to the page. The page counts the compiled functions and
+    shows a recorded run."""
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     opened: list[str] = []
     monkeypatch.setattr("webbrowser.open", opened.append)
@@ -40,6 +40,11 @@ def test_the_page_opens_while_it_is_compiled(
         first = ready()
         assert eventually(page, lambda: ready() > first, 60.0)
         assert page.get_by_text("PREPARING").is_visible()
+        assert page.get_by_text("The robot plays a recorded run of this lesson.").is_visible()
+        (viewer,) = server._viser.get_clients().values()
+        elbow = viewer.scene._handle_from_node_name["/recorded/3"]
+        seen = elbow.wxyz.copy()
+        assert eventually(page, lambda: float(abs(elbow.wxyz - seen).max()) > 0.01, 10.0)
         assert not page.get_by_text("Start again").is_visible()
     finally:
         page.context.close()

@@ -14,7 +14,7 @@ from playwright.sync_api import Browser, Locator, Page, expect
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace, parts_of
 from app.link.messages import Post
-from app.server.server import PageServer
+from app.web.server import PageServer
 from browsing.browser_actions import eventually, key, open_page, press
 from browsing.lessons import expect_part, hurry, marks, open_lesson, predict, run, words_in_view
 from lessons.authoring.lesson import lesson_named

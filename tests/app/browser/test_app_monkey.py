@@ -6,7 +6,7 @@ import pytest
 from playwright.sync_api import Browser
 
 from app.link.choice import SceneChoice
-from app.server.server import PageServer
+from app.web.server import PageServer
 from benchmarks.findings import StandardError
 from benchmarks.monkey import walk
 from lessons.scenes.run_spec import RunSpec

@@ -11,7 +11,7 @@ from playwright.sync_api import Browser, Page
 
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
-from app.server.server import PageServer
+from app.web.server import PageServer
 from browsing.browser_actions import drag_target, eventually, open_page, target_position
 from browsing.scene_switch import reset_all, show_scene
 from lessons.scenes.run_spec import RunSpec

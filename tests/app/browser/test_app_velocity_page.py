@@ -13,7 +13,7 @@ from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.messages import Post
 from app.link.mission_view import MissionView
-from app.server.server import PageServer
+from app.web.server import PageServer
 from browsing.browser_actions import (
     camera,
     drag_target,

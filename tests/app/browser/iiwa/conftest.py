@@ -4,15 +4,12 @@ seconds of both cores to open."""
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import partial
 
 import pytest
 from playwright.sync_api import Browser, Page
 
 from app.link.choice import SceneChoice
-from app.link.forkserver import ForkServer
-from app.link.spares import Spares
-from app.server.server import PageServer
+from app.web.server import PageServer
 from browsing.browser_actions import eventually, open_page, tab
 from browsing.scene_switch import reset_all, show_scene
 from lessons.own.folder import Folder
@@ -22,10 +19,8 @@ CHOICE = SceneChoice(RunSpec("iiwa14-hold"))
 
 
 @pytest.fixture(scope="package")
-def server(fork_server: ForkServer | None) -> Iterator[PageServer]:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("app.server.sessions.Spares", partial(Spares, lent=fork_server))
-        running = PageServer(CHOICE, port=0, max_sessions=2, grace=2.0, own_files=Folder.at("."))
+def server(one_fork_server: None) -> Iterator[PageServer]:
+    running = PageServer(CHOICE, port=0, max_sessions=2, grace=2.0, own_files=Folder.at("."))
     yield running
     running.close()
 

@@ -8,7 +8,7 @@ import numpy as np
 from playwright.sync_api import Page, expect
 
 from app.client.simulation_client import SimulationClient
-from app.server.server import PageServer
+from app.web.server import PageServer
 from browsing.browser_actions import eventually, row, tab
 from himpc.catalog import CONTROLLERS
 

@@ -8,7 +8,7 @@ import numpy as np
 from playwright.sync_api import Page, expect
 
 from app.link.messages import Post
-from app.server.server import PageServer
+from app.web.server import PageServer
 from browsing.browser_actions import eventually, is_drawn, key, pick, position, press, tab
 from lessons.events import MoveTarget
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from playwright.sync_api import Page, expect
 
 from app.client.simulation_client import SimulationClient
-from app.server.server import PageServer
+from app.web.server import PageServer
 from browsing.browser_actions import eventually, press, row, set_number, tab, write
 from browsing.scene_switch import reset_all
 from lessons.replay.state import decode

@@ -17,7 +17,7 @@ from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.messages import Load
 from app.link.process import wait_until
-from app.server.server import PageServer
+from app.web.server import PageServer
 from browsing.browser_actions import (
     camera,
     drag_target,

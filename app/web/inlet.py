@@ -1,4 +1,4 @@
-"""Checks every message of a page, as described in `app.server.words`, before viser applies the message."""
+"""Checks every message of a page, as described in `app.web.words`, before viser applies the message."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ from msgspec import Meta
 from app.classes.gathering import Gathering
 from app.classes.hall import Hall
 from app.classes.saved import SavedGathering, saved
-from app.server.passes import Passes
+from app.web.passes import Passes
 
 PERIOD = 1.0
 """Shortest time, s, between two writings of the file."""

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import re
 from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from http import HTTPStatus
 from typing import Any, NoReturn, Protocol
+from urllib.parse import urlsplit
 
 from websockets.asyncio.server import ServerConnection
 from websockets.exceptions import ConnectionClosedError
@@ -12,20 +16,62 @@ from websockets.frames import CloseCode, Frame, Opcode
 from websockets.http11 import Request
 
 from app.classes.words import LONGEST
-from app.server import budget
-from app.server.budget import Budget
-from app.server.connection_limits import ConnectionLimits
-from app.server.door import Answer
-from app.server.request_line import RequestLine, request_line
-from app.server.uploads import TRANSFER, Uploads
-from app.server.words import refusal
+from app.web import limits
+from app.web.door import Answer
+from app.web.limits import TRANSFER, Budget, ConnectionLimits, Uploads
+from app.web.load import PATHS
+from app.web.words import refusal
+
+_FIRST_LINE = re.compile(rb"([A-Z]{1,20}) ([^\s]+) HTTP/1\.([01])(?=\r\n)")
+_READ = ("GET", "HEAD")
+NOT_ALLOWED = Answer(
+    HTTPStatus.METHOD_NOT_ALLOWED,
+    "This request is not supported",
+    "<p>This server answers GET and HEAD only.</p>",
+    (("Allow", ", ".join(_READ)),),
+)
+_TOO_OLD = Answer(
+    HTTPStatus.HTTP_VERSION_NOT_SUPPORTED,
+    "HTTP/1.1 is needed",
+    "<p>In HTTP/1.0 this server answers only /health and /metrics. In a proxy, switch on HTTP/1.1; in nginx "
+    "with <code>proxy_http_version 1.1;</code>.</p>",
+)
+
+
+@dataclass(frozen=True)
+class RequestLine:
+    """Method and path of a request: websockets reads only GET in HTTP/1.1, but monitors also use HEAD and
+    HTTP/1.0. is_old: whether it is in HTTP/1.0. A line that cannot be read has the method ""."""
+
+    method: str = ""
+    path: str = ""
+    is_old: bool = False
+
+    @property
+    def refusal(self) -> Answer | None:
+        """The response to a request that is not supported; None for every other request."""
+        if self.method not in (*_READ, ""):
+            return NOT_ALLOWED
+        return _TOO_OLD if self.is_old and urlsplit(self.path).path not in PATHS else None
+
+
+def request_line(data: bytes) -> tuple[RequestLine, bytes]:
+    """Returns the first line of `data`, and the data with GET and HTTP/1.1 in this line. If the line cannot
+    be read, the data are unchanged, and websockets refuses them."""
+    found = _FIRST_LINE.match(data)
+    if found is None:
+        return RequestLine(), data
+    method, path, version = found[1].decode(), found[2], found[3]
+    line = RequestLine(method, path.decode("ascii", "surrogateescape"), version == b"0")
+    return line, b"GET " + path + b" HTTP/1.1" + data[found.end() :]
+
 
 _SLICE = 4096  # B that are parsed between two checks of the limits
 _LINE = 8192  # largest length of a request's first line, B
 
 
 class Guard(Protocol):
-    """The guard of the server, see `app.server.guard.ConnectionGuard`."""
+    """The guard of the server, see `app.web.guard.ConnectionGuard`."""
 
     crowd: ConnectionLimits
     taken: int
@@ -111,7 +157,7 @@ class GuardedConnection(ServerConnection):
                     return
             elif event.opcode is not Opcode.CLOSE:
                 self._waiting += 1
-                if self._waiting > budget.WAITING:
+                if self._waiting > limits.WAITING:
                     self.transport.abort()
                     return
         super().process_event(event)

@@ -14,8 +14,9 @@ from typing import ClassVar
 
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
-from app.link.spares import Spares
-from app.server.malloc_tuning import give_back
+from app.link.process import Spares
+from app.link.threads import on_thread
+from app.web.malloc_tuning import give_back
 
 WORKER = "app.worker.entry"
 """The name of the module that a simulation process runs. The server never imports this module."""
@@ -43,8 +44,7 @@ class Sessions:
         self._guide: SimulationClient | None = None
         self._closed = threading.Event()
         self._spares.refill()
-        self._keeper = threading.Thread(target=self._keep, daemon=True)
-        self._keeper.start()
+        self._keeper = on_thread("sessions", self._keep_on_thread)
 
     @property
     def learners(self) -> tuple[SimulationClient, ...]:
@@ -85,7 +85,7 @@ class Sessions:
         learner.left_at = time.monotonic()
         learner.attached = False
 
-    def _keep(self) -> None:
+    def _keep_on_thread(self) -> None:
         tidied, scenes = time.monotonic(), 0
         while not self._closed.wait(_PERIOD):
             now = time.monotonic()
@@ -119,12 +119,8 @@ class Sessions:
             learners, self._learners = list(self._learners.values()), {}
             if self._guide is not None:
                 learners.append(self._guide)
-        threads = [threading.Thread(target=learner.close) for learner in learners]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            with contextlib.suppress(RuntimeError):
-                thread.join()
+        for thread in [on_thread("ending", learner.close) for learner in learners]:
+            thread.join()
         self._spares.close()
 
 

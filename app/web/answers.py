@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from html import escape
 from http import HTTPStatus
+from urllib.parse import urlencode, urlsplit
 
 from websockets.datastructures import Headers
-from websockets.http11 import Response
+from websockets.http11 import Request, Response
 
-from app.server.door import Answer
+from app.web.door import ELSEWHERE, NAME, Answer, query_of
 
 _PAGE = (
     '<!doctype html><html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
@@ -57,3 +58,30 @@ def as_response(answer: Answer) -> Response:
     headers["Content-Length"] = str(len(body))
     headers["Connection"] = "close"
     return Response(answer.status.value, answer.status.phrase, headers, body)
+
+
+PREFIX = "X-Forwarded-Prefix"
+"""The header in which a proxy, e.g. jupyter-server-proxy, sends the path that it removed."""
+
+
+def under_its_name(request: Request) -> Answer | None:
+    """Serves the page below a path of another site: changes a request for the page's name so that it opens
+    the page. Returns a redirect to this name if the request is for the folder below a path or names another
+    server, else None.
+
+    viser's page opens its web socket at its own address without the slash at the end. A proxy that serves the
+    page below a path redirects this address to the address with the slash, but browsers do not follow
+    redirects of web sockets. Therefore the page has a name (`NAME`) below a path, and its address has no
+    slash at the end. viser's page then also writes the address of its web socket into its own address, and a
+    reload sends this parameter. It could name another server, and is removed.
+    """
+    parts, given = urlsplit(request.path), query_of(request)
+    rest = urlencode({name: values for name, values in given.items() if name not in ELSEWHERE}, True)
+    query = f"?{rest}" if rest else ""
+    named = parts.path == f"/{NAME}"
+    if named and ELSEWHERE.isdisjoint(given):
+        request.path = f"/{query}"
+    elif named or (parts.path == "/" and any(each.strip("/") for each in request.headers.get_all(PREFIX))):
+        link = (("Location", f"./{NAME}{query}"), ("Cache-Control", "no-store"))
+        return Answer(HTTPStatus.SEE_OTHER, "himpc-lab", "Opening …", link)
+    return None

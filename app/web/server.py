@@ -14,16 +14,17 @@ import viser
 from app.adapter import private
 from app.classes.words import TEACHER
 from app.link.choice import SceneChoice
+from app.link.threads import on_thread
 from app.page.page import lay_out, starting
-from app.server.address import LOOPBACK, address_in_use, check_address, local_url, seen_from_outside
-from app.server.classroom import Classroom
-from app.server.connection_limits import OF_A_CLASS, ConnectionLimits
-from app.server.door import SELF, Door, as_origin, names_of_this_machine
-from app.server.guard import ConnectionGuard
-from app.server.malloc_tuning import few_arenas, large_arrays_apart
-from app.server.passes import VARIABLE, Passes, new_key, new_token, shared
-from app.server.sessions import GRACE, Sessions
-from app.server.visit import FIRST_TEXT, Visit
+from app.web.address import LOOPBACK, address_in_use, check_address, local_url, seen_from_outside
+from app.web.classroom import Classroom
+from app.web.door import SELF, Door, as_origin, names_of_this_machine
+from app.web.guard import ConnectionGuard
+from app.web.limits import OF_A_CLASS, ConnectionLimits
+from app.web.malloc_tuning import few_arenas, large_arrays_apart
+from app.web.passes import VARIABLE, Passes, new_key, new_token, shared
+from app.web.sessions import GRACE, Sessions
+from app.web.visit import FIRST_TEXT, Visit
 from lessons.own.folder import Folder
 from lessons.scenes.run_spec import RunSpec
 from robots import InputError
@@ -31,7 +32,7 @@ from robots import InputError
 if TYPE_CHECKING:  # needed for a class only, and loaded late
     from app.classes.hall import Hall
     from app.classes.sockets import Sockets
-    from app.server.class_file import ClassFile
+    from app.web.class_file import ClassFile
 
 FIRST = SceneChoice(RunSpec("iiwa14-hold"))
 """The scene that the page shows by default."""
@@ -151,8 +152,7 @@ class PageServer:
             self.guard.open(door, self.sessions, refers)
         else:
             self._open_class(door, refers, self.hall)
-        self._loading = threading.Thread(target=_load, args=(choice,), daemon=True)
-        self._loading.start()
+        self._loading = on_thread("loading", _load_on_thread, choice)
 
     @property
     def loading(self) -> bool:
@@ -208,7 +208,7 @@ class PageServer:
 
     def _open_class(self, door: Door, refers: bool, hall: Hall) -> None:
         from app.classes.sockets import Sockets
-        from app.server.class_door import ClassDoor
+        from app.web.class_door import ClassDoor
 
         self._sockets = Sockets(hall, lambda: self.outside, not self.public, self._keep_class)
         self._sockets.start(self._viser.get_event_loop())
@@ -283,7 +283,7 @@ def _check_choice(choice: SceneChoice) -> None:
         start(choice.scene(), choice.run.seed)
 
 
-def _load(choice: SceneChoice) -> None:
+def _load_on_thread(choice: SceneChoice) -> None:
     """Loads the data of pages while the first page connects: the panels, then the meshes, whose
     simplification takes some time."""
     import_module("app.page.layout")

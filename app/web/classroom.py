@@ -9,8 +9,8 @@ from typing import ClassVar, cast
 
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
-from app.link.spares import Spares
-from app.server.sessions import WORKER, Refuse
+from app.link.process import Spares
+from app.web.sessions import WORKER, Refuse
 
 STEERING = "Only the instructor can control the robot: enter the instructor's token on this page first."
 

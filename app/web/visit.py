@@ -6,34 +6,65 @@ import asyncio
 import errno
 import json
 import secrets
-from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import viser
 
 from app.adapter import private
 from app.adapter.names import STORED
-from app.adapter.removed_handle_errors import print_exception
+from app.adapter.removed_handle_errors import print_exception, unless_removed
 from app.client.progress import Notebook
 from app.client.simulation_client import SimulationClient
 from app.html.text import block
-from app.link.children import why_not
+from app.link.process import why_not
 from app.page.comfort import ASK_MOTION, ASK_WINDOW, MOTION, REDUCED, Comfort, window_size
-from app.page.inlet import Inlet
 from app.page.page import Page
 from app.panels.run.class_card import ClassCard
 from app.panels.run.classroom import add_watching
-from app.server import place
-from app.server.budget import UPLOADS
-from app.server.classroom import Classroom, Watcher
-from app.server.guard import GuardedConnection
-from app.server.sessions import Sessions, tokens_of
-from app.server.uploads import Uploads
-from app.server.workers import Workers
+from app.web import place
+from app.web.classroom import Classroom, Watcher
+from app.web.guard import GuardedConnection
+from app.web.inlet import Inlet
+from app.web.limits import UPLOADS, Uploads
+from app.web.sessions import Sessions, tokens_of
 from lessons.own.folder import Folder
 from lessons.replay.progress import LearnerProgress, load_progress
+
+THREADS = 4
+WAITING = 64
+"""Largest number of calls that wait for a thread; further calls are dropped."""
+
+
+class Workers(ThreadPoolExecutor):
+    """The threads of one page, on which its callbacks run without blocking other pages. Calls beyond their
+    limit are dropped, and all calls after the shutdown."""
+
+    def __init__(self, threads: int = THREADS, waiting: int = WAITING) -> None:
+        super().__init__(threads, thread_name_prefix="page")
+        self._room = threading.Semaphore(threads + waiting)
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Submits a call; returns a future with the result None if the call is dropped."""
+        if not self._room.acquire(blocking=False):
+            return _dropped()
+        try:
+            future = super().submit(unless_removed, fn, *args, **kwargs)
+        except RuntimeError:  # the pool was shut down when its page closed
+            self._room.release()
+            return _dropped()
+        future.add_done_callback(lambda _: self._room.release())
+        return future
+
+
+def _dropped() -> Future[Any]:
+    future: Future[Any] = Future()
+    future.set_result(None)
+    return future
+
 
 if TYPE_CHECKING:  # needed for a class only, and loaded late
     from app.classes.room import Room
@@ -223,7 +254,7 @@ class Visit:
 
     def _watch(self) -> None:
         """Checks every _PERIOD s, on viser's event loop, whether scene or settings have changed. If so, the
-        tab stores the page's new place (see `app.server.place`), as the simulation reported it."""
+        tab stores the page's new place (see `app.web.place`), as the simulation reported it."""
         if self._left or not isinstance(self._sessions, Sessions):
             return
         page = self._page

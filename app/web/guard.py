@@ -13,19 +13,17 @@ from websockets.asyncio.server import ServerConnection
 from websockets.http11 import Request, Response
 
 from app.classes.words import PHONES, is_of_a_class
-from app.server import budget
-from app.server.answers import CROWDED, FULL, GUESSED, NO_CLASS, NOT_OPEN, as_response, plain
-from app.server.connection import GuardedConnection
-from app.server.connection_limits import ConnectionLimits
-from app.server.door import Answer, Door, is_upgrade
-from app.server.load import Load, Places, load_of, report
-from app.server.peers import ends_of
-from app.server.prefix import under_its_name
-from app.server.request_line import NOT_ALLOWED
-from app.server.wrong_codes import DELAY, WrongCodes
+from app.web import limits
+from app.web.answers import CROWDED, FULL, GUESSED, NO_CLASS, NOT_OPEN, as_response, plain, under_its_name
+from app.web.connection import NOT_ALLOWED, GuardedConnection
+from app.web.door import Answer, Door, is_upgrade
+from app.web.limits import ConnectionLimits
+from app.web.load import Load, Places, load_of, report
+from app.web.peers import ends_of
+from app.web.wrong_codes import DELAY, WrongCodes
 
 if TYPE_CHECKING:  # loaded only for a class: the server listens before these modules are loaded
-    from app.server.class_door import ClassDoor, Served
+    from app.web.class_door import ClassDoor, Served
 
 HANDSHAKE = 5.0
 """Time, s, within which a request must be complete."""
@@ -118,7 +116,7 @@ class ConnectionGuard:
             "process_request": request,
             "process_response": secure,
             "create_connection": lambda *of, **more: GuardedConnection(*of, guard=self, **more),
-            "max_size": budget.MESSAGE,
+            "max_size": limits.MESSAGE,
             "open_timeout": HANDSHAKE,
             "server_header": None,
             "logger": _log(),

@@ -12,15 +12,15 @@ from urllib.parse import parse_qs, quote, urlencode, urlsplit
 from websockets.datastructures import Headers
 from websockets.http11 import Request
 
-from app.server.passes import QUERY, USER_HEADER, Passes, Role
-from app.server.peers import came_through_a_proxy
+from app.web.passes import QUERY, USER_HEADER, Passes, Role
+from app.web.peers import came_through_a_proxy
 from robots import InputError
 
 _HOST = re.compile(r"(?P<name>\[[0-9a-fA-F:.]+\]|[A-Za-z0-9._-]+)(?::(?P<port>\d{1,5}))?")
 _PLAIN = re.compile(r"(/[A-Za-z0-9_~-][A-Za-z0-9._~@-]*)*/?")
 ELSEWHERE = frozenset({"websocket", "playbackPath"})
 NAME = "page"
-"""The page's name if it is served below a path of another site, see `app.server.prefix`."""
+"""The page's name if it is served below a path of another site, see `app.web.answers`."""
 SELF = "'self'"
 """Used in place of an origin. It means the origin of the page itself, for a proxy that also serves other
 pages."""
@@ -67,7 +67,7 @@ class Door:
     def judge(self, request: Request, who: str = "") -> Answer | None:
         """Returns None if the request is admitted, else the response to send. An admitted request names this
         server as its host. If the browser names the page that sent the request, this page must be one of
-        ours. who: identifies the sender, see `app.server.peers`."""
+        ours. who: identifies the sender, see `app.web.peers`."""
         return self.refuses(request) or self._ask_token(request, request.headers["Host"], who)
 
     def refuses(self, request: Request) -> Answer | None:

@@ -106,7 +106,7 @@ class SceneNodeDragMessage(msgspec.Struct, forbid_unknown_fields=True, tag=True,
 
 
 class GuiUpdateMessage(msgspec.Struct, forbid_unknown_fields=True, tag=True, tag_field="type"):
-    """A control was changed or pressed. The allowed values depend on the control, see `app.page.inlet`."""
+    """A control was changed or pressed. The allowed values depend on the control, see `app.web.inlet`."""
 
     uuid: Name
     updates: Annotated[dict[str, Any], Meta(max_length=16)]

@@ -1,0 +1,129 @@
+"""viser's private names that `app.adapter` uses. viser documents none of them, and a new version may lack
+some. `pyproject.toml` admits only versions that passed these tests."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import viser
+from viser import _messages, infra
+
+from app.adapter import names, private
+from app.web.door import Door
+from app.web.guard import ConnectionGuard
+from robots import InputError
+
+OF_VISER = {
+    "_messages": (
+        *("RunJavascriptMessage", "SetPositionMessage", "SetOrientationMessage", "Message"),
+        *("GuiUpdateMessage", "ShareUrlRequest", "ShareUrlDisconnect", "FileTransferStartUpload"),
+        *("LocalStorageGetItemRequestMessage", "LocalStorageGetItemResponseMessage", "FileTransferPart"),
+        *("TransformControlsUpdateMessage", "SceneNodeDragMessage", "SceneNodeClickMessage"),
+        "ScenePointerMessage",
+    ),
+    "infra.WebsockClientConnection": ("_handle_incoming_message", "get_message_buffer", "queue_message"),
+    "_gui_handles._GuiHandleState": ("uuid", "value", "removed", "gui_api"),
+    "_scene_handles._SceneNodeHandleState": ("name", "api", "position", "wxyz"),
+    "SceneApi": ("_queue_scene_message",),
+    "GuiUplotHandle": ("_queue_update",),
+}
+OF_A_SERVER = (
+    "_websock_server._live_connections",
+    "_websock_server._incoming_handlers",
+    "_websock_server._client_state_from_id",
+    "_websock_server._broadcast_buffer.message_event",
+    "_websock_server._broadcast_buffer.message_from_id",
+    "_websock_server._broadcast_buffer.window_duration_sec",
+    "gui._current_file_upload_states",
+    "gui._gui_input_handle_from_uuid",
+    "gui._thread_executor",
+    "gui._websock_interface",
+    "scene._thread_executor",
+    "scene._dispatch_callback",
+)
+OF_THE_PAGE = (
+    ("MessageHandler.tsx", f'LOCAL_STORAGE_PREFIX = "{names.STORED}"'),
+    ("components/common.tsx", '<Flex align="center">'),
+    ("components/common.tsx", "<label htmlFor={props.uuid}>"),
+    ("App.tsx", "w.__viserMutable = mutable.current"),
+    ("WebsocketInterface.tsx", "viewerMutable.sendMessage = (message)"),
+    ("components/UplotComponent.css", f"{names.CHART} {names.CHART_TITLE} {{"),
+    ("components/Slider.tsx", 'import { Slider, Flex, NumberInput } from "@mantine/core"'),
+    ("components/Slider.tsx", "id={uuid}"),
+    ("components/Button.tsx", 'import { Button } from "@mantine/core"'),
+    ("components/Button.tsx", "id={uuid}"),
+    ("ControlPanel/BottomPanel.tsx", 'width: "20em"'),
+)
+"""Pairs: a file below viser's `client/src`, and a text that this file must contain."""
+
+
+def reaches(start: object, path: str) -> bool:
+    """Returns whether an object has the attribute, or a dataclass has the field, at a dotted path."""
+    for name in path.split("."):
+        if name in getattr(start, "__dataclass_fields__", ()):
+            return True
+        start = getattr(start, name, None)
+    return start is not None
+
+
+@pytest.fixture
+def server() -> Iterator[viser.ViserServer]:
+    running = private.open_server("127.0.0.1", 0, ConnectionGuard(Door()))
+    yield running
+    private.stop(running)
+
+
+@pytest.mark.parametrize("path", [f"{place}.{name}" for place, found in OF_VISER.items() for name in found])
+def test_viser_has_the_name(path: str) -> None:
+    assert reaches(viser, path)
+
+
+def test_a_server_has_the_names(server: viser.ViserServer) -> None:
+    assert [path for path in OF_A_SERVER if not reaches(server, path)] == []
+
+
+@pytest.mark.parametrize(("file", "words"), OF_THE_PAGE)
+def test_visers_page_has_what_scripts_and_styles_use(file: str, words: str) -> None:
+    sources = Path(viser.__file__).parent / "client" / "src"
+    assert words in (sources / file).read_text("utf-8")
+
+
+def answer(port: int) -> bytes:
+    with socket.create_connection(("127.0.0.1", port), timeout=10.0) as stranger:
+        stranger.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+        return stranger.recv(100)
+
+
+def test_a_guard_that_is_not_open_refuses(server: viser.ViserServer) -> None:
+    assert answer(server.get_port()).startswith(b"HTTP/1.1 503")
+
+
+def test_a_viser_that_serves_in_another_way_is_not_served(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Requests without permission could not be refused then: the server refuses all, and ends with one
+    sentence."""
+    seen: list[tuple[int, bytes]] = []
+    stop = private.stop
+
+    def look_first(running: viser.ViserServer) -> None:
+        seen.append((running.get_port(), answer(running.get_port())))
+        stop(running)
+
+    monkeypatch.setattr(private, "_NEEDED", ("no_such_argument",))
+    monkeypatch.setattr(private, "stop", look_first)
+    with pytest.raises(InputError, match="does not fit this page"):
+        private.open_server("127.0.0.1", 0, ConnectionGuard(Door()))
+    ((port, found),) = seen
+    assert found.startswith(b"HTTP/1.1 503")
+    with pytest.raises(OSError):
+        answer(port)
+
+
+def test_a_server_opens_no_public_tunnel(server: viser.ViserServer) -> None:
+    handlers = server._websock_server._incoming_handlers
+    assert not {_messages.ShareUrlRequest, _messages.ShareUrlDisconnect} & {
+        kind for kind, found in handlers.items() if found
+    }
+    assert isinstance(server._websock_server, infra.WebsockServer)
