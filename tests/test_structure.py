@@ -119,7 +119,7 @@ APP = {
     "adapter": (),
 }
 """The folders that each folder of app/ may import beside itself: page and simulation meet only in `link`.
-Only the server imports both; it passes the entry point of the simulation on."""
+Only `web` imports both; it passes the entry point of the simulation on."""
 
 
 def test_app_is_the_folders_it_says() -> None:
@@ -152,7 +152,7 @@ def test_contributing_names_what_is_there() -> None:
 
 @pytest.mark.parametrize("folder", APP)
 def test_page_and_simulation_meet_in_link_only(folder: str) -> None:
-    """Imports go in the direction commands → server → page → panels → view → client → link ← worker. A folder
+    """Imports go in the direction commands → web → page → panels → view → client → link ← worker. A folder
     imports only the folders that `APP` lists for it."""
     files = sources(f"app/{folder}")
     assert files

@@ -59,6 +59,7 @@ class ForkServer:
         self._forks = sys.platform == "linux"  # other systems have libraries that fail after a fork
         self._stopped = False  # whether the last server was ended because it had been stopped (SIGSTOP)
         self._users = 0
+        self._path = os.environ.get("PYTHONPATH")
         self._heard_at = 0.0
         self._waiting: list[tuple[float, float]] = []  # (time, time waited for a core) of each request
         self._lock = threading.Lock()
@@ -93,8 +94,8 @@ class ForkServer:
             with contextlib.suppress(OSError, EOFError), self._request():
                 return _started(mp.get_context("forkserver"), function, args)
             _wait_for_end(self._last)
-            # A server that was never ready is not replaced: the next one would fail as well.
-            self._forks = self.ready or self._stopped
+            # A server that failed before it was ready is not replaced: the next one would fail as well.
+            self._forks = self.ready or self._stopped or not self.worker
         return _started(mp.get_context("spawn"), function, args)
 
     @contextlib.contextmanager
@@ -113,6 +114,8 @@ class ForkServer:
         if self._listener is None:
             self._listener = Listener(family="AF_UNIX")
             on_thread("fork servers", self._accept_on_thread, self._listener)
+        if self.pid is not None:
+            return
         path = os.pathsep.join(filter(None, sys.path))
         forkserver.set_forkserver_preload([_PRELOADED])
         resource_tracker.ensure_running()  # otherwise the next call starts it, and lets Ctrl-C through
@@ -142,7 +145,7 @@ class ForkServer:
         with contextlib.suppress(OSError, EOFError), line:
             data = spawn.get_preparation_data("")
             main = data.get("init_main_from_name"), data.get("init_main_from_path")
-            line.send((self.worker, main, os.environ.get("PYTHONPATH")))
+            line.send((self.worker, main, self._path))
             pid = self._last = line.recv()
             self.ready, self.doing, self._stopped = False, "", False
             self.pid, self._heard_at = pid, time.monotonic()
@@ -212,12 +215,9 @@ _line: Any = None
 
 
 def prepare() -> None:
-    """Runs in the server's process before all else: loads what the page's worker needs. Does nothing in other
-    processes."""
+    """Runs in the server's process before all else: loads what the page's worker needs."""
     global _line
-    address = os.environ.pop(_LINE, None)
-    if address is None:
-        return
+    address = os.environ.pop(_LINE)  # absent if `multiprocessing` has replaced a server by itself: it ends
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the page handles Ctrl-C
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     try:
@@ -225,6 +225,8 @@ def prepare() -> None:
         worker, main, path = line.recv()
     except (OSError, EOFError):
         os._exit(0)  # the page has ended already
+    if not worker:
+        os._exit(0)  # nobody needs this server any more
     if path is None:
         del os.environ["PYTHONPATH"]  # the page's, see `_ensure_running`
     else:

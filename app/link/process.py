@@ -103,7 +103,7 @@ class Process:
     def _hear_on_thread(self, worker: str, theirs: Connection) -> None:
         try:
             child = SERVER.start(_run, worker, theirs)
-        except OSError as error:
+        except (OSError, RuntimeError) as error:  # RuntimeError: no thread can be started
             failed, why = False, why_not(error)
         else:
             theirs.close()  # from now on, the connection is closed when the child ends
@@ -251,14 +251,15 @@ def _watched(child: BaseProcess) -> int:
     return child.sentinel
 
 
-def why_not(error: OSError) -> str:
-    """Returns a sentence with the limit because of which a process cannot be started."""
+def why_not(error: OSError | RuntimeError) -> str:
+    """Returns a sentence with the limit because of which a process, or a thread, cannot be started."""
+    number = (error.errno or 0) if isinstance(error, OSError) else errno.EAGAIN
     limit = {
         errno.EAGAIN: "the limit of processes is reached (ulimit -u, or that of the container)",
         errno.EMFILE: "the limit of open files is reached (ulimit -n)",
         errno.ENFILE: "the limit of open files of this computer is reached",
         errno.ENOMEM: "there is not enough memory",
-    }.get(error.errno or 0, str(error))
+    }.get(number, str(error))
     return (
         f"No simulation can be started: {limit}. Close pages or end other programs, then try again; the "
         "person who started himpc-lab can also raise the limit, or lower --max-sessions."

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import errno
 import json
 import secrets
 import threading
@@ -209,8 +208,7 @@ class Visit:
             try:
                 entered = self._sessions.enter(tokens, self._refuse, self._account)
             except (OSError, RuntimeError) as error:  # RuntimeError: no thread can be started
-                known = error if isinstance(error, OSError) else OSError(errno.EAGAIN, str(error))
-                self.tell("There is no robot", why_not(known))
+                self.tell("There is no robot", why_not(error))
                 return
         if watching is not None:
             self._sessions.leave(watching.learner)  # left last, as a classroom counts its pages

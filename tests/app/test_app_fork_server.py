@@ -16,7 +16,8 @@ from children import LONG, Start, born, gone, running
 from app.client.simulation_client import SimulationClient
 from app.link import fork_server
 from app.link.fork_server import SERVER
-from app.link.process import wait_until
+from app.link.process import Spares, wait_until
+from app.web.sessions import WORKER
 
 HERE = Path(__file__).parent
 
@@ -48,6 +49,18 @@ def test_without_a_fork_server_children_are_spawned(start: Start, worker: str) -
     assert parent(learner) == os.getpid()
     another = start("planar3-hold")
     assert wait_until(lambda: running(another), LONG)
+
+
+def test_a_server_that_nobody_waits_for_any_more_leaves_room_for_the_next(start: Start) -> None:
+    """A page that closes at once ends its server before this has connected; the next page has its own."""
+    SERVER.end()
+    early = Spares(WORKER)
+    early.refill()
+    SERVER.end()
+    early.close()
+    learner = start("planar3-hold", own_server=True)
+    assert wait_until(lambda: running(learner), LONG)
+    assert parent(learner) == server()
 
 
 def test_a_dead_fork_server_takes_nobody_along(start: Start) -> None:
