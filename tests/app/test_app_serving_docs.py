@@ -43,7 +43,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "serving.md"
 NAME = "lab.example.org"
 PROTOCOL: Any = [f"viser-v{__version__}"]
 LONG = 60.0
-NGINX = pytest.mark.nightly("app/server", "docs/serving.md")
+NGINX = pytest.mark.nightly("app/web", "docs/serving.md")
 
 
 def free_port() -> int:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-pytestmark = pytest.mark.nightly("app/link", "app/server", "benchmarks/soak.py", "benchmarks/switches.py")
+pytestmark = pytest.mark.nightly("app/link", "app/web", "benchmarks/soak.py", "benchmarks/switches.py")
 
 ROOT = Path(__file__).parents[2]
 
