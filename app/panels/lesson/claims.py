@@ -140,7 +140,7 @@ def _progress(lecture: Lecture) -> str:
         case "done":
             words = f'<span title="judged on the first {lecture.t:.3g} s">{badge("DONE", LEVELS[1])}</span>'
     if lecture.lost_at is not None:
-        words += f"<br>{badge('LOST', BAD)} The robot went out of control at {lecture.lost_at:.2f} s."
+        words += f"<br>{badge('LOST', BAD)} Out of control at {lecture.lost_at:.2f} s."
     if lecture.changed:
         words += f"<br><i>{esc(lecture.changed)}</i>"
     return block(words + ("" if lecture.phase == "done" else bar(share, LEVELS[1])))

@@ -40,7 +40,8 @@ def test_the_page_opens_while_it_is_compiled(
         first = ready()
         assert eventually(page, lambda: ready() > first, 60.0)
         assert page.get_by_text("PREPARING").is_visible()
-        assert page.get_by_text("The robot plays a recorded run of this lesson.").is_visible()
+        recorded = page.get_by_text("The robot plays a recorded run of this lesson.")
+        assert eventually(page, recorded.is_visible, 60.0)
         (viewer,) = server._viser.get_clients().values()
         elbow = viewer.scene._handle_from_node_name["/recorded/3"]
         seen = elbow.wxyz.copy()
