@@ -81,7 +81,7 @@ _TEXTS = """() => {
   while (all.nextNode()) {
     const node = all.currentNode, around = node.parentElement, formula = around.closest("math");
     if (!node.textContent.trim() || !around.checkVisibility()) continue;
-    if (around.closest("style, script, title, .mantine-Notifications-root")) continue;
+    if (around.closest("style, script, title, .hl-at, .mantine-Notifications-root")) continue;
     const range = document.createRange();
     range.selectNodeContents(node);
     const drawn = [...range.getClientRects()].some((box) => {

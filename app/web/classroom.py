@@ -51,6 +51,7 @@ for _name in (
         "look",
         "ask",
         "code",
+        "compiles",
     ),
 ):
     setattr(Watcher, _name, _of_the_session(_name))

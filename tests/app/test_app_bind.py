@@ -23,6 +23,7 @@ from app.panels.velocity.plant import add_servo_plant
 from app.panels.widgets import mirror as bind
 from app.panels.widgets.mirror import Bindings
 from app.panels.widgets.window import PopupWindow
+from app.web.inlet import allowed
 from lessons.events import Event, Set
 from lessons.scenes.catalog import load_scene, torque_scene
 from lessons.settings.torque import TorqueSettings
@@ -42,7 +43,8 @@ def settings() -> TorqueSettings:
 
 
 class Panel:
-    """A slider of N with its bindings, and functions that act as a browser through viser's own handler."""
+    """A slider of N with its bindings, and functions that act as a browser through the inlet and viser's own
+    handler."""
 
     def __init__(self, server: viser.ViserServer, monkeypatch: pytest.MonkeyPatch) -> None:
         self.posted: list[Event] = []
@@ -62,7 +64,8 @@ class Panel:
             thread.join()
 
         self.slider._impl.sync_cb = run
-        message = _messages.GuiUpdateMessage(self.slider._impl.uuid, {"value": value})
+        updates = {"value": allowed(self.slider, {"value": value})}
+        message = _messages.GuiUpdateMessage(self.slider._impl.uuid, updates)
         asyncio.run_coroutine_threadsafe(self.gui._handle_gui_updates(0, message), self.loop).result(10)  # pyright: ignore
 
     def refresh(self, settings: TorqueSettings) -> None:

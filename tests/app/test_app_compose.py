@@ -163,7 +163,7 @@ def test_a_control_may_be_written_after_its_panel_was_rebuilt(
     show = AddTask._show
 
     def slowly(panel: AddTask) -> None:
-        if threading.current_thread().name.startswith("page"):
+        if threading.current_thread().name.startswith("page_"):
             begun.set()
             rebuilt.wait(LONG)
             try:
