@@ -35,7 +35,7 @@ _OWN = 1.0
 """Time, s, after a drag during which changes of targets are attributed to this drag."""
 _PATIENCE = 0.05
 """Time, s, that a drag waits for the reachability check, which takes a millisecond for reachable targets."""
-_PAUSED, _LESSON_PAUSED = "paused: press Run", "paused"
+_PAUSED, _LESSON_PAUSED = "paused: press Run", "paused: press Run this step"
 Later = Callable[[float, Callable[[], None]], object]
 """Calls a function after a delay, s."""
 
