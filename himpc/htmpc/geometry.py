@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from himpc.htmpc.kernel.kinematics import frame_along
 from himpc.kinematics.geometry import Geometry, geometry
-from himpc.tick.kernel.kinematics import ORIENTATION, POSITION, place_all
+from himpc.tick.kernel.kinematics import ORIENTATION, POSITION
+from himpc.tick.kernel.placements import place_all
 from robots import Robot
 from robots.per_robot import per_robot
 

@@ -23,8 +23,8 @@ from himpc.tick.kernel.distance_rows import (
     distance_rows,
     nearest,
 )
-from himpc.tick.kernel.kinematics import place_all
 from himpc.tick.kernel.near import near
+from himpc.tick.kernel.placements import place_all
 from robots import Robot
 from robots.collision import Surroundings
 from robots.cover_shapes import WorldShape, cover_surroundings, placements

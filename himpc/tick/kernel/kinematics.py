@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-from himpc.compilation.compiled import INDICES, MATRICES, MATRIX, inline_kernel, kernel
-from himpc.compilation.views import borrowed
+from himpc.compilation.compiled import inline_kernel
 from himpc.tick.kernel.arrays import Array, Whole
 from himpc.tick.kernel.linear import copy
 
@@ -54,25 +53,6 @@ def forward_kinematics(
             here[3 * a + 2] = cos * h + along * w + sin * (f * y - g * x)
             point = left * translation[j, 0] + middle * translation[j, 1] + right * translation[j, 2]
             here[9 + a] = before[9 + a] + point + gone * z[j, a]
-
-
-@kernel(INDICES, INDICES, MATRICES, MATRIX, MATRIX, MATRIX, MATRICES, MATRICES)
-def place_all(
-    parent: Whole,
-    is_revolute: Whole,
-    rotation: Array,
-    translation: Array,
-    axis: Array,
-    q: Array,
-    placed: Array,
-    z: Array,
-) -> None:
-    """Applies `forward_kinematics` to configurations q (K, n). Results: placed (K, n+1, 12) and z
-    (K, n+1, 3)."""
-    rotation, translation, axis, q = borrowed(rotation), borrowed(translation), borrowed(axis), borrowed(q)
-    placed, z = borrowed(placed), borrowed(z)
-    for k in range(len(q)):
-        forward_kinematics(q[k], parent, is_revolute, rotation, translation, axis, placed[k], z[k])
 
 
 @inline_kernel
