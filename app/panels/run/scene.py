@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from threading import Thread
 
 import viser
 
@@ -13,6 +12,7 @@ from app.html.palette import BAD, DAMPING, GOOD, LEVELS, css
 from app.html.text import badge, block, esc
 from app.link.choice import SceneChoice
 from app.link.messages import Ready
+from app.link.threads import on_thread
 from app.panels.widgets.command import on_click
 from lessons.experiments.verdict import verdict
 from lessons.own.files import is_file, is_lesson
@@ -147,12 +147,12 @@ class RobotPanel:
         found = f"<b>{count} finding{'' if count == 1 else 's'}</b> · "
         card = gui.add_html(block(f"{found}its target is being dragged …"))
 
-        def drag() -> None:
+        def drag_on_thread() -> None:
             text = verdict(robot)
             colour = GOOD if text.startswith("follows") else LEVELS[1]
             unless_removed(setattr, card, "content", block(f"{found}{esc(text)}", _edge(colour)))
 
-        Thread(target=drag, daemon=True).start()
+        on_thread("drag", drag_on_thread)
 
     def _add_file(self, gui: viser.GuiApi, current: SceneChoice, own_files: Folder) -> None:
         with gui.add_folder("A file of your own"):
