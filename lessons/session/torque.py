@@ -25,7 +25,6 @@ from lessons.session.deadline import DelayedTorque
 from lessons.session.given import Given
 from lessons.session.leak import at_once, dynamic_leak
 from lessons.session.observed import observed
-from lessons.session.period import period_too_long
 from lessons.session.places import Places
 from lessons.session.session import LOST_SPEED, Session
 from lessons.session.targets import carried, kept, move_target, target_at
@@ -181,10 +180,7 @@ class TorqueSession(Session):
         if recomposed:
             self.layout, self.references, self.plan, self.given = layout, references, None, None
             self._row, self._at = np.full(layout.size, np.nan), Places.of(layout)
-        period = settings.T_s > self.settings.T_s or settings.controller != self.settings.controller
         self.settings = settings
-        if period and (sentence := period_too_long(self.robot, settings)):
-            self.notices.append(sentence)
 
     def _hand_over(self, taking: Controller) -> None:
         taking.reset(self.plant.tau)
