@@ -108,9 +108,8 @@ def write(name: str, folder: Path = FOLDER) -> Path:
 def opening(path: Path) -> dict[str, Any]:
     """Returns what a page shows of the recorded lesson: the robot, its motion, and the period in s."""
     motion = json.loads(path.read_text("utf-8"))["motion"]
-    robot = (
-        load_lesson(path.stem).run_of(load_lesson(path.stem).steps[motion["step"]]).scene.partition("-")[0]
-    )
+    lesson = load_lesson(path.stem)
+    robot = lesson.run_of(lesson.steps[motion["step"]]).scene.partition("-")[0]
     return {"robot": robot, "period": motion["period"], "q": motion["q"][0]}
 
 

@@ -15,12 +15,13 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from types import FrameType
 from typing import Protocol, TypeVar
 
 from robots import InputError
+from robots.processes.environment import environment
 from robots.processes.orphans import end_with_parent
 
 T = TypeVar("T")
@@ -180,17 +181,7 @@ def _obey_the_owner() -> None:
     end_with_parent()
 
 
-@contextmanager
-def _one_thread_each() -> Iterator[None]:
+def _one_thread_each() -> AbstractContextManager[None]:
     """Sets environment variables that children inherit. NumPy reads them when it is first imported, before
     any code of ours runs in a child."""
-    before = {name: os.environ.get(name) for name in _THREADS}
-    os.environ.update(dict.fromkeys(_THREADS, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
+    return environment(dict.fromkeys(_THREADS, "1"))

@@ -25,6 +25,7 @@ from multiprocessing.process import BaseProcess
 from typing import Any, final
 
 from app.link.threads import on_thread
+from robots.processes.environment import environment
 from robots.processes.isolation import is_stopped, threads, waited
 from robots.processes.orphans import end_with
 
@@ -119,7 +120,7 @@ class ForkServer:
         path = os.pathsep.join(filter(None, sys.path))
         forkserver.set_forkserver_preload([_PRELOADED])
         resource_tracker.ensure_running()  # otherwise the next call starts it, and lets Ctrl-C through
-        with _environment({_LINE: str(self._listener.address), "PYTHONPATH": path}):
+        with environment({_LINE: str(self._listener.address), "PYTHONPATH": path}):
             before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
             try:
                 forkserver.ensure_running()
@@ -193,20 +194,6 @@ def _wait_for_end(pid: int | None) -> None:
                 time.sleep(0.01)
                 continue
         return
-
-
-@contextlib.contextmanager
-def _environment(values: dict[str, str]) -> Iterator[None]:
-    before = {name: os.environ.get(name) for name in values}
-    os.environ.update(values)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
 
 
 # ---------------------------------------------------------------- in the server's process
