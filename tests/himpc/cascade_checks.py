@@ -65,12 +65,3 @@ def exact_increments(hierarchy: Hierarchy, *guesses: list[LevelSolution]) -> lis
 def off(solutions: list[LevelSolution], exact: list[Array]) -> float:
     """Returns the largest difference between solutions and the optima, N·m."""
     return max(float(np.abs(one.U - U).max()) for one, U in zip(solutions, exact, strict=True))
-
-
-def second_opinion(hierarchy: Hierarchy, compiled: list[LevelSolution]) -> list[Array]:
-    """Returns the optima by the printed equations. If there is no verified optimum at some level, returns
-    those of `exact_increments` instead."""
-    printed = hierarchy.solve("printed")
-    if all(solution.fallback == "solve" for solution in printed):
-        return [solution.U for solution in printed]
-    return exact_increments(hierarchy, compiled, printed)

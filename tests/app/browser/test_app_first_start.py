@@ -9,6 +9,7 @@ import pytest
 from playwright.sync_api import Browser
 
 from app.link.choice import SceneChoice
+from app.link.fork_server import SERVER
 from app.link.process import wait_until
 from app.web.server import PageServer
 from app.web.serving import opened_in_a_browser
@@ -22,6 +23,7 @@ def test_the_page_opens_while_it_is_compiled(
     """The file that the browser opens first redirects to the page. The page counts the compiled functions and
     shows a recorded run."""
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    SERVER.end()  # that of earlier tests has compiled everything
     opened: list[str] = []
     monkeypatch.setattr("webbrowser.open", opened.append)
     server = PageServer(SceneChoice(RunSpec("iiwa14-hold")), port=0)
@@ -50,3 +52,4 @@ def test_the_page_opens_while_it_is_compiled(
     finally:
         page.context.close()
         server.close()
+        SERVER.end()  # later tests use their own cache
