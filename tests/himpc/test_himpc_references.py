@@ -295,5 +295,6 @@ def test_quaternions_and_matrices_go_back_and_forth(seed: int) -> None:
     q = quaternion(R)
     assert q[3] >= 0
     assert np.linalg.norm(q) == pytest.approx(1)
-    np.testing.assert_allclose(from_quaternion(-7.5 * q), R, atol=1e-12)
+    for length in (-7.5, 1e-200, 1e-310, 1e200, 1e308):
+        np.testing.assert_allclose(from_quaternion(length * q), R, atol=1e-12)
     np.testing.assert_allclose(step_between(from_quaternion(q), R), 0.0, atol=1e-9)
