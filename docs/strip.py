@@ -1,4 +1,5 @@
-"""Makes docs/strip.webp: the page on a desktop and on a phone, from the first start to a lesson of two tasks.
+"""Makes docs/lessons/first-minutes.webp: the page on a desktop and on a phone, from the first start to
+*Deliveries*.
 
 python -m docs.strip
 """
@@ -6,7 +7,6 @@ python -m docs.strip
 from __future__ import annotations
 
 import io
-from pathlib import Path
 
 from matplotlib.font_manager import findfont
 from PIL import Image, ImageDraw, ImageFont
@@ -16,14 +16,14 @@ from app.link.choice import SceneChoice
 from app.web.server import PageServer
 from browsing.browser_actions import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, open_page, press, tab
 from browsing.lessons import expect_part, hurry, open_lesson, predict, run
+from docs.gallery import ROOT
 from lessons.course import load_lesson
 from lessons.scenes.run_spec import RunSpec
 
-OUT = Path(__file__).parents[1] / "docs" / "strip.webp"
+OUT = ROOT / "docs" / "lessons" / "first-minutes.webp"
 SIZES = {"desktop": (1440, 900, 0.42), "phone": (390, 844, 0.78)}
 """Width and height of the window, and the scale of its stored pictures."""
 LINE, ROW = 18, 3
-
 LESSONS = ("a-redundant-arm", "a-blind-arm", "deliveries")
 
 
@@ -63,7 +63,7 @@ def _look(page: Page, scale: float) -> Image.Image:
 def strip(pictures: list[tuple[str, Image.Image]]) -> Image.Image:
     """Returns one picture with rows of three."""
     rows = [pictures[k : k + ROW] for k in range(0, len(pictures), ROW)]
-    wide = max(sum(each.width + 6 for _, each in row) for row in rows)
+    wide = max(sum(picture.width + 6 for _, picture in row) for row in rows)
     paper = Image.new("RGB", (wide, sum(row[0][1].height + LINE for row in rows)), "white")
     pen, font, y = ImageDraw.Draw(paper), ImageFont.truetype(findfont("DejaVu Sans"), 12), 0
     for row in rows:
