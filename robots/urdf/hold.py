@@ -13,7 +13,7 @@ from robots.errors import InputError, shortened, unknown_name
 from robots.report import Finding
 from robots.urdf.joints import freeze
 from robots.urdf.read import end_of, label, named
-from robots.urdf.structure import chains, movable_joints
+from robots.urdf.structure import chains, followers, movable_joints
 from robots.urdf.tip import not_legs
 
 MAX_JOINTS = 20
@@ -29,7 +29,7 @@ def held_by_name(root: Element, patterns: tuple[str, ...]) -> dict[str, tuple[fl
     Raises InputError for a pattern that is not a regular expression, or that is the whole name of no moving
     joint.
     """
-    names = [joint.get("name", "") for joint in movable_joints(root)]
+    names = [joint.get("name", "") for joint in (*movable_joints(root), *followers(root))]
     held: dict[str, tuple[float, str]] = {}
     for text in patterns:
         pattern, value = _parts(text)

@@ -37,8 +37,18 @@ def check_structure(root: Element, source: str) -> Iterator[Finding]:
 
 
 def movable_joints(root: Element) -> list[Element]:
-    """Returns the joints that are not fixed, in the file's order."""
-    return [joint for joint in root.findall("joint") if joint.get("type") in MOVABLE]
+    """Returns the joints that are neither fixed nor follow another joint, in the file's order."""
+    return [joint for joint in root.findall("joint") if _moves(joint)]
+
+
+def followers(root: Element) -> list[Element]:
+    """Returns the joints that follow (mimic) another joint and are not fixed, in the file's order."""
+    joints = (joint for joint in root.findall("joint") if joint.get("type") in MOVABLE)
+    return [joint for joint in joints if joint.find("mimic") is not None]
+
+
+def _moves(joint: Element) -> bool:
+    return joint.get("type") in MOVABLE and joint.find("mimic") is None
 
 
 def parent_joints(root: Element) -> dict[str, Element]:
@@ -57,7 +67,7 @@ def chains(root: Element) -> dict[str, tuple[str, ...]]:
             at = end_of(carriers[at], "parent")
         below = found.setdefault(at, ())
         for each in reversed(passed):
-            if carriers[each].get("type") in MOVABLE:
+            if _moves(carriers[each]):
                 below = (*below, carriers[each].get("name", ""))
             found[each] = below
     return {link: found[link] for link in named(root, "link")}
