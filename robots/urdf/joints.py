@@ -15,7 +15,7 @@ from lxml.etree import _Element as Element
 from robots.errors import shortened
 from robots.report import Finding
 from robots.urdf.read import UNLIMITED, Refusal, end_of, label, limit_value, named, numbers, placement
-from robots.urdf.structure import followers, movable_joints, parent_joints
+from robots.urdf.structure import followers, movable_joints, parent_joints, resting
 
 UNBOUNDED = UNLIMITED  # limit of a joint without limits, so that nq = nv; it is read as ±inf
 _TURNS = 4.0 * math.pi  # rad: no arm's joint turns further, but a limit in degrees says so
@@ -80,8 +80,8 @@ def freeze(joint: Element, value: float, reason: str) -> Finding:
 
 
 def hold_followers(root: Element) -> Iterator[Finding]:
-    """Fixes each joint that follows another one at factor · q + offset of (mimic), where q is the value at
-    which its leader is held. If the leader moves, q is 0 or the nearest value within the leader's limits, and
+    """Fixes each joint that follows another one at multiplier · q + offset, where q is the value at which its
+    leader is held. If the leader moves, q is that of the file's home, or 0, within the leader's limits, and
     the finding says that the motion is not simulated."""
     joints, following = named(root, "joint"), {joint.get("name", ""): joint for joint in followers(root)}
     moving = {joint.get("name", "") for joint in movable_joints(root)}
@@ -107,11 +107,12 @@ def _led(joint: Element, leader: str, leads: Element | None, moves: bool) -> tup
     mimic = _require(joint, "mimic")
     factor = float(numbers(mimic, "multiplier", 1, (1.0,))[0])
     offset = float(numbers(mimic, "offset", 1, (0.0,))[0])
-    limit = None if leads is None else leads.find("limit")
-    if leads is not None and leads.get("type") == "fixed":
+    if leads is None or (leads.get("type") != "fixed" and leads.find("limit") is None):
+        q = 0.0
+    elif leads.get("type") == "fixed":
         q = float(leads.get(HELD, "0"))
     else:
-        q = 0.0 if limit is None else float(np.clip(0.0, *_ends(limit)))
+        q = float(np.clip(resting(leads), *_ends(_require(leads, "limit"))))
     reason = f"it mimics '{shortened(leader)}'"
     if moves:
         reason = (
@@ -134,7 +135,7 @@ def _to_freeze(root: Element, held: dict[str, tuple[float, str]]) -> dict[str, t
     for joint in moving:
         name = joint.get("name", "")
         if _GRIPPER_JOINT.search(name) or _GRIPPER_LINK.search(end_of(joint, "child")):
-            frozen.setdefault(name, (0.0, "by its name it belongs to a gripper"))
+            frozen.setdefault(name, (resting(joint), "by its name it belongs to a gripper"))
     carriers = parent_joints(root)
     loaded = {  # joints that carry an arm
         above.get("name", "")
@@ -146,7 +147,9 @@ def _to_freeze(root: Element, held: dict[str, tuple[float, str]]) -> dict[str, t
         name, leader = joint.get("name", ""), _leader(joint)
         pair = {name, leader}
         if leader in joints and not pair & loaded and not _same_chain(carriers, joint, joints[leader]):
-            frozen.setdefault(leader, (0.0, f"'{name}' mimics it, so it drives a gripper"))
+            frozen.setdefault(
+                leader, (resting(joints[leader]), f"'{name}' mimics it, so it drives a gripper")
+            )
     # The robot may be a hand without an arm: if no other joints move, joints with gripper names stay movable.
     return dict(held) if {joint.get("name", "") for joint in moving} <= frozen.keys() else frozen
 

@@ -19,6 +19,9 @@ MAX_DEPTH = 200
 """Largest number of joints in a chain. Readers of URDF are recursive functions, with one call per joint of a
 chain."""
 MAX_NAME = 100
+HOME = "home"
+"""Attribute of a joint with its value in the posture from which the robot starts, rad or m. Other readers
+ignore it."""
 MOVABLE = ("revolute", "continuous", "prismatic")
 _KNOWN = (*MOVABLE, "fixed", "floating", "planar")
 _GUESSES = 5
@@ -45,6 +48,16 @@ def followers(root: Element) -> list[Element]:
     """Returns the joints that follow (mimic) another joint and are not fixed, in the file's order."""
     joints = (joint for joint in root.findall("joint") if joint.get("type") in MOVABLE)
     return [joint for joint in joints if joint.find("mimic") is not None]
+
+
+def resting(joint: Element) -> float:
+    """Returns the value at which a joint stands if nobody gives another one, rad or m: that of the file's
+    home, or 0."""
+    try:
+        value = float(joint.get(HOME, "0"))
+    except ValueError:
+        return 0.0
+    return value if abs(value) < 1e6 else 0.0  # false for NaN
 
 
 def _moves(joint: Element) -> bool:
