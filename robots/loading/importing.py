@@ -3,6 +3,7 @@ process, without limits on time or memory."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,7 +15,7 @@ from lxml.etree import _Element as Element
 
 from robots.errors import InputError
 from robots.inertia import mass_matrix, rotor_inertia, suggest_M_bar, tracking_bandwidth
-from robots.loading.home import find_home, sensible_a_max
+from robots.loading.home import chain_length, find_home, sensible_a_max
 from robots.loading.imported import with_collision
 from robots.meshes.files import has_meshes
 from robots.plant import Plant
@@ -112,7 +113,8 @@ def _robot(canonical: Canonical) -> Robot | None:
     home, told = _home_of(canonical, lower, upper)
     if home is None:
         home = find_home(model, frames[canonical.report.tip], lower, upper)
-    findings = (*canonical.report.findings, *told, *_assumed(model, given, home, M_bar))
+    strange = _strange_inertias(model, chain_length(model, frames[canonical.report.tip]))
+    findings = (*canonical.report.findings, *told, *strange, *_assumed(model, given, home, M_bar))
     return Robot(
         name=canonical.name,
         model=model,
@@ -128,6 +130,20 @@ def _robot(canonical: Canonical) -> Robot | None:
         urdf_text=canonical.text,
         report=replace(canonical.report, findings=findings),
     )
+
+
+def _strange_inertias(model: pin.Model, length: float) -> Iterator[Finding]:
+    """Yields a note for each body whose inertia, kg·m², cannot be that of its mass in an arm of this length,
+    m: the radius of gyration is larger than the arm."""
+    for joint in range(1, model.njoints):
+        body = model.inertias[joint]
+        radius = math.sqrt(float(np.linalg.eigvalsh(body.inertia)[-1]) / body.mass)
+        if radius > length > 0.0:
+            text = (
+                f"the inertia of what it moves is as if its mass were {radius:.2g} m from its centre, and "
+                f"the arm is {length:.2g} m long: check its unit (kg·m²)"
+            )
+            yield Finding("note", f"joint '{model.names[joint]}'", text)
 
 
 def _home_of(

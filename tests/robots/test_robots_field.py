@@ -156,6 +156,20 @@ def test_a_joint_that_should_follow_another_is_held_and_the_report_says_what_is_
     )
 
 
+def test_an_inertia_in_another_unit_is_reported() -> None:
+    """1 kg with 200 kg m2 would be 14 m away from its centre; the arm is 0.3 m long."""
+    text = ARM.replace('ixx="0.01" iyy="0.02" izz="0.02"', 'ixx="100" iyy="200" izz="200"', 1)
+    told = [str(each) for each in load_urdf_text(ARM.replace("0.01", "0.011")).report.findings]
+    assert "check its unit" not in str(told)
+    text = text[::-1].replace('"20.0"=zzi "20.0"=yyi "10.0"=xxi', '"002"=zzi "002"=yyi "001"=xxi', 1)[::-1]
+    assert "as if its mass were 14 m from its centre, and the arm is" in findings_of(text)
+
+
+def findings_of(text: str) -> str:
+    """Returns all findings of a robot that can be used."""
+    return " | ".join(map(str, load_urdf_text(text).report.findings))
+
+
 def turned(arm: Robot, frame: str) -> float:
     """Returns the angle about y, rad, by which the file's joints have turned a frame that is held."""
     R = arm.model.frames[arm.frame_id(frame)].placement.rotation
