@@ -98,6 +98,8 @@ def write_index(out: Path) -> None:
         "",
         "The pictures show every step before and after its run, as on the page; `python -m docs.gallery`",
         "makes them. The predictions in them are plausible, but many of them are wrong.",
+        "",
+        "![The page on a desktop and on a phone, from the first start to *Deliveries*](first-minutes.webp)",
     ]
     for number, name in enumerate(COURSE, start=1):
         if (out / f"{name}.webp").exists():

@@ -25,7 +25,7 @@ from app.panels.torque.start import StartPanel
 from app.panels.torque.tasks import TasksPanel
 from app.panels.widgets.snapshot import SessionSnapshot
 from app.view.coordinates import draggable
-from app.view.drag import Hand, TargetFrames
+from app.view.drag import Hand, TargetFrames, paused_words
 from app.view.drag_target import Movable
 from app.view.ellipsoids import EllipsoidView
 from app.view.pull import Pull
@@ -213,8 +213,9 @@ class TorqueFace:
         context, T_s = self._context, self._context.settings.T_s
         self._frames.show(bool(self._start.frames.value))
         self._trails.show(bool(self._start.trace.value), bool(self._start.prediction.value))
-        running = moment.status.running or not moment.live
-        self._hand.show(self._frames, context.settings, moment.latest, context.ready.layout.fields, running)
+        moves = moment.status.running or not moment.live
+        paused = "" if moves else paused_words(context.learner.lecture_of(context.ready))
+        self._hand.show(self._frames, context.settings, moment.latest, context.ready.layout.fields, paused)
         self._hand.look_back(None if moment.live else moment.status.targets)
         tips = moment.way[:, -1, :3] if len(moment.way) else np.zeros((0, 3))
         self._trails.draw(tips, moment.status.path, T_s)

@@ -15,6 +15,7 @@ import viser.transforms as vtf
 from app.adapter import private
 from app.html.palette import BAD, TARGET
 from app.html.text import quantity
+from app.link.exercise import Lecture
 from app.link.messages import Ready, TaskView
 from app.view.coordinates import draggable, full, of_task, raw, xyzw
 from app.view.drag_target import Gap, Handle, Movable, turned
@@ -22,6 +23,8 @@ from app.view.reachability import Question, Reachability, ReachabilityWorker
 from app.view.robot import ARROW, target_radius
 from lessons.events import MoveTarget
 from lessons.settings.torque import TorqueSettings
+from lessons.teaching.lesson import Challenge
+from lessons.teaching.prediction import Choice
 
 Moved = Callable[[np.ndarray, np.ndarray | None], None]
 
@@ -35,9 +38,19 @@ _OWN = 1.0
 """Time, s, after a drag during which changes of targets are attributed to this drag."""
 _PATIENCE = 0.05
 """Time, s, that a drag waits for the reachability check, which takes a millisecond for reachable targets."""
-_PAUSED, _LESSON_PAUSED = "paused: press Run", "paused: press Run this step"
 Later = Callable[[float, Callable[[], None]], object]
 """Calls a function after a delay, s."""
+
+
+def paused_words(lecture: Lecture | None) -> str:
+    """Returns how a paused simulation continues. lecture: the state of the lesson's step, if there is one."""
+    if lecture is None or lecture.phase != "waiting":
+        return "paused: press Run"
+    part = lecture.exercise.part
+    if isinstance(part, Challenge):
+        return "paused: press Start the run"
+    unanswered = isinstance(part.prediction, Choice) and lecture.answer is None
+    return "paused: answer first" if unanswered else "paused: press Run this step"
 
 
 class TargetGizmo:
@@ -245,7 +258,6 @@ class Hand:
         self._targets = targets
         self._moved_at = -math.inf
         self._later = later
-        self._go_on = _LESSON_PAUSED if ready.choice.exercise is not None else _PAUSED
         self._gizmo: TargetGizmo | None = None
         self._judge: ReachabilityWorker | None = None
         self._lock = threading.Lock()  # drags arrive on viser's loop, the check answers on its own thread
@@ -373,14 +385,10 @@ class Hand:
         settings: TorqueSettings,
         latest: np.ndarray,
         fields: dict[str, slice],
-        running: bool,
+        paused: str,
     ) -> None:
         """Shows the filtered target of the last telemetry row, rings if an orientation can be dragged, and
-        the verdict.
-
-        running: true if simulated time passes or a past instant is shown; if it is false, the gizmo says how
-            to continue.
-        """
+        the verdict. paused: see `TargetGizmo.pause`."""
         gizmo = self._gizmo
         if gizmo is None:
             return
@@ -393,7 +401,7 @@ class Hand:
         if gizmo.orientation is not None:
             name = gizmo.orientation.level
             gizmo.show_rings(any(level.name == name and level.enabled for level in settings.levels))
-        gizmo.pause("" if running else self._go_on)
+        gizmo.pause(paused)
         if self.verdict is not None:
             gizmo.show_accepted(self.verdict.accepted, self.verdict.missing)
 

@@ -24,7 +24,7 @@ from lessons.scenes.run_spec import RunSpec
 pytestmark = pytest.mark.usefixtures("one_fork_server")
 
 LONG = 240.0  # s: the first start after a checkout compiles
-TORQUE, STEP = "Torque, % of bound", "Control step, ms"
+TORQUE, NEAREST = "Torque, % of bound", "Joint nearest its bound, %"
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +52,7 @@ def test_only_charts_in_view_are_sent(alone: PageServer) -> None:
     viewer = Viewer(alone.link, tab="Joints")
     with viewer.connect() as page:
         hear_until(viewer, page, lambda: TORQUE in viewer.drawn and bool(viewer.second.links))
-        for tab, seen, unseen in (("Errors", STEP, TORQUE), ("Joints", TORQUE, STEP)):
+        for tab, seen, unseen in (("Errors", NEAREST, TORQUE), ("Joints", TORQUE, NEAREST)):
             viewer.show(tab)
             viewer.second = Second()
             # wait until data that were sent earlier have arrived

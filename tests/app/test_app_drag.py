@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from queue import Queue
 from types import SimpleNamespace
@@ -15,10 +16,11 @@ import pytest
 
 from app.html.palette import JOINTS, LEVELS
 from app.link.choice import SceneChoice
+from app.link.exercise import Lecture, LessonPlace
 from app.link.messages import Post, Ready
 from app.panels.torque.start import StartPanel
 from app.view import drag
-from app.view.drag import Hand
+from app.view.drag import Hand, paused_words
 from app.view.reachability import Question, Reachability, ReachabilityWorker
 from app.view.robot import gizmo_size, target_radius
 from app.worker.simulation import SimulationRunner
@@ -273,11 +275,27 @@ def test_a_line_with_its_length_leads_from_the_hand_to_a_small_target(
         (one.start, "target: pull an arrow"),
     ):
         row[ready.layout.fields["x/position"]] = hand
-        one.hand.show(MagicMock(), settings, row, ready.layout.fields, running=True)
+        one.hand.show(MagicMock(), settings, row, ready.layout.fields, "")
         assert label.text == words
         assert line.visible == ("to go" in words)
-    one.hand.show(MagicMock(), settings, row, ready.layout.fields, running=False)
-    assert label.text.startswith("paused")
+    one.hand.show(MagicMock(), settings, row, ready.layout.fields, "paused: press Run")
+    assert label.text == "paused: press Run"
+
+
+def test_a_paused_robot_says_which_button_goes_on() -> None:
+    """The label at the target names the button that the page offers at that moment."""
+    asked = Lecture(LessonPlace("a-redundant-arm"), "waiting", 0, 0.0, 1.0)
+    guessed = Lecture(LessonPlace("a-redundant-arm", 2), "waiting", 0, 0.0, 1.0)
+    graded = Lecture(LessonPlace("one-task", 4), "waiting", 0, 0.0, 1.0)
+    for lecture, words in (
+        (None, "paused: press Run"),
+        (asked, "paused: answer first"),
+        (replace(asked, answer=0), "paused: press Run this step"),
+        (replace(asked, phase="done", attempt=1), "paused: press Run"),
+        (guessed, "paused: press Run this step"),
+        (graded, "paused: press Start the run"),
+    ):
+        assert paused_words(lecture) == words
 
 
 def test_target_and_arrows_have_the_size_of_the_robot() -> None:

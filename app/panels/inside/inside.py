@@ -59,10 +59,11 @@ class InsidePanel:
         levels = tuple(dict.fromkeys(task.level for task in ready.tasks))
         self._plane: PlanePanel | None = None
         if ready.robot.n > 1:
-            self._plane = PlanePanel(client, in_view, ready.robot, levels, colours, post)
+            in_lesson = ready.choice.exercise is not None
+            self._plane = PlanePanel(client, in_view, ready.robot, levels, colours, post, in_lesson)
         else:
             client.gui.add_html(block("This robot has one joint with one Δτ; the plane needs two."))
-        with client.gui.add_folder("The Hessian of one level", expand_by_default=False):
+        with client.gui.add_folder("The Hessian", expand_by_default=False):
             self._matrix = MatrixPanel(client, in_view, ready.robot, levels)
         self._spectrum = spectrum
         self._watching = InsideSubscription(send)

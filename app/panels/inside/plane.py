@@ -311,8 +311,10 @@ class PlanePanel:
         levels: tuple[str, ...],
         colours: dict[str, RGB],
         post: Send,
+        in_lesson: bool,
     ) -> None:
-        """levels: names, highest priority first; post: posts an event to the session."""
+        """levels: names, highest priority first; post: posts an event to the session; in_lesson: the legend
+        is folded, because a lesson has a text of its own."""
         gui = client.gui
         self._colours = colours
         self._half: float | None = None
@@ -321,13 +323,15 @@ class PlanePanel:
             f"{self._names[a]}, {self._names[b]}": (a, b) for a, b in combinations(range(robot.n), 2)
         }
         self._picture = SvgPicture(client, in_view, TITLE, SIZE, _EMPTY)
-        self._words = gui.add_html("")
+        self._why_not = gui.add_html("")
+        with gui.add_folder("Legend", expand_by_default=not in_lesson) as self._folder:
+            self._words = gui.add_html("")
         self._fewer = gui.add_button(
             "Look one knot ahead (N = 1)",
             visible=False,
             hint="The QP then has fewer variables, and the plane of two joints shows more of it",
         )
-        with gui.add_folder("Choice of the plane", expand_by_default=False):
+        with gui.add_folder("Which joints", expand_by_default=False):
             self._pair = gui.add_dropdown(
                 "Joints",
                 tuple(self._pairs),
@@ -378,7 +382,11 @@ class PlanePanel:
         several = settings.horizon > 1 and settings.controller != "hiqp"
         if self._fewer.visible != several:
             self._fewer.visible = several
-        words = block(esc(inside.why_not)) if inside.plane is None else self._legend(inside.plane, several)
+        drawn = inside.plane is not None
+        why_not = "" if drawn else block(esc(inside.why_not))
+        if self._why_not.content != why_not:
+            self._why_not.content, self._folder.visible = why_not, drawn
+        words = "" if inside.plane is None else self._legend(inside.plane, several)
         if self._words.content != words:
             self._words.content = words
 

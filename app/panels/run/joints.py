@@ -3,7 +3,6 @@ shares of their bounds, or one joint in its units."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -52,6 +51,7 @@ class Input:
     units: tuple[str, str]
 
 
+Sheet = tuple[tuple[np.ndarray, np.ndarray], ...]
 TORQUE = Input("Torque", "tau", "tau_lower", "tau_upper", ("N·m", "N"))
 ACCELERATION = Input("Acceleration, largest", "acceleration", None, "a_limit", ("rad/s²", "m/s²"))
 
@@ -62,7 +62,7 @@ class JointPlots:
     def __init__(self, gui: viser.GuiApi, in_view: InView, robot: Robot, driven: Input = TORQUE) -> None:
         self._gui, self._in_view = gui, in_view
         self._robot, self._input = robot, driven
-        self._sheet = _sheet(robot, driven)
+        self._sheet = data_sheet(robot, driven)
         self._prismatic = [joint_axis(robot.model, joint)[0] for joint in range(1, robot.n + 1)]
         self._joint: int | None = None
         self._built: tuple[int | None, bool] | None = None
@@ -89,8 +89,9 @@ class JointPlots:
             self._build(joint, ghost is not None)
         if not any(chart.in_view for chart in self._charts):
             return
-        beside = [None] * 3 if ghost is None else self._read(ghost)
-        for kind, (chart, *found) in enumerate(zip(self._charts, self._read(window), beside, strict=True)):
+        beside = [None] * 3 if ghost is None else quantities(ghost, self._input, self._sheet)
+        own = quantities(window, self._input, self._sheet)
+        for kind, (chart, *found) in enumerate(zip(self._charts, own, beside, strict=True)):
             chart.show(window, partial(self._curves, window.at_bound(kind), kind, joint, *found))
 
     def _curves(
@@ -111,29 +112,6 @@ class JointPlots:
             dashed = [] if other is None else [unit * other.values[:, joint]]
             marked = at_bound[:, joint]
         return [*lines, np.where(marked, low + _RUG * (high - low), low), *dashed]
-
-    def _read(self, window: PlotWindow) -> Sequence[_Quantity]:
-        columns, fields = window.columns, window.layout.fields
-        v, driven = columns(fields["v_limit"]), self._input
-        upper = columns(fields[driven.upper])
-        lower = -upper if driven.lower is None else columns(fields[driven.lower])
-        found = (
-            (driven.title, driven.value, lower, upper),
-            ("Velocity", "v", -v, v),
-            ("Position", "q", columns(fields["q_lower"]), columns(fields["q_upper"])),
-        )
-        quantities: list[_Quantity] = []
-        for kind, (title, field, lower, upper) in enumerate(found):
-            sheet_lower, sheet_upper = self._sheet[kind]
-            quantities.append(
-                _Quantity(
-                    title,
-                    columns(fields[field]),
-                    np.where(np.isfinite(lower), lower, sheet_lower),
-                    np.where(np.isfinite(upper), upper, sheet_upper),
-                )
-            )
-        return quantities
 
     def _unit(self, kind: int, joint: int) -> tuple[str, float]:
         """Returns the unit on the axis and the factor from the SI unit."""
@@ -200,7 +178,28 @@ class JointPlots:
         )
 
 
-def _sheet(robot: Robot, driven: Input) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
+def quantities(window: PlotWindow, driven: Input, sheet: Sheet) -> list[_Quantity]:
+    """Returns input, velocity and position of all joints with their bounds. sheet: see `data_sheet`."""
+    columns, fields = window.columns, window.layout.fields
+    v, upper = columns(fields["v_limit"]), columns(fields[driven.upper])
+    lower = -upper if driven.lower is None else columns(fields[driven.lower])
+    found = (
+        (driven.title, driven.value, lower, upper),
+        ("Velocity", "v", -v, v),
+        ("Position", "q", columns(fields["q_lower"]), columns(fields["q_upper"])),
+    )
+    return [
+        _Quantity(
+            title,
+            columns(fields[field]),
+            np.where(np.isfinite(lower), lower, sheet_lower),
+            np.where(np.isfinite(upper), upper, sheet_upper),
+        )
+        for (title, field, lower, upper), (sheet_lower, sheet_upper) in zip(found, sheet, strict=True)
+    ]
+
+
+def data_sheet(robot: Robot, driven: Input) -> Sheet:
     """Returns the bounds of the robot's data sheet; ± one turn for a joint without position bounds."""
     own = robot.tau_limit if driven is TORQUE else robot.a_max
     u = np.where(np.isfinite(own), own, 1e3)

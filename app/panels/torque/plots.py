@@ -1,5 +1,5 @@
-"""Plots about the whole controller: error per level, the nearest distance, solve time, and leaks between
-levels."""
+"""Plots about the whole controller: errors, torque and speed in % of their bounds, the nearest distance; on
+request, solve time and leaks between levels."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ import numpy as np
 import viser
 
 from app.client.decimated import BUCKETS, PlotWindow
-from app.html.palette import BAD, BOUND, GOOD, LEVELS, RGB
+from app.html.palette import BAD, BOUND, GOOD, JOINTS, LEVELS, RGB
 from app.html.text import block
 from app.link.messages import Ready
+from app.panels.run.joints import TORQUE, data_sheet, quantities
 from app.panels.widgets.chart import Chart, ChartLine, of_ghost
 from app.panels.widgets.in_view import InView
 from lessons.settings.torque import TorqueSettings
@@ -19,6 +20,7 @@ _ERROR = (1e-3, 1e3)  # mm or degrees
 _TIME = (1e-2, 1e2)  # ms
 _LEAK = (1e-12, 1e2)  # m/s² or rad/s²
 _DISTANCE = (0.0, 250.0)  # mm
+_SHARE = (0.0, 120.0)  # %
 _COVERS = (
     "The distance is that of the covers of the links, which are a few millimetres thicker than the links. "
     "At 0 the links do not touch yet."
@@ -40,8 +42,11 @@ class LevelPlots:
     ) -> None:
         self._gui, self._in_view = gui, in_view
         self._tasks, self._colours = ready.tasks, colours
+        self._sheet = data_sheet(ready.robot, TORQUE)
         self._place = gui.add_folder(None)
+        self._inner = gui.add_folder("Computing time and leaks", expand_by_default=False)
         self._charts: list[Chart] = []
+        self._covers: viser.GuiHtmlHandle | None = None
         self._furnished = any(not isinstance(thing.shape, Floor) for thing in ready.world)
         self._settings = settings
         self._build(ghost=False)
@@ -59,6 +64,9 @@ class LevelPlots:
     def _build(self, ghost: bool) -> None:
         for chart in self._charts:
             chart.remove()
+        if self._covers is not None:
+            self._covers.remove()
+            self._covers = None
         self._shown = self._wanted(ghost)
         _, contacts, distances = self._shown
         errors = [
@@ -68,26 +76,35 @@ class LevelPlots:
         step = [ChartLine("whole step", LEVELS[1], width=2.0)]
         leaks = [ChartLine("priority (own model)", LEVELS[2]), ChartLine("dynamic (true plant)", BAD)]
         near = [ChartLine("nearest pair", LEVELS[0], width=2.0)]
-        errors, step, leaks, near = (
-            [*lines, *of_ghost(lines, ghost)] for lines in (errors, step, leaks, near)
+        shares = [ChartLine("torque", JOINTS[0], width=2.0), ChartLine("speed", JOINTS[3], width=2.0)]
+        errors, step, leaks, near, shares = (
+            [*lines, *of_ghost(lines, ghost)] for lines in (errors, step, leaks, near, shares)
         )
         kept = ChartLine("bound: no closer", BAD, dashed=True, fill=0.12)
         # An area over the whole height marks the time in which the robot touches something.
         errors += [ChartLine("contact", BAD, fill=0.12, width=0.0)] if contacts else []
         budget = ChartLine("budget", GOOD, dashed=True, fill=0.12)
+        bound = ChartLine("bound", BOUND, dashed=True)
         with self._place:
             self._charts = [
-                Chart(self._gui, self._in_view, title, lines, span, height=height, log=span is not _DISTANCE)
-                for title, lines, span, height in (
-                    ("Error per task, mm or °", errors, _ERROR, 200),
-                    ("Distance of the nearest pair, mm", [*near, kept], _DISTANCE, 170),
-                    ("Control step, ms", [*step, budget], _TIME, 170),
-                    ("Leak into higher levels, m/s² or rad/s²", leaks, _LEAK, 170),
-                )
-                if distances or span is not _DISTANCE
+                self._chart("Error per task, mm or °", errors, _ERROR, 200),
+                self._chart("Joint nearest its bound, %", [*shares, bound], _SHARE),
             ]
             if distances:
-                self._gui.add_html(block(_COVERS))
+                self._charts.append(self._chart("Distance of the nearest pair, mm", [*near, kept], _DISTANCE))
+                self._covers = self._gui.add_html(block(_COVERS))
+        with self._inner:
+            self._charts += [
+                self._chart("Control step, ms", [*step, budget], _TIME),
+                self._chart("Leak into higher levels, m/s² or rad/s²", leaks, _LEAK),
+            ]
+
+    def _chart(
+        self, title: str, lines: list[ChartLine], span: tuple[float, float], height: int = 170
+    ) -> Chart:
+        return Chart(
+            self._gui, self._in_view, title, lines, span, height=height, log=span not in (_DISTANCE, _SHARE)
+        )
 
     def draw(self, window: PlotWindow, ghost: PlotWindow | None, settings: TorqueSettings) -> None:
         """Draws the plots of the window. ghost: the ghost's data over the same interval. If the plant has
@@ -96,12 +113,21 @@ class LevelPlots:
         if self._wanted(ghost is not None) != self._shown:
             self._build(ghost is not None)
         windows, T_s = [window] if ghost is None else [window, ghost], settings.T_s
-        error, *distance, step, leak = self._charts
+        error, share, *distance, step, leak = self._charts
         error.show(window, lambda: self._errors_and_contacts(window, windows))
+        share.show(window, lambda: [*self._shares(windows), np.full(2 * BUCKETS, 100.0)])
         step.show(window, lambda: [*(_times(each) for each in windows), np.full(2 * BUCKETS, 1e3 * T_s)])
         leak.show(window, lambda: [curve for each in windows for curve in _leaks(each)])
         for near in distance:
             near.show(window, lambda: _distances(window, windows))
+
+    def _shares(self, windows: list[PlotWindow]) -> list[np.ndarray]:
+        """Returns torque and speed of the joint that is nearest its bound, %."""
+        return [
+            np.abs(quantity.shares()).max(axis=1)
+            for window in windows
+            for quantity in quantities(window, TORQUE, self._sheet)[:2]
+        ]
 
     def _errors_and_contacts(self, window: PlotWindow, windows: list[PlotWindow]) -> list[np.ndarray]:
         curves = [curve for each in windows for curve in self._errors(each)]

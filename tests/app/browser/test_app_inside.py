@@ -184,14 +184,14 @@ def test_nobody_asks_while_nobody_looks(sheet: Page, drawing: PageServer) -> Non
 
 
 def test_the_hessian_opens_on_demand(sheet: Page, drawing: PageServer) -> None:
-    sheet.get_by_text("The Hessian of one level").click()
+    sheet.get_by_text("The Hessian", exact=True).click()
     sheet.locator(f'[data-chart="{HESSIAN}"]').scroll_into_view_if_needed()
     assert eventually(sheet, lambda: sheet.get_by_text("H = GᵀQG + R of level").is_visible())
     learner = learner_of(drawing)
     assert eventually(sheet, lambda: learner.status is not None and learner.status.inside is not None
                       and learner.status.inside.matrix is not None)  # fmt: skip
     expect(sheet.locator(f'[data-chart="{HESSIAN}"]').get_by_text("joint by joint")).to_be_visible()
-    sheet.get_by_text("The Hessian of one level").click()
+    sheet.get_by_text("The Hessian", exact=True).click()
 
 
 def test_eigenvalues_move_with_M_bar(sheet: Page, drawing: PageServer) -> None:

@@ -14,6 +14,7 @@ from playwright.sync_api import Browser, Locator, Page, expect
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace, parts_of
 from app.link.messages import Post
+from app.panels.inside.plane import TITLE as PLANE
 from app.web.server import PageServer
 from browsing.browser_actions import eventually, key, open_page, press
 from browsing.lessons import expect_part, hurry, marks, open_lesson, predict, run, words_in_view
@@ -104,7 +105,7 @@ def walk(page: Page, school: PageServer, lesson: Lesson) -> None:
         expect(marks(page, "✗")).to_have_count(0)
         expect(page.get_by_text("You predicted:")).to_have_count(int(part.prediction is not None))
         assert eventually(page, lambda: words_in_view(page) <= AFTER), words_in_view(page)
-        drawn = page.get_by_role("img", name=re.compile("over time$")).first.bounding_box()
+        drawn = page.get_by_role("img", name=re.compile(f"over time$|^{PLANE}$")).first.bounding_box()
         assert drawn is not None and drawn["height"] >= 200
         assert_order(page.get_by_text("Now you:"), page.get_by_text("Your knobs"), next_of(page))
         if part is not parts_of(lesson)[-1]:

@@ -232,7 +232,7 @@ def test_the_browser_tells_which_charts_it_shows(
         return shown._stage is not None and shown._stage._in_view.sees(title)
 
     for name, seen, unseen in (
-        ("Joints", "Torque, % of bound", "Control step, ms"),
+        ("Joints", "Torque, % of bound", "Joint nearest its bound, %"),
         ("Who binds", "", "Torque, % of bound"),
         ("Errors", "Error per task, mm or °", "Torque, % of bound"),
     ):
