@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import compress, product
 from time import process_time
 
 import numpy as np
@@ -15,7 +16,9 @@ from lessons.events import MoveTarget
 from lessons.scenes.hold import hold_robot
 from lessons.session.start import begin
 from robots import Robot
+from robots.errors import listed, shortened
 from robots.loading.home import chain_length
+from robots.plant import Plant
 from robots.reach import ReachJudge
 
 Array = NDArray[np.float64]
@@ -24,6 +27,8 @@ SHARE = 0.15
 """Length of the drag as a share of the arm's length."""
 START, HOLD = 0.1, 2.0  # s: when the target moves first, and how long it stays at each place
 FOLLOWS = 0.01  # largest error, as a share of the drag, of a robot that follows
+_MARGIN = 0.02  # rad or m: nearest that a joint comes to its limit at a target
+_NEAR = 2e-3  # m: difference from the distance to keep at which it holds a robot back
 _STILL = 0.01  # largest speed, as a share of its limit, of a joint at rest
 _SECONDS = 120.0  # s of processor time for a drag
 
@@ -40,6 +45,7 @@ class Motion:
         rest: whether all joints are at rest at the end.
         lost: simulated time at which control was lost, s; None if it was not.
         over: whether the time of the computation ended before the drag.
+        why: the limits and contacts at the first target that the tip did not reach; "" if there are none.
     """
 
     drag: float
@@ -50,6 +56,7 @@ class Motion:
     rest: bool = False
     lost: float | None = None
     over: bool = False
+    why: str = ""
 
     @property
     def follows(self) -> bool:
@@ -68,7 +75,7 @@ class Motion:
         how = f"follows within {worst:.2g} mm" if self.follows else f"stays {worst:.2g} mm away"
         return (
             f"{how} after 2 s (drag of {drag:.0f} mm); uses {100 * self.torque:.0f} % of a torque limit and "
-            f"{100 * self.speed:.0f} % of a speed limit; {end}"
+            f"{100 * self.speed:.0f} % of a speed limit; {end}{f' ({self.why})' if self.why else ''}"
         )
 
 
@@ -85,10 +92,11 @@ def dragged(robot: Robot) -> Motion:
         (START + k * HOLD, MoveTarget("position", tuple(map(float, place)))) for k, place in enumerate(places)
     )
     session = begin(replace(scene, events=events), 0)
-    errors, torque, speed, began = [], 0.0, 0.0, process_time()
+    errors, torque, speed, why, began = [], 0.0, 0.0, "", process_time()
+    at, row = session.layout.fields, np.empty(0)
     for place in places:
         while session.t < START + (len(errors) + 1) * HOLD - 0.5 * session.settings.T_s:
-            row, at = session.tick(), session.layout.fields
+            row = session.tick()
             torque = max(torque, float(np.abs(row[at["tau"]] / robot.tau_limit).max()))
             speed = max(speed, float(np.abs(row[at["v"]] / robot.v_limit).max()))
             if session.diverged_at is not None:
@@ -96,31 +104,59 @@ def dragged(robot: Robot) -> Motion:
             if process_time() - began > _SECONDS:
                 return Motion(drag, over=True)
         errors.append(float(np.linalg.norm(session.plant.frame_pose(robot.tip)[1] - place)))
+        why = why or ("" if errors[-1] <= FOLLOWS * drag else _at_limits(session.plant, *_distance(row, at)))
     still = float(np.abs(session.plant.v / robot.v_limit).max()) < _STILL
-    return Motion(drag, *errors, torque=torque, speed=speed, rest=still)
+    return Motion(drag, *errors, torque=torque, speed=speed, rest=still, why=why)
+
+
+def _distance(row: Array, at: Mapping[str, slice]) -> tuple[float, float]:
+    """Returns the least distance of two links, or of a link and an object, and the distance to keep, m."""
+    return float(row[at["distance"]][0]), float(row[at["distance_kept"]][0])
+
+
+def _at_limits(plant: Plant, distance: float, kept: float) -> str:
+    """Returns what a plant touches, the joints that are at a limit, and the least distance, m, if it is the
+    one to keep."""
+    robot = plant.robot
+    at_torque = np.abs(plant.tau) > 0.99 * robot.tau_limit
+    near = np.minimum(plant.q - robot.q_lower, robot.q_upper - plant.q) < _MARGIN
+    touching = dict.fromkeys(" touches ".join(map(shortened, each.between)) for each in plant.contacts)
+    limits = (("torque", at_torque), ("position", near))
+    told = [
+        f"{listed(list(compress(robot.joint_names, found)))} at the {what} limit"
+        for what, found in limits
+        if found.any()
+    ]
+    if distance < kept + _NEAR:
+        told.append(f"{1e3 * distance:.0f} mm to another link or an object, and {1e3 * kept:.0f} mm are kept")
+    return "; ".join([*list(touching)[:2], *told])
 
 
 def target(robot: Robot, drag: float, floor: bool) -> Array | None:
     """Returns the place (3,), m, to which the tip is dragged.
 
     Inverse kinematics from home tries 26 places, at the distance `drag`, m, along the axes and their
-    diagonals. Of those that the tip can reach, the one is taken for which the joints turn by the least share
-    of their range. If it can reach none of them, as with two joints, a place counts that is nearest to one of
-    them and at least half as far. Above a floor, joints and tip stay half the drag above it, or as far as at
-    home if that is less. None: there is no such place.
+    diagonals. Of those that the tip can reach with all joints 20 mrad or mm away from their limits, the one
+    is taken for which the joints turn by the least share of their range. If it can reach none of them, as
+    with two joints, a place counts that is nearest to one of them and at least half as far. Above a floor,
+    joints and tip stay half the drag above it, or as far as at home if that is less. None: there is no such
+    place.
     """
     judge, span = ReachJudge(robot), np.clip(robot.q_upper - robot.q_lower, 0.0, 2.0 * np.pi)
+    low, high = robot.q_lower + _MARGIN, robot.q_upper - _MARGIN
     home = _points(robot, robot.home)
     least = min(0.5 * drag, float(home[:, 2].min())) - 1e-3 if floor else -math.inf
     found: list[tuple[bool, float, int, Array]] = []
     for place, signs in enumerate(each for each in product((0.0, 1.0, -1.0), repeat=3) if any(each)):
         way = np.array(signs) / np.linalg.norm(signs)
         result = judge.solve(home[-1] + drag * way)
-        points = _points(robot, result.q)
+        q = np.clip(result.q, np.minimum(low, robot.home), np.maximum(high, robot.home))
+        points = _points(robot, q)
         far = float(np.linalg.norm(points[-1] - home[-1])) >= 0.5 * drag
         if far and float(points[:, 2].min()) >= least:
-            turn = float((np.abs(result.q - robot.home) / span).max())
-            found.append((not result.reachable, turn, place, points[-1]))
+            turn = float((np.abs(q - robot.home) / span).max())
+            far_off = float(np.linalg.norm(points[-1] - home[-1] - drag * way)) > 0.1 * drag
+            found.append((far_off, turn, place, points[-1]))
     return min(found)[3] if found else None
 
 

@@ -15,6 +15,7 @@ _ROUNDS = 12  # number of steps of the search for the middle of a circle
 _DIGITS = 4  # decimal places of a coordinate in m
 _FEW, _MANY = 48, 100  # numbers of directions in which a quick and a tight fit look for farthest points
 _FACTORS = np.array([1.0, 1.05, 1.1, 1.2, 1.3, 1.5])  # radii that are tried, as multiples of the smallest
+_BLOCK = 1_000  # number of balls whose heights fit into a fast memory
 _AT_ONCE = 2_000_000  # largest number of elements of an array
 
 
@@ -66,10 +67,7 @@ def quick_fits(points: Array, swell: Array, groups: Mask) -> Fit:
 def tight_fit(points: Array, swell: Array) -> Fit:
     """Returns a capsule that contains balls and has about the smallest volume. Its numbers are multiples of
     0.1 mm."""
-    rows = max(1, _AT_ONCE // _MANY)
-    parts = range(0, len(points), rows)
-    far = [_farthest(points[k : k + rows], swell[k : k + rows]) + k for k in parts]
-    chosen = np.unique(np.concatenate(far))
+    chosen = _farthest(points, swell)
     few, thick = points[chosen], swell[chosen]
     ends = np.unique(few, axis=0)
     if len(ends) <= 2 and np.ptp(swell) == 0.0:
@@ -90,7 +88,15 @@ def _rounded(points: Array, swell: Array, start: Array, end: Array) -> Fit:
 
 
 def _farthest(points: Array, swell: Array) -> NDArray[np.intp]:
-    return np.unique((sphere(_MANY) @ points.T + swell).argmax(axis=1))
+    """Returns the indices of the balls that are farthest out in one of the directions."""
+    most, found = np.full(_MANY, -np.inf), np.zeros(_MANY, np.intp)
+    for first in range(0, len(points), _BLOCK):
+        heights = sphere(_MANY) @ points[first : first + _BLOCK].T + swell[first : first + _BLOCK]
+        place = heights.argmax(axis=1)
+        height = heights[np.arange(_MANY), place]
+        found = np.where(height > most, place + first, found)
+        most = np.maximum(height, most)
+    return np.unique(found)
 
 
 @lru_cache(maxsize=4)

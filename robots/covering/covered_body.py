@@ -81,15 +81,11 @@ class Body:
     def gaps(self, fits: Fit, count: int) -> tuple[Array, Array]:
         """Returns two arrays for points on the outer surface of the capsules: the distance of each point from
         the triangles, m, and the area that it represents, m²."""
-        every = [surface(fits.chosen(k), count) for k in range(len(fits.radius))]
-        outer = np.concatenate(
-            [
-                np.delete(reach(points, np.zeros(count), fits), k, axis=0).min(axis=0, initial=1.0) > 0.0
-                for k, points in enumerate(every)
-            ]
-        )
-        areas = np.repeat(fits.area / count, count)[outer]
-        points = np.concatenate(every)[outer]
+        points, own = surfaces(fits, count), np.repeat(np.arange(len(fits.radius)), count)
+        out = reach(points, np.zeros(len(points)), fits)
+        out[own, np.arange(len(points))] = 1.0
+        outer = out.min(axis=0) > 0.0
+        areas, points = np.repeat(fits.area / count, count)[outer], points[outer]
         return np.maximum(self._nearby.query(points)[0] - self.swells.max(), 0.0), areas
 
     def name(self, mask: NDArray[np.bool_]) -> str:
@@ -136,15 +132,16 @@ def _cut(corners: Array, swells: Array, links: Indices, edge: float) -> tuple[Ar
     return np.concatenate(first), np.concatenate(second), np.concatenate(third)
 
 
-def surface(fit: Fit, count: int) -> Array:
-    """Returns points that are evenly spread on the surface of a capsule, (count, 3) m."""
-    axis, radius = fit.end - fit.start, float(fit.radius)
-    length = float(np.linalg.norm(axis))
-    across = np.linalg.svd(axis[None])[2][1:]
-    along = axis / length if length > 0.0 else np.cross(across[0], across[1])
+def surfaces(fits: Fit, count: int) -> Array:
+    """Returns points that are evenly spread on the surfaces of capsules (K,), `count` points of each,
+    (K count, 3) m."""
+    axis, radius, length = fits.end - fits.start, fits.radius[:, None], fits.length[:, None]
+    across = np.linalg.svd(axis[:, None, :])[2][:, 1:]
+    along = np.where(length > 0.0, axis / np.maximum(length, 1e-300), np.cross(across[:, 0], across[:, 1]))
     # The area of a ball or a cylinder between two heights is proportional to their difference.
     height = (length + 2.0 * radius) * (np.arange(count) + 0.5) / count - radius
     ring = np.sqrt(np.maximum(radius**2 - (height - np.clip(height, 0.0, length)) ** 2, 0.0))
     turn = np.pi * (1.0 + np.sqrt(5.0)) * np.arange(count)
-    local = np.column_stack([ring * np.cos(turn), ring * np.sin(turn), height])
-    return fit.start + local @ np.vstack([across, along])
+    local = np.stack([ring * np.cos(turn), ring * np.sin(turn), height], axis=2)
+    found = fits.start[:, None, :] + local @ np.concatenate([across, along[:, None, :]], axis=1)
+    return found.reshape(-1, 3)

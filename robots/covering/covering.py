@@ -25,7 +25,7 @@ MOST = 6
 _LINKS = 4  # if a body has more links than this, all its links are treated as one
 _CUTS = (0.25, 0.4, 0.6, 0.75)  # positions of a cut, as shares of the extent along a principal axis
 _SMALL = 0.03  # share of a usual body's size; a body whose capsules stand out less gets no further capsules
-_WORK = 2_000_000  # largest sum of triangles over all improvements
+_WORK = 1_300_000  # largest sum of triangles over all improvements; a core needs about 10 s for it
 _FIXED_WORK = 20_000  # number of triangles that is added for each improvement
 _WORTH = 0.97  # largest ratio of the distances after and before an improvement
 

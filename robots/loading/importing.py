@@ -3,6 +3,7 @@ process, without limits on time or memory."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,19 +11,22 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 from lxml import etree
+from lxml.etree import _Element as Element
 
 from robots.errors import InputError
 from robots.inertia import mass_matrix, rotor_inertia, suggest_M_bar, tracking_bandwidth
-from robots.loading.home import find_home, sensible_a_max
+from robots.loading.home import chain_length, find_home, sensible_a_max
 from robots.loading.imported import with_collision
 from robots.meshes.files import has_meshes
 from robots.plant import Plant
 from robots.report import Finding, ImportReport
 from robots.robot import Robot
 from robots.urdf import UNBOUNDED, Canonical, canonicalise
-from robots.urdf.read import Refusal, root_tag
+from robots.urdf.read import Refusal, label, root_tag
+from robots.urdf.structure import HOME, resting
 
 _TRIAL = 5  # number of periods of 1 ms
+_ROUNDING = 1e-4  # rad or m: what a file's rounded home may be outside the limits
 _SLOW = 3.0  # 1/s: a robot with less bandwidth needs seconds to reach a target
 
 
@@ -106,8 +110,11 @@ def _robot(canonical: Canonical) -> Robot | None:
         return None
     if not np.all(np.isfinite(M_bar) & (M_bar > 0.0)):
         return None
-    home = find_home(model, frames[canonical.report.tip], lower, upper)
-    findings = (*canonical.report.findings, *_assumed(model, given, home, M_bar))
+    home, told = _home_of(canonical, lower, upper)
+    if home is None:
+        home = find_home(model, frames[canonical.report.tip], lower, upper)
+    strange = _strange_inertias(model, chain_length(model, frames[canonical.report.tip]))
+    findings = (*canonical.report.findings, *told, *strange, *_assumed(model, given, home, M_bar))
     return Robot(
         name=canonical.name,
         model=model,
@@ -125,10 +132,46 @@ def _robot(canonical: Canonical) -> Robot | None:
     )
 
 
+def _strange_inertias(model: pin.Model, length: float) -> Iterator[Finding]:
+    """Yields a note for each body whose inertia, kg·m², cannot be that of its mass in an arm of this length,
+    m: the radius of gyration is larger than the arm."""
+    for joint in range(1, model.njoints):
+        body = model.inertias[joint]
+        radius = math.sqrt(float(np.linalg.eigvalsh(body.inertia)[-1]) / body.mass)
+        if radius > length > 0.0:
+            text = (
+                f"the inertia of what it moves is as if its mass were {radius:.2g} m from its centre, and "
+                f"the arm is {length:.2g} m long: check its unit (kg·m²)"
+            )
+            yield Finding("note", f"joint '{model.names[joint]}'", text)
+
+
+def _home_of(
+    canonical: Canonical, lower: np.ndarray, upper: np.ndarray
+) -> tuple[np.ndarray | None, tuple[Finding, ...]]:
+    """Returns the posture (n,), rad or m, from which the file says that the robot starts, and a note; None if
+    there is none, or if it is outside the limits."""
+    joints = _joints_of(canonical)
+    if any(joint.get(HOME) is None for joint in joints):
+        return None, ()
+    home = np.array([resting(joint) for joint in joints])
+    for joint, at, low, high in zip(joints, home, lower, upper, strict=True):
+        if not low - _ROUNDING <= at <= high + _ROUNDING:
+            text = f"{label(joint)} would be at {at:.4g}, outside its range [{low:.4g}, {high:.4g}]"
+            return None, (Finding("note", "home", f"that of the file is not used: {text}"),)
+    note = Finding("note", "home", "the robot starts from the posture of its file")
+    return np.clip(home, lower, upper), (note,)
+
+
+def _joints_of(canonical: Canonical) -> list[Element]:
+    """Returns the joints that move, in the order of the model."""
+    joints = {each.get("name"): each for each in etree.fromstring(canonical.text).iterfind("{*}joint")}
+    return [joints[name] for name in canonical.model.names[1:]]
+
+
 def _rotors_of(canonical: Canonical) -> np.ndarray:
     """Returns the rotor inertias, (n,) kg·m² or kg, that a canonical description gives; 0: none."""
-    joints = {each.get("name"): each for each in etree.fromstring(canonical.text).iterfind("{*}joint")}
-    given = [joints[name].find("{*}dynamics") for name in canonical.model.names[1:]]
+    given = [joint.find("{*}dynamics") for joint in _joints_of(canonical)]
     return np.array([0.0 if each is None else float(each.get("armature", "0")) for each in given])
 
 

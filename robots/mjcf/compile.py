@@ -32,11 +32,13 @@ files."""
 
 @dataclass(frozen=True)
 class Compiled:
-    """A compiled model, the files of its meshes by their names, and what was noted."""
+    """A compiled model, the files of its meshes by their names, the name and the text of `qpos` of each key
+    posture, and what was noted."""
 
     name: str
     model: mujoco.MjModel
     meshes: dict[str, Path]
+    keys: tuple[tuple[str, str], ...]
     findings: tuple[Finding, ...]
 
 
@@ -52,6 +54,7 @@ def compiled_mjcf(
     _include(root, source, folder, within)
     if next(root.iter("attach", "model"), None) is not None:
         raise Refusal(source, "it attaches other models; give the whole model (MuJoCo's `MjSpec.to_xml`)")
+    keys = tuple((key.get("name", ""), key.get("qpos", "")) for key in root.iterfind("keyframe/key"))
     for tag in _UNUSED:
         for element in [*root.iter(tag)]:
             _remove(element)
@@ -77,7 +80,7 @@ def compiled_mjcf(
     text = f"{len(missing)} mesh file(s) not found ({listed(missing.values())})"
     text += "" if folder else "; a zip of the robot's folder brings them along"
     found = (*found, Finding("note", "meshes", text)) if missing else found
-    return Compiled(spec.modelname, model, meshes, found)
+    return Compiled(spec.modelname, model, meshes, keys, found)
 
 
 def _parsed(data: bytes, source: str) -> Element:

@@ -17,6 +17,7 @@ from robots.errors import shortened
 from robots.mjcf.compile import Compiled, compiled_mjcf
 from robots.report import Finding
 from robots.urdf.read import Refusal
+from robots.urdf.structure import HOME
 
 _TIP = re.compile(r"attach|grip|grasp|tcp|tool|pinch|flange|(^|_)(tip|ee|eef)(_|$)|end_?eff", re.IGNORECASE)
 _CUBE = (np.pi / 6.0) ** (1.0 / 3.0)
@@ -31,7 +32,7 @@ _FREE, _BALL, _SLIDE, _HINGE = (
 def as_urdf(
     data: bytes, source: str, folder: Path | None = None, within: Path | None = None
 ) -> tuple[bytes, tuple[Finding, ...]]:
-    """Returns a URDF with the bodies, joints, inertias, limits, rotor inertias and shapes of an MJCF
+    """Returns a URDF with the bodies, joints, inertias, limits, rotor inertias, shapes and home of an MJCF
     document, and what was left out.
 
     A link has the frame of its body, and a joint has MuJoCo's value. The arguments are those of
@@ -44,8 +45,9 @@ def as_urdf(
     for body in kept:
         _add_link(root, model, body, found.meshes)
     followed = dict(_followed(model))
+    home, why_not = _home(found)
     for body in kept[1:]:
-        _add_joints(root, model, body, followed)
+        _add_joints(root, model, body, followed, home)
     links = {link.get("name") for link in root.iter("link")}
     for site in range(model.nsite):
         name, body = model.site(site).name, int(model.site_bodyid[site])
@@ -53,7 +55,8 @@ def as_urdf(
             etree.SubElement(root, "link", name=name)
             at = _placement(model.site_pos[site], model.site_quat[site])
             _joint(root, f"site {name}", _name(model, body), name, at, "fixed")
-    return etree.tostring(root), (*found.findings, *_left_out(found, source, kept, followed))
+    noted = (Finding("note", "home", f"{why_not}: another home was chosen"),) if why_not else ()
+    return etree.tostring(root), (*found.findings, *noted, *_left_out(found, source, kept, followed))
 
 
 def _name(model: mujoco.MjModel, body: int) -> str:
@@ -134,8 +137,30 @@ def _solids(model: mujoco.MjModel, geom: int, meshes: dict[str, Path]) -> Iterat
                 yield at * moved.inverse(), etree.Element("mesh", filename=str(path), scale=scale)
 
 
+def _home(found: Compiled) -> tuple[np.ndarray | None, str]:
+    """Returns the posture `qpos` from which the robot starts: the key posture `home`, or the only one. If
+    there are key postures and none is used, a sentence says why."""
+    chosen = [each for each in found.keys if each[0] == "home"] or [*found.keys]
+    if not chosen:
+        return None, ""
+    name, text = chosen[0]
+    if len(chosen) > 1 and name != "home":
+        return None, f"none of its {len(chosen)} key postures is called 'home'"
+    try:
+        values = np.array([float(word) for word in text.split()]) if text.strip() else found.model.qpos0
+    except ValueError:
+        values = np.zeros(0)
+    if values.shape != (found.model.nq,) or not np.isfinite(values).all():
+        return None, f"its key posture '{shortened(name)}' has not {found.model.nq} finite numbers"
+    return values, ""
+
+
 def _add_joints(
-    root: Element, model: mujoco.MjModel, body: int, followed: dict[int, tuple[int, float, float]]
+    root: Element,
+    model: mujoco.MjModel,
+    body: int,
+    followed: dict[int, tuple[int, float, float]],
+    home: np.ndarray | None,
 ) -> None:
     """Adds the joints between a body and its parent. In MuJoCo a body may have several, each with an anchor
     of its own; a URDF needs a link after each, which gets the least mass that a simulator can use."""
@@ -159,6 +184,8 @@ def _add_joints(
         joint = _joint(
             root, label, parent, child, at * anchor * motion, "prismatic" if slides else "revolute"
         )
+        if home is not None:
+            joint.set(HOME, _text(home[model.jnt_qposadr[k]]))
         etree.SubElement(joint, "axis", xyz=_text(axis))
         limit = etree.SubElement(joint, "limit", velocity="0", effort=_text(_effort(model, k)))
         if model.jnt_limited[k]:

@@ -17,7 +17,7 @@ from robots.meshes.files import localise
 from robots.report import Finding, ImportReport
 from robots.urdf.hold import MAX_JOINTS, held_by_name, hold_what_does_not_move
 from robots.urdf.inertials import ASSUMED, repair_inertials
-from robots.urdf.joints import normalise_joints
+from robots.urdf.joints import HELD, hold_followers, normalise_joints
 from robots.urdf.limits import fill_efforts, fill_speeds, fit_masses
 from robots.urdf.read import Refusal, named, parse, without_shapes
 from robots.urdf.shapes import remove_unusable_shapes
@@ -76,6 +76,7 @@ def canonicalise(
     if refused_by(
         lambda _: told,
         lambda tree: hold_what_does_not_move(tree, chosen),
+        hold_followers,
         lambda tree: _check_freedom(tree, source),
         repair_inertials,
         fill_speeds,
@@ -87,6 +88,8 @@ def canonicalise(
         findings.extend(fit_masses(root, _model(root)))
         for inertial in root.iterfind("link/inertial"):
             inertial.attrib.pop(ASSUMED, None)
+        for joint in root.iterfind("joint"):
+            joint.attrib.pop(HELD, None)
         model = _model(root)
         findings.extend(fill_efforts(root, model))
     except Refusal as refusal:

@@ -13,7 +13,7 @@ from robots.errors import InputError, shortened, unknown_name
 from robots.report import Finding
 from robots.urdf.joints import freeze
 from robots.urdf.read import end_of, label, named
-from robots.urdf.structure import chains, movable_joints
+from robots.urdf.structure import chains, followers, movable_joints, resting
 from robots.urdf.tip import not_legs
 
 MAX_JOINTS = 20
@@ -24,36 +24,38 @@ _EXAMPLE = "a pattern describes a whole name, such as '.*{}.*'"
 
 def held_by_name(root: Element, patterns: tuple[str, ...]) -> dict[str, tuple[float, str]]:
     """Returns the moving joints that the patterns "REGEX" and "REGEX=VALUE" hold, as name → (value, reason);
-    the value is in rad or m, and 0 if a pattern has none. If several patterns fit a joint, the last is used.
+    the value is in rad or m; without one, it is that of the file's home, or 0. If several patterns fit a
+    joint, the last is used.
 
     Raises InputError for a pattern that is not a regular expression, or that is the whole name of no moving
     joint.
     """
-    names = [joint.get("name", "") for joint in movable_joints(root)]
+    joints = {joint.get("name", ""): joint for joint in (*movable_joints(root), *followers(root))}
     held: dict[str, tuple[float, str]] = {}
     for text in patterns:
         pattern, value = _parts(text)
         try:
-            found = [name for name in names if re.fullmatch(pattern, name)]
+            found = [name for name in joints if re.fullmatch(pattern, name)]
         except (re.error, OverflowError, RecursionError) as error:
             raise InputError(
                 f"The pattern '{shortened(pattern)}' of joints to hold is not a regular expression: {error}."
             ) from None
         if not found:
             example = _EXAMPLE.format(shortened(pattern, 20))
-            raise unknown_name("moving joint with the name or pattern", pattern, names, example)
-        held.update((name, (value, f"'{shortened(text)}' holds it")) for name in found)
+            raise unknown_name("moving joint with the name or pattern", pattern, list(joints), example)
+        reason = f"'{shortened(text)}' holds it"
+        held.update((name, (resting(joints[name]) if value is None else value, reason)) for name in found)
     return held
 
 
-def _parts(text: str) -> tuple[str, float]:
+def _parts(text: str) -> tuple[str, float | None]:
     pattern, _, value = text.rpartition("=")
     try:
         number = float(value)
     except ValueError:
-        return text, 0.0
+        return text, None
     if not pattern:
-        return text, 0.0
+        return text, None
     if not math.isfinite(number):
         raise InputError(f"'{shortened(text)}' holds a joint at {number}: give a finite number of rad or m.")
     return pattern, number
@@ -77,8 +79,9 @@ def hold_what_does_not_move(root: Element, tip: str) -> Iterator[Finding]:
             first = next(each for each in carried[end_of(joint, "child")] if each not in kept)
             groups.setdefault(end_of(moving[first], "parent"), []).append(name)
     for body, names in groups.items():
-        told = [freeze(moving[name], 0.0, "").text for name in names]
-        where = "at 0" if all(text.startswith("held at 0 ") for text in told) else "near 0"
+        told = [freeze(moving[name], resting(moving[name]), "").text for name in names]
+        where = "near 0" if all(resting(moving[name]) == 0.0 for name in names) else "as in the file's home"
+        where = "at 0" if all(text.startswith("held at 0 ") for text in told) else where
         first, last = shortened(names[0]), shortened(names[-1])
         which = (
             f"1 joint that it carries ({first}) does"

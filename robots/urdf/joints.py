@@ -1,5 +1,5 @@
-"""Normalises the joints of a URDF: axes get unit length, `continuous` joints become revolute, gripper and
-mimic joints become fixed."""
+"""Normalises the joints of a URDF: axes get unit length, `continuous` joints become revolute, joints of
+grippers become fixed, and so do joints that follow (mimic) another one, where their leader puts them."""
 
 from __future__ import annotations
 
@@ -15,12 +15,14 @@ from lxml.etree import _Element as Element
 from robots.errors import shortened
 from robots.report import Finding
 from robots.urdf.read import UNLIMITED, Refusal, end_of, label, limit_value, named, numbers, placement
-from robots.urdf.structure import MOVABLE, movable_joints, parent_joints
+from robots.urdf.structure import followers, movable_joints, parent_joints, resting
 
 UNBOUNDED = UNLIMITED  # limit of a joint without limits, so that nq = nv; it is read as ±inf
 _TURNS = 4.0 * math.pi  # rad: no arm's joint turns further, but a limit in degrees says so
 _GRIPPER_JOINT = re.compile(r"finger|knuckle|gripper|thumb|jaw", re.IGNORECASE)
 _GRIPPER_LINK = re.compile(r"finger|knuckle|thumb", re.IGNORECASE)  # "gripper" also names whole hands
+HELD = "held"
+"""Attribute with the value at which a joint was made fixed; the canonical form does not have it."""
 
 
 def normalise_joints(root: Element, held: dict[str, tuple[float, str]]) -> Iterator[Finding]:
@@ -36,6 +38,7 @@ def normalise_joints(root: Element, held: dict[str, tuple[float, str]]) -> Itera
     for joint in root.findall("joint"):
         try:
             placement(joint)
+            joint.attrib.pop(HELD, None)
             _drop(joint, "calibration", "safety_controller")
             if joint.get("type") == "fixed":
                 _drop(joint, "limit", "axis", "mimic", "dynamics")
@@ -45,7 +48,7 @@ def normalise_joints(root: Element, held: dict[str, tuple[float, str]]) -> Itera
             yield from _limits(joint, joint in unlimited)
             if joint.get("name") in frozen:
                 yield freeze(joint, *frozen[joint.get("name", "")])
-            else:
+            elif joint.find("mimic") is None:
                 yield from _freeze_if_stuck(joint)
         except Refusal as refusal:
             yield refusal.finding
@@ -56,7 +59,7 @@ def freeze(joint: Element, value: float, reason: str) -> Finding:
     to the joint's origin."""
     limit = joint.find("limit")
     if limit is not None:
-        value = float(np.clip(value, float(limit.get("lower", "0")), float(limit.get("upper", "0"))))
+        value = float(np.clip(value, *_ends(limit)))
     axis = numbers(_require(joint, "axis"), "xyz", 3)
     if joint.get("type") == "prismatic":
         motion = pin.SE3(np.eye(3), axis * value)
@@ -71,40 +74,84 @@ def freeze(joint: Element, value: float, reason: str) -> Finding:
         origin.set("rpy", _text(pin.rpy.matrixToRpy(placed.rotation)))
     unit = "m" if joint.get("type") == "prismatic" else "rad"
     joint.set("type", "fixed")
+    joint.set(HELD, repr(value))
     _drop(joint, "limit", "axis", "mimic", "dynamics")
     return Finding("fixed", label(joint), f"held at {value:.4g} {unit}: {reason}")
 
 
+def hold_followers(root: Element) -> Iterator[Finding]:
+    """Fixes each joint that follows another one at multiplier · q + offset, where q is the value at which its
+    leader is held. If the leader moves, q is that of the file's home, or 0, within the leader's limits, and
+    the finding says that the motion is not simulated."""
+    joints, following = named(root, "joint"), {joint.get("name", ""): joint for joint in followers(root)}
+    moving = {joint.get("name", "") for joint in movable_joints(root)}
+    for first in list(following):
+        chain: dict[str, None] = {}
+        name = first
+        while name in following and name not in chain:
+            chain[name] = None
+            name = _leader(following[name])
+        for each in reversed(chain):
+            joint = following.pop(each)
+            leader = _leader(joint)
+            try:
+                yield freeze(joint, *_led(joint, leader, joints.get(leader), leader in moving))
+            except Refusal as refusal:
+                yield refusal.finding
+            if leader in moving:
+                moving.add(each)
+
+
+def _led(joint: Element, leader: str, leads: Element | None, moves: bool) -> tuple[float, str]:
+    """Returns the value of a joint that follows another one, rad or m, and the reason for the report."""
+    mimic = _require(joint, "mimic")
+    factor = float(numbers(mimic, "multiplier", 1, (1.0,))[0])
+    offset = float(numbers(mimic, "offset", 1, (0.0,))[0])
+    if leads is None or (leads.get("type") != "fixed" and leads.find("limit") is None):
+        q = 0.0
+    elif leads.get("type") == "fixed":
+        q = float(leads.get(HELD, "0"))
+    else:
+        q = float(np.clip(resting(leads), *_ends(_require(leads, "limit"))))
+    reason = f"it mimics '{shortened(leader)}'"
+    if moves:
+        reason = (
+            f"it should follow '{shortened(leader)}' with factor {factor:g}, which is not simulated: "
+            "what it carries moves differently on the real robot"
+        )
+    elif q != 0.0:
+        reason += f", which is held at {q:.4g}"
+    return factor * q + offset, reason
+
+
+def _leader(joint: Element) -> str:
+    return _require(joint, "mimic").get("joint", "")
+
+
 def _to_freeze(root: Element, held: dict[str, tuple[float, str]]) -> dict[str, tuple[float, str]]:
-    """Returns the joints that an arm controller does not move, as name → (value, reason). A joint that
-    mimics another is at the value that it has beside the held value of the other one, or beside 0."""
+    """Returns the joints that an arm controller does not move, as name → (value, reason)."""
     frozen = dict(held)
-    joints, carriers = named(root, "joint"), parent_joints(root)
-    for joint in movable_joints(root):
+    joints, moving = named(root, "joint"), movable_joints(root)
+    for joint in moving:
         name = joint.get("name", "")
-        mimic = joint.find("mimic")
-        if mimic is not None and name not in held:
-            offset = float(numbers(mimic, "offset", 1, (0.0,))[0])
-            factor = float(numbers(mimic, "multiplier", 1, (1.0,))[0])
-            leader = mimic.get("joint", "")
-            led = factor * held[leader][0] if leader in held else 0.0
-            reason = f"it mimics '{shortened(leader)}'"
-            moves = leader in joints and leader not in held and joints[leader].get("type") in MOVABLE
-            if moves and _same_chain(carriers, joint, joints[leader]):
-                reason = (
-                    f"it should follow '{shortened(leader)}' with factor {factor:g}, which is not simulated: "
-                    "what it carries moves differently on the real robot"
-                )
-            frozen[name] = (led + offset, reason)
-            if leader in joints and not _same_chain(carriers, joint, joints[leader]):
-                frozen.setdefault(leader, (0.0, f"'{name}' mimics it, so it drives a gripper"))
-        elif _GRIPPER_JOINT.search(name) or _GRIPPER_LINK.search(end_of(joint, "child")):
-            frozen.setdefault(name, (0.0, "by its name it belongs to a gripper"))
+        if _GRIPPER_JOINT.search(name) or _GRIPPER_LINK.search(end_of(joint, "child")):
+            frozen.setdefault(name, (resting(joint), "by its name it belongs to a gripper"))
+    carriers = parent_joints(root)
+    loaded = {  # joints that carry an arm
+        above.get("name", "")
+        for joint in moving
+        if joint.get("name") not in frozen
+        for above in _ancestors(carriers, end_of(joint, "parent"))
+    }
+    for joint in followers(root):
+        name, leader = joint.get("name", ""), _leader(joint)
+        pair = {name, leader}
+        if leader in joints and not pair & loaded and not _same_chain(carriers, joint, joints[leader]):
+            frozen.setdefault(
+                leader, (resting(joints[leader]), f"'{name}' mimics it, so it drives a gripper")
+            )
     # The robot may be a hand without an arm: if no other joints move, joints with gripper names stay movable.
-    if len(frozen) == len(movable_joints(root)):
-        asked = (name for name in frozen if name in held or joints[name].find("mimic") is not None)
-        frozen = {name: frozen[name] for name in asked}
-    return frozen
+    return dict(held) if {joint.get("name", "") for joint in moving} <= frozen.keys() else frozen
 
 
 def _same_chain(carriers: dict[str, Element], one: Element, other: Element) -> bool:
@@ -145,7 +192,8 @@ def _without_range(root: Element) -> list[Element]:
         except Refusal:
             return False
 
-    joints = [joint for joint in movable_joints(root) if joint.get("type") != "continuous"]
+    every = (*movable_joints(root), *followers(root))
+    joints = [joint for joint in every if joint.get("type") != "continuous"]
     zero = [joint for joint in joints if is_zero(joint)]
     return zero if 2 * len(zero) > len(joints) else []
 
@@ -199,11 +247,15 @@ def _keep_armature(joint: Element) -> None:
 
 
 def _freeze_if_stuck(joint: Element) -> Iterator[Finding]:
-    limit = _require(joint, "limit")
-    lower, upper = float(limit.get("lower", "0")), float(limit.get("upper", "0"))
+    lower, upper = _ends(_require(joint, "limit"))
     if upper - lower < 1e-6:
         reason = "its limits allow no motion; set lower and upper to let it move"
         yield freeze(joint, 0.5 * (lower + upper), reason)
+
+
+def _ends(limit: Element) -> tuple[float, float]:
+    """Returns the ends of a joint's range, which `_limits` has written, rad or m."""
+    return float(limit.get("lower", "0")), float(limit.get("upper", "0"))
 
 
 def _require(joint: Element, tag: str) -> Element:

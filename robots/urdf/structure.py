@@ -19,6 +19,9 @@ MAX_DEPTH = 200
 """Largest number of joints in a chain. Readers of URDF are recursive functions, with one call per joint of a
 chain."""
 MAX_NAME = 100
+HOME = "home"
+"""Attribute of a joint with its value in the posture from which the robot starts, rad or m. Other readers
+ignore it."""
 MOVABLE = ("revolute", "continuous", "prismatic")
 _KNOWN = (*MOVABLE, "fixed", "floating", "planar")
 _GUESSES = 5
@@ -37,8 +40,28 @@ def check_structure(root: Element, source: str) -> Iterator[Finding]:
 
 
 def movable_joints(root: Element) -> list[Element]:
-    """Returns the joints that are not fixed, in the file's order."""
-    return [joint for joint in root.findall("joint") if joint.get("type") in MOVABLE]
+    """Returns the joints that are neither fixed nor follow another joint, in the file's order."""
+    return [joint for joint in root.findall("joint") if _moves(joint)]
+
+
+def followers(root: Element) -> list[Element]:
+    """Returns the joints that follow (mimic) another joint and are not fixed, in the file's order."""
+    joints = (joint for joint in root.findall("joint") if joint.get("type") in MOVABLE)
+    return [joint for joint in joints if joint.find("mimic") is not None]
+
+
+def resting(joint: Element) -> float:
+    """Returns the value at which a joint stands if nobody gives another one, rad or m: that of the file's
+    home, or 0."""
+    try:
+        value = float(joint.get(HOME, "0"))
+    except ValueError:
+        return 0.0
+    return value if abs(value) < 1e6 else 0.0  # false for NaN
+
+
+def _moves(joint: Element) -> bool:
+    return joint.get("type") in MOVABLE and joint.find("mimic") is None
 
 
 def parent_joints(root: Element) -> dict[str, Element]:
@@ -57,7 +80,7 @@ def chains(root: Element) -> dict[str, tuple[str, ...]]:
             at = end_of(carriers[at], "parent")
         below = found.setdefault(at, ())
         for each in reversed(passed):
-            if carriers[each].get("type") in MOVABLE:
+            if _moves(carriers[each]):
                 below = (*below, carriers[each].get("name", ""))
             found[each] = below
     return {link: found[link] for link in named(root, "link")}

@@ -69,6 +69,20 @@ def test_a_robot_of_two_tonnes_follows_and_a_small_one_keeps_the_printed_weights
     assert hold_robot(load_robot("panda")).settings.R_on == "torque"
 
 
+def test_a_drag_does_not_end_at_a_position_limit() -> None:
+    """The controller stays 7 mrad away from a limit: each joint has at least 20 mrad left at the target."""
+    text = (FIELD / "mimic_in_chain.urdf").read_text()
+    motion = dragged(load_urdf_text(text.replace('lower="-2" upper="2"', 'lower="-0.175" upper="0.175"')))
+    assert motion.follows, str(motion)
+
+
+def test_the_verdict_says_why_a_robot_does_not_follow() -> None:
+    """An arm with links of 1 kg has motors of 1 N m: it cannot hold itself; the verdict names them."""
+    text = (FIELD / "mimic_in_chain.urdf").read_text()
+    told = str(dragged(load_urdf_text(text.replace('effort="50"', 'effort="1"'))))
+    assert "mm away" in told and "'j2' at the torque limit" in told, told
+
+
 def test_what_is_not_good_is_said() -> None:
     assert str(Motion(0.0)).startswith("not dragged: no target")
     late = Motion(0.1, 0.01, 0.0, 1.0, 0.5, rest=False)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from arms import humanoid, joint, link, load, two_joint_arm
 
-from robots import InputError, load_robot, load_urdf_text
+from robots import InputError, Robot, load_robot, load_urdf_text
 from robots.urdf import canonicalise
 
 FIELD = Path(__file__).parent / "field"
@@ -153,6 +153,75 @@ def test_a_joint_that_should_follow_another_is_held_and_the_report_says_what_is_
     assert "not simulated" not in str(both.report.findings)
     np.testing.assert_allclose(
         both.model.frames[both.frame_id("link3")].placement.rotation, np.eye(3), atol=1e-12
+    )
+
+
+def test_an_inertia_in_another_unit_is_reported() -> None:
+    """1 kg with 200 kg m2 would be 14 m away from its centre; the arm is 0.3 m long."""
+    text = ARM.replace('ixx="0.01" iyy="0.02" izz="0.02"', 'ixx="100" iyy="200" izz="200"', 1)
+    told = [str(each) for each in load_urdf_text(ARM.replace("0.01", "0.011")).report.findings]
+    assert "check its unit" not in str(told)
+    text = text[::-1].replace('"20.0"=zzi "20.0"=yyi "10.0"=xxi', '"002"=zzi "002"=yyi "001"=xxi', 1)[::-1]
+    assert "as if its mass were 14 m from its centre, and the arm is" in findings_of(text)
+
+
+def findings_of(text: str) -> str:
+    """Returns all findings of a robot that can be used."""
+    return " | ".join(map(str, load_urdf_text(text).report.findings))
+
+
+def turned(arm: Robot, frame: str) -> float:
+    """Returns the angle about y, rad, by which the file's joints have turned a frame that is held."""
+    R = arm.model.frames[arm.frame_id(frame)].placement.rotation
+    return float(np.arctan2(R[0, 2], R[2, 2]))
+
+
+MIMIC = '<limit lower="-2" upper="2"/><mimic joint="{}" multiplier="{}" offset="{}"/>'
+
+
+def test_followers_of_a_held_joint_are_where_it_puts_them() -> None:
+    """The limits move the driver of the gripper to 0.4 rad; a follower of a follower follows, too."""
+    inside = '<limit lower="0.4" upper="1" velocity="1" effort="1"/>'
+    gripper = (
+        joint("last", "f1", "f2", inside=MIMIC.format("other", 2, 0.1))
+        + joint("other", "l2", "f1", inside=MIMIC.format("drive", -0.5, 0.05))
+        + joint("drive", "l2", "f3", inside=inside)
+    )
+    hand = two_joint_arm("".join(map(link, ("f1", "f2", "f3"))) + gripper)
+    arm = load_urdf_text(hand)
+    assert arm.joint_names == ("j1", "j2")
+    assert turned(arm, "f3") == pytest.approx(0.4)
+    assert turned(arm, "f1") == pytest.approx(-0.15)
+    assert turned(arm, "f2") == pytest.approx(-0.15 - 0.2)
+    assert "joint 'other': held at -0.15 rad: it mimics 'drive', which is held at 0.4" in str(
+        [*map(str, arm.report.findings)]
+    )
+    assert turned(load_urdf_text(hand, hold=("drive=1",)), "f2") == pytest.approx(-0.45 - 0.8)
+
+
+def test_followers_are_placed_after_the_joints_that_do_not_move_the_tip_are_held() -> None:
+    """The fingers of a large hand are held because too many joints move: their followers are where they
+    belong, and no finding says that they should move."""
+    text = (FIELD / "arm_and_hand_21_joints.urdf").read_text()
+    follower = joint("knob", "h42", "knob", inside=MIMIC.format("f42", 3, 0))
+    assert 'name="f42"' in text
+    held = text.replace("</robot>", link("knob") + follower + "</robot>")
+    arm = load_urdf_text(held)
+    assert arm.n == 6
+    assert "not simulated" not in str(arm.report.findings)
+    assert "'knob'" in str(arm.report.of_kind("fixed"))
+
+
+def test_a_joint_that_carries_an_arm_moves_although_a_rod_follows_it() -> None:
+    """A palletising robot: a rod beside the upper arm keeps the hand level. It carries nothing, and the
+    joint that it follows is no gripper."""
+    rod = joint("rod", "l1", "bar", inside=MIMIC.format("j2", 1, 0))
+    arm = load_urdf_text(
+        two_joint_arm(link("l3") + joint("j3", "l2", "l3", axis="1 0 0") + link("bar") + rod)
+    )
+    assert arm.joint_names == ("j1", "j2", "j3")
+    assert "joint 'rod': held at 0 rad: it should follow 'j2' with factor 1" in str(
+        [*map(str, arm.report.findings)]
     )
 
 

@@ -159,6 +159,63 @@ def test_a_finger_that_follows_another_is_a_mimic_joint() -> None:
     assert "equality" not in str(robot.report.findings)
 
 
+def with_keys(*keys: str, text: str = ARM) -> str:
+    every = "".join(f"<key {key}/>" for key in keys)
+    return text.replace("</mujoco>", f"<keyframe>{every}</keyframe></mujoco>")
+
+
+START = (0.4, -0.3, 0.1, 0.7)
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [
+        ('name="rest" qpos="0 0 0 0"', 'name="home" qpos="0.4 -0.3 0.1 0.7" ctrl="1 2"'),
+        ('name="stand" qpos="0.4 -0.3 0.1 0.7"',),
+        ('qpos="0.4 -0.3 0.1 0.7"',),
+    ],
+    ids=["named home", "the only one", "without a name"],
+)
+def test_a_robot_starts_from_the_home_of_its_file(keys: tuple[str, ...]) -> None:
+    robot = loaded(with_keys(*keys))
+    np.testing.assert_array_equal(robot.home, START)
+    assert "note: home: the robot starts from the posture of its file" in [*map(str, robot.report.findings)]
+
+
+@pytest.mark.parametrize(
+    ("keys", "why"),
+    [
+        (('qpos="0.4 -0.3 0.3 0.7"',), "joint 'slide' would be at 0.3, outside its range [-0.1, 0.2]"),
+        (('name="home" qpos="0.4 -0.3 0.1"',), "its key posture 'home' has not 4 finite numbers"),
+        (('name="home" qpos="0.4 -0.3 nan 0"',), "its key posture 'home' has not 4 finite numbers"),
+        (('qpos="0 0 0 0"', 'qpos="1 1 0 0"'), "none of its 2 key postures is called 'home'"),
+    ],
+)
+def test_a_home_that_cannot_be_used_is_reported(keys: tuple[str, ...], why: str) -> None:
+    robot = loaded(with_keys(*keys))
+    np.testing.assert_array_equal(robot.home, loaded(ARM).home)
+    assert why in str([*map(str, robot.report.findings)])
+
+
+def test_held_joints_stand_at_the_home_of_the_file() -> None:
+    """The fingers of a gripper are open if they are open there."""
+    fingers = "".join(
+        f'<body name="{side}"><joint name="{side}_finger" type="slide" range="0 0.04"/><geom size="0.01"/>'
+        "</body>"
+        for side in ("left", "right")
+    )
+    text = ARM.replace('<site name="att', f'{fingers}<site name="att').replace(
+        "</mujoco>",
+        '<equality><joint joint1="left_finger" joint2="right_finger"/></equality></mujoco>',
+    )
+    robot = loaded(with_keys('name="home" qpos="0.4 -0.3 0.1 0.7 0.03 0.03"', text=text))
+    np.testing.assert_array_equal(robot.home, START)
+    for side in ("left", "right"):
+        at = robot.model.frames[robot.frame_id(side)].placement.translation
+        hand = robot.model.frames[robot.frame_id("hand")].placement
+        assert hand.actInv(at)[2] == pytest.approx(0.03)
+
+
 def brick(path: Path) -> None:
     """Writes a mesh without symmetry that is away from the origin."""
     corners = np.array([(0.1, 0, 0), (0.3, 0, 0), (0.1, 0.2, 0), (0.1, 0, 0.4)])
