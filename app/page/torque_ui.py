@@ -225,7 +225,7 @@ class TorqueFace:
         self._inside.draw(moment)
         q = moment.latest[context.ready.layout.fields["q"]]
         if self._turns is not None:
-            self._turns.draw(moment.t, q, moment.poses)
+            self._turns.draw(moment.t, q, moment.poses, moment.window)
         self._ellipsoids.draw(bool(self._start.ellipsoids.value), q, context.settings.levels)
         self._cover.draw(bool(self._start.cover.value))
 

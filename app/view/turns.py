@@ -5,26 +5,40 @@ from __future__ import annotations
 import numpy as np
 import viser
 
+from app.client.decimated import PlotWindow
+
 _BEGIN = 0.05
 """Simulated time, s, until which the robot counts as being at its start."""
 
 
 class JointTurns:
-    """A label at each joint, such as "3: 12°"; without labels until the start of a run was seen."""
+    """A label at each joint, such as "3: 12°"; no labels if the recording does not contain the start."""
 
     def __init__(self, scene: viser.SceneApi, joints: int) -> None:
         self._labels = [scene.add_label(f"/turn/{k}", "", visible=False) for k in range(1, joints + 1)]
         self._start: np.ndarray | None = None
 
-    def draw(self, t: float, q: np.ndarray, poses: np.ndarray) -> None:
-        """t: simulated time, s; q: (n,) rad; poses: (n + 1, 7), of the joints and the tip."""
+    def draw(self, t: float, q: np.ndarray, poses: np.ndarray, window: PlotWindow) -> None:
+        """t: simulated time, s; q: (n,) rad; poses: (n + 1, 7), of the joints and the tip; window: the recording
+        up to this time."""
         if t < _BEGIN:
-            self._start = np.array(q)
-        if self._start is None:
-            return
-        for k, (label, turn) in enumerate(zip(self._labels, np.degrees(q - self._start), strict=True)):
-            label.visible = t >= _BEGIN
-            label.position = tuple(poses[k, :3])
-            text = f"{k + 1}: {abs(turn):.{0 if abs(turn) >= 10 else 1}f}°"
+            self._start = None
+        elif self._start is None:
+            self._start = _start_of(window)
+        start = self._start if np.isfinite(q).all() else None
+        for k, label in enumerate(self._labels):
+            if label.visible != (start is not None):
+                label.visible = start is not None
+            if start is None:
+                continue
+            turn = abs(np.degrees(q[k] - start[k]))
+            text = f"{k + 1}: {turn:.{0 if turn >= 10 else 1}f}°"
             if label.text != text:
                 label.text = text
+            label.position = tuple(poses[k, :3])
+
+
+def _start_of(window: PlotWindow) -> np.ndarray | None:
+    fields = window.layout.fields
+    early = np.flatnonzero(window.columns(fields["t"])[:, 0] < _BEGIN)
+    return window.columns(fields["q"])[early[0]] if len(early) else None
