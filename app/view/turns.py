@@ -19,8 +19,8 @@ class JointTurns:
         self._start: np.ndarray | None = None
 
     def draw(self, t: float, q: np.ndarray, poses: np.ndarray, window: PlotWindow) -> None:
-        """t: simulated time, s; q: (n,) rad; poses: (n + 1, 7), of the joints and the tip; window: the recording
-        up to this time."""
+        """t: simulated time, s; q: (n,) rad; poses: (n + 1, 7), of the joints and the tip; window: the
+        recording up to this time."""
         if t < _BEGIN:
             self._start = None
         elif self._start is None:
