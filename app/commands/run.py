@@ -40,8 +40,9 @@ def run(
         urdf: robot for the scene "hold": a URDF or MuJoCo model (.xml), a folder or zip with one, or a name
             of the catalog.
         tip: end-effector frame, for the scene "hold".
-        hold: hold the joints with this name or regular expression at 0, or with PATTERN=VALUE at VALUE (rad
-            or m), for the scene "hold"; e.g. --hold 'left_.*' --hold gripper_joint=0.02.
+        hold: hold the joints with this name or regular expression where the file's home has them, or at 0;
+            with PATTERN=VALUE at VALUE (rad or m). For the scene "hold"; e.g. --hold 'left_.*' --hold
+            gripper_joint=0.02.
         controller: controller to use instead of the scene's own: a name (see himpc-lab controllers) or a
             Python file of your own.
         task: Python file with a task of your own, for a --state whose stack contains this task. With

@@ -51,8 +51,8 @@ def serve(
         task: Python file with a task of your own, which can then be added to the stack.
         urdf: your own robot: a URDF or MuJoCo model (.xml), or a folder or zip with one.
         tip: end-effector frame of that robot.
-        hold: hold the joints of that robot with this name or regular expression at 0, or with PATTERN=VALUE
-            at VALUE (rad or m).
+        hold: hold the joints of that robot with this name or regular expression where the file's home has
+            them, or at 0; with PATTERN=VALUE at VALUE (rad or m).
         state: a state code, as the page shows it; the page gets its scene, robot, settings, seed, lesson and
             step.
         max_sessions: number of people who may use the page at once, each with a robot of their own.
