@@ -122,7 +122,7 @@ def test_a_phone_asks_first_then_plots(browser: Browser) -> None:
         option = page.get_by_role("button", name=re.compile("one or two"))
         go, idea = (
             page.get_by_role("button", name="Run (answer first)"),
-            page.get_by_text("seven joints").last,
+            page.get_by_text("The arm has seven joints").last,
         )
         assert_order(page.get_by_text("Predict:"), option, go, idea, page.get_by_text("Paused", exact=True))
         box = go.bounding_box()
