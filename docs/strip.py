@@ -6,8 +6,6 @@ python -m docs.strip
 
 from __future__ import annotations
 
-import io
-
 from matplotlib.font_manager import findfont
 from PIL import Image, ImageDraw, ImageFont
 from playwright.sync_api import Browser, Page, expect, sync_playwright
@@ -16,7 +14,7 @@ from app.link.choice import SceneChoice
 from app.web.server import PageServer
 from browsing.browser_actions import CHROMIUM_ARGS, SELDOM, SLOW, find_chromium, open_page, press, tab
 from browsing.lessons import expect_part, hurry, open_lesson, predict, run
-from docs.gallery import ROOT
+from docs.gallery import ROOT, look
 from lessons.course import load_lesson
 from lessons.scenes.run_spec import RunSpec
 
@@ -31,31 +29,29 @@ def shots(browser: Browser, server: PageServer, device: str) -> list[tuple[str, 
     """Returns the pictures of a device with their titles."""
     width, height, scale = SIZES[device]
     page = open_page(browser, server.link, width, height, scale=1.0, rest=SELDOM)
-    found = [("first start", _look(page, scale))]
+    found = [("first start", _small(page, scale))]
     tab(page, "Tasks")
     page.get_by_role("button", name="⋯").first.click()
-    found.append(("Tasks", _look(page, scale)))
+    found.append(("Tasks", _small(page, scale)))
     for name in LESSONS:
         lesson = load_lesson(name)
         open_lesson(page, lesson)
         step = lesson.steps[0]
         expect_part(page, lesson, step)
         if name == LESSONS[0]:
-            found.append((f"{lesson.card.title}: the question", _look(page, scale)))
+            found.append((f"{lesson.card.title}: the question", _small(page, scale)))
         assert step.prediction is not None
         predict(page, step.prediction)
         hurry(page)
         run(page)
         press(page, "Pause")
-        found.append((f"{lesson.card.title}: the answer", _look(page, scale)))
+        found.append((f"{lesson.card.title}: the answer", _small(page, scale)))
     page.context.close()
     return [(f"{device}, {title}", picture) for title, picture in found]
 
 
-def _look(page: Page, scale: float) -> Image.Image:
-    page.mouse.move(5, 300)  # at other positions the mouse would show a hint
-    page.wait_for_timeout(2500)
-    screen = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+def _small(page: Page, scale: float) -> Image.Image:
+    screen = look(page)
     size = (round(screen.width * scale), round(screen.height * scale))
     return screen.resize(size, Image.Resampling.LANCZOS)
 
