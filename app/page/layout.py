@@ -140,8 +140,10 @@ class Stage:
             )
         with learn if exercise is None else robot:
             self._face.add_start(gui)
+        # The levels also stand over the scene, so that a learner who reads can see and swap them.
+        strip = None if narrow else gui.add_panel()
         with tasks:
-            self._face.add_tasks(gui)
+            self._face.add_tasks(gui, None if strip is None else strip.add_tab("Levels"))
         with control:
             self._face.add_control(gui)
         with robot:
@@ -165,6 +167,8 @@ class Stage:
         if isinstance(plots, viser.PanelHandle):
             plots.dock_left()
             plots.set_width(400)
+        if strip is not None:
+            strip.float(x=8.0, y=8.0, width=320.0)
 
     def _toggle(self, place: int) -> None:
         event = self._face.toggle(place)

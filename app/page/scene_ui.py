@@ -72,8 +72,9 @@ class Face(Protocol):
         """Adds what to try first: the target, pushes, what is drawn."""
         ...
 
-    def add_tasks(self, gui: viser.GuiApi) -> None:
-        """Adds the levels and what stands with them."""
+    def add_tasks(self, gui: viser.GuiApi, strip: viser.GuiTabHandle | None) -> None:
+        """Adds the levels and what stands with them; the rows of the levels also to the tab `strip` of a
+        panel over the scene."""
         ...
 
     def add_control(self, gui: viser.GuiApi) -> None:

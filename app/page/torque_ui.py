@@ -60,7 +60,7 @@ class TorqueFace:
         self._start.on_theme = context.theme
         self._start.on_recall = self._recall
 
-    def add_tasks(self, gui: viser.GuiApi) -> None:
+    def add_tasks(self, gui: viser.GuiApi, strip: viser.GuiTabHandle | None) -> None:
         context, ready = self._context, self._context.ready
         self._tasks = TasksPanel(
             gui,
@@ -71,6 +71,7 @@ class TorqueFace:
             lambda: self._context.settings,
             self._targets_now,
             in_lesson=ready.choice.exercise is not None,
+            strip=strip,
         )
         self._horizon = HorizonPanel(
             context.client, context.in_view, context.bindings, context.settings, ready.robot

@@ -69,9 +69,9 @@ class VelocityFace:
         self._begin.on_obstacle = self._add_obstacle
         self._begin.on_clear = self._clear_ball
 
-    def add_tasks(self, gui: viser.GuiApi) -> None:
+    def add_tasks(self, gui: viser.GuiApi, strip: viser.GuiTabHandle | None) -> None:
         context, settings, colours = self._context, self._context.settings, self._context.colours
-        self._roles = RolesPanel(gui, context.bindings, settings, colours, self._settings)
+        self._roles = RolesPanel(gui, context.bindings, settings, colours, self._settings, strip)
         self._mission = MissionPanel(
             gui,
             self._points,

@@ -34,7 +34,7 @@ _TURN, _WAY = np.pi, 2.0
 
 
 class LevelCard:
-    """The row of one level, with its settings."""
+    """The row of one level, with its settings; over the scene the same row without settings."""
 
     def __init__(
         self,
@@ -50,22 +50,21 @@ class LevelCard:
         press: Callable[[str, str], None],
         opened: bool,
         unfolded: bool,
+        strip: viser.GuiFolderHandle | None,
     ) -> None:
         """targets: returns the present targets, which `moves` shows; press: called with the name of the level
         and the button that was pressed; opened: whether its settings are open; unfolded: whether the controls
-        that edit the tasks are unfolded."""
+        that edit the tasks are unfolded; strip: the place over the scene."""
         name = self.name = level.name
-        hint = f"On or off: key {place + 1}. ▲ ▼: priority. ⋯: gains, weights and tasks of this level"
-        self._row = LevelRow(
-            gui,
-            name,
-            colours.get(name, BOUND),
-            (ON if level.enabled else OFF, UP, DOWN),
-            hint,
-            partial(press, name),
-            opened or unfolded,
-        )
-        with self._row.details:
+        hint = f"On or off: key {place + 1}. ▲ ▼: priority"
+        colour, buttons = colours.get(name, BOUND), (ON if level.enabled else OFF, UP, DOWN)
+        settings_hint = f"{hint}. ⋯: gains, weights and tasks of this level"
+        row = LevelRow(gui, name, colour, buttons, settings_hint, partial(press, name), opened or unfolded)
+        self._rows = [row]
+        if strip is not None:
+            with strip:
+                self._rows.append(LevelRow(gui, name, colour, buttons, hint, partial(press, name), None))
+        with row.details:
             controls = Controls(gui, bindings, settings)
             controls.add(f"levels.{name}.Q", f"levels.{name}.R")
             for task in level.tasks:
@@ -86,16 +85,17 @@ class LevelCard:
         fallback = now.number(f"rung/{level.name}")
         failed = level.enabled and fallback == fallback and fallback > 0
         found = now.status.ranks.get(level.name)
-        self._row.update(
-            place,
-            f"{place + 1} · {level.name}",
-            level.enabled,
-            max((value for _, value, _ in errors), default=0.0),
-            error_in_words(errors),
-            "" if found is None or not level.enabled else f"{found[0]} of {found[1]} free",
-            _rank(found),
-            FALLBACKS[int(fallback)] if failed else "",
-        )
+        for row in self._rows:
+            row.update(
+                place,
+                f"{place + 1} · {level.name}",
+                level.enabled,
+                max((value for _, value, _ in errors), default=0.0),
+                error_in_words(errors),
+                "" if found is None or not level.enabled else f"{found[0]} of {found[1]} free",
+                _rank(found),
+                FALLBACKS[int(fallback)] if failed else "",
+            )
 
 
 def _rank(found: tuple[int, int] | None) -> str:
@@ -198,13 +198,15 @@ class TasksPanel:
         current: Callable[[], TorqueSettings],
         targets: Callable[[], Targets],
         in_lesson: bool,
+        strip: viser.GuiTabHandle | None,
     ) -> None:
         """bindings: for controls that exist in every stack; loop: viser's event loop; current, targets:
-        return the present settings and targets; in_lesson: true if a lesson forbids other stacks."""
+        return the present settings and targets; in_lesson: true if a lesson forbids other stacks; strip: the
+        tab of a panel over the scene, which shows the rows, too."""
         self._gui, self._loop, self._colours = gui, loop, colours
         self._current, self._targets = current, targets
         self._robot, self._in_lesson = robot, in_lesson
-        self._post, self._edited = bindings.post, ""
+        self._post, self._edited, self._strip = bindings.post, "", strip
         self._open: set[str] = set()
         gui.add_html(block("Each level gets the freedom that the levels above leave."), order=-1.0)
         self._place = gui.add_folder(None, order=0.0)
@@ -235,6 +237,10 @@ class TasksPanel:
         self._moves: Bindings[Targets] = Bindings(self._post, self._loop)
         with self._place:
             self._levels = self._gui.add_folder(None)
+        self._rows_over_scene: viser.GuiFolderHandle | None = None
+        if self._strip is not None:
+            with self._strip:
+                self._rows_over_scene = self._gui.add_folder(None)
         with self._levels:
             self._cards = [
                 LevelCard(
@@ -250,6 +256,7 @@ class TasksPanel:
                     self._press,
                     opened=level.name in self._open,
                     unfolded=any(task.name == self._edited for task in level.tasks),
+                    strip=self._rows_over_scene,
                 )
                 for place, level in enumerate(settings.levels)
             ]
@@ -275,6 +282,8 @@ class TasksPanel:
         """Shows the new stack."""
         self.close()
         self._levels.remove()
+        if self._rows_over_scene is not None:
+            self._rows_over_scene.remove()
         self._build(self._current())
 
     @property

@@ -29,14 +29,16 @@ class RolesPanel:
         settings: VelocitySettings,
         colours: dict[str, RGB],
         current: Callable[[], VelocitySettings],
+        strip: viser.GuiTabHandle | None,
     ) -> None:
+        """strip: the tab of a panel over the scene, which shows the rows, too."""
         self._current = current
         self._order = tuple(level.name for level in settings.levels)
         self._enabled: dict[str, PendingEdit[bool]] = {name: PendingEdit() for name in self._order}
         gui.add_html(block("The mission below sets the order of the levels."), order=-1.0)
         self._cards = [
-            _Card(gui, bindings, settings, level, colours[level.name], place, self._switch)
-            for place, level in enumerate(settings.levels)
+            _Card(gui, bindings, settings, level, colours[level.name], self._switch, strip)
+            for level in settings.levels
         ]
 
     def toggle(self, place: int) -> Set | None:
@@ -69,8 +71,8 @@ class _Card:
         settings: VelocitySettings,
         level: Level,
         colour: RGB,
-        place: int,
         switch: Callable[[str], Set],
+        strip: viser.GuiTabHandle | None,
     ) -> None:
         name = self.name = level.name
 
@@ -78,23 +80,27 @@ class _Card:
             if button != MORE:
                 bindings.post(switch(name))
 
-        self._row = LevelRow(
-            gui, name, colour, (ON if level.enabled else OFF,), "⋯: the weight of this level", press
-        )
-        with self._row.details:
+        button = (ON if level.enabled else OFF,)
+        row = LevelRow(gui, name, colour, button, "⋯: the weight of this level", press)
+        self._rows = [row]
+        if strip is not None:
+            with strip:
+                self._rows.append(LevelRow(gui, name, colour, button, "On or off", press, None))
+        with row.details:
             Controls(gui, bindings, settings).add(f"levels.{name}.Q")
 
     def update(self, now: SessionSnapshot[VelocitySettings], level: Level, place: int, inside: bool) -> None:
         task = level.tasks[0]
         error, bound = now.error(task.name), now.number(f"bound/{level.name}")
         fallback = now.number(f"rung/{level.name}")
-        self._row.update(
-            place + 1,
-            f"{place + 1} · {level.name}",
-            level.enabled,
-            error if inside else 0.0,
-            f"<b>{quantity(error, task.unit)}</b>" if inside else "no task now",
-            f"≤ {quantity(bound, task.unit)}" if inside and bound == bound else "",
-            "Levels below may increase the error of this level to this bound",
-            FALLBACKS[int(fallback)] if inside and fallback == fallback and fallback > 0 else "",
-        )
+        for row in self._rows:
+            row.update(
+                place + 1,
+                f"{place + 1} · {level.name}",
+                level.enabled,
+                error if inside else 0.0,
+                f"<b>{quantity(error, task.unit)}</b>" if inside else "no task now",
+                f"≤ {quantity(bound, task.unit)}" if inside and bound == bound else "",
+                "Levels below may increase the error of this level to this bound",
+                FALLBACKS[int(fallback)] if inside and fallback == fallback and fallback > 0 else "",
+            )

@@ -28,7 +28,7 @@ _STYLE = (
 
 
 class LevelRow:
-    """The row of one level; `details` is the folder of its settings."""
+    """The row of one level. `details` is the folder of its settings; over the scene a row has none."""
 
     def __init__(
         self,
@@ -38,19 +38,21 @@ class LevelRow:
         buttons: Sequence[str],
         hint: str,
         press: Callable[[str], None],
-        opened: bool = False,
+        opened: bool | None = False,
     ) -> None:
         """buttons: without the last one, which opens the settings; press: called with the button that was
-        pressed; opened: whether the settings are open."""
-        self._colour, self._others = colour, (*buttons[1:], MORE)
+        pressed; opened: whether the settings are open, or None for a row without settings."""
+        buttons = (*buttons, MORE) if opened is not None else tuple(buttons)
+        self._colour, self._others = colour, buttons[1:]
         self._folder = gui.add_folder(None)
         with self._folder:
             self._text = gui.add_html("")
-            self._buttons = gui.add_button_group(f"Level {name}", (*buttons, MORE), hint=hint)
+            self._buttons = gui.add_button_group(name if opened is None else f"Level {name}", buttons, hint=hint)
             row = f'{ROW}:has(> * > * > label[for="{dom_id(self._buttons)}"])'
-            gui.add_html(_STYLE.format(row, _EACH * (len(buttons) + 1), ROW))
-            self.details = gui.add_folder(f"Settings of {name}", visible=opened)
-        self._room = _EACH * (len(buttons) + 1) + 1.5
+            gui.add_html(_STYLE.format(row, _EACH * len(buttons), ROW))
+            if opened is not None:
+                self.details = gui.add_folder(f"Settings of {name}", visible=opened)
+        self._room = _EACH * len(buttons) + 1.5
 
         def pressed() -> None:
             button = str(self._buttons.value)
