@@ -169,6 +169,8 @@ class Stage:
             plots.set_width(400)
         if strip is not None:
             strip.float(x=8.0, y=8.0, width=320.0)
+            if exercise is not None:
+                strip.minimize()  # a lesson shows little at once
 
     def _toggle(self, place: int) -> None:
         event = self._face.toggle(place)

@@ -217,7 +217,7 @@ def _points(challenge: Challenge, lecture: Lecture, best: float | None) -> str:
 def pictures(part: Part, lecture: Lecture) -> str:
     """Returns the signals of the step, plotted over the run: the predicted one first, and large."""
     if not lecture.curves:
-        return block("The curves of the run appear here.")
+        return block("No run yet.")
     claims = part.goals if isinstance(part, Challenge) else part.claims
     ghost = part.ghost.words if isinstance(part, Step) and part.ghost is not None else ""
     signals = signals_of(part)

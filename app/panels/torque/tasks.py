@@ -64,6 +64,8 @@ class LevelCard:
         if strip is not None:
             with strip:
                 self._rows.append(LevelRow(gui, name, colour, buttons, hint, partial(press, name), None))
+        for shown in self._rows:
+            shown.update(place, self._title(place), level.enabled)
         with row.details:
             controls = Controls(gui, bindings, settings)
             controls.add(f"levels.{name}.Q", f"levels.{name}.R")
@@ -80,6 +82,9 @@ class LevelCard:
                     merge = gui.add_button("Merge with the level above")
                     merge.on_click(lambda _: bindings.post(Set("stack.merge", [name, above])))
 
+    def _title(self, place: int) -> str:
+        return f"{place + 1} · {self.name}"
+
     def update(self, now: SessionSnapshot[TorqueSettings], level: Level, place: int) -> None:
         errors = [(task.name, now.error(task.name), task.unit) for task in level.tasks]
         fallback = now.number(f"rung/{level.name}")
@@ -88,11 +93,11 @@ class LevelCard:
         for row in self._rows:
             row.update(
                 place,
-                f"{place + 1} · {level.name}",
+                self._title(place),
                 level.enabled,
                 max((value for _, value, _ in errors), default=0.0),
                 error_in_words(errors),
-                "" if found is None or not level.enabled else f"{found[0]} of {found[1]} free",
+                "" if found is None or not level.enabled else f"{found[0]}/{found[1]} free",
                 _rank(found),
                 FALLBACKS[int(fallback)] if failed else "",
             )

@@ -37,8 +37,8 @@ class RolesPanel:
         self._enabled: dict[str, PendingEdit[bool]] = {name: PendingEdit() for name in self._order}
         gui.add_html(block("The mission below sets the order of the levels."), order=-1.0)
         self._cards = [
-            _Card(gui, bindings, settings, level, colours[level.name], self._switch, strip)
-            for level in settings.levels
+            _Card(gui, bindings, settings, level, colours[level.name], place, self._switch, strip)
+            for place, level in enumerate(settings.levels)
         ]
 
     def toggle(self, place: int) -> Set | None:
@@ -71,6 +71,7 @@ class _Card:
         settings: VelocitySettings,
         level: Level,
         colour: RGB,
+        place: int,
         switch: Callable[[str], Set],
         strip: viser.GuiTabHandle | None,
     ) -> None:
@@ -86,8 +87,13 @@ class _Card:
         if strip is not None:
             with strip:
                 self._rows.append(LevelRow(gui, name, colour, button, "On or off", press, None))
+        for shown in self._rows:
+            shown.update(place + 1, self._title(place), level.enabled)
         with row.details:
             Controls(gui, bindings, settings).add(f"levels.{name}.Q")
+
+    def _title(self, place: int) -> str:
+        return f"{place + 1} · {self.name}"
 
     def update(self, now: SessionSnapshot[VelocitySettings], level: Level, place: int, inside: bool) -> None:
         task = level.tasks[0]
@@ -96,7 +102,7 @@ class _Card:
         for row in self._rows:
             row.update(
                 place + 1,
-                f"{place + 1} · {level.name}",
+                self._title(place),
                 level.enabled,
                 error if inside else 0.0,
                 f"<b>{quantity(error, task.unit)}</b>" if inside else "no task now",

@@ -67,13 +67,13 @@ class LevelRow:
         place: int,
         title: str,
         on: bool,
-        error: float,
-        error_words: str,
-        free: str,
+        error: float = 0.0,
+        error_words: str = "",
+        free: str = "",
         about: str = "",
         fault: str = "",
     ) -> None:
-        """Updates the row.
+        """Updates the row. Before the first control step there is neither an error nor a freedom.
 
         Args:
             place: the index of the level, 0 being the highest priority.
