@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from nbclient import NotebookClient
 
-from app.jupyter.frame import Surroundings, surroundings
+from app.jupyter.frame import Surroundings, outside, surroundings
 from app.jupyter.lab import Lab
 from app.link.choice import SceneChoice
 from browsing.wire import Wire, eventually
@@ -117,6 +117,16 @@ def test_the_frame_has_the_address_at_which_jupyter_serves(
     found = surroundings({"JPY_PARENT_PID": "12"})
     assert found is not None and found.address == "http://127.0.0.1:8889/lab/"
     assert surroundings({}) is None
+    assert surroundings(hub | {"COLAB_RELEASE_TAG": "1"}) is None  # no browser can reach its server
+
+
+def test_a_notebook_elsewhere_says_what_to_do() -> None:
+    """Colab gets a sentence instead of an address that does not work; VS Code needs its port."""
+    reachable, note = outside({"COLAB_RELEASE_TAG": "release-colab_20261101"}, 8080)
+    assert not reachable and "your own machine" in note
+    reachable, note = outside({"VSCODE_PID": "7"}, 8080)
+    assert reachable and "8080" in note
+    assert outside({}, 8080) == (True, "")
 
 
 def _value(page: Wire, label: str) -> object:

@@ -13,7 +13,7 @@ from urllib.parse import urlsplit
 
 from app.web.door import SELF, as_origin
 
-_PROXY = "jupyter_server_proxy"
+_PROXY, _COLAB = "jupyter_server_proxy", "COLAB_RELEASE_TAG"
 
 
 @dataclass(frozen=True)
@@ -55,6 +55,8 @@ class Surroundings:
 def surroundings(environment: Mapping[str, str]) -> Surroundings | None:
     """Returns the Jupyter server that started this process; None if there is none."""
     proxied = find_spec(_PROXY) is not None
+    if _COLAB in environment:
+        return None  # its server has an address that no browser can reach
     prefix = environment.get("JUPYTERHUB_SERVICE_PREFIX")
     if prefix is not None:
         public = urlsplit(environment.get("JUPYTERHUB_PUBLIC_URL", ""))
@@ -70,6 +72,18 @@ def surroundings(environment: Mapping[str, str]) -> Surroundings | None:
         return Surroundings(str(json.loads(about.read_text())["url"]), proxied)
     except (OSError, ValueError, KeyError):
         return None
+
+
+def outside(environment: Mapping[str, str], port: int) -> tuple[bool, str]:
+    """Returns, for a notebook without a Jupyter server whose address is known: whether its browser may reach
+    a port of this machine, and a sentence with the next step ("" if there is nothing to say)."""
+    if _COLAB in environment:
+        return False, (
+            "Google Colab does not pass the page on to your browser. Python controls the robot here without "
+            "it. For the page, install himpc-lab on your own machine, or himpc-lab[jupyter] in a JupyterHub."
+        )
+    remote = "VSCODE_PID" in environment or "VSCODE_IPC_HOOK_CLI" in environment
+    return True, f"On another machine, first add port {port} in VS Code's tab Ports." if remote else ""
 
 
 def here() -> Surroundings | None:

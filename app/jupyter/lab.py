@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import threading
 import weakref
 from collections.abc import Sequence
@@ -13,7 +14,7 @@ from urllib.parse import urlsplit
 import numpy as np
 
 from app.client.simulation_client import SimulationClient
-from app.jupyter.frame import here
+from app.jupyter.frame import here, outside
 from app.link.choice import SceneChoice
 from app.link.messages import Post, Ready
 from app.link.process import wait_until
@@ -63,7 +64,11 @@ def show(
     known = () if around is None else (*around.embedders, *filter(None, [around.origin]))
     origins = tuple(dict.fromkeys((*known, *filter(None, [embed_in]))))
     lab = Lab(choice, origins)
-    _display(lab.url if around is None else around.source(*lab.address), height if origins else 0)
+    if around is None:
+        reachable, note = outside(os.environ, lab.address[0])
+        _display(lab.url if reachable else "", height if origins else 0, note)
+    else:
+        _display(around.source(*lab.address), height if origins else 0)
     return lab
 
 
@@ -191,9 +196,9 @@ def _end(server: PageServer, ended: threading.Event, reader: threading.Thread) -
     server.close()
 
 
-def _display(source: str, height: int) -> None:
-    """Shows the page in the cell, or a link to the page if the height is 0. Does nothing outside a
-    notebook."""
+def _display(source: str, height: int, note: str = "") -> None:
+    """Shows the page in the cell, or a link to the page and a note if the height is 0; if the source is "",
+    only the note. Does nothing outside a notebook."""
     with contextlib.suppress(ImportError):
         from IPython.core.getipython import get_ipython
         from IPython.display import HTML, IFrame, display
@@ -202,4 +207,5 @@ def _display(source: str, height: int) -> None:
             link = (
                 f'<a href="{escape(source)}" target="_blank" rel="noopener">Open the page of this robot</a>'
             )
-            display(IFrame(source, "100%", height) if height else HTML(link))
+            text = (link if source else "") + f"<p>{escape(note)}</p>"
+            display(IFrame(source, "100%", height) if height and source else HTML(text))

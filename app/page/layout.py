@@ -51,6 +51,7 @@ from lessons.settings.velocity import VelocitySettings
 _PHONE = f"<style>@media (max-width: 36em) {{ {SHEET} {{ width: 100vw !important }} }}</style>"
 """Makes viser's bottom sheet on a phone as wide as the screen; by default the sheet is narrower, with an
 empty strip beside it. The style applies while an HTML element that contains it is shown."""
+_LOW = 600  # px: in a lower window the levels would cover the robot, and begin folded
 _HOTKEYS = ("1", "2", "3", "4", "5", "6", "7", "8", "9")
 _FACES: dict[type[SceneSettings], Callable[[Context], Face]] = {
     TorqueSettings: TorqueFace,
@@ -169,8 +170,9 @@ class Stage:
             plots.set_width(400)
         if strip is not None:
             strip.float(x=8.0, y=8.0, width=320.0)
-            if exercise is not None:
-                strip.minimize()  # a lesson shows little at once
+            low = self._comfort.window is not None and self._comfort.window[1] < _LOW
+            if low or exercise is not None:  # a lesson shows little at once
+                strip.minimize()
 
     def _toggle(self, place: int) -> None:
         event = self._face.toggle(place)

@@ -47,7 +47,9 @@ class LevelRow:
         self._folder = gui.add_folder(None)
         with self._folder:
             self._text = gui.add_html("")
-            self._buttons = gui.add_button_group(name if opened is None else f"Level {name}", buttons, hint=hint)
+            self._buttons = gui.add_button_group(
+                name if opened is None else f"Level {name}", buttons, hint=hint
+            )
             row = f'{ROW}:has(> * > * > label[for="{dom_id(self._buttons)}"])'
             gui.add_html(_STYLE.format(row, _EACH * len(buttons), ROW))
             if opened is not None:

@@ -83,6 +83,7 @@ def test_a_task_is_added_dragged_moved_reduced_merged_passed_on_and_removed(
     assert eventually(page, lambda: error(learner, "position") < 2e-3)
     assert now(learner, "priority_leak") < 1e-6  # the elbow's level does not disturb the level above
 
+    page.get_by_text("Levels", exact=True).click()
     row(page, "elbow").get_by_role("button", name="▲", exact=True).click()  # over the scene
     assert eventually(page, lambda: levels(learner)[:2] == ["elbow", "position"])
     expect(page.get_by_text("1 · elbow", exact=True)).to_have_count(2)
