@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import viser
 
 from app.adapter import private
-from app.adapter.names import CHART, CLOSES_NOTICE, ICON_BUTTON, ROW, SCROLLS, STORED
+from app.adapter.names import CHART, CLOSES_NOTICE, FOLDED_PANEL, ICON_BUTTON, ROW, SCROLLS, STORED
 from app.client.simulation_client import SimulationClient
 from app.link.messages import Play
 from app.panels.run.narration import Narration, facts_of
@@ -37,7 +37,7 @@ STYLE = """
 # A slider and the number box beside it share one label, but viser names at most one of the two. Controls
 # appear and disappear with tabs; therefore the script checks regularly.
 _NAMES = """
-const row = %s, icon = %s, closes = %s, scrolls = %s, chart = %s, key = "__himpcLabNames";
+const row = %s, icon = %s, closes = %s, scrolls = %s, chart = %s, folded = %s, key = "__himpcLabNames";
 window[key]?.();
 const empty = (each) => !each.getAttribute("aria-label") && !each.getAttribute("aria-labelledby");
 const name = (each, words) => { if (words && empty(each)) each.setAttribute("aria-label", words); };
@@ -51,6 +51,14 @@ const look = () => {
   for (const each of document.querySelectorAll(icon))
     if (!each.textContent.trim()) name(each, "Commands and settings");
   for (const each of document.querySelectorAll(scrolls)) each.tabIndex = 0;
+  for (const bar of document.querySelectorAll(`${folded}[role=tablist]`)) {
+    bar.setAttribute("role", "group");
+    bar.removeAttribute("aria-orientation");
+    for (const each of bar.querySelectorAll("[role=tab]")) {
+      each.setAttribute("role", "button");
+      each.removeAttribute("aria-selected");
+    }
+  }
   for (const each of document.querySelectorAll("canvas")) {
     if (each.closest(chart)) { each.setAttribute("aria-hidden", "true"); continue; }
     each.setAttribute("role", "img");
@@ -101,7 +109,7 @@ _SAY = """(() => {
 
 def _names_and_colours() -> str:
     """JavaScript that adds names, language and style; it may run again for each scene."""
-    names = _NAMES % tuple(map(json.dumps, (ROW, ICON_BUTTON, CLOSES_NOTICE, SCROLLS, CHART)))
+    names = _NAMES % tuple(map(json.dumps, (ROW, ICON_BUTTON, CLOSES_NOTICE, SCROLLS, CHART, FOLDED_PANEL)))
     return f"""(() => {{
 document.documentElement.lang = "en";
 const id = "himpc-lab-style";

@@ -56,6 +56,7 @@ OF_THE_PAGE = (
     ("components/Button.tsx", 'import { Button } from "@mantine/core"'),
     ("components/Button.tsx", "id={uuid}"),
     ("ControlPanel/BottomPanel.tsx", 'width: "20em"'),
+    ("dock/MinimizedBar.tsx", names.FOLDED_PANEL.strip("[]")),
 )
 """Pairs: a file below viser's `client/src`, and a text that this file must contain."""
 
