@@ -11,7 +11,7 @@ from app.html.palette import BAD, BOUND, GOOD, JOINTS, LEVELS, RGB
 from app.html.text import block
 from app.link.messages import Ready
 from app.panels.run.joints import TORQUE, data_sheet, quantities
-from app.panels.widgets.chart import Chart, ChartLine, of_ghost
+from app.panels.widgets.chart import NO_TICK, Chart, ChartLine, of_ghost
 from app.panels.widgets.in_view import InView
 from lessons.settings.torque import TorqueSettings
 from robots.collision import Floor
@@ -21,6 +21,9 @@ _TIME = (1e-2, 1e2)  # ms
 _LEAK = (1e-12, 1e2)  # m/s² or rad/s²
 _DISTANCE = (0.0, 250.0)  # mm
 _SHARE = (0.0, 120.0)  # %
+_NO_PAIR = (
+    "Before a tick has run, or if no two links or objects can come close to each other, there is no curve."
+)
 _COVERS = (
     "The distance is that of the covers of the links, which are a few millimetres thicker than the links. "
     "At 0 the links do not touch yet."
@@ -91,7 +94,8 @@ class LevelPlots:
                 self._chart("Joint nearest its bound, %", [*shares, bound], _SHARE),
             ]
             if distances:
-                self._charts.append(self._chart("Distance of the nearest pair, mm", [*near, kept], _DISTANCE))
+                title = "Distance of the nearest pair, mm"
+                self._charts.append(self._chart(title, [*near, kept], _DISTANCE, empty=_NO_PAIR))
                 self._covers = self._gui.add_html(block(_COVERS))
         with self._inner:
             self._charts += [
@@ -100,11 +104,15 @@ class LevelPlots:
             ]
 
     def _chart(
-        self, title: str, lines: list[ChartLine], span: tuple[float, float], height: int = 170
+        self,
+        title: str,
+        lines: list[ChartLine],
+        span: tuple[float, float],
+        height: int = 170,
+        empty: str = NO_TICK,
     ) -> Chart:
-        return Chart(
-            self._gui, self._in_view, title, lines, span, height=height, log=span not in (_DISTANCE, _SHARE)
-        )
+        log = span not in (_DISTANCE, _SHARE)
+        return Chart(self._gui, self._in_view, title, lines, span, height=height, log=log, empty=empty)
 
     def draw(self, window: PlotWindow, ghost: PlotWindow | None, settings: TorqueSettings) -> None:
         """Draws the plots of the window. ghost: the ghost's data over the same interval. If the plant has

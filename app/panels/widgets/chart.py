@@ -36,7 +36,7 @@ _TIMES: uplot.Axis = {
 _BOUND_DASH, _GHOST_DASH = (6.0, 4.0), (3.0, 3.0)
 _PATIENCE = 12
 """Number of updates without a value after which a text explains why the chart is empty."""
-_NOTHING = block("No tick has run yet: run (Space), or take single ticks (T), to see a curve.")
+NO_TICK = "No tick has run yet: run (Space), or take single ticks (T), to see a curve."
 
 
 @dataclass(frozen=True)
@@ -76,10 +76,11 @@ class Chart:
         log: bool = False,
         bands: Sequence[tuple[int, int, RGB]] = (),
         legend: bool = True,
+        empty: str = NO_TICK,
     ) -> None:
         """span: range of the axis in the chart's unit; log: whether the axis is logarithmic; the ends of
         `span` are then powers of ten; bands: areas between two lines, as (index of the upper line, index of
-        the lower line, colour)."""
+        the lower line, colour); empty: why the chart may stay without a curve."""
         self._log = log
         if log:
             # The logarithmic scale of uPlot would draw nine grid lines per decade.
@@ -108,7 +109,7 @@ class Chart:
             height=height,
             padding=(6, 12, 0, 0),
         )
-        self._note = gui.add_html(_NOTHING, visible=False)
+        self._note = gui.add_html(block(empty), visible=False)
 
     @property
     def in_view(self) -> bool:
