@@ -148,9 +148,8 @@ def main() -> None:
     seconds = options.seconds or (16.0 if options.first_level else 3.0)
     for scene in options.scenes or SCENES[options.first_level]:
         found = measure(scene, variants, places, seconds, options.down)
-        print(
-            f"\n| {scene} | tick, p99 | step, p99 | {' | '.join(PARTS[2:])} | ratio | errors: halves, largest |"
-        )
+        head = (scene, "tick, p99", "step, p99", *PARTS[2:], "ratio", "errors: halves, largest")
+        print(f"\n| {' | '.join(head)} |")
         print(f"|---|{'--:|' * (len(PARTS) + 1)}---|")
         first = None
         for (variant, place), ticks in found.items():
