@@ -35,17 +35,9 @@ from lessons.session.torque import TorqueSession
 Array = NDArray[np.float64]
 
 SCENES = (
-    "iiwa14-circle",
-    "iiwa14-hold",
-    "iiwa14-hold",
-    "panda-hold",
-    "planar3-circle",
-    "planar3-conflict",
-    "planar3-hold",
-    "planar3-singular",
-    "iiwa14-circle-paper",
-    "ridgeback-ur10-hold",
-)
+    "iiwa14-circle", "iiwa14-hold", "iiwa14-hold", "panda-hold", "planar3-circle", "planar3-conflict",
+    "planar3-hold", "planar3-singular", "iiwa14-circle-paper", "ridgeback-ur10-hold",
+)  # fmt: skip
 CONTROLLERS = ("himpc",) * 6 + ("hiqp", "nhimpc", "weighted", "weighted", "hqp", "tdeosf")
 BOUNDED = ("himpc", "hiqp", "nhimpc", "weighted", "hqp")
 """Controllers that impose the torque bounds."""
@@ -64,15 +56,14 @@ class Tally:
     faults: Counter[str] = field(default_factory=Counter)
     fallbacks: Counter[str] = field(default_factory=Counter)
     longest_ms: float = 0.0
-    lines: list[str] = field(default_factory=list)
+    shown: set[tuple[str, int]] = field(default_factory=set)
 
     def fault(self, kind: str, seed: int, tick: int, what: str) -> None:
         """Counts a fault, and prints the first of each kind in an episode."""
         self.faults[kind] += 1
-        line = f"{kind}: --episode {seed}, tick {tick}: {what}"
-        if not any(each.startswith(f"{kind}: --episode {seed},") for each in self.lines):
-            self.lines.append(line)
-            print(line, flush=True)
+        if (kind, seed) not in self.shown:
+            self.shown.add((kind, seed))
+            print(f"{kind}: --episode {seed}, tick {tick}: {what}", flush=True)
 
 
 def state(rng: np.random.Generator, session: TorqueSession) -> tuple[Array, Array]:
@@ -185,9 +176,8 @@ def episode(seed: int, ticks: int, tally: Tally) -> None:
                 reading = session.plant.tau * 10.0 ** rng.uniform(-1, 4)
                 if rng.random() < 0.1:
                     reading = np.full(q.size, rng.choice([np.nan, np.inf, 1e300]))
-                outlook = Outlook(
-                    session.references, session.t, session.settings.T_s, session.settings.horizon
-                )
+                own = session.settings
+                outlook = Outlook(session.references, session.t, own.T_s, own.horizon)
                 started = thread_time()
                 plan = session.controller.step(q, v, outlook, reading)
             else:
@@ -221,17 +211,7 @@ def main() -> int:
             if monotonic() - began > 60 * given.minutes:
                 break
             episode(int(seeds.spawn(1)[0].generate_state(1)[0]), given.length, tally)
-    print(
-        json.dumps(
-            {
-                "ticks": tally.ticks,
-                "episodes": tally.episodes,
-                "faults": dict(tally.faults),
-                "rungs": dict(tally.fallbacks),
-                "longest_ms": round(tally.longest_ms, 2),
-            }
-        )
-    )
+    print(json.dumps({name: value for name, value in vars(tally).items() if name != "shown"}))
     return 1 if tally.faults else 0
 
 

@@ -21,7 +21,7 @@ from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from random import Random
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -368,7 +368,7 @@ def main() -> int:
             browser = playwright.chromium.launch(executable_path=find_chromium(), args=CHROMIUM_ARGS)
             found = attack(lambda server, found: Monkey(browser, server, found), *run)
             browser.close()
-    told = asdict(found) | {"scenes": list(found.scenes), "lessons": list(found.lessons)}
+    told = vars(found) | {"scenes": list(found.scenes), "lessons": list(found.lessons)}
     print(json.dumps(told, indent=1))
     return 1 if found.faults else 0
 

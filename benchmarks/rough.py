@@ -23,6 +23,7 @@ import threading
 import time
 import urllib.request
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -68,53 +69,39 @@ def treat(kills: int, stops: int, scene: str = "iiwa14-hold") -> dict[str, objec
     shared = shutil.disk_usage("/dev/shm").total if os.path.exists("/dev/shm") else 0
     before, there = _memory_left(), set(psutil.Process().children(recursive=True))
     server = PageServer(SceneChoice(RunSpec(scene)), port=0, max_sessions=3)
-    counts: dict[str, str] = {}
+    found: dict[str, object] = {"shared memory MB": round(shared / 1e6, 1)}
     treated = recovered = 0
-    try:
-        with contextlib.ExitStack() as opened:
-            # The pages open one after the other, so that the processes of each are known.
-            pairs = [(opened.enter_context(Wire(server.link)), _learner(server, place)) for place in range(3)]
-            (witness, *wires), learners = zip(*pairs, strict=True)
-            assert eventually(lambda: all(map(_runs, learners)), LONG), "the pages do not start"
-            pages = list(zip(learners[1:], wires, strict=True))
-            with _watch(server.link, witness) as watched:
-                for name, times, harm in (
-                    ("killed", kills, lambda each: _hurt(each, signal.SIGKILL)),
-                    ("stopped", stops, lambda each: _hurt(each, signal.SIGSTOP)),
-                    ("load that hangs", 2, _hang),
-                ):
-                    good = 0
-                    for round_ in range(times):
-                        learner, page = pages[round_ % 2]
-                        good += _recovers(learner, page, harm, by_reset=bool(round_ // 2 % 2))
-                    counts[name] = f"{good} of {times} recovered"
-                    treated, recovered = treated + times, recovered + good
-                answers: list[str] = []
-                uploads = [threading.Thread(target=_upload, args=(page, answers)) for _, page in pages]
-                for each in uploads:
-                    each.start()
-                for each in uploads:
-                    each.join(LONG)
-                counts["uploads of 40 MB"] = ", ".join(answers)
-                treated += 2
-                recovered += answers.count(_REFUSED) if _runs(learners[0]) else 0
-    finally:
-        server.close()
+    with contextlib.closing(server), contextlib.ExitStack() as opened:
+        # The pages open one after the other, so that the processes of each are known.
+        pairs = [(opened.enter_context(Wire(server.link)), _learner(server, place)) for place in range(3)]
+        (witness, *wires), learners = zip(*pairs, strict=True)
+        assert eventually(lambda: all(map(_runs, learners)), LONG), "the pages do not start"
+        pages = list(zip(learners[1:], wires, strict=True))
+        with _watch(server.link, witness) as worst:
+            for name, times, harm in (
+                ("killed", kills, lambda each: _hurt(each, signal.SIGKILL)),
+                ("stopped", stops, lambda each: _hurt(each, signal.SIGSTOP)),
+                ("load that hangs", 2, _hang),
+            ):
+                good = sum(_recovers(*pages[k % 2], harm, by_reset=bool(k // 2 % 2)) for k in range(times))
+                found[name] = f"{good} of {times} recovered"
+                treated, recovered = treated + times, recovered + good
+            with ThreadPoolExecutor() as uploads:
+                answers = list(uploads.map(_upload, wires))
+            found["uploads of 40 MB"] = ", ".join(answers)
+            treated += 2
+            recovered += answers.count(_REFUSED) if _runs(learners[0]) else 0
 
     def others() -> set[psutil.Process]:
         return set(psutil.Process().children(recursive=True)) - there
 
     eventually(lambda: not others(), 5.0)
-    left = [f"process {child.pid}" for child in others()]
-    left += sorted(_memory_left() - before)
-    return {
-        "shared memory MB": round(shared / 1e6, 1),
-        **counts,
+    return found | {
         "treated": treated,
         "recovered": recovered,
-        "longest silence of the watching page s": round(watched[0], 2),
-        "longest GET s": round(watched[1], 2),
-        "left behind": left,
+        "longest silence of the watching page s": round(worst[0], 2),
+        "longest GET s": round(worst[1], 2),
+        "left behind": [f"process {child.pid}" for child in others()] + sorted(_memory_left() - before),
     }
 
 
@@ -165,45 +152,39 @@ def _recovers(
     return eventually(lambda: learner.pid != pid and learner.ready is not ready and _runs(learner), LONG)
 
 
-def _upload(page: Wire, answers: list[str]) -> None:
-    """Uploads an unwanted file as fast as possible; the server may close the connection. The response is
-    added to `answers`."""
+def _upload(page: Wire) -> str:
+    """Uploads an unwanted file as fast as possible; the server may close the connection. Returns the
+    response."""
     eventually(lambda: page.find("Upload a URDF") is not None, LONG)
     button = page.find("Upload a URDF")
     assert button is not None, "the page has no button to upload a robot"
-    count = UPLOAD // _PART
-    name = f"large-{id(page)}"
+    count, name = UPLOAD // _PART, f"large-{id(page)}"
     try:
         page.say(_messages.FileTransferStartUpload(button, name, "large.urdf", "text/xml", count, UPLOAD))
         for place in range(count):
             page.say(_messages.FileTransferPart(button, name, place, bytes(_PART)))
     except (ConnectionClosed, OSError):
-        answers.append("connection ended")
-        return
+        return "connection ended"
 
     def notices() -> int:
         return [title for title, _ in page.notices].count("Not uploaded")
 
     answered = eventually(lambda: notices() > 0, 10.0)
-    answers.append((_REFUSED if notices() == 1 else f"{notices()} notices") if answered else "no answer")
+    return (_REFUSED if notices() == 1 else f"{notices()} notices") if answered else "no answer"
 
 
 @contextlib.contextmanager
 def _watch(url: str, witness: Wire) -> Iterator[list[float]]:
     """Yields (longest silence of a page, longest response time of a GET), s, during the disturbance."""
     worst, over = [0.0, 0.0], threading.Event()
-    seen: dict[str, object] = {}
 
     def look() -> None:
-        changed = time.monotonic()
+        seen, changed = dict[str, str](), time.monotonic()
         while not over.wait(0.05):
-            now = {
-                uuid: str(each["props"].get("content", "")) for uuid, each in list(witness.controls.items())
-            }
+            shown = list(witness.controls.items())
+            now = {uuid: str(each["props"].get("content", "")) for uuid, each in shown}
             if now != seen:
-                seen.clear()
-                seen.update(now)
-                changed = time.monotonic()
+                seen, changed = now, time.monotonic()
             worst[0] = max(worst[0], time.monotonic() - changed)
 
     def get() -> None:
