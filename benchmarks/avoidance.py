@@ -25,7 +25,6 @@ chain. The exit code is 1 if a force exceeds 50 N, a joint is faster than 1.05 t
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
@@ -36,6 +35,7 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 import pinocchio as pin
+import tyro
 from numpy.typing import NDArray
 
 import lessons.course
@@ -287,32 +287,26 @@ def line(robot: str, total: Total, times: Sequence[float]) -> str:
     )
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--chains", type=int, default=25)
-    parser.add_argument("--robots", nargs="*", default=list(ROBOTS))
-    parser.add_argument("--often", action="store_true")
-    parser.add_argument("--off", action="store_true")
-    parser.add_argument("--balls", action="store_true")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--controller", default="himpc")
-    parser.add_argument("--set", nargs="*", default=[], dest="changes")
-    given = parser.parse_args(arguments)
-    changes = [*(["avoidance.on=false"] if given.off else []), *given.changes]
+def main(
+    chains: int = 25, robots: tuple[str, ...] = ROBOTS, often: bool = False, off: bool = False,
+    balls: bool = False, seed: int = 1, controller: str = "himpc", set: tuple[str, ...] = (),
+) -> int:  # fmt: skip
+    """Does what the module says."""
+    changes = [*(["avoidance.on=false"] if off else []), *set]
     print("| robot | drags | largest force, N | chains above 50 N | speed | lost | unsolved | at rest | ms |")
     print("|---|---|---|---|---|---|---|---|---|")
     worst = 0
-    for robot in given.robots:
+    for robot in robots:
         total, times = run(
-            *(robot, given.chains, given.seed, changes, given.controller, given.balls, given.often),
+            *(robot, chains, seed, changes, controller, balls, often),
             tell=lambda *found, robot=robot: print(line(robot, *found), file=sys.stderr, flush=True),
         )
         print(line(robot, total, times), flush=True)
         bad = total.lost or total.resting < 0.95 * total.chains
-        bad = bad or (total.speed > FAST_OFF if given.off else total.hard or total.speed > FAST)
+        bad = bad or (total.speed > FAST_OFF if off else total.hard or total.speed > FAST)
         worst = max(worst, int(bool(bad)))
     return worst
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(tyro.cli(main, description=__doc__))

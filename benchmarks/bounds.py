@@ -15,7 +15,6 @@ and than with himpc_printed, where this was run.
 
 from __future__ import annotations
 
-import argparse
 import gc
 import sys
 from itertools import product
@@ -23,6 +22,7 @@ from time import thread_time
 from typing import NamedTuple
 
 import numpy as np
+import tyro
 
 from benchmarks.avoidance import jumps
 from lessons.scenes.names import SCENES
@@ -107,33 +107,28 @@ def run(cell: Cell, controller: str, seconds: float) -> Found:
     return Found(unsolved, of, speed, max(times[1:]), float(np.median(times[1:])), spent)
 
 
-def main() -> int:
-    """Prints the table and the number of cells with faults."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    parser.add_argument("--quick", action="store_true")
-    parser.add_argument("--seconds", type=float, default=0.33)
-    parser.add_argument("--scenes", nargs="+")
-    parser.add_argument("--horizons", nargs="+", type=int, default=HORIZONS)
-    parser.add_argument("--velocity", nargs="+", type=float, default=VELOCITY)
-    parser.add_argument("--torque", nargs="+", type=float, default=TORQUE)
-    parser.add_argument("--printed", action="store_true", help="also runs himpc_printed")
-    given = parser.parse_args()
+def main(
+    quick: bool = False, seconds: float = 0.33, scenes: tuple[str, ...] = (), printed: bool = False,
+    horizons: tuple[int, ...] = HORIZONS, velocity: tuple[float, ...] = VELOCITY,
+    torque: tuple[float, ...] = TORQUE,
+) -> int:  # fmt: skip
+    """Does what the module says."""
     print("| scene | N | velocity | torque | unsolved | printed | speed | printed | ms | median | budget | |")
     print("|---|---|---|---|---|---|---|---|---|---|---|---|")
     ran = wrong = 0
     every = [
-        Cell(scene, N, velocity, torque)
-        for scene in given.scenes or [name for name in SCENES if name != "hold"]
-        for N, velocity, torque in product(given.horizons, given.velocity, given.torque)
+        Cell(scene, N, v_scale, tau_scale)
+        for scene in scenes or [name for name in SCENES if name != "hold"]
+        for N, v_scale, tau_scale in product(horizons, velocity, torque)
     ]
-    for cell in QUICK if given.quick else every:
-        found, other, said = run(cell, "himpc", given.seconds), ("", ""), list[str]()
+    for cell in QUICK if quick else every:
+        found, other, said = run(cell, "himpc", seconds), ("", ""), list[str]()
         if found.longest_ms > LONGEST_MS:
             said.append("slow")
         if found.unsolved > MOST_UNSOLVED * found.of:
             said.append("unsolved")
-        if given.printed:
-            reference = run(cell, "himpc_printed", given.seconds)
+        if printed:
+            reference = run(cell, "himpc_printed", seconds)
             other = (str(reference.unsolved), f"{reference.speed:.3f}")
             if found.speed > 1.02 * max(reference.speed, 1.0):
                 said.append("fast")
@@ -150,4 +145,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(tyro.cli(main, description=__doc__))

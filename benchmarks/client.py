@@ -11,12 +11,13 @@ last reload it prints a line. The clients leave when stdin ends.
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 import threading
 import time
 from queue import SimpleQueue
+
+import tyro
 
 from app.link.process import wait_until
 from benchmarks.child import Child, tell
@@ -39,18 +40,18 @@ class Viewers(Child):
         return self.hear("came", 180.0 + PATIENCE * times)["came"]
 
 
-def watch(options: argparse.Namespace, client: int, asked: SimpleQueue[int]) -> None:
+def watch(url: str, tab: str, delay: float, client: int, asked: SimpleQueue[int]) -> None:
     """Stays connected, tells what arrives every second, and reloads when it is asked to."""
     storage = Storage()
     while True:
-        with Viewer(options.url, storage, options.tab, delay=options.delay) as page:
+        with Viewer(url, storage, tab, delay=delay) as page:
             while asked.empty():
                 page.second, began = Second(), time.monotonic()
                 wait_until(lambda: not asked.empty(), 1.0, 0.1)
                 if not page.is_open:
                     return
                 tell(client=client, **page.second.rates(time.monotonic() - began))
-        tell(client=client, came=sum(visited(options.url, storage) for _ in range(asked.get())))
+        tell(client=client, came=sum(visited(url, storage) for _ in range(asked.get())))
 
 
 def visited(url: str, storage: Storage) -> bool:
@@ -59,21 +60,15 @@ def visited(url: str, storage: Storage) -> bool:
         return wait_until(lambda: bool(page.second.plots or page.second.links), PATIENCE)
 
 
-def main() -> None:
-    """Runs clients as the command line says."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("url")
-    parser.add_argument("--clients", type=int, default=1)
-    parser.add_argument("--tab", default=CURVES)
-    parser.add_argument("--delay", type=float, default=0.0)
-    options = parser.parse_args()
-    queues = [SimpleQueue[int]() for _ in range(options.clients)]
+def main(url: tyro.conf.Positional[str], clients: int = 1, tab: str = CURVES, delay: float = 0.0) -> None:
+    """Does what the module says."""
+    queues = [SimpleQueue[int]() for _ in range(clients)]
     for client, asked in enumerate(queues):
-        threading.Thread(target=watch, args=(options, client, asked), daemon=True).start()
+        threading.Thread(target=watch, args=(url, tab, delay, client, asked), daemon=True).start()
     for line in sys.stdin:
         queues[0].put(int(line))
     os._exit(0)
 
 
 if __name__ == "__main__":
-    main()
+    tyro.cli(main, description=__doc__)

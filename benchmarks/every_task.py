@@ -8,12 +8,13 @@ The program prints a row per robot and kind: the error after holding and after d
 
 from __future__ import annotations
 
-import argparse
+import sys
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
 import numpy as np
+import tyro
 from numpy.typing import NDArray
 
 from himpc.kinematics.configuration import Configuration
@@ -128,19 +129,16 @@ def settled_within(task: Task, robot: Robot) -> NDArray[np.float64]:
     return np.array([SETTLED["m" if joints.get(name, task.unit == "m") else "rad"] for name in names])
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seconds", type=float, default=3.0)
-    parser.add_argument("--robot", choices=CATALOG, default=None)
-    given = parser.parse_args()
+def main(seconds: float = 3.0, robot: str | None = None) -> int:
+    """Does what the module says."""
     found = []
-    for robot in CATALOG if given.robot is None else (given.robot,):
+    for name in CATALOG if robot is None else (robot,):
         for kind in KINDS:
             for controller in CONTROLLERS:
-                each = measured(robot, kind, controller, given.seconds)
+                each = measured(name, kind, controller, seconds)
                 found.append(each)
                 print(
-                    f"{robot:16}{kind:22}{controller:7}held {each.held:8.2g}  moved {each.moved:8.3g}  "
+                    f"{name:16}{kind:22}{controller:7}held {each.held:8.2g}  moved {each.moved:8.3g}  "
                     f"settled {each.settled:8.2g}  v {each.calm:.1e}",
                     flush=True,
                 )
@@ -150,4 +148,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    sys.exit(tyro.cli(main, description=__doc__))

@@ -13,7 +13,6 @@ there was any fault.
 
 from __future__ import annotations
 
-import argparse
 import gc
 import json
 import sys
@@ -24,6 +23,7 @@ from dataclasses import dataclass, field, replace
 from time import monotonic, thread_time
 
 import numpy as np
+import tyro
 from numpy.typing import NDArray
 
 from himpc.plan import Plan
@@ -150,7 +150,7 @@ def check(tally: Tally, seed: int, tick: int, session: TorqueSession, plan: Plan
         tally.fault("torque", seed, tick, f"{plan.tau} above {session.robot.tau_limit}")
 
 
-def episode(seed: int, ticks: int, tally: Tally) -> None:
+def run_episode(seed: int, ticks: int, tally: Tally) -> None:
     """Runs one episode."""
     rng = np.random.default_rng(seed)
     scene = torque_scene(str(rng.choice(SCENES)))
@@ -193,27 +193,22 @@ def episode(seed: int, ticks: int, tally: Tally) -> None:
             return
 
 
-def main() -> int:
-    """Prints the faults and a summary."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    parser.add_argument("--ticks", type=int, default=1_000_000)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--minutes", type=float, default=1e9)
-    parser.add_argument("--length", type=int, default=400, help="ticks of an episode")
-    parser.add_argument("--episode", type=int, help="the seed of the only episode to run")
-    given = parser.parse_args()
+def main(
+    ticks: int = 1_000_000, seed: int = 0, minutes: float = 1e9, length: int = 400, episode: int | None = None
+) -> int:
+    """Does what the module says."""
     tally, began = Tally(), monotonic()
-    seeds = np.random.SeedSequence(given.seed)
+    seeds = np.random.SeedSequence(seed)
     with np.errstate(all="ignore"), suppress(KeyboardInterrupt):
-        if given.episode is not None:
-            episode(given.episode, given.length, tally)
-        while given.episode is None and tally.ticks < given.ticks:
-            if monotonic() - began > 60 * given.minutes:
+        if episode is not None:
+            run_episode(episode, length, tally)
+        while episode is None and tally.ticks < ticks:
+            if monotonic() - began > 60 * minutes:
                 break
-            episode(int(seeds.spawn(1)[0].generate_state(1)[0]), given.length, tally)
+            run_episode(int(seeds.spawn(1)[0].generate_state(1)[0]), length, tally)
     print(json.dumps({name: value for name, value in vars(tally).items() if name != "shown"}))
     return 1 if tally.faults else 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(tyro.cli(main, description=__doc__))

@@ -12,7 +12,6 @@ simulations depends on the machine's cores; it is not judged.
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 import time
@@ -22,6 +21,7 @@ from statistics import median
 from typing import Any
 
 import psutil
+import tyro
 
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
@@ -29,6 +29,7 @@ from app.link.process import wait_until
 from app.web.server import PageServer
 from benchmarks.child import LONG
 from benchmarks.client import Viewers
+from browsing.viewer import CURVES
 from lessons.scenes.run_spec import RunSpec
 
 SETTLE = 5.0  # s
@@ -40,34 +41,32 @@ RATES = {
 }
 
 
-def main() -> int:
-    """Measures as the command line says."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--clients", type=int, default=2)
-    parser.add_argument("--scene", default="iiwa14-circle")
-    parser.add_argument("--horizon", type=int, default=None)
-    parser.add_argument("--tab", default="Joints")
-    parser.add_argument("--seconds", type=float, default=20.0)
-    options = parser.parse_args()
-    own = () if options.horizon is None else (f"horizon={options.horizon}",)
-    with served(RunSpec(options.scene, set=own), options.clients, "--tab", options.tab) as (
-        _,
-        viewers,
-        learners,
-    ):
+def main(
+    clients: int = 2, scene: str = "iiwa14-circle", horizon: int | None = None, tab: str = CURVES,
+    seconds: float = 20.0,
+) -> int:  # fmt: skip
+    """Does what the module says."""
+    own = () if horizon is None else (f"horizon={horizon}",)
+    with served(RunSpec(scene, set=own), clients, "--tab", tab) as (_, viewers, learners):
         time.sleep(SETTLE)
         heard = len(viewers.said)
         before = [(simulated(each), *counts(each)) for each in learners]
         busy, began = time.process_time(), time.perf_counter()
-        time.sleep(options.seconds)
+        time.sleep(seconds)
         spent = time.perf_counter() - began
-        share = (time.process_time() - busy) / spent / options.clients
+        share = (time.process_time() - busy) / spent / clients
         rows = [
             {**found(*both, spent), **of_client(viewers.said[heard:], client)}
             for client, both in enumerate(zip(learners, before, strict=True))
         ]
-    measured = {**vars(options), "cores": psutil.cpu_count(), "server_share_per_learner": round(share, 4)}
-    print(json.dumps({**measured, "learners": rows}, indent=1))
+    told = {
+        "clients": clients,
+        "scene": scene,
+        "horizon": horizon,
+        "tab": tab,
+        "cores": psutil.cpu_count(),
+    }
+    print(json.dumps({**told, "server_share_per_learner": round(share, 4), "learners": rows}, indent=1))
     good = share <= SHARE and all(
         row["kilobytes_per_s"] <= KILOBYTES and row["poses_hz"] >= POSES_HZ and row["plots_hz"] >= PLOTS_HZ
         for row in rows
@@ -123,4 +122,4 @@ def counts(learner: SimulationClient) -> tuple[int, int]:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(tyro.cli(main, description=__doc__))

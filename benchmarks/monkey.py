@@ -11,7 +11,6 @@ program prints all actions as JSON. The exit code is 1 if there was a fault.
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import sys
@@ -23,6 +22,8 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from random import Random
+
+import tyro
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
@@ -351,17 +352,12 @@ class Monkey(User):
         load(self.page, self.server.link)
 
 
-def main() -> int:
+def main(minutes: float = 1.0, seed: int = 0, scene: str = "iiwa14-hold", hostile: bool = False) -> int:
+    """Does what the module says."""
     from benchmarks.hostile import HostileUser
 
-    parser = argparse.ArgumentParser(description="A random user of the page.")
-    parser.add_argument("--minutes", type=float, default=1.0)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--scene", default="iiwa14-hold")
-    parser.add_argument("--hostile", action="store_true")
-    given = parser.parse_args()
-    run = (given.scene, 60.0 * given.minutes, given.seed)
-    if given.hostile:
+    run = (scene, 60.0 * minutes, seed)
+    if hostile:
         found = attack(HostileUser, *run, pages=4)
     else:
         with sync_playwright() as playwright:
@@ -374,4 +370,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(tyro.cli(main, description=__doc__))

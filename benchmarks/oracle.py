@@ -11,11 +11,13 @@ optimum, and the distance of its points from the optimum, N·m.
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Annotated
+
+import tyro
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # several threads are slower on such small matrices
 
@@ -161,16 +163,16 @@ def table(found: list[Found]) -> str:
     return "\n".join(lines)
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--stacks", type=int, default=200)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--longest", type=int, default=30)
-    parser.add_argument("--robot", choices=CATALOG, default=None)
-    given = parser.parse_args()
-    robots = tuple(CATALOG) if given.robot is None else (given.robot,)
+def main(
+    count: Annotated[int, tyro.conf.arg(name="stacks")] = 200,
+    seed: int = 0,
+    longest: int = 30,
+    robot: str | None = None,
+) -> int:
+    """Does what the module says."""
+    robots = tuple(CATALOG) if robot is None else (robot,)
     found, unknown = [], 0
-    for stack in stacks(given.stacks, given.seed, given.longest, robots):
+    for stack in stacks(count, seed, longest, robots):
         rows = judged(stack)
         if rows is None:
             unknown += 1
@@ -181,9 +183,9 @@ def main() -> int:
             if any(error is None or error > 1e-6 for error in (each.compiled, each.printed)):
                 print(each, file=sys.stderr, flush=True)
     print(table(found))
-    print(f"{given.stacks} stacks, for {unknown} of them the optimum was not found", file=sys.stderr)
+    print(f"{count} stacks, for {unknown} of them the optimum was not found", file=sys.stderr)
     return 1 if unknown else 0
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    sys.exit(tyro.cli(main, description=__doc__))

@@ -10,7 +10,6 @@ without the robot's own process, needs at most one core and every vote was count
 
 from __future__ import annotations
 
-import argparse
 import asyncio
 import json
 import sys
@@ -20,6 +19,7 @@ from statistics import quantiles
 from typing import Any
 
 import psutil
+import tyro
 from websockets.asyncio.client import ClientConnection, connect
 
 from app.link.choice import SceneChoice
@@ -32,26 +32,20 @@ from lessons.scenes.run_spec import RunSpec
 STEP = LessonPlace("a-redundant-arm", 0)
 
 
-def main() -> int:
-    """Measures as the command line says."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--phones", type=int, default=200)
-    parser.add_argument("--scene", default="iiwa14-circle")
-    parser.add_argument("--seconds", type=float, default=20.0)
-    parser.add_argument("--at", default=None, help="runs only phones; they join the class at this address")
-    options = parser.parse_args()
-    if options.at is not None:
-        asyncio.run(be_phones(options.at, options.phones))
+def main(
+    phones: int = 200, scene: str = "iiwa14-circle", seconds: float = 20.0, at: str | None = None
+) -> int:
+    """Does what the module says."""
+    if at is not None:
+        asyncio.run(be_phones(at, phones))
         return 0
-    server = PageServer(
-        SceneChoice(RunSpec(options.scene)), port=0, max_sessions=1, classroom=True, class_names=True
-    )
+    server = PageServer(SceneChoice(RunSpec(scene)), port=0, max_sessions=1, classroom=True, class_names=True)
     try:
-        found = measured(server, options.phones, options.seconds)
+        found = measured(server, phones, seconds)
     finally:
         server.close()
     print(json.dumps(found, indent=1))
-    return 0 if found["server_share"] <= 1.0 and found["counted"] == [options.phones] * 2 else 1
+    return 0 if found["server_share"] <= 1.0 and found["counted"] == [phones] * 2 else 1
 
 
 # ------------------------------------------------------------------ the phones
@@ -171,4 +165,4 @@ def measured(server: PageServer, count: int, seconds: float) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(tyro.cli(main, description=__doc__))

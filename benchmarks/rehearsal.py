@@ -11,7 +11,6 @@ depend on the cores and on their other load. They are printed, but they do not c
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import io
 import json
@@ -26,6 +25,7 @@ from statistics import median
 from typing import Any
 
 import psutil
+import tyro
 from websockets.sync.client import connect
 
 from app.__main__ import main as himpc_lab
@@ -44,30 +44,24 @@ KEY = "a key of a rehearsal"
 LONG = 300.0  # s
 
 
-def main() -> int:
-    """Measures as the command line says."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--learners", type=int, default=20)
-    parser.add_argument("--phones", type=int, default=200)
-    parser.add_argument("--lesson", default="a-redundant-arm")
-    parser.add_argument("--serve", action="store_true", help=argparse.SUPPRESS)
-    options = parser.parse_args()
-    if options.serve:
-        be_a_server(options.learners, options.lesson)
+def main(learners: int = 20, phones: int = 200, lesson: str = "a-redundant-arm", serve: bool = False) -> int:
+    """Does what the module says."""
+    if serve:
+        be_a_server(learners, lesson)
         return 0
-    size = ("--learners", str(options.learners), "--lesson", options.lesson)
+    size = ("--learners", str(learners), "--lesson", lesson)
     with contextlib.ExitStack() as all_leave:
         host = all_leave.enter_context(Child("benchmarks.rehearsal", "--serve", *size))
         links = host.hear("teacher")
         teacher = all_leave.enter_context(Teacher(links["teacher"]))
-        pages = [all_leave.enter_context(Learner(links["learners"])) for _ in range(options.learners)]
+        pages = [all_leave.enter_context(Learner(links["learners"])) for _ in range(learners)]
         for k, page in enumerate(pages):
             page.use("Your name", f"learner {k}")
-        phones = all_leave.enter_context(crowd(links["phones"], options.phones))
-        phones.say()  # begins the counting of pictures
-        phones.say()  # ends the counting; from now on, each line is a vote
-        phones.hear("slowest_hz")
-        found = Rehearsal(host, pages, phones, teacher, options.lesson, len(pages) + options.phones).held()
+        voters = all_leave.enter_context(crowd(links["phones"], phones))
+        voters.say()  # begins the counting of pictures
+        voters.say()  # ends the counting; from now on, each line is a vote
+        voters.hear("slowest_hz")
+        found = Rehearsal(host, pages, voters, teacher, lesson, len(pages) + phones).held()
     print(json.dumps(found, indent=1))
     return 1 if found["lost"] else 0
 
@@ -300,4 +294,4 @@ def figures(values: Sequence[float]) -> dict[str, float]:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(tyro.cli(main, description=__doc__))

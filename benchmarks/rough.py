@@ -11,7 +11,6 @@ GET, and what was left behind. The exit code is 0 if every page recovered and no
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import json
 import os
@@ -25,6 +24,8 @@ import urllib.request
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+
+import tyro
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
@@ -45,20 +46,15 @@ _REFUSED = "refused in one sentence"
 _INSIDE = "HIMPC_LAB_ROUGH_INSIDE"
 
 
-def main() -> int:
-    """Disturbs a server as the command line says."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--kills", type=int, default=100)
-    parser.add_argument("--stops", type=int, default=20)
-    parser.add_argument("--shm", type=int, default=8)
-    given = parser.parse_args()
+def main(kills: int = 100, stops: int = 20, shm: int = 8) -> int:
+    """Does what the module says."""
     if _INSIDE not in os.environ and os.geteuid() == 0 and shutil.which("unshare"):
-        mount = f"mount -t tmpfs -o size={given.shm}m tmpfs /dev/shm"
+        mount = f"mount -t tmpfs -o size={shm}m tmpfs /dev/shm"
         command = ["unshare", "--mount", "sh", "-c", f'{mount} && exec "$@"', "sh", sys.executable, "-m"]
         return subprocess.call(
             [*command, "benchmarks.rough", *sys.argv[1:]], env={**os.environ, _INSIDE: "1"}
         )
-    found = treat(given.kills, given.stops)
+    found = treat(kills, stops)
     print(json.dumps(found, indent=1))
     sound = found["recovered"] == found["treated"] and not found["left behind"]
     return 0 if sound else 1
@@ -223,4 +219,4 @@ def _maps(process: int) -> list[str]:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(tyro.cli(main, description=__doc__))

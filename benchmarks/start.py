@@ -10,7 +10,6 @@ into a temporary folder.
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import resource
@@ -20,6 +19,8 @@ import sys
 import tempfile
 import time
 from statistics import median
+
+import tyro
 
 LISTS = (["--help"], ["scenes"], ["controllers"], ["robots"], ["lessons"])
 PAGES = ([], ["--lesson", "one-task"], ["--scene", "hold", "--urdf", "planar3"])
@@ -47,26 +48,23 @@ def listening(arguments: list[str]) -> tuple[float, float]:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK"), wall
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--runs", type=int, default=5)
-    parser.add_argument("--cold", action="store_true")
-    given = parser.parse_args()
+def main(runs: int = 5, cold: bool = False) -> None:
+    """Does what the module says."""
     found: dict[str, float] = {}
     for words in LISTS:
-        cpu = median(cost([sys.executable, "-m", "app", *words]) for _ in range(given.runs))
+        cpu = median(cost([sys.executable, "-m", "app", *words]) for _ in range(runs))
         found[f"himpc-lab {' '.join(words)}, CPU s"] = round(cpu, 3)
     for words in PAGES:
-        times = zip(*(listening(words) for _ in range(given.runs)), strict=True)
+        times = zip(*(listening(words) for _ in range(runs)), strict=True)
         for kind, each in zip(("CPU", "wall"), times, strict=True):
             found[f"listening {' '.join(words)}, {kind} s"] = round(median(each), 3)
-    if given.cold:
+    if cold:
         with tempfile.TemporaryDirectory() as folder:
             command = [sys.executable, "-c", COMPILE]
-            cold = cost(command, NUMBA_CACHE_DIR=folder)
-            found["compiling, CPU s"] = round(cold - cost(command, NUMBA_CACHE_DIR=folder), 2)
+            first = cost(command, NUMBA_CACHE_DIR=folder)
+            found["compiling, CPU s"] = round(first - cost(command, NUMBA_CACHE_DIR=folder), 2)
     print(json.dumps(found, indent=2))
 
 
 if __name__ == "__main__":
-    main()
+    tyro.cli(main, description=__doc__)
