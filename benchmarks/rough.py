@@ -63,7 +63,7 @@ def main(kills: int = 100, stops: int = 20, shm: int = 8) -> int:
 def treat(kills: int, stops: int, scene: str = "iiwa14-hold") -> dict[str, object]:
     """Does all disturbances in sequence, see the module. scene: the scene that the pages show."""
     shared = shutil.disk_usage("/dev/shm").total if os.path.exists("/dev/shm") else 0
-    before, there = _memory_left(), set(psutil.Process().children(recursive=True))
+    before, there = _memory_left(), _children()
     server = PageServer(SceneChoice(RunSpec(scene)), port=0, max_sessions=3)
     found: dict[str, object] = {"shared memory MB": round(shared / 1e6, 1)}
     treated = recovered = 0
@@ -88,16 +88,14 @@ def treat(kills: int, stops: int, scene: str = "iiwa14-hold") -> dict[str, objec
             treated += 2
             recovered += answers.count(_REFUSED) if _runs(learners[0]) else 0
 
-    def others() -> set[psutil.Process]:
-        return set(psutil.Process().children(recursive=True)) - there
-
-    eventually(lambda: not others(), 5.0)
+    eventually(lambda: not _children() - there, 5.0)
     return found | {
         "treated": treated,
         "recovered": recovered,
         "longest silence of the watching page s": round(worst[0], 2),
         "longest GET s": round(worst[1], 2),
-        "left behind": [f"process {child.pid}" for child in others()] + sorted(_memory_left() - before),
+        "left behind": [f"process {child.pid}" for child in _children() - there]
+        + sorted(_memory_left() - before),
     }
 
 
@@ -199,6 +197,17 @@ def _watch(url: str, witness: Wire) -> Iterator[list[float]]:
         over.set()
         for each in threads:
             each.join(LONG)
+
+
+def _children() -> set[psutil.Process]:
+    """Returns the processes below this one, without the two that Python keeps as long as this program runs:
+    the fork server and the tracker of resources."""
+    own, found = psutil.Process(), set[psutil.Process]()
+    for child in own.children(recursive=True):
+        with contextlib.suppress(psutil.NoSuchProcess):  # it has ended
+            if child.ppid() != own.pid or "from multiprocessing." not in child.cmdline()[-1]:
+                found.add(child)
+    return found
 
 
 def _memory_left() -> set[str]:

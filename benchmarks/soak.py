@@ -285,20 +285,24 @@ def everybody(learners: Sequence[SimulationClient], scene: str, speed: float) ->
 
 
 def state(server: PageServer) -> dict[str, float]:
-    """Returns the state of the server after all pages were built and a moment passed without activity."""
+    """Returns the state of the server after all pages were built and nothing was added to them any more."""
     viewers = server._viser.get_clients().values()
-    assert wait_until(
-        lambda: all("/robot/1" in viewer.scene._handle_from_node_name for viewer in viewers), LONG
-    ), "not all pages are built"
-    time.sleep(4.0)
+
+    def shown() -> dict[str, float]:
+        nodes = [viewer.scene._handle_from_node_name for viewer in viewers]
+        assert wait_until(lambda: all("/robot/1" in each for each in nodes), LONG), "not all pages are built"
+        controls = sum(len(viewer.gui._gui_input_handle_from_uuid) for viewer in viewers)
+        return {"nodes": sum(map(len, nodes)), "controls": controls}
+
+    before: dict[str, float] = {}
+    while before != (before := shown()):
+        time.sleep(4.0)
     gc.collect()
     process = psutil.Process()
-    return {
+    return before | {
         "megabytes": round(1e-6 * process.memory_info().rss, 1),
         "processes": len(process.children(recursive=True)),
         "blocks": sum("memfd:himpc-lab" in each.path for each in process.memory_maps(grouped=False)),
-        "nodes": sum(len(viewer.scene._handle_from_node_name) for viewer in viewers),
-        "controls": sum(len(viewer.gui._gui_input_handle_from_uuid) for viewer in viewers),
     }
 
 
