@@ -25,23 +25,24 @@ chain. The exit code is 1 if a force exceeds 50 N, a joint is faster than 1.05 t
 
 from __future__ import annotations
 
-import argparse
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import thread_time_ns
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import pinocchio as pin
+import tyro
 from numpy.typing import NDArray
 
 import lessons.course
-from benchmarks.crossing import BALL_M, crossing
 from himpc.controllers.controller import Controller
 from himpc.kinematics.configuration import Configuration
 from himpc.plan import Plan
+from himpc.rotation import exp3, quaternion
 from lessons.events import MoveTarget
 from lessons.scenes.catalog import torque_scene
 from lessons.scenes.hold import hold
@@ -51,6 +52,7 @@ from lessons.session.torque import TorqueSession
 from lessons.settings.assignments import with_assignments
 from robots import Robot
 from robots.covering.cover_of import cover_of
+from robots.errors import InputError
 from robots.world import Ball, Thing
 
 Array = NDArray[np.float64]
@@ -64,6 +66,11 @@ JUMP_M, JUMP_RAD, JUMP_JOINT = 0.3, 0.6, 0.3
 HARD_N, AT_REST = 50.0, 0.05
 FAST, FAST_OFF = 1.05, 1.5
 """Largest shares of the velocity limits, with and without distances."""
+BALL_M, BESIDE_M, BALL_SPEED = 0.08, 0.6, (0.15, 0.5)
+"""Radius of a dragged ball, the length of its path before and behind a link, and its range of speeds, m/s."""
+PAST_M, CLEAR_M = 0.25, 0.35
+"""The smallest distance, m, between the ball's path and the first three joints of an arm, and between the
+start of the path and the whole arm."""
 AWAY = np.array([0.0, 0.0, 10.0])
 """The position at which the ball waits, m."""
 SCENES = {"iiwa14": "iiwa14-hold", "panda": "panda-hold", "baxter": "baxter-hold"}
@@ -132,30 +139,56 @@ def drags(session: TorqueSession, rng: np.random.Generator) -> list[MoveTarget]:
                 found.append(MoveTarget(task.name, tuple((target.raw + away).tolist())))
             elif turns and len(getattr(task, "axes", "xyz")) == 3:
                 axis = rng.normal(size=3)
-                turn = pin.exp3(rng.uniform(0.0, TURN_RAD) * axis / np.linalg.norm(axis))
-                goal = pin.Quaternion(turn @ target.raw).coeffs()
-                found.append(MoveTarget(task.name, tuple(goal.tolist())))
+                turn = exp3(rng.uniform(0.0, TURN_RAD) * axis / np.linalg.norm(axis))
+                found.append(MoveTarget(task.name, tuple(quaternion(turn @ target.raw).tolist())))
     return found
 
 
-def jumps(session: TorqueSession, rng: np.random.Generator) -> list[MoveTarget]:
-    """Returns a jump of every target, from its value at the start of the run."""
-    found, start = [], _at_start(session)
-    for task in (task for level in session.settings.levels for task in level.tasks):
-        if session.target(task.name) is None:
+def jumps(
+    session: TorqueSession, rng: np.random.Generator, start: Configuration | None = None
+) -> Iterator[MoveTarget]:
+    """Yields a jump of every target that can be moved: positions by a normal sample of 0.3 m, orientations of
+    0.6 rad, postures of 0.3 rad. The jumps are from the values at `start`, or from the present targets."""
+    for task in (task for level in session.scene.settings.levels for task in level.tasks):
+        target = session.target(task.name)
+        if target is None:
             continue
-        raw = task.target(start)
+        raw = target.raw if start is None else task.target(start)
         if raw.ndim == 2:
-            goal = pin.Quaternion(pin.exp3(rng.normal(0.0, JUMP_RAD, 3)) @ raw).coeffs()
+            goal = quaternion(exp3(rng.normal(0.0, JUMP_RAD, 3)) @ raw)
         else:
-            goal = raw + rng.normal(0.0, JUMP_M if task.unit == "m" else JUMP_JOINT, raw.size)
-        found.append(MoveTarget(task.name, tuple(goal.tolist())))
-    return found
+            goal = raw + rng.normal(0.0, JUMP_M if task.unit == "m" else JUMP_JOINT, raw.shape)
+        with suppress(InputError):  # a target outside the range of the task
+            yield MoveTarget(task.name, tuple(goal.tolist()))
 
 
-def _at_start(session: TorqueSession) -> Configuration:
-    robot, scene = session.robot, session.scene
-    return Configuration(robot, robot.model.createData(), scene.q_0, np.zeros(robot.n))
+class Crossing(NamedTuple):
+    """A ball that is dragged through an arm: its position at the start, m, its velocity, m/s, and the
+    duration, s."""
+
+    start: Array
+    velocity: Array
+    seconds: float
+
+
+def crossing(session: TorqueSession, rng: np.random.Generator) -> Crossing:
+    """Returns a path through the origin of a random joint that moves. The path does not come near the first
+    three joints of the arm."""
+    robot, data = session.robot, session.robot.model.createData()
+    pin.forwardKinematics(robot.model, data, session.plant.q)
+    origins = np.array([each.translation for each in data.oMi])
+    depth = np.array([len(each) - 1 for each in robot.model.supports])
+    points = np.vstack([origins, 0.5 * (origins[1:] + origins[robot.model.parents.tolist()[1:]])])
+    while True:
+        away = rng.normal(size=3)
+        away[2] *= 0.3
+        away /= np.linalg.norm(away)
+        middle, speed = origins[int(rng.choice(np.flatnonzero(depth > 3)))], rng.uniform(*BALL_SPEED)
+        first = origins[depth <= 3] - middle
+        along = np.clip(first @ away, -BESIDE_M, BESIDE_M)
+        past = np.linalg.norm(first - along[:, None] * away, axis=1).min() > PAST_M
+        if past and np.linalg.norm(points - middle - BESIDE_M * away, axis=1).min() > CLEAR_M:
+            return Crossing(middle + BESIDE_M * away, -speed * away, 2.0 * BESIDE_M / speed)
 
 
 class Timed:
@@ -205,32 +238,29 @@ def run(
     rng, total, times = np.random.default_rng(seed), Total(), []
     scene = scene_of(robot, seed)
     settings = with_assignments(replace(scene.settings, controller=controller), changes)
-    world = (
-        (*scene.world, Thing(Ball("ball", tuple(AWAY.tolist()), BALL_M), mass_kg=1.0))
-        if balls
-        else scene.world
-    )
+    ball = Thing(Ball("ball", tuple(AWAY.tolist()), BALL_M), mass_kg=1.0)
+    world = (*scene.world, *([ball] if balls else []))
     left_out = {(each.first, each.second) for each in cover_of(scene.robot).excluded}
     for _ in range(chains):
         session = TorqueSession(replace(scene, settings=settings, world=world))
         session.controller = cast(Controller, Timed(session.controller, times))
         hardest = fastest = 0.0
         total.chains += 1
-        many, apart, move = (OFTEN, EVERY_S, jumps) if often else (DRAGS, APART_S, drags)
+        start = Configuration(scene.robot, scene.robot.model.createData(), scene.q_0, np.zeros(scene.robot.n))
+        many, apart = (OFTEN, EVERY_S) if often else (DRAGS, APART_S)
         for drag in range(many):
             total.drags += 1
             path = crossing(session, rng) if balls else None
-            for event in () if balls else move(session, rng):
+            moved = () if balls else jumps(session, rng, start) if often else drags(session, rng)
+            for event in moved:
                 session.post(event)
             crossed, rest = path.seconds if path else apart, REST_S if drag == many - 1 else 0.0
             seconds = max(crossed, rest) if path is None else crossed + rest
             for tick in range(round(seconds / session.step_s)):
                 if path is not None:
                     t = tick * session.step_s
-                    there = (
-                        (path.start + t * path.velocity, path.velocity) if t < crossed else (AWAY, 0.0 * AWAY)
-                    )
-                    session.plant.carry(0, *there)
+                    here = (path.start + t * path.velocity, path.velocity)
+                    session.plant.carry(0, *(here if t < crossed else (AWAY, 0.0 * AWAY)))
                 session.tick()
                 assert session.plan is not None
                 total.unsolved += session.plan.unsolved
@@ -257,32 +287,26 @@ def line(robot: str, total: Total, times: Sequence[float]) -> str:
     )
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--chains", type=int, default=25)
-    parser.add_argument("--robots", nargs="*", default=list(ROBOTS))
-    parser.add_argument("--often", action="store_true")
-    parser.add_argument("--off", action="store_true")
-    parser.add_argument("--balls", action="store_true")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--controller", default="himpc")
-    parser.add_argument("--set", nargs="*", default=[], dest="changes")
-    given = parser.parse_args(arguments)
-    changes = [*(["avoidance.on=false"] if given.off else []), *given.changes]
+def main(
+    chains: int = 25, robots: tuple[str, ...] = ROBOTS, often: bool = False, off: bool = False,
+    balls: bool = False, seed: int = 1, controller: str = "himpc", set: tuple[str, ...] = (),
+) -> int:  # fmt: skip
+    """Does what the module says."""
+    changes = [*(["avoidance.on=false"] if off else []), *set]
     print("| robot | drags | largest force, N | chains above 50 N | speed | lost | unsolved | at rest | ms |")
     print("|---|---|---|---|---|---|---|---|---|")
     worst = 0
-    for robot in given.robots:
+    for robot in robots:
         total, times = run(
-            *(robot, given.chains, given.seed, changes, given.controller, given.balls, given.often),
+            *(robot, chains, seed, changes, controller, balls, often),
             tell=lambda *found, robot=robot: print(line(robot, *found), file=sys.stderr, flush=True),
         )
         print(line(robot, total, times), flush=True)
         bad = total.lost or total.resting < 0.95 * total.chains
-        bad = bad or (total.speed > FAST_OFF if given.off else total.hard or total.speed > FAST)
+        bad = bad or (total.speed > FAST_OFF if off else total.hard or total.speed > FAST)
         worst = max(worst, int(bool(bad)))
     return worst
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(tyro.cli(main, description=__doc__))

@@ -1,22 +1,20 @@
 """Runs every kind of task on every robot of the catalog in closed loop under two controllers. The task is
 held. Then its target is dragged to the value of the task in another posture, so that it can be reached.
 
-    python -m benchmarks.every_task [--seconds 3] [--json -]
+    python -m benchmarks.every_task [--seconds 3] [--robot NAME]
 
 The program prints a row per robot and kind: the error after holding and after dragging (mm or degrees).
 """
 
 from __future__ import annotations
 
-import argparse
-import json
 import sys
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+import tyro
 from numpy.typing import NDArray
 
 from himpc.kinematics.configuration import Configuration
@@ -70,18 +68,16 @@ def entry(kind: str, scene: TorqueScene) -> dict[str, Any]:
     tasks = [task for level in scene.settings.levels for task in level.tasks]
     fields = {name for of in KINDS[kind].makes for name in of.__dataclass_fields__}
     given: dict[str, Any] = {"task": kind, "name": "x"}
-    planar = "axes" in vars(tasks[0]) and vars(tasks[0])["axes"] == "xy"
-    if "axes" in fields and planar and "pose" not in kind:
+    if "axes" in fields and getattr(tasks[0], "axes", "") == "xy" and "pose" not in kind:
         given["axes"] = "z" if "orientation" in kind else "xy"
     if "root" in fields:
         given["root"] = robot.frames[len(robot.frames) // 3]
-    if kind == "pointing":
-        given["axis"] = "x"
-    if kind == "plane_distance":
-        given["normal"] = [1.0, 0.0, 0.0]
-    if kind == "joints":
-        given["joints"] = list(robot.joint_names[:2])
-    return given
+    own: dict[str, dict[str, Any]] = {
+        "pointing": {"axis": "x"},
+        "plane_distance": {"normal": [1.0, 0.0, 0.0]},
+        "joints": {"joints": list(robot.joint_names[:2])},
+    }
+    return given | own.get(kind, {})
 
 
 def measured(robot: str, kind: str, controller: str, seconds: float) -> Found:
@@ -133,31 +129,23 @@ def settled_within(task: Task, robot: Robot) -> NDArray[np.float64]:
     return np.array([SETTLED["m" if joints.get(name, task.unit == "m") else "rad"] for name in names])
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seconds", type=float, default=3.0)
-    parser.add_argument("--robot", choices=CATALOG, default=None)
-    parser.add_argument("--json", default=None)
-    given = parser.parse_args()
+def main(seconds: float = 3.0, robot: str | None = None) -> int:
+    """Does what the module says."""
     found = []
-    for robot in CATALOG if given.robot is None else (given.robot,):
+    for name in CATALOG if robot is None else (robot,):
         for kind in KINDS:
             for controller in CONTROLLERS:
-                each = measured(robot, kind, controller, given.seconds)
+                each = measured(name, kind, controller, seconds)
                 found.append(each)
                 print(
-                    f"{robot:16}{kind:22}{controller:7}held {each.held:8.2g}  moved {each.moved:8.3g}  "
+                    f"{name:16}{kind:22}{controller:7}held {each.held:8.2g}  moved {each.moved:8.3g}  "
                     f"settled {each.settled:8.2g}  v {each.calm:.1e}",
-                    file=sys.stderr,
                     flush=True,
                 )
-    if given.json is not None:
-        text = json.dumps([asdict(each) for each in found], indent=1)
-        sys.stdout.write(text) if given.json == "-" else Path(given.json).write_text(text)
     bad = [each for each in found if not (each.held < 1.0 and each.settled < 1.0)]
-    print(f"{len(found)} runs, {len(bad)} not settled", file=sys.stderr)
+    print(f"{len(found)} runs, {len(bad)} not settled")
     return 1 if bad else 0
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    sys.exit(tyro.cli(main, description=__doc__))

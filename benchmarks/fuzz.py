@@ -13,7 +13,6 @@ there was any fault.
 
 from __future__ import annotations
 
-import argparse
 import gc
 import json
 import sys
@@ -24,6 +23,7 @@ from dataclasses import dataclass, field, replace
 from time import monotonic, thread_time
 
 import numpy as np
+import tyro
 from numpy.typing import NDArray
 
 from himpc.plan import Plan
@@ -35,17 +35,9 @@ from lessons.session.torque import TorqueSession
 Array = NDArray[np.float64]
 
 SCENES = (
-    "iiwa14-circle",
-    "iiwa14-hold",
-    "iiwa14-hold",
-    "panda-hold",
-    "planar3-circle",
-    "planar3-conflict",
-    "planar3-hold",
-    "planar3-singular",
-    "iiwa14-circle-paper",
-    "ridgeback-ur10-hold",
-)
+    "iiwa14-circle", "iiwa14-hold", "iiwa14-hold", "panda-hold", "planar3-circle", "planar3-conflict",
+    "planar3-hold", "planar3-singular", "iiwa14-circle-paper", "ridgeback-ur10-hold",
+)  # fmt: skip
 CONTROLLERS = ("himpc",) * 6 + ("hiqp", "nhimpc", "weighted", "weighted", "hqp", "tdeosf")
 BOUNDED = ("himpc", "hiqp", "nhimpc", "weighted", "hqp")
 """Controllers that impose the torque bounds."""
@@ -64,15 +56,14 @@ class Tally:
     faults: Counter[str] = field(default_factory=Counter)
     fallbacks: Counter[str] = field(default_factory=Counter)
     longest_ms: float = 0.0
-    lines: list[str] = field(default_factory=list)
+    shown: set[tuple[str, int]] = field(default_factory=set)
 
     def fault(self, kind: str, seed: int, tick: int, what: str) -> None:
         """Counts a fault, and prints the first of each kind in an episode."""
         self.faults[kind] += 1
-        line = f"{kind}: --episode {seed}, tick {tick}: {what}"
-        if not any(each.startswith(f"{kind}: --episode {seed},") for each in self.lines):
-            self.lines.append(line)
-            print(line, flush=True)
+        if (kind, seed) not in self.shown:
+            self.shown.add((kind, seed))
+            print(f"{kind}: --episode {seed}, tick {tick}: {what}", flush=True)
 
 
 def state(rng: np.random.Generator, session: TorqueSession) -> tuple[Array, Array]:
@@ -159,7 +150,7 @@ def check(tally: Tally, seed: int, tick: int, session: TorqueSession, plan: Plan
         tally.fault("torque", seed, tick, f"{plan.tau} above {session.robot.tau_limit}")
 
 
-def episode(seed: int, ticks: int, tally: Tally) -> None:
+def run_episode(seed: int, ticks: int, tally: Tally) -> None:
     """Runs one episode."""
     rng = np.random.default_rng(seed)
     scene = torque_scene(str(rng.choice(SCENES)))
@@ -185,9 +176,8 @@ def episode(seed: int, ticks: int, tally: Tally) -> None:
                 reading = session.plant.tau * 10.0 ** rng.uniform(-1, 4)
                 if rng.random() < 0.1:
                     reading = np.full(q.size, rng.choice([np.nan, np.inf, 1e300]))
-                outlook = Outlook(
-                    session.references, session.t, session.settings.T_s, session.settings.horizon
-                )
+                own = session.settings
+                outlook = Outlook(session.references, session.t, own.T_s, own.horizon)
                 started = thread_time()
                 plan = session.controller.step(q, v, outlook, reading)
             else:
@@ -203,37 +193,22 @@ def episode(seed: int, ticks: int, tally: Tally) -> None:
             return
 
 
-def main() -> int:
-    """Prints the faults and a summary."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    parser.add_argument("--ticks", type=int, default=1_000_000)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--minutes", type=float, default=1e9)
-    parser.add_argument("--length", type=int, default=400, help="ticks of an episode")
-    parser.add_argument("--episode", type=int, help="the seed of the only episode to run")
-    given = parser.parse_args()
+def main(
+    ticks: int = 1_000_000, seed: int = 0, minutes: float = 1e9, length: int = 400, episode: int | None = None
+) -> int:
+    """Does what the module says."""
     tally, began = Tally(), monotonic()
-    seeds = np.random.SeedSequence(given.seed)
+    seeds = np.random.SeedSequence(seed)
     with np.errstate(all="ignore"), suppress(KeyboardInterrupt):
-        if given.episode is not None:
-            episode(given.episode, given.length, tally)
-        while given.episode is None and tally.ticks < given.ticks:
-            if monotonic() - began > 60 * given.minutes:
+        if episode is not None:
+            run_episode(episode, length, tally)
+        while episode is None and tally.ticks < ticks:
+            if monotonic() - began > 60 * minutes:
                 break
-            episode(int(seeds.spawn(1)[0].generate_state(1)[0]), given.length, tally)
-    print(
-        json.dumps(
-            {
-                "ticks": tally.ticks,
-                "episodes": tally.episodes,
-                "faults": dict(tally.faults),
-                "rungs": dict(tally.fallbacks),
-                "longest_ms": round(tally.longest_ms, 2),
-            }
-        )
-    )
+            run_episode(int(seeds.spawn(1)[0].generate_state(1)[0]), length, tally)
+    print(json.dumps({name: value for name, value in vars(tally).items() if name != "shown"}))
     return 1 if tally.faults else 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(tyro.cli(main, description=__doc__))

@@ -1,6 +1,6 @@
 """Compares the kernel and the printed equations with the exact optimum, for random stacks on every robot.
 
-    python -m benchmarks.oracle [--stacks 200] [--seed 0] [--longest 30] [--json -]
+    python -m benchmarks.oracle [--stacks 200] [--seed 0] [--longest 30]
 
 A stack has one to four levels with random tasks, weights (Q over five decades, R on the torque or on the
 acceleration), horizons and limits, in a random state and with random targets. The kernel and
@@ -11,13 +11,13 @@ optimum, and the distance of its points from the optimum, N·m.
 
 from __future__ import annotations
 
-import argparse
-import json
 import os
 import sys
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from dataclasses import dataclass
+from typing import Annotated
+
+import tyro
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # several threads are slower on such small matrices
 
@@ -80,24 +80,24 @@ def random_stack(robot: str, seed: int, longest: int) -> Stack | None:
     scene = scene_of(robot)
     kinds = [kind for kind in KINDS if kind != "damping"]
     levels = int(rng.integers(1, 5))
+
+    def decades(low: float, high: float) -> float:
+        return float(10.0 ** rng.uniform(low, high))
+
     stack = [
         entry(str(rng.choice(kinds)), scene)
-        | {
-            "name": f"x{place}",
-            "Q": float(10.0 ** rng.uniform(0.0, 5.0)),
-            "R": float(10.0 ** rng.uniform(-1.0, 2.0)),
-            "K_p": float(10.0 ** rng.uniform(0.0, 2.5)),
-            "K_v": float(10.0 ** rng.uniform(0.0, 1.5)),
-        }
+        | {"name": f"x{place}", "Q": decades(0.0, 5.0), "R": decades(-1.0, 2.0)}
+        | {"K_p": decades(0.0, 2.5), "K_v": decades(0.0, 1.5)}
         for place in range(levels)
     ]
-    settings = [
-        assignment("stack", stack),
-        assignment("horizon", int(rng.integers(1, longest + 1))),
-        assignment("R_on", str(rng.choice(["torque", "acceleration"]))),
-        assignment("limits.velocity_scale", float(rng.choice([1.0, 0.3, 0.1]))),
-        assignment("limits.torque_scale", float(rng.choice([1.0, 0.5]))),
-    ]
+    given = {
+        "stack": stack,
+        "horizon": int(rng.integers(1, longest + 1)),
+        "R_on": str(rng.choice(["torque", "acceleration"])),
+        "limits.velocity_scale": float(rng.choice([1.0, 0.3, 0.1])),
+        "limits.torque_scale": float(rng.choice([1.0, 0.5])),
+    }
+    settings = [assignment(path, value) for path, value in given.items()]
     session = TorqueSession(prepared(scene, "himpc", settings))
     controller = session.controller
     assert isinstance(controller, HIMPC)
@@ -130,9 +130,7 @@ def judged(stack: Stack) -> list[Found] | None:
         for by in METHODS:  # after a level without a point, the next problem differs
             right[by] = right[by] and points[by].fallback == "solve"
         errors = [float(np.abs(points[by].U - best.U).max()) if right[by] else None for by in METHODS]
-        found.append(
-            Found(stack.robot, stack.seed, place + 1, len(problem.B), best.active, errors[0], errors[1])
-        )
+        found.append(Found(stack.robot, stack.seed, place + 1, len(problem.B), best.active, *errors))
         above.append((problem, best))
     return found
 
@@ -165,17 +163,16 @@ def table(found: list[Found]) -> str:
     return "\n".join(lines)
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--stacks", type=int, default=200)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--longest", type=int, default=30)
-    parser.add_argument("--robot", choices=CATALOG, default=None)
-    parser.add_argument("--json", default=None)
-    given = parser.parse_args()
-    robots = tuple(CATALOG) if given.robot is None else (given.robot,)
+def main(
+    count: Annotated[int, tyro.conf.arg(name="stacks")] = 200,
+    seed: int = 0,
+    longest: int = 30,
+    robot: str | None = None,
+) -> int:
+    """Does what the module says."""
+    robots = tuple(CATALOG) if robot is None else (robot,)
     found, unknown = [], 0
-    for stack in stacks(given.stacks, given.seed, given.longest, robots):
+    for stack in stacks(count, seed, longest, robots):
         rows = judged(stack)
         if rows is None:
             unknown += 1
@@ -186,12 +183,9 @@ def main() -> int:
             if any(error is None or error > 1e-6 for error in (each.compiled, each.printed)):
                 print(each, file=sys.stderr, flush=True)
     print(table(found))
-    print(f"{given.stacks} stacks, for {unknown} of them the optimum was not found", file=sys.stderr)
-    if given.json is not None:
-        text = json.dumps([asdict(each) for each in found], indent=1)
-        sys.stdout.write(text) if given.json == "-" else Path(given.json).write_text(text)
+    print(f"{count} stacks, for {unknown} of them the optimum was not found", file=sys.stderr)
     return 1 if unknown else 0
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    sys.exit(tyro.cli(main, description=__doc__))

@@ -1,19 +1,17 @@
 """Measures the cost of a lecture hall: phones vote and watch the teacher's robot.
 
-    python -m benchmarks.phones [--phones 200] [--scene S] [--seconds S] [--json -]
+    python -m benchmarks.phones [--phones 200] [--scene S] [--seconds S]
 
 The program starts a server with a class and, in a process of their own, phones that use the page's protocol
 and draw nothing. The teacher's robot moves all the time, so that each phone gets five pictures a second. Then
-all phones vote at the same time. They vote twice. The exit code is 0 if the server, without the robot's own
-process, needs at most one core and every vote was counted.
+all phones vote at the same time. They vote twice. The program prints JSON. The exit code is 0 if the server,
+without the robot's own process, needs at most one core and every vote was counted.
 """
 
 from __future__ import annotations
 
-import argparse
 import asyncio
 import json
-import subprocess
 import sys
 import time
 from math import sqrt
@@ -21,39 +19,33 @@ from statistics import quantiles
 from typing import Any
 
 import psutil
+import tyro
 from websockets.asyncio.client import ClientConnection, connect
 
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
 from app.link.process import wait_until
 from app.web.server import PageServer
+from benchmarks.child import LONG, Child, tell
 from lessons.scenes.run_spec import RunSpec
 
-LONG = 120.0  # s
 STEP = LessonPlace("a-redundant-arm", 0)
 
 
-def main() -> int:
-    """Measures as the command line says."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--phones", type=int, default=200)
-    parser.add_argument("--scene", default="iiwa14-circle")
-    parser.add_argument("--seconds", type=float, default=20.0)
-    parser.add_argument("--json", choices=["-"], default=None)
-    parser.add_argument("--at", default=None, help="runs only phones; they join the class at this address")
-    options = parser.parse_args()
-    if options.at is not None:
-        asyncio.run(be_phones(options.at, options.phones))
+def main(
+    phones: int = 200, scene: str = "iiwa14-circle", seconds: float = 20.0, at: str | None = None
+) -> int:
+    """Does what the module says."""
+    if at is not None:
+        asyncio.run(be_phones(at, phones))
         return 0
-    server = PageServer(
-        SceneChoice(RunSpec(options.scene)), port=0, max_sessions=1, classroom=True, class_names=True
-    )
+    server = PageServer(SceneChoice(RunSpec(scene)), port=0, max_sessions=1, classroom=True, class_names=True)
     try:
-        found = measured(server, options.phones, options.seconds)
+        found = measured(server, phones, seconds)
     finally:
         server.close()
-    print(json.dumps(found, indent=1) if options.json else table(found))
-    return 0 if found["server_share"] <= 1.0 and found["counted"] == [options.phones] * 2 else 1
+    print(json.dumps(found, indent=1))
+    return 0 if found["server_share"] <= 1.0 and found["counted"] == [phones] * 2 else 1
 
 
 # ------------------------------------------------------------------ the phones
@@ -63,21 +55,21 @@ async def be_phones(address: str, count: int) -> None:
     """Connects all phones. The first line on stdin begins the counting of pictures, and the second ends it.
     Each further line lets all phones vote, after which a line with the measured times is printed."""
     phones = await asyncio.gather(*(Phone.open(address, k) for k in range(count)))
-    _tell(phones=len(phones))
+    tell(phones=len(phones))
     await _line()
     before, began = [phone.poses for phone in phones], time.monotonic()
     await _line()
     spent = time.monotonic() - began
     rates = [(phone.poses - then) / spent for phone, then in zip(phones, before, strict=True)]
     size = sum(phone.bytes for phone in phones) / count / spent
-    _tell(
+    tell(
         slowest_hz=round(min(rates), 2),
         fastest_hz=round(max(rates), 2),
         kilobytes_per_s=round(1e-3 * size, 2),
     )
     while await _line():
         waits = await asyncio.gather(*(phone.vote() for phone in phones))
-        _tell(median_ms=round(1e3 * quantiles(waits)[1]), longest_ms=round(1e3 * max(waits)))
+        tell(median_ms=round(1e3 * quantiles(waits)[1]), longest_ms=round(1e3 * max(waits)))
 
 
 class Phone:
@@ -123,43 +115,14 @@ async def _line() -> bool:
     return bool(await asyncio.to_thread(sys.stdin.readline))
 
 
-def _tell(**found: float) -> None:
-    sys.stdout.write(json.dumps(found) + "\n")
-    sys.stdout.flush()
-
-
 # ------------------------------------------------------------------ the server
 
 
-class Crowd:
-    """The phones, in a process of their own."""
-
-    def __init__(self, *arguments: str) -> None:
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", "benchmarks.phones", *arguments],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-        self.pid = self._process.pid
-
-    def go_on(self) -> None:
-        """Starts the next action of the phones, see `be_phones`."""
-        assert self._process.stdin is not None
-        self._process.stdin.write("go on\n")
-        self._process.stdin.flush()
-
-    def hear(self) -> dict[str, float]:
-        """Returns the next line that the phones print."""
-        assert self._process.stdout is not None
-        return json.loads(self._process.stdout.readline())
-
-    def __enter__(self) -> Crowd:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._process.kill()
-        self._process.wait()
+def crowd(address: str, count: int) -> Child:
+    """Returns phones in a process of their own that have joined a class."""
+    phones = Child("benchmarks.phones", "--phones", str(count), "--at", address)
+    assert phones.hear("phones")["phones"] == count
+    return phones
 
 
 def measured(server: PageServer, count: int, seconds: float) -> dict[str, Any]:
@@ -168,25 +131,24 @@ def measured(server: PageServer, count: int, seconds: float) -> dict[str, Any]:
     hall = server.hall
     assert hall is not None
     address = f"{server.url.replace('http', 'ws')}/v/{hall.code}"
-    with Crowd("--phones", str(count), "--at", address) as phones:
-        assert phones.hear()["phones"] == count
+    with crowd(address, count) as phones:
         assert wait_until(lambda: (hall.pose() or {"t": 0.0})["t"] > 0.5, LONG), "the robot does not move"
         alone = psutil.Process(phones.pid)
-        phones.go_on()
+        phones.say()
         busy, theirs, began = time.process_time(), sum(alone.cpu_times()[:2]), time.perf_counter()
         time.sleep(seconds)
         spent = time.perf_counter() - began
         share, shares = (time.process_time() - busy) / spent, (sum(alone.cpu_times()[:2]) - theirs) / spent
-        phones.go_on()
-        watched = phones.hear()
+        phones.say()
+        watched = phones.hear("slowest_hz")
         hall.go(STEP)
         assert wait_until(lambda: hall.robot.choice.exercise == STEP, LONG), "the step is not loaded"
         counted, waits = [], []
         for _ in range(2):
             hall.open_vote()
             time.sleep(1.0)  # wait until all phones have received this
-            phones.go_on()
-            waits.append(phones.hear())
+            phones.say()
+            waits.append(phones.hear("longest_ms"))
             hall.close_vote()
             poll = hall.state.poll
             counted.append(0 if poll is None else len(poll.latest))
@@ -202,18 +164,5 @@ def measured(server: PageServer, count: int, seconds: float) -> dict[str, Any]:
     }
 
 
-def table(found: dict[str, Any]) -> str:
-    """Returns the results as text."""
-    votes = "; ".join(
-        f"median {each['median_ms']} ms, longest {each['longest_ms']} ms" for each in found["votes"]
-    )
-    return (
-        f"{found['phones']} phones, {found['cores']} cores, load average {found['load_average']}\n"
-        f"server: {found['server_share']:.1%} of a core, at most 100 %; phones: {found['phones_share']:.1%}\n"
-        f"pictures: {found['slowest_hz']} to {found['fastest_hz']} Hz, {found['kilobytes_per_s']} kB/s each\n"
-        f"votes counted: {found['counted']}; until the answer: {votes}"
-    )
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(tyro.cli(main, description=__doc__))

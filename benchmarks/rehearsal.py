@@ -1,16 +1,16 @@
 """Rehearses a class: learners with robots of their own, and phones, go through a lesson.
 
-    python -m benchmarks.rehearsal [--learners 20] [--phones 200] [--lesson L] [--json -]
+    python -m benchmarks.rehearsal [--learners 20] [--phones 200] [--lesson L]
 
 The class goes to each step of the lesson, votes, votes again, and runs the step on all robots. Then every
 learner hands in, and all texts are graded. Learners and phones use the protocol of their pages and draw
-nothing. The exit code is 0 if no vote, step or text was lost. Waiting times and real-time factors depend on
-the cores and on their other load. They are printed, but they do not change the exit code.
+nothing; the server and the phones have processes of their own. The program prints JSON: waiting times, s, and
+shares of a core. The exit code is 0 if no vote, step or text was lost. Waiting times and real-time factors
+depend on the cores and on their other load. They are printed, but they do not change the exit code.
 """
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import io
 import json
@@ -18,225 +18,280 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from statistics import median
 from typing import Any
 
 import psutil
+import tyro
+from websockets.sync.client import connect
 
 from app.__main__ import main as himpc_lab
+from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
 from app.panels.widgets.controls import STEPS
-from benchmarks.phones import Crowd
-from benchmarks.rehearsal_host import KEY, Host
-from benchmarks.rehearsal_people import Learner, Teacher
+from app.panels.widgets.in_view import AWAKE, LABEL
+from app.web.server import PageServer
+from benchmarks.child import Child, tell
+from benchmarks.phones import crowd
+from browsing.wire import Wire, eventually
+from lessons.replay.progress import read_key
 from lessons.teaching.prediction import Choice, Value
 
-Waits = dict[str, list[float]]
+KEY = "a key of a rehearsal"
+LONG = 300.0  # s
 
 
-def main() -> int:
-    """Measures as the command line says."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--learners", type=int, default=20)
-    parser.add_argument("--phones", type=int, default=200)
-    parser.add_argument("--lesson", default="a-redundant-arm")
-    parser.add_argument("--json", choices=["-"], default=None)
-    options = parser.parse_args()
-    found = rehearsed(options.learners, options.phones, options.lesson)
-    print(json.dumps(found, indent=1) if options.json else table(found))
+def main(learners: int = 20, phones: int = 200, lesson: str = "a-redundant-arm", serve: bool = False) -> int:
+    """Does what the module says."""
+    if serve:
+        be_a_server(learners, lesson)
+        return 0
+    size = ("--learners", str(learners), "--lesson", lesson)
+    with contextlib.ExitStack() as all_leave:
+        host = all_leave.enter_context(Child("benchmarks.rehearsal", "--serve", *size))
+        links = host.hear("teacher")
+        teacher = all_leave.enter_context(Teacher(links["teacher"]))
+        pages = [all_leave.enter_context(Learner(links["learners"])) for _ in range(learners)]
+        for k, page in enumerate(pages):
+            page.use("Your name", f"learner {k}")
+        voters = all_leave.enter_context(crowd(links["phones"], phones))
+        voters.say()  # begins the counting of pictures
+        voters.say()  # ends the counting; from now on, each line is a vote
+        voters.hear("slowest_hz")
+        found = Rehearsal(host, pages, voters, teacher, lesson, len(pages) + phones).held()
+    print(json.dumps(found, indent=1))
     return 1 if found["lost"] else 0
+
+
+# ------------------------------------------------------------------ the pages
+
+
+class Learner(Wire):
+    """A learner's page."""
+
+    def _take(self, message: dict[str, Any]) -> None:
+        super()._take(message)
+        if message["type"] == "GuiTextMessage" and message["props"]["label"] == LABEL:
+            self.write(message["uuid"], value=AWAKE)  # a browser shows only the curves of the step
+
+    def use(self, label: str, value: object) -> None:
+        """Uses the control with this label, as soon as the page has it."""
+        assert eventually(lambda: self.find(label) is not None, LONG), f"a page has no {label!r}"
+        found = self.find(label)
+        assert found is not None
+        self.write(found, value=value)
+
+    @property
+    def ready(self) -> bool:
+        """Whether the page shows a step that was not run yet and that has a button to run it."""
+        labels = ("Run this step", "Run (answer first)")
+        return any(self.find(label) for label in labels) and not self.shows("DONE")
+
+    @property
+    def text(self) -> str:
+        """The text to hand in."""
+        control = self.controls.get(self.find("To hand in") or "")
+        return "" if control is None else str(control.get("value", ""))
+
+
+class Teacher(contextlib.AbstractContextManager["Teacher"]):
+    """A teacher's page. told: the latest value of each part that the page shows."""
+
+    def __init__(self, link: str) -> None:
+        self._line = connect(link.replace("http", "ws", 1), max_size=None, ping_interval=None)
+        self.told: dict[str, Any] = {}
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+        self.send(do="here", address="")
+
+    def _read(self) -> None:
+        with contextlib.suppress(Exception):
+            for text in self._line:
+                self.told |= json.loads(text)
+
+    def send(self, **message: object) -> None:
+        """Presses a button."""
+        self._line.send(json.dumps(message))
+
+    def __exit__(self, *_: object) -> None:
+        self._line.close()
+        self._reader.join(5.0)
+
+
+# ------------------------------------------------------------------ the server
+
+
+def be_a_server(learners: int, lesson: str) -> None:
+    """Serves a class, and prints its own addresses. For each line on stdin it prints the real-time factor of
+    each learner's run, and the processor time that the server and the robots have used so far, s."""
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "key.txt").write_text(KEY)
+        # A robot that waits for its step needs no processor.
+        server = PageServer(
+            SceneChoice.opening(lesson), port=0, max_sessions=learners, key=read_key(f"{folder}/key.txt"),
+            class_names=True, grace=60.0,
+        )  # fmt: skip
+        over, runs = threading.Event(), defaultdict[tuple[str, LessonPlace], list[float]](list)
+        try:
+            assert server.hall is not None
+            phones = f"{server.url.replace('http', 'ws')}/v/{server.hall.code}"
+            tell(learners=server.guest_link, teacher=server.teachers_link, phones=phones)
+            threading.Thread(target=follow, args=(server, runs, over), daemon=True).start()
+            while sys.stdin.readline():
+                ended = [times for times in list(runs.values()) if len(times) == 3]
+                factors = [round(duration / (end - begin), 3) for begin, end, duration in ended]
+                used = [psutil.Process(each.pid).cpu_times() for each in server.sessions.learners if each.pid]
+                robots = sum(each.user + each.system for each in used)
+                tell(factors=factors, robots=robots, busy=time.process_time())
+        finally:
+            over.set()
+            server.close()
+
+
+def follow(
+    server: PageServer, runs: dict[tuple[str, LessonPlace], list[float]], over: threading.Event
+) -> None:
+    """Records when each learner's run begins and ends (accuracy 0.02 s), and its simulated duration."""
+    while not over.wait(0.02):
+        for learner in server.sessions.learners:
+            lecture = learner.lecture
+            if lecture is None:
+                continue
+            times = runs[learner.token, lecture.exercise]
+            if lecture.phase == "running" and not times:
+                # A report is up to 0.1 s old, and contains the time of the run at that moment.
+                times.append(time.monotonic() - lecture.t)
+            elif lecture.phase == "done" and len(times) == 1:
+                times += [time.monotonic(), lecture.t]
 
 
 # ------------------------------------------------------------------ the rehearsal
 
 
-def rehearsed(learners: int, phones: int, lesson: str) -> dict[str, Any]:
-    """Returns everything that was measured."""
-    host = Host(learners, lesson)
-    try:
-        with _people(host, learners, phones) as (pages, crowd, teacher):
-            return _lecture(host, pages, crowd, teacher, lesson, len(pages) + phones)
-    finally:
-        host.close()
+class Rehearsal:
+    """One class. waits: the waiting times, s; lost: what did not arrive."""
+
+    def __init__(
+        self, host: Child, pages: Sequence[Learner], phones: Child, teacher: Teacher, lesson: str, voters: int
+    ) -> None:
+        self._host, self._pages, self._phones, self._teacher = host, pages, phones, teacher
+        self._lesson, self._voters = lesson, voters
+        self.waits = defaultdict[str, list[float]](list)
+        self.lost: list[str] = []
+
+    def held(self) -> dict[str, Any]:
+        """Holds the class, and returns everything that was measured."""
+        before, began, own = self._report(), time.monotonic(), time.process_time()
+        steps = LessonPlace(self._lesson).whole.steps
+        for place, step in enumerate(steps):
+            title = f"{place + 1} {step.title}"
+            self._teacher.send(do="go", lesson=self._lesson, place=place)
+            self._all("step on the page", lambda page, title=title: page.shows(title) and page.ready)
+            for number in (1, 2) if isinstance(step.prediction, (Choice, Value)) else ():
+                self._ballot(place, number, step.prediction)
+            self._press("run")
+            self._all("run on the page", lambda page: page.shows("DONE"))
+        seconds = time.monotonic() - began
+        eventually(lambda: all(row["done"] == len(steps) for row in self._rows), 5.0)
+        done = {row["number"]: row["done"] for row in self._rows}
+        self.lost += [f"learner {k}: {n} of {len(steps)} steps" for k, n in done.items() if n != len(steps)]
+        after = self._report()
+        used = (after["busy"] - before["busy"], after["robots"] - before["robots"], time.process_time() - own)
+        self._hand_in(len(steps))
+        return {
+            "learners": len(self._pages),
+            "voters": self._voters,
+            "cores": psutil.cpu_count(),
+            "load_average": round(psutil.getloadavg()[0], 1),
+            "minutes": round(seconds / 60, 2),
+            "shares": dict(
+                zip(("server", "robots", "clients"), (round(each / seconds, 3) for each in used), strict=True)
+            ),
+            "real_time_factors": {"runs": len(after["factors"]), **figures(after["factors"])},
+            "waits": {name: figures(times) for name, times in self.waits.items()},
+            "lost": self.lost,
+        }
+
+    def _report(self) -> dict[str, Any]:
+        self._host.say()
+        return self._host.hear("busy")
+
+    @property
+    def _rows(self) -> list[dict[str, Any]]:
+        return self._teacher.told["class"]["rows"]
+
+    def _press(self, button: str) -> None:
+        self._teacher.send(do="press", button=button)
+
+    def _ballot(self, place: int, number: int, asked: object) -> None:
+        """Lets everybody vote."""
+        self._press("open")
+        says = "Vote:" if number == 1 else "Second vote:"
+        self._all("vote on the page", lambda page: page.shows(says))
+        for k, page in enumerate(self._pages, start=number):
+            if isinstance(asked, Choice):
+                option = k % len(asked.options)
+                page.use(f"{'ABCDEFG'[option]}   {asked.options[option].text}", True)
+            elif isinstance(asked, Value):
+                page.use("My guess", STEPS // 2 + 1 + k % 7)  # the slider begins in the middle
+        self._phones.say()
+        self.waits["phone's vote"].append(1e-3 * self._phones.hear("longest_ms")["longest_ms"])
+        since, told = time.monotonic(), self._teacher.told
+        eventually(lambda: told["all"]["voted"] >= self._voters, 20.0)
+        self.waits["votes counted"].append(time.monotonic() - since)
+        if (voted := told["all"]["voted"]) != self._voters:
+            self.lost.append(f"step {place + 1}, vote {number}: {voted} of {self._voters}")
+        self._press("close")
+        self._all("bars on the page", lambda page: page.shows("The vote is closed"))
+
+    def _all(self, name: str, shows: Callable[[Learner], object]) -> None:
+        """Measures the time that each page needs until it shows something."""
+        began, times = time.monotonic(), list[float]()
+
+        def wait(page: Learner) -> None:
+            if eventually(lambda: bool(shows(page)), LONG):
+                times.append(time.monotonic() - began)
+
+        threads = [threading.Thread(target=wait, args=(page,)) for page in self._pages]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        missing = len(self._pages) - len(times)
+        assert not missing, f"{name}: {missing} learners waited too long"
+        self.waits[name] += times
+        print(f"{name}: {max(times):.1f} s", file=sys.stderr, flush=True)
+
+    def _hand_in(self, steps: int) -> None:
+        """Lets every learner hand in, and grades all texts."""
+        for page in self._pages:
+            page.use("Write the text", True)
+        self._all("text to hand in", lambda page: page.text)
+        with tempfile.TemporaryDirectory() as folder:
+            key = Path(folder) / "key.txt"
+            key.write_text(KEY)
+            began = time.monotonic()
+            for k, page in enumerate(self._pages):
+                file, out = Path(folder) / f"{k}.txt", Path(folder) / f"{k}.json"
+                file.write_text(page.text)
+                with contextlib.redirect_stdout(io.StringIO()):
+                    code = himpc_lab(["grade", str(file), "--key", str(key), "--json", str(out)])
+                lessons = {each["lesson"]: each["steps"] for each in json.loads(out.read_text())["lessons"]}
+                ran = lessons.get(self._lesson, [])
+                if code != 0 or len(ran) != steps:
+                    self.lost.append(f"text of learner {k}: exit code {code}, steps {ran}")
+            self.waits["grading of all"] = [time.monotonic() - began]
 
 
-@contextlib.contextmanager
-def _people(host: Host, learners: int, phones: int) -> Iterator[tuple[list[Learner], Crowd, Teacher]]:
-    with contextlib.ExitStack() as all_leave:
-        teacher = Teacher(host.links["teacher"])
-        all_leave.callback(teacher.close)
-        pages = [Learner(host.links["learners"]) for _ in range(learners)]
-        for page in pages:
-            all_leave.enter_context(page)
-        for page in pages:
-            page.waits_for(lambda page=page: page.find("Your name"))
-        crowd = Crowd("--phones", str(phones), "--at", host.links["phones"])
-        all_leave.enter_context(crowd)
-        crowd.hear()
-        crowd.go_on()  # begins the counting of pictures
-        crowd.go_on()  # ends the counting; from now on, each line is a vote
-        crowd.hear()
-        yield pages, crowd, teacher
-
-
-def _lecture(
-    host: Host,
-    pages: Sequence[Learner],
-    crowd: Crowd,
-    teacher: Teacher,
-    lesson: str,
-    everybody: int,
-) -> dict[str, Any]:
-    waits: Waits = {}
-    lost: list[str] = []
-    for k, page in enumerate(pages):
-        page.use("Your name", f"learner {k}")
-    began, before = time.monotonic(), host.report()
-    own = time.process_time()
-    steps = LessonPlace(lesson).whole.steps
-    for place, step in enumerate(steps):
-        title = f"{place + 1} {step.title}"
-        teacher.send(do="go", lesson=lesson, place=place)
-        _all(waits, "step on the page", pages, lambda page, title=title: page.shows(title) and _ready(page))
-        for number in (1, 2) if isinstance(step.prediction, (Choice, Value)) else ():
-            teacher.send(do="press", button="open")
-            says = "Vote:" if number == 1 else "Second vote:"
-            _all(waits, "vote on the page", pages, lambda page, says=says: page.shows(says))
-            for k, page in enumerate(pages):
-                _vote(page, step.prediction, k + number)
-            crowd.go_on()
-            waits.setdefault("phone's vote", []).append(1e-3 * crowd.hear()["longest_ms"])
-            since = time.monotonic()
-            while teacher.told["all"]["voted"] < everybody and time.monotonic() < since + 20.0:
-                time.sleep(0.02)
-            waits.setdefault("votes counted", []).append(time.monotonic() - since)
-            voted = teacher.told["all"]["voted"]
-            if voted != everybody:
-                lost.append(f"step {place + 1}, vote {number}: {voted} of {everybody}")
-            teacher.send(do="press", button="close")
-            _all(waits, "bars on the page", pages, lambda page: page.shows("The vote is closed"))
-        teacher.send(do="press", button="run")
-        _all(waits, "run on the page", pages, lambda page: page.shows("DONE"))
-    minutes = (time.monotonic() - began) / 60
-    lost += [
-        f"learner {row['number']}: {row['done']} of {len(steps)} steps"
-        for row in _rows(teacher, len(steps))
-        if row["done"] != len(steps)
-    ]
-    report = host.report()
-    used, robots = (report[what] - before[what] for what in ("busy", "robots"))
-    clients = time.process_time() - own
-    factors = report["factors"]
-    lost += _handed_in(pages, waits, lesson, len(steps))
-    return {
-        "learners": len(pages),
-        "voters": everybody,
-        "cores": psutil.cpu_count(),
-        "load_average": round(psutil.getloadavg()[0], 1),
-        "minutes": round(minutes, 2),
-        "server_share": round(used / 60 / minutes, 3),
-        "robots_share": round(robots / 60 / minutes, 3),
-        "clients_share": round(clients / 60 / minutes, 3),
-        "real_time_factors": {"runs": len(factors), **_figures(factors)},
-        "waits": {name: _figures(times) for name, times in waits.items()},
-        "lost": lost,
-    }
-
-
-def _ready(page: Learner) -> bool:
-    """Returns whether the page shows a step that was not run yet and that has a button to run it."""
-    labels = ("Run this step", "Run (answer first)")
-    return any(page.find(label) for label in labels) and not page.shows("DONE")
-
-
-def _all(waits: Waits, name: str, pages: Sequence[Learner], shows: Callable[[Learner], object]) -> None:
-    """Measures the time that each page needs until it shows something."""
-    times: list[float] = []
-
-    def wait(page: Learner) -> None:
-        times.append(page.waits_for(lambda: shows(page)))
-
-    threads = [threading.Thread(target=wait, args=(page,)) for page in pages]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert len(times) == len(pages), f"{name}: {len(pages) - len(times)} learners waited too long"
-    waits.setdefault(name, []).extend(times)
-    print(f"{name}: {max(times):.1f} s", file=sys.stderr, flush=True)
-
-
-def _vote(page: Learner, asked: object, number: int) -> None:
-    if isinstance(asked, Choice):
-        place = number % len(asked.options)
-        page.use(f"{'ABCDEFG'[place]}   {asked.options[place].text}", True)
-    elif isinstance(asked, Value):
-        page.use("My guess", STEPS // 2 + 1 + number % 7)  # the slider begins in the middle
-
-
-def _rows(teacher: Teacher, steps: int) -> list[dict[str, Any]]:
-    end = time.monotonic() + 5.0
-    while time.monotonic() < end and any(row["done"] < steps for row in teacher.told["class"]["rows"]):
-        time.sleep(0.05)
-    return teacher.told["class"]["rows"]
-
-
-def _handed_in(pages: Sequence[Learner], waits: Waits, lesson: str, steps: int) -> list[str]:
-    """Lets every learner hand in, grades all texts, and returns what is missing in them."""
-    lost: list[str] = []
-    for page in pages:
-        page.waits_for(lambda page=page: page.find("Write the text"))
-        found = page.find("Write the text")
-        assert found is not None
-        page.write(found, value=True)
-    _all(waits, "text to hand in", pages, lambda page: page.find("To hand in") and _text(page))
-    with tempfile.TemporaryDirectory() as folder:
-        key = Path(folder) / "key.txt"
-        key.write_text(KEY)
-        began = time.monotonic()
-        for k, page in enumerate(pages):
-            file, out = Path(folder) / f"{k}.txt", Path(folder) / f"{k}.json"
-            file.write_text(_text(page))
-            with contextlib.redirect_stdout(io.StringIO()):
-                code = himpc_lab(["grade", str(file), "--key", str(key), "--json", str(out)])
-            found = json.loads(out.read_text())
-            ran = next((each["steps"] for each in found["lessons"] if each["lesson"] == lesson), [])
-            if code != 0 or len(ran) != steps:
-                lost.append(f"text of learner {k}: exit code {code}, steps {ran}")
-        waits["grading of all"] = [time.monotonic() - began]
-    return lost
-
-
-def _text(page: Learner) -> str:
-    found = page.find("To hand in")
-    control = None if found is None else page.controls.get(found)
-    return "" if control is None else str(control.get("value", ""))
-
-
-def _figures(values: Sequence[float]) -> dict[str, float]:
+def figures(values: Sequence[float]) -> dict[str, float]:
+    """Returns the least, the median and the largest value."""
     if not values:
         return {}
     return {name: round(of(values), 3) for name, of in (("least", min), ("median", median), ("most", max))}
 
 
-def table(found: dict[str, Any]) -> str:
-    """Returns the results as text."""
-    waits = "\n".join(
-        f"  {name:18} median {each['median']:7.2f}   longest {each['most']:7.2f}"
-        for name, each in found["waits"].items()
-    )
-    factors = found["real_time_factors"]
-    return (
-        f"{found['learners']} learners, {found['cores']} cores, load average "
-        f"{found['load_average']}, {found['minutes']} minutes\n"
-        f"server: {found['server_share']} of a core; all robots: {found['robots_share']}; all clients: "
-        f"{found['clients_share']}\n"
-        f"simulated over real time in {factors['runs']} runs: least {factors['least']}, median "
-        f"{factors['median']}\nwaiting times, s:\n{waits}\nlost: {found['lost'] or 'nothing'}"
-    )
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(tyro.cli(main, description=__doc__))

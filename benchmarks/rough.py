@@ -11,7 +11,6 @@ GET, and what was left behind. The exit code is 0 if every page recovered and no
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import json
 import os
@@ -23,7 +22,10 @@ import threading
 import time
 import urllib.request
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+
+import tyro
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
@@ -44,20 +46,15 @@ _REFUSED = "refused in one sentence"
 _INSIDE = "HIMPC_LAB_ROUGH_INSIDE"
 
 
-def main() -> int:
-    """Disturbs a server as the command line says."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--kills", type=int, default=100)
-    parser.add_argument("--stops", type=int, default=20)
-    parser.add_argument("--shm", type=int, default=8)
-    given = parser.parse_args()
+def main(kills: int = 100, stops: int = 20, shm: int = 8) -> int:
+    """Does what the module says."""
     if _INSIDE not in os.environ and os.geteuid() == 0 and shutil.which("unshare"):
-        mount = f"mount -t tmpfs -o size={given.shm}m tmpfs /dev/shm"
+        mount = f"mount -t tmpfs -o size={shm}m tmpfs /dev/shm"
         command = ["unshare", "--mount", "sh", "-c", f'{mount} && exec "$@"', "sh", sys.executable, "-m"]
         return subprocess.call(
             [*command, "benchmarks.rough", *sys.argv[1:]], env={**os.environ, _INSIDE: "1"}
         )
-    found = treat(given.kills, given.stops)
+    found = treat(kills, stops)
     print(json.dumps(found, indent=1))
     sound = found["recovered"] == found["treated"] and not found["left behind"]
     return 0 if sound else 1
@@ -66,55 +63,39 @@ def main() -> int:
 def treat(kills: int, stops: int, scene: str = "iiwa14-hold") -> dict[str, object]:
     """Does all disturbances in sequence, see the module. scene: the scene that the pages show."""
     shared = shutil.disk_usage("/dev/shm").total if os.path.exists("/dev/shm") else 0
-    before, there = _memory_left(), set(psutil.Process().children(recursive=True))
+    before, there = _memory_left(), _children()
     server = PageServer(SceneChoice(RunSpec(scene)), port=0, max_sessions=3)
-    counts: dict[str, str] = {}
+    found: dict[str, object] = {"shared memory MB": round(shared / 1e6, 1)}
     treated = recovered = 0
-    try:
-        with contextlib.ExitStack() as opened:
-            # The pages open one after the other, so that the processes of each are known.
-            pairs = [(opened.enter_context(Wire(server.link)), _learner(server, place)) for place in range(3)]
-            (witness, *wires), learners = zip(*pairs, strict=True)
-            assert eventually(lambda: all(map(_runs, learners)), LONG), "the pages do not start"
-            pages = list(zip(learners[1:], wires, strict=True))
-            with _watch(server.link, witness) as watched:
-                for name, times, harm in (
-                    ("killed", kills, lambda each: _hurt(each, signal.SIGKILL)),
-                    ("stopped", stops, lambda each: _hurt(each, signal.SIGSTOP)),
-                    ("load that hangs", 2, _hang),
-                ):
-                    good = 0
-                    for round_ in range(times):
-                        learner, page = pages[round_ % 2]
-                        good += _recovers(learner, page, harm, by_reset=bool(round_ // 2 % 2))
-                    counts[name] = f"{good} of {times} recovered"
-                    treated, recovered = treated + times, recovered + good
-                answers: list[str] = []
-                uploads = [threading.Thread(target=_upload, args=(page, answers)) for _, page in pages]
-                for each in uploads:
-                    each.start()
-                for each in uploads:
-                    each.join(LONG)
-                counts["uploads of 40 MB"] = ", ".join(answers)
-                treated += 2
-                recovered += answers.count(_REFUSED) if _runs(learners[0]) else 0
-    finally:
-        server.close()
+    with contextlib.closing(server), contextlib.ExitStack() as opened:
+        # The pages open one after the other, so that the processes of each are known.
+        pairs = [(opened.enter_context(Wire(server.link)), _learner(server, place)) for place in range(3)]
+        (witness, *wires), learners = zip(*pairs, strict=True)
+        assert eventually(lambda: all(map(_runs, learners)), LONG), "the pages do not start"
+        pages = list(zip(learners[1:], wires, strict=True))
+        with _watch(server.link, witness) as worst:
+            for name, times, harm in (
+                ("killed", kills, lambda each: _hurt(each, signal.SIGKILL)),
+                ("stopped", stops, lambda each: _hurt(each, signal.SIGSTOP)),
+                ("load that hangs", 2, _hang),
+            ):
+                good = sum(_recovers(*pages[k % 2], harm, by_reset=bool(k // 2 % 2)) for k in range(times))
+                found[name] = f"{good} of {times} recovered"
+                treated, recovered = treated + times, recovered + good
+            with ThreadPoolExecutor() as uploads:
+                answers = list(uploads.map(_upload, wires))
+            found["uploads of 40 MB"] = ", ".join(answers)
+            treated += 2
+            recovered += answers.count(_REFUSED) if _runs(learners[0]) else 0
 
-    def others() -> set[psutil.Process]:
-        return set(psutil.Process().children(recursive=True)) - there
-
-    eventually(lambda: not others(), 5.0)
-    left = [f"process {child.pid}" for child in others()]
-    left += sorted(_memory_left() - before)
-    return {
-        "shared memory MB": round(shared / 1e6, 1),
-        **counts,
+    eventually(lambda: not _children() - there, 5.0)
+    return found | {
         "treated": treated,
         "recovered": recovered,
-        "longest silence of the watching page s": round(watched[0], 2),
-        "longest GET s": round(watched[1], 2),
-        "left behind": left,
+        "longest silence of the watching page s": round(worst[0], 2),
+        "longest GET s": round(worst[1], 2),
+        "left behind": [f"process {child.pid}" for child in _children() - there]
+        + sorted(_memory_left() - before),
     }
 
 
@@ -165,45 +146,39 @@ def _recovers(
     return eventually(lambda: learner.pid != pid and learner.ready is not ready and _runs(learner), LONG)
 
 
-def _upload(page: Wire, answers: list[str]) -> None:
-    """Uploads an unwanted file as fast as possible; the server may close the connection. The response is
-    added to `answers`."""
+def _upload(page: Wire) -> str:
+    """Uploads an unwanted file as fast as possible; the server may close the connection. Returns the
+    response."""
     eventually(lambda: page.find("Upload a URDF") is not None, LONG)
     button = page.find("Upload a URDF")
     assert button is not None, "the page has no button to upload a robot"
-    count = UPLOAD // _PART
-    name = f"large-{id(page)}"
+    count, name = UPLOAD // _PART, f"large-{id(page)}"
     try:
         page.say(_messages.FileTransferStartUpload(button, name, "large.urdf", "text/xml", count, UPLOAD))
         for place in range(count):
             page.say(_messages.FileTransferPart(button, name, place, bytes(_PART)))
     except (ConnectionClosed, OSError):
-        answers.append("connection ended")
-        return
+        return "connection ended"
 
     def notices() -> int:
         return [title for title, _ in page.notices].count("Not uploaded")
 
     answered = eventually(lambda: notices() > 0, 10.0)
-    answers.append((_REFUSED if notices() == 1 else f"{notices()} notices") if answered else "no answer")
+    return (_REFUSED if notices() == 1 else f"{notices()} notices") if answered else "no answer"
 
 
 @contextlib.contextmanager
 def _watch(url: str, witness: Wire) -> Iterator[list[float]]:
     """Yields (longest silence of a page, longest response time of a GET), s, during the disturbance."""
     worst, over = [0.0, 0.0], threading.Event()
-    seen: dict[str, object] = {}
 
     def look() -> None:
-        changed = time.monotonic()
+        seen, changed = dict[str, str](), time.monotonic()
         while not over.wait(0.05):
-            now = {
-                uuid: str(each["props"].get("content", "")) for uuid, each in list(witness.controls.items())
-            }
+            shown = list(witness.controls.items())
+            now = {uuid: str(each["props"].get("content", "")) for uuid, each in shown}
             if now != seen:
-                seen.clear()
-                seen.update(now)
-                changed = time.monotonic()
+                seen, changed = now, time.monotonic()
             worst[0] = max(worst[0], time.monotonic() - changed)
 
     def get() -> None:
@@ -224,6 +199,17 @@ def _watch(url: str, witness: Wire) -> Iterator[list[float]]:
             each.join(LONG)
 
 
+def _children() -> set[psutil.Process]:
+    """Returns the processes below this one, without the two that Python keeps as long as this program runs:
+    the fork server and the tracker of resources."""
+    own, found = psutil.Process(), set[psutil.Process]()
+    for child in own.children(recursive=True):
+        with contextlib.suppress(psutil.NoSuchProcess):  # it has ended
+            if child.ppid() != own.pid or "from multiprocessing." not in child.cmdline()[-1]:
+                found.add(child)
+    return found
+
+
 def _memory_left() -> set[str]:
     """Returns the named shared memory that belongs to no other living program, and the rings that this
     process still maps."""
@@ -242,4 +228,4 @@ def _maps(process: int) -> list[str]:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(tyro.cli(main, description=__doc__))

@@ -1,19 +1,28 @@
-"""Measures whether the server's memory, threads and handles stay constant, over time and over reconnections.
+"""Measures whether the server's memory, threads and handles stay constant: over time, over reconnections, and
+while learners change scenes and ghosts.
 
-    python -m benchmarks.soak [--minutes M] [--clients K] [--reconnects N] [--scene S] [--json -]
+    python -m benchmarks.soak [--minutes M] [--clients K] [--reconnects N] [--scene S]
+    python -m benchmarks.soak --every S [--minutes M] [--clients K] [--speed X] [--seed N]
 
 The program runs a server and, in a process of their own, K clients that use the page's protocol
-(benchmarks/client.py). It measures for M minutes. In the first ten minutes (or the first half of a shorter
-run) the robots run at twice the speed and fill the histories for playback and export. This phase lasts until
-every robot has run for two minutes of simulated time. Then one of the clients reloads its page N times. The
-program prints a table. The exit code is 0 if the memory of the server and of its children grew by at most 5 %
-since the histories were full, the numbers of threads and handles are the same as before, and 100 reloads cost
-at most 5 MB.
+(benchmarks/client.py). It measures for M minutes and prints a sample a minute, and at the end faults, as
+lines of JSON. The exit code is 1 if there are faults.
 
-The measured memory is the memory that a process has written and does not share with other processes. Free
-memory is returned to the system first. Otherwise the memory that an allocator keeps would vary by more than a
-leak adds. The pages of libraries are not counted: their memory also varies, because they are shared only as
-long as another program on the machine uses them.
+First form: in the first ten minutes (or the first half of a shorter run) the robots run at twice the speed
+and fill the histories for playback and export. This phase lasts until every robot has run for two minutes of
+simulated time. After the M minutes one client reloads its page N times. The memory of the server and of its
+children may then have grown by at most 5 % since the histories were full, the numbers of threads and handles
+must be the same as before, and 100 reloads may cost at most 5 MB. The measured memory is the memory that a
+process has written and does not share with other processes. Free memory is returned to the system first.
+Otherwise the memory that an allocator keeps would vary by more than a leak adds. The pages of libraries are
+not counted: their memory also varies, because they are shared only as long as another program uses them.
+
+With --every, each learner opens another scene, starts a ghost or ends it every S seconds, at random, after
+all have opened every scene once. The simulations run at X times real time, so that a small machine can run
+all of them. The memory `rss` is measured without garbage collection before it. It may never be more than
+BASE + K · EACH, and in the last third of the time at most 10 % more than in the first. (Thirds are compared
+only if each is at least five minutes long, because shorter ones differ by the scenes that happen to be open.)
+At the end all learners return to the first scene, and nothing may be left behind.
 """
 
 from __future__ import annotations
@@ -25,10 +34,11 @@ import gc
 import json
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
 from itertools import combinations
 from pathlib import Path
+from random import Random
 from statistics import median
 
 import psutil
@@ -36,12 +46,19 @@ import psutil
 from app.client.rows import MOST, RATE
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
-from app.link.messages import Speed
+from app.link.messages import Load, Speed
 from app.link.process import wait_until
 from app.web.server import PageServer
-from benchmarks.learners import LONG, Viewers, simulated
+from benchmarks.child import LONG
+from benchmarks.client import Viewers
+from benchmarks.learners import served, simulated
 from lessons.scenes.run_spec import RunSpec
+from lessons.teaching.lesson import Ghost
 
+SCENES = (
+    "planar3-hold", "iiwa14-hold", "planar3-circle", "panda-hold", "ridgeback-ur10-drag", "baxter-hold",
+    "iiwa14-htmpc", "ridgeback-ur10-hold",
+)  # fmt: skip
 FILL = 10.0  # minutes
 EVERY = 5.0  # s
 NEAR = 5  # the smallest number of samples over which a median is taken
@@ -53,6 +70,10 @@ PER_100 = 5.0
 """Memory, MB, that 100 reconnections may cost."""
 SPARE = 3
 """Number by which the processes, the threads or the handles may increase."""
+SWITCHED, THIRD = 1.1, 5.0
+"""Factor by which memory may grow while scenes change, and the shortest third, minutes, that is compared."""
+BASE, EACH = 300.0, 50.0
+"""Memory of a server with its libraries and the meshes of all scenes, and of a learner with a ghost, MB."""
 
 
 @dataclass(frozen=True)
@@ -76,99 +97,107 @@ class Sample:
 
 def main() -> int:
     """Runs the test as the command line says."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--minutes", type=float, default=60.0)
     parser.add_argument("--clients", type=int, default=8)
     parser.add_argument("--reconnects", type=int, default=100)
     parser.add_argument("--scene", default="iiwa14-hold")
-    parser.add_argument("--json", choices=["-"], default=None)
+    parser.add_argument("--every", type=float, help="seconds between two changes of a learner")
+    parser.add_argument("--speed", type=float, default=1.0)
+    parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
-    server = PageServer(SceneChoice(RunSpec(options.scene)), port=0, max_sessions=options.clients)
-    try:
-        with Viewers(server.link, "--clients", str(options.clients)) as viewers:
-            assert wait_until(lambda: len(server.sessions.learners) == options.clients, LONG), "not let in"
-            learners = server.sessions.learners
-            assert wait_until(lambda: all(simulated(each) > 0.5 for each in learners), LONG), "nothing runs"
-            fill = min(FILL, options.minutes / 2)
-            go(learners, 2.0)
-            samples = watched(fill, viewers.pid)
-            while not all(simulated(each) > MOST / RATE for each in learners):
-                time.sleep(EVERY)
-            go(learners, 1.0)
-            filled = len(samples)
-            samples += watched(options.minutes - fill, viewers.pid, fill)
-            cost = reconnected(viewers, options.reconnects)
-    finally:
-        server.close()
-    faults = judged(samples[filled:], cost)
-    found = {"reconnects_mb_per_100": cost, "faults": faults, "samples": [asdict(each) for each in samples]}
-    print(json.dumps(found, indent=1) if options.json else table(samples, cost, faults))
+    first = options.scene if options.every is None else SCENES[0]
+    with served(RunSpec(first), options.clients) as (server, viewers, learners):
+        faults = (lasting if options.every is None else switching)(server, viewers, learners, options)
+    print(json.dumps({"faults": faults}))
     return 1 if faults else 0
 
 
-def go(learners: Sequence[SimulationClient], speed: float) -> None:
+# ------------------------------------------------------------------ over time, and over reconnections
+
+
+def lasting(
+    _: PageServer, viewers: Viewers, learners: Sequence[SimulationClient], options: argparse.Namespace
+) -> list[str]:
+    """Returns sentences about exceeded limits."""
+    fill = min(FILL, options.minutes / 2)
+    go(learners, 2.0)
+    watched(fill, viewers.pid)
+    while not all(simulated(each) > MOST / RATE for each in learners):
+        time.sleep(EVERY)
+    go(learners, 1.0)
+    later = watched(options.minutes - fill, viewers.pid, fill)
+    some = max(NEAR, len(later) // 10)  # data on the way to a client vary within minutes
+    faults = grown(later[:some], later[-some:], ("server", "children"), GROWTH)
+    faults += grown(later[:some], later[-some:], ("processes", "threads", "handles"), 1.0, SPARE)
+    cost = reconnected(viewers, options.reconnects)
+    print(json.dumps({"reconnects_mb_per_100": cost}))
+    return faults + ([f"100 reconnects cost {cost:.1f} MB."] if cost > PER_100 else [])
+
+
+def go(learners: Iterable[SimulationClient], speed: float) -> None:
     """Sets the speed of all robots, simulated seconds per second."""
     for learner in learners:
         learner.send(Speed(speed))
 
 
-def reconnected(viewers: Viewers, times: int) -> float | None:
+def grown(
+    first: Sequence[Sample], last: Sequence[Sample], names: Iterable[str], factor: float, spare: float = 0.0
+) -> list[str]:
+    """Returns a sentence for each of these figures whose median grew by more than a factor and a number."""
+    pairs = {name: [median(getattr(each, name) for each in part) for part in (first, last)] for name in names}
+    return [
+        f"There were {before:g} of {name}, then {after:g}."
+        for name, (before, after) in pairs.items()
+        if after > factor * before + spare
+    ]
+
+
+def reconnected(viewers: Viewers, times: int) -> float:
     """Returns the MB that the server keeps per hundred reloads of a page, after some reloads to warm up. This
     is the median slope between any two of several batches, because a single reading varies."""
     if not times:
-        return None
-    visit(viewers, max(20, times // 5))
-    size, held = max(1, times // BATCHES), [rested(viewers.pid)]
-    for _ in range(BATCHES):
-        visit(viewers, size)
-        held.append(rested(viewers.pid))
+        return 0.0
+    size, held = max(1, times // BATCHES), list[float]()
+    for count in (max(20, times // 5), *(BATCHES * [size])):
+        came = viewers.reload(count)
+        assert came == count, f"of {count} visits only {came} saw a robot"
+        time.sleep(REST)
+        held.append(median(sample(0.0, viewers.pid).server for _ in range(NEAR) if time.sleep(0.5) is None))
     pairs = combinations(range(len(held)), 2)
     return round(median(100 / size * (held[b] - held[a]) / (b - a) for a, b in pairs), 2)
 
 
-def visit(viewers: Viewers, times: int) -> None:
-    """Lets a browser reload a number of times."""
-    came = viewers.reload(times)
-    assert came == times, f"of {times} visits only {came} saw a robot"
-
-
-def rested(client: int) -> float:
-    """Returns the MB of the server after a moment without activity."""
-    time.sleep(REST)
-    found: list[float] = []
-    for _ in range(NEAR):
-        time.sleep(0.5)
-        found.append(sample(0.0, client).server)
-    return median(found)
-
-
-def watched(minutes: float, client: int, after: float = 0.0) -> list[Sample]:
+def watched(
+    minutes: float, client: int, after: float = 0.0, meanwhile: Callable[[], object] | None = None
+) -> list[Sample]:
     """Returns samples over a number of minutes, or over a longer time if these are too few for a verdict.
-    after: the minute of the first sample."""
-    began, found = time.monotonic(), list[Sample]()
+    after: the minute of the first sample. meanwhile: what is done all the time; memory is then measured as
+    it is, and is not tidied before."""
+    began, found, due = time.monotonic(), list[Sample](), 0.0
     while (minute := (time.monotonic() - began) / 60) < minutes or len(found) < 2 * NEAR:
-        found.append(sample(after + minute, client))
-        if len(found) % 12 == 1:  # a run takes an hour and may fail at its end
-            print(json.dumps(asdict(found[-1])), file=sys.stderr, flush=True)
-        time.sleep(EVERY)
+        if time.monotonic() >= due:
+            due = time.monotonic() + min(EVERY, 60.0 * minutes / 20 if meanwhile else EVERY)
+            found.append(sample(after + minute, client, tidied=meanwhile is None))
+            if len(found) % 12 == 1:  # a run takes an hour and may fail at its end
+                print(json.dumps(asdict(found[-1])), flush=True)
+        (meanwhile or (lambda: time.sleep(EVERY)))()
     return found
 
 
-def sample(minute: float, client: int) -> Sample:
+def sample(minute: float, client: int, tidied: bool = True) -> Sample:
     """Returns what the server and its children use now. client: id of the process that is not part of the
-    server."""
+    server. tidied: whether free memory is returned to the system first."""
     server = psutil.Process()
-    tidy()
+    if tidied:
+        tidy()
     memory = written(server)
     own, processes = 0.0, 0
     for child in server.children(recursive=True):
-        if child.pid == client:
-            continue
-        try:
-            own += written(child)
-            processes += 1
-        except psutil.NoSuchProcess:
-            pass
+        with contextlib.suppress(psutil.NoSuchProcess):
+            if child.pid != client:
+                own += written(child)
+                processes += 1
     return Sample(
         minute=round(minute, 2),
         server=round(1e-6 * memory, 1),
@@ -198,37 +227,83 @@ def tidy() -> None:
         ctypes.CDLL(None).malloc_trim(0)
 
 
-def judged(later: list[Sample], cost: float | None) -> list[str]:
-    """Returns sentences about exceeded limits. later: the samples after the histories were full."""
-    if len(later) < 2 * NEAR:
-        return [f"Too short: {len(later)} samples since the histories were full."]
-    some = max(NEAR, len(later) // 10)  # data on the way to a client vary within minutes
-    first, last = later[:some], later[-some:]
-    faults: list[str] = []
-    for name in ("server", "children"):
-        before, after = (median(getattr(each, name) for each in part) for part in (first, last))
-        if after > GROWTH * before:
-            faults.append(f"Memory of the {name} grew from {before:.1f} to {after:.1f} MB.")
-    for name in ("processes", "threads", "handles"):
-        before, after = (median(getattr(each, name) for each in part) for part in (first, last))
-        if after > before + SPARE:
-            faults.append(f"There were {before:g} {name}, then {after:g}.")
-    if cost is not None and cost > PER_100:
-        faults.append(f"100 reconnects cost {cost:.1f} MB.")
+# ------------------------------------------------------------------ while scenes change
+
+
+def switching(
+    server: PageServer, viewers: Viewers, learners: Sequence[SimulationClient], options: argparse.Namespace
+) -> list[str]:
+    """Returns sentences about exceeded limits."""
+    for scene in (*SCENES, SCENES[0]):  # the meshes of each robot are loaded once
+        everybody(learners, scene, options.speed)
+    before, chance = state(server), Random(options.seed)
+    print(json.dumps({"after the warm-up": before}), flush=True)
+
+    def each_in_turn() -> None:
+        for learner in learners:
+            change(learner, chance, options.speed)
+            time.sleep(options.every / len(learners))
+
+    samples = watched(options.minutes, viewers.pid, meanwhile=each_in_turn)
+    everybody(learners, SCENES[0], options.speed)
+    after = state(server)
+    print(json.dumps({"at the end": after}), flush=True)
+    counted = ("processes", "blocks", "nodes", "controls")
+    faults = [f"There were {before[x]:g} {x}, then {after[x]:g}." for x in counted if after[x] > before[x]]
+    if options.minutes >= 3 * THIRD:
+        third = len(samples) // 3
+        faults += grown(samples[:third], samples[-third:], ("rss",), SWITCHED)
+    peak, most = max(each.rss for each in samples), BASE + EACH * len(learners)
+    if peak > most:
+        faults.append(f"Memory reached {peak:.0f} MB; at most {most:.0f} were expected.")
     return faults
 
 
-def table(samples: list[Sample], cost: float | None, faults: list[str]) -> str:
-    """Returns a table of about thirty lines."""
-    names = list(asdict(samples[0]))
-    lines = ["  ".join(name.rjust(9) for name in names)]
-    lines += [
-        "  ".join(str(value).rjust(9) for value in asdict(each).values())
-        for each in samples[:: max(1, len(samples) // 30)]
-    ]
-    if cost is not None:
-        lines.append(f"100 reconnects: {cost:.1f} MB")
-    return "\n".join([*lines, *(faults or ["No limit was exceeded."])])
+def change(learner: SimulationClient, chance: Random, speed: float) -> None:
+    """Does one action of a learner."""
+    match chance.choices(("scene", "ghost", "alone"), (5, 3, 2))[0]:
+        case "scene":
+            learner.load(SceneChoice(RunSpec(chance.choice(SCENES))))
+        case "ghost":
+            learner.start_ghost(Ghost("N = 1", ("horizon=1",)))
+        case _:
+            learner.stop_ghost()
+    learner.send(Speed(speed))
+
+
+def everybody(learners: Sequence[SimulationClient], scene: str, speed: float) -> None:
+    """Moves all learners to a scene, without ghosts."""
+    for learner in learners:
+        learner.stop_ghost()
+        learner.send(Load(SceneChoice(RunSpec(scene))))
+        learner.send(Speed(speed))
+
+    def shown() -> bool:
+        return all(each.choice.run.scene == scene and simulated(each) > 0.01 for each in learners)
+
+    assert wait_until(shown, LONG), f"not all show {scene}"
+
+
+def state(server: PageServer) -> dict[str, float]:
+    """Returns the state of the server after all pages were built and nothing was added to them any more."""
+    viewers = server._viser.get_clients().values()
+
+    def shown() -> dict[str, float]:
+        nodes = [viewer.scene._handle_from_node_name for viewer in viewers]
+        assert wait_until(lambda: all("/robot/1" in each for each in nodes), LONG), "not all pages are built"
+        controls = sum(len(viewer.gui._gui_input_handle_from_uuid) for viewer in viewers)
+        return {"nodes": sum(map(len, nodes)), "controls": controls}
+
+    before: dict[str, float] = {}
+    while before != (before := shown()):
+        time.sleep(4.0)
+    gc.collect()
+    process = psutil.Process()
+    return before | {
+        "megabytes": round(1e-6 * process.memory_info().rss, 1),
+        "processes": len(process.children(recursive=True)),
+        "blocks": sum("memfd:himpc-lab" in each.path for each in process.memory_maps(grouped=False)),
+    }
 
 
 if __name__ == "__main__":

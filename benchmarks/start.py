@@ -1,7 +1,7 @@
 """Measures the cost of a start: CPU and wall time until the page listens, and CPU time of lists, help and
 compiling.
 
-    python benchmarks/start.py [--runs 5] [--cold]
+    python -m benchmarks.start [--runs 5] [--cold]
 
 CPU time is the sum of user and system time. It is measured for the server's process alone, and for a command
 with its children. The program prints medians of several runs. With `--cold` it also compiles everything once,
@@ -10,16 +10,17 @@ into a temporary folder.
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import resource
 import signal
-import statistics
 import subprocess
 import sys
 import tempfile
 import time
+from statistics import median
+
+import tyro
 
 LISTS = (["--help"], ["scenes"], ["controllers"], ["robots"], ["lessons"])
 PAGES = ([], ["--lesson", "one-task"], ["--scene", "hold", "--urdf", "planar3"])
@@ -47,27 +48,23 @@ def listening(arguments: list[str]) -> tuple[float, float]:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK"), wall
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--runs", type=int, default=5)
-    parser.add_argument("--cold", action="store_true")
-    given = parser.parse_args()
-    found: dict[str, object] = {}
-    for arguments in LISTS:
-        command = [sys.executable, "-m", "app", *arguments]
-        cpu = statistics.median(cost(command) for _ in range(given.runs))
-        found[f"himpc-lab {' '.join(arguments)}, CPU s"] = round(cpu, 3)
-    for arguments in PAGES:
-        times = [listening(arguments) for _ in range(given.runs)]
-        found[f"listening {' '.join(arguments)}, CPU s"] = round(statistics.median(t[0] for t in times), 3)
-        found[f"listening {' '.join(arguments)}, wall s"] = round(statistics.median(t[1] for t in times), 3)
-    if given.cold:
+def main(runs: int = 5, cold: bool = False) -> None:
+    """Does what the module says."""
+    found: dict[str, float] = {}
+    for words in LISTS:
+        cpu = median(cost([sys.executable, "-m", "app", *words]) for _ in range(runs))
+        found[f"himpc-lab {' '.join(words)}, CPU s"] = round(cpu, 3)
+    for words in PAGES:
+        times = zip(*(listening(words) for _ in range(runs)), strict=True)
+        for kind, each in zip(("CPU", "wall"), times, strict=True):
+            found[f"listening {' '.join(words)}, {kind} s"] = round(median(each), 3)
+    if cold:
         with tempfile.TemporaryDirectory() as folder:
             command = [sys.executable, "-c", COMPILE]
-            cold = cost(command, NUMBA_CACHE_DIR=folder)
-            found["compiling, CPU s"] = round(cold - cost(command, NUMBA_CACHE_DIR=folder), 2)
+            first = cost(command, NUMBA_CACHE_DIR=folder)
+            found["compiling, CPU s"] = round(first - cost(command, NUMBA_CACHE_DIR=folder), 2)
     print(json.dumps(found, indent=2))
 
 
 if __name__ == "__main__":
-    main()
+    tyro.cli(main, description=__doc__)

@@ -38,9 +38,9 @@ class Storage:
 class Tab(Wire):
     """A page without a browser that stores data as a browser does."""
 
-    def __init__(self, url: str, storage: Storage) -> None:
+    def __init__(self, url: str, storage: Storage, slow: bool = False) -> None:
         self.storage = storage
-        super().__init__(url)
+        super().__init__(url, slow=slow)
 
     @property
     def is_open(self) -> bool:

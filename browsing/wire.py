@@ -6,6 +6,8 @@ import http.client
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from socket import SO_RCVBUF, SOL_SOCKET, socket
 from typing import Any, Self
 from urllib.parse import urlsplit
 
@@ -61,8 +63,9 @@ class Wire:
         eye: the last camera position that the server sent, m.
     """
 
-    def __init__(self, url: str, headers: Mapping[str, str] | None = None) -> None:
-        """headers: further headers of the handshake, from the browser or a proxy."""
+    def __init__(self, url: str, headers: Mapping[str, str] | None = None, slow: bool = False) -> None:
+        """headers: further headers of the handshake, from the browser or a proxy. slow: emulates a slow line,
+        on which some kilobytes wait at most."""
         protocol: Any = [f"viser-v{__version__}"]
         self.controls: dict[str, dict[str, Any]] = {}
         self.commands: dict[str, dict[str, Any]] = {}
@@ -76,8 +79,10 @@ class Wire:
         # Browsers send no pings, and a busy machine would answer them too late.
         self._socket = connect(
             url.replace("http", "ws", 1),
+            sock=_slow_line(url) if slow else None,
             subprotocols=protocol,
             max_size=None,
+            max_queue=1 if slow else 16,
             ping_interval=None,
             additional_headers=dict(headers or {}),
         )
@@ -136,14 +141,16 @@ class Wire:
         return any(text in str(each["props"].get("content", "")) for each in shown)
 
     def _read(self) -> None:
-        while True:
-            try:
+        with suppress(ConnectionClosed):
+            while True:
                 raw = self._socket.recv()
-            except ConnectionClosed:
-                return
-            if isinstance(raw, bytes):
-                for message in messages_of(raw):
-                    self._take(message)
+                if isinstance(raw, bytes):
+                    self._hear(raw)
+
+    def _hear(self, raw: bytes) -> None:
+        """Takes the messages in a packet."""
+        for message in messages_of(raw):
+            self._take(message)
 
     def _take(self, message: dict[str, Any]) -> None:
         kind: str = message["type"]
@@ -170,6 +177,8 @@ class Wire:
                 self.meshes[message["name"]] = message["owner"]
             case "RemoveSceneNodeMessage":
                 self.nodes.pop(message["name"], None)
+            case "ResetGuiMessage":
+                self.controls.clear()
             case "GuiRemoveMessage":
                 self.controls.pop(message["uuid"], None)
             case "GuiUpdateMessage" if message["uuid"] in self.controls:
@@ -184,6 +193,13 @@ class Wire:
     def _update(control: dict[str, Any], updates: dict[str, Any]) -> None:
         for name, value in updates.items():
             (control if name == "value" else control["props"])[name] = value
+
+
+def _slow_line(url: str) -> socket:
+    line, address = socket(), urlsplit(url)
+    line.setsockopt(SOL_SOCKET, SO_RCVBUF, 8192)
+    line.connect((address.hostname, address.port))
+    return line
 
 
 def eventually(condition: Callable[[], bool], timeout: float = 40.0) -> bool:

@@ -83,17 +83,10 @@ class TargetGizmo:
             self._say()
             moved(self.raw, self.rotation if self._rings else None)
 
-        self._gizmo = Handle(scene, "/target", position.axes, size, dragged, position=start).control
-        self._turn = Handle(
-            scene,
-            "/target/turn",
-            position.axes,
-            size,
-            dragged,
-            rings=True,
-            wxyz=_wxyz(rotation),
-            visible=orientation is not None,
-        ).control
+        place = {"wxyz": _wxyz(rotation), "visible": orientation is not None}
+        arrows = Handle(scene, "/target", position.axes, size, position=start)
+        rings = Handle(scene, "/target/turn", position.axes, size, rings=True, **place)
+        self._gizmo, self._turn = arrows.control, rings.control
         self._ball = scene.add_icosphere(
             "/target/ball", radius=radius, color=TARGET, opacity=_OPACITY, cast_shadow=False
         )
@@ -112,6 +105,8 @@ class TargetGizmo:
         self._gap = Gap(scene, "/gap", BAD, 0.006)
         self._way = Gap(scene, "/way", TARGET, 0.004, _NEAR)
         self._far = 0.0
+        arrows.listen(dragged)
+        rings.listen(dragged)
 
     @property
     def raw(self) -> np.ndarray:

@@ -25,18 +25,20 @@ class Handle:
         node: str,
         axes: str,
         size: float,
-        moved: Callable[[], object],
         rings: bool = False,
         **given: Any,
     ) -> None:
-        """size: of the arrows or rings, m; moved: called after each move; given: further attributes of the
-        control."""
+        """size: of the arrows or rings, m; given: further attributes of the control."""
         x, y, z = (axis in axes for axis in "xyz")
         look = {"disable_axes": rings, "disable_sliders": rings, "disable_rotations": not rings}
         self._touched = -float("inf")
         self.control = scene.add_transform_controls(
             node, scale=size, active_axes=(x, y, z), depth_test=False, **{"line_width": 3.0, **look, **given}
         )
+
+    def listen(self, moved: Callable[[], object]) -> None:
+        """Lets `moved` be called after each move. The owner calls this when all that `moved` needs is there:
+        the browser draws the handle before that, and its moves arrive on viser's loop."""
 
         @self.control.on_update
         async def _(_: viser.TransformControlsEvent) -> None:

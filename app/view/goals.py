@@ -50,7 +50,7 @@ class Goal:
         if moved is None:
             self._node = scene.add_frame(node, show_axes=False, position=position)
         else:
-            self._handle = Handle(scene, node, axes, size, lambda: moved(self.place()), position=position)
+            self._handle = Handle(scene, node, axes, size, position=position)
             self._node = self._handle.control
         if floor:
             scene.add_cylinder(
@@ -60,6 +60,8 @@ class Goal:
             scene.add_icosphere(f"{node}/ball", radius=_BALL, color=colour, opacity=0.8, cast_shadow=False)
         self._label = scene.add_label(f"{node}/label", role, position=(0.0, 0.0, 0.9 * size + 0.06))
         self._gap = Gap(scene, f"/gap/{role}", colour, 0.008, _GAP)
+        if moved is not None and self._handle is not None:
+            self._handle.listen(lambda: moved(self.place()))
 
     def put(self, place: np.ndarray) -> None:
         """Moves the goal as its arrows do, along the directions of the arrows only."""

@@ -88,12 +88,12 @@ class _Solid:
             f"/obstacle_arrows/{index}",
             "xyz",
             size + _ARROWS,
-            self._dragged,
             position=obstacle.centre,
             disable_sliders=True,
             line_width=2.0,
         )
         self._arrows = self._handle.control
+        self._handle.listen(self._dragged)
 
     def _dragged(self) -> None:
         x, y, z = (float(value) for value in self._arrows.position)

@@ -79,7 +79,7 @@ class _Target:
         self._base = scene.add_frame(node, show_axes=False)
         turning, flat = task.kind in _TURNING, task.kind == "plane_distance"
         along = "xyz" if task.kind == "pointing" else "x" if flat else task.axes
-        self._handle = Handle(scene, f"{node}/control", along, size, self._moved, rings=turning)
+        self._handle = Handle(scene, f"{node}/control", along, size, rings=turning)
         self._control = self._handle.control
         mark = f"{node}/control/mark"
         if flat:
@@ -92,6 +92,7 @@ class _Target:
         scene.add_label(f"{node}/control/label", task.name, position=(0.0, 0.0, above))
         self._gap = Gap(scene, f"/gaps/{task.name}", colour, 0.005, radius)
         self.follow(poses, task.raw, True)
+        self._handle.listen(self._moved)
 
     def _moved(self) -> None:
         self._handle.touch()

@@ -20,7 +20,7 @@ from robots.world import Ball, Box, Floor, Post, Thing, World
 _STICTION_SOLREF = (0.002, 1.0)
 _STICTION_SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 CONTACT_SOLREF = (0.004, 1.0)
-"""Time constant (s) and damping ratio of a contact: see `benchmarks/contacts.py`."""
+"""Time constant (s) and damping ratio of a contact: see `benchmarks/contacts.py` of commit 0da97aa1."""
 CONTACT_SOLIMP = (0.95, 0.99, 0.001, 0.5, 2.0)
 _STOP_SOLREF = (0.004, 1.0)
 _SLIDING = 0.5

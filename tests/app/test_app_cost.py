@@ -4,12 +4,11 @@ client reads."""
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
 from viser import ClientHandle
-from websockets.sync.connection import Connection
 
 from app.adapter import private
 from app.client.decimated import decimate
@@ -18,7 +17,7 @@ from app.link.choice import SceneChoice
 from app.link.process import wait_until
 from app.panels.widgets.chart import _TOP, _axis
 from app.web.server import PageServer
-from benchmarks.client import Second, Viewer
+from browsing.viewer import Second, Viewer
 from lessons.scenes.run_spec import RunSpec
 
 pytestmark = pytest.mark.usefixtures("one_fork_server")
@@ -41,49 +40,39 @@ def alone(circling: PageServer) -> PageServer:
     return circling
 
 
-def hear_until(viewer: Viewer, page: Connection, condition: Callable[[], bool]) -> None:
-    end = time.monotonic() + LONG
-    while not condition():
-        assert time.monotonic() < end
-        viewer.hear(page, 0.2)
-
-
 def test_only_charts_in_view_are_sent(alone: PageServer) -> None:
-    viewer = Viewer(alone.link, tab="Joints")
-    with viewer.connect() as page:
-        hear_until(viewer, page, lambda: TORQUE in viewer.drawn and bool(viewer.second.links))
+    with Viewer(alone.link) as viewer:
+        assert wait_until(lambda: TORQUE in viewer.drawn and bool(viewer.second.links), LONG)
         for tab, seen, unseen in (("Errors", NEAREST, TORQUE), ("Joints", TORQUE, NEAREST)):
-            viewer.show(tab)
+            viewer.tab = tab
             viewer.second = Second()
             # wait until data that were sent earlier have arrived
-            hear_until(viewer, page, lambda seen=seen: seen in viewer.drawn)
+            assert wait_until(lambda seen=seen: seen in viewer.drawn, LONG)
             viewer.second = Second()
-            hear_until(viewer, page, lambda: max(viewer.second.plots.values(), default=0) >= 5)
+            assert wait_until(lambda: max(viewer.second.plots.values(), default=0) >= 5, LONG)
             assert seen in viewer.drawn and unseen not in viewer.drawn
 
 
 def test_a_page_that_nobody_sees_gets_no_pictures(alone: PageServer) -> None:
-    viewer = Viewer(alone.link)
-    with viewer.connect() as page:
-        hear_until(viewer, page, lambda: bool(viewer.second.plots and viewer.second.links))
-        viewer.show(None)
+    with Viewer(alone.link) as viewer:
+        assert wait_until(lambda: viewer.moves, LONG)
+        viewer.tab = None
         (shown,) = (each._page for each in alone._visits.values() if each._page is not None)
-        hear_until(viewer, page, lambda: shown._stage is not None and shown._stage._in_view.asleep)
+        assert wait_until(lambda: shown._stage is not None and shown._stage._in_view.asleep, LONG)
         for _ in range(2):  # the last updates may still arrive in the first second
             viewer.second = Second()
-            hear_until(viewer, page, lambda: viewer.second.messages >= 30)
+            assert wait_until(lambda: viewer.second.messages >= 30, LONG)
         assert not viewer.second.plots and not viewer.second.links
-        viewer.show("Joints")
-        hear_until(viewer, page, lambda: bool(viewer.second.plots and viewer.second.links))
+        viewer.tab = "Joints"
+        assert wait_until(lambda: viewer.moves, LONG)
 
 
 def test_a_slow_line_gets_fewer_pictures_not_a_queue(alone: PageServer) -> None:
-    viewer = Viewer(alone.link)
-    with viewer.connect(slow=True) as page:
-        hear_until(viewer, page, lambda: bool(viewer.second.plots and viewer.second.links))
+    with Viewer(alone.link, slow=True) as viewer:
+        assert wait_until(lambda: viewer.moves, LONG)
         (client,) = alone._viser.get_clients().values()
         (learner,) = alone.sessions.learners
-        # The client reads nothing any more, so written data stay in the buffers.
+        viewer.reads.clear()  # written data stay in the buffers
         assert wait_until(lambda: private.waiting(client) > 0, LONG)
         status = learner.status
         assert status is not None
@@ -92,20 +81,21 @@ def test_a_slow_line_gets_fewer_pictures_not_a_queue(alone: PageServer) -> None:
         assert private.waiting(client) < waits + 100  # each text replaces its previous one
         # When the client reads again, updates arrive again.
         viewer.second = Second()
-        hear_until(viewer, page, lambda: private.waiting(client) == 0)
-        hear_until(viewer, page, lambda: bool(viewer.second.plots and viewer.second.links))
+        viewer.reads.set()
+        assert wait_until(lambda: private.waiting(client) == 0, LONG)
+        assert wait_until(lambda: viewer.moves, LONG)
 
 
 def test_a_slow_line_queues_one_scene_at_most(alone: PageServer) -> None:
     """While a connection delivers nothing, the page does not build further scenes; afterwards it builds the
     last one."""
-    viewer = Viewer(alone.link)
-    with viewer.connect(slow=True) as page:
-        hear_until(viewer, page, lambda: bool(viewer.second.plots and viewer.second.links))
+    with Viewer(alone.link, slow=True) as viewer:
+        assert wait_until(lambda: viewer.moves, LONG)
         (client,) = alone._viser.get_clients().values()
         (learner,) = alone.sessions.learners
         (shown,) = (each._page for each in alone._visits.values() if each._page is not None)
         assert wait_until(lambda: private.waiting(client) > 0, LONG)
+        viewer.reads.clear()
         queued = []
         for scene in ("planar3-hold", "planar3-singular", "planar3-conflict"):
             learner.load(SceneChoice(RunSpec(scene)))
@@ -113,7 +103,8 @@ def test_a_slow_line_queues_one_scene_at_most(alone: PageServer) -> None:
             assert wait_until(lambda: is_steady(client), LONG)  # a scene may still be built
             queued.append(private.waiting(client))
         assert queued[-1] < queued[0] + 100
-        hear_until(viewer, page, lambda: shown._built is learner.ready and private.waiting(client) == 0)
+        viewer.reads.set()
+        assert wait_until(lambda: shown._built is learner.ready and private.waiting(client) == 0, LONG)
 
 
 def is_steady(client: ClientHandle) -> bool:

@@ -21,12 +21,16 @@ from app.link.messages import Post, Ready
 from app.panels.torque.start import StartPanel
 from app.view import drag
 from app.view.drag import Hand, paused_words
+from app.view.goals import Goal
+from app.view.obstacles import _Solid
 from app.view.reachability import Question, Reachability, ReachabilityWorker
 from app.view.robot import gizmo_size, target_radius
+from app.view.targets import Targets
 from app.worker.simulation import SimulationRunner
 from lessons.events import Event, MoveTarget
 from lessons.scenes.run_spec import RunSpec
 from lessons.settings.torque import TorqueSettings
+from robots.collision import Ball
 from robots.loading.load import load_urdf_text
 from robots.reach import ReachJudge
 
@@ -45,7 +49,8 @@ class Scene:
         def add(name: str, *given: Any, **made: Any) -> Any:
             text = given[0] if given and isinstance(given[0], str) else ""
             points = given[0] if given and isinstance(given[0], np.ndarray) else None
-            made = {"wxyz": np.array([1.0, 0, 0, 0]), "visible": True, "text": text, "points": points, **made}
+            turn, here = np.array([1.0, 0, 0, 0]), np.zeros(3)
+            made = {"wxyz": turn, "position": here, "visible": True, "text": text, "points": points, **made}
             node = SimpleNamespace(**made, remove=lambda: None, on_update=self._listen)
             self.nodes[name] = node
             return node
@@ -233,6 +238,29 @@ def test_targets_from_before_the_axes_were_changed_are_not_drawn(held: Callable[
     assert one.scene.nodes["/target"].position == pytest.approx(one.start)
     one.hand.look_back(before)
     assert one.scene.nodes["/target"].visible
+
+
+class Hasty(Scene):
+    """A scene whose controls are moved as soon as somebody listens: the browser draws them before the rest is
+    there, and drags arrive on viser's loop while another thread still builds."""
+
+    def _listen(self, back: Any) -> Any:
+        super()._listen(back)
+        self.moved()
+        return back
+
+
+@pytest.mark.usefixtures("held")
+def test_a_drag_that_arrives_while_its_handle_is_built_does_no_harm(ready: Ready) -> None:
+    scene: Any = Hasty()
+    moved = MagicMock()
+    Goal(scene, "hand", "xyz", JOINTS[0], np.zeros(3), 0.2, moved)
+    _Solid(scene, 0, Ball("ball", (0.0, 0.0, 0.0), 0.1), moved)
+    arms = SimulationRunner(SceneChoice(RunSpec("baxter-hold"))).ready()
+    Targets(scene, arms, {}, np.tile(TIP, (len(arms.robot.joint_names) + 1, 1)), 0.2, moved)
+    assert moved.call_count == 4  # of the goal, of the obstacle, and of the two targets
+    targets = {task.name: task.raw for task in ready.tasks if task.raw is not None}
+    Hand(scene, ready, targets, TIP, 0.2, moved, lambda: True, moved, moved)
 
 
 def test_keys_move_and_turn_the_target_as_a_drag_does(held: Callable[[bool], Held]) -> None:

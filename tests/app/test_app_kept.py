@@ -17,7 +17,7 @@ from app.link.choice import SceneChoice
 from app.link.process import wait_until
 from app.web.server import PageServer
 from app.worker.simulation import SimulationRunner
-from benchmarks.learners import Viewers
+from benchmarks.client import Viewers
 from browsing.wire import Wire
 from lessons.scenes.run_spec import RunSpec
 
@@ -92,7 +92,7 @@ def test_scenes_that_were_left_keep_nothing() -> None:
     counted in one round; a leak grows in every round."""
     server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
     try:
-        with Viewers(server.link, "--clients", "1"):
+        with Viewers(server.link, 1):
             assert wait_until(lambda: bool(server.sessions.learners), LONG)
 
             def visit(times: int) -> int:

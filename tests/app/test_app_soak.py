@@ -1,5 +1,4 @@
-"""Short versions of `benchmarks.soak` and `benchmarks.switches`: the server's memory and handles stay
-constant."""
+"""Short versions of `benchmarks.soak`: the server's memory and handles stay constant."""
 
 from __future__ import annotations
 
@@ -11,30 +10,24 @@ from pathlib import Path
 
 import pytest
 
-pytestmark = pytest.mark.nightly("app/link", "app/web", "benchmarks/soak.py", "benchmarks/switches.py")
+pytestmark = pytest.mark.nightly("app/link", "app/web", "benchmarks/soak.py", "benchmarks/client.py")
 
 ROOT = Path(__file__).parents[2]
 
 
-def test_nothing_grows() -> None:
-    """Memory of server and simulations, threads and handles stay constant, also over reloads. The benchmark
-    runs in a process of its own, without the memory of other tests."""
-    options = ["--minutes", "2", "--clients", "2", "--reconnects", "50", "--scene", "planar3-hold"]
-    found = json.loads(run("soak", *options, "--json", "-"))
-    assert found["faults"] == [], found
-
-
-def test_scenes_and_ghosts_that_are_left_are_given_back() -> None:
-    """Two learners change scenes and ghosts every two seconds; all memory and processes are released."""
-    options = ["--minutes", "0.25", "--clients", "2", "--every", "2", "--speed", "0.5"]
-    lines = [json.loads(line) for line in run("switches", *options).splitlines()]
-    assert lines[-1]["faults"] == [], lines
-
-
-def run(benchmark: str, *options: str) -> str:
-    """Returns the output of a benchmark."""
+@pytest.mark.parametrize(
+    "options",
+    [
+        pytest.param("--minutes 2 --clients 2 --reconnects 50 --scene planar3-hold", id="time and reloads"),
+        pytest.param("--minutes 0.25 --clients 2 --every 2 --speed 0.5", id="scenes and ghosts"),
+    ],
+)
+def test_nothing_grows(options: str) -> None:
+    """Memory of server and simulations, threads and handles stay constant, over time, over reloads, and while
+    learners change scenes and ghosts. The benchmark runs in a process of its own, without the memory of other
+    tests."""
     done = subprocess.run(
-        [sys.executable, "-m", f"benchmarks.{benchmark}", *options],
+        [sys.executable, "-m", "benchmarks.soak", *options.split()],
         cwd=ROOT,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         capture_output=True,
@@ -42,4 +35,5 @@ def run(benchmark: str, *options: str) -> str:
         check=False,
     )
     assert done.returncode in (0, 1), done.stderr
-    return done.stdout
+    lines = [json.loads(line) for line in done.stdout.splitlines()]
+    assert lines[-1]["faults"] == [], lines

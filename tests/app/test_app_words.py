@@ -25,8 +25,8 @@ from app.view.robot import aim
 from app.web import words
 from app.web.server import PageServer
 from app.worker.simulation import SimulationRunner
-from benchmarks.findings import StandardError
-from benchmarks.roam import roam
+from benchmarks.hostile import HostileUser
+from benchmarks.monkey import attack
 from browsing.wire import Wire, camera, eventually
 from lessons.scenes.run_spec import RunSpec
 from robots import load_robot
@@ -121,12 +121,7 @@ def test_what_is_no_message_is_refused(raw: bytes) -> None:
 
 def test_a_hostile_user_stops_nothing() -> None:
     """The page survives a few seconds of `benchmarks.monkey --hostile` without a fault."""
-    with StandardError() as terminal:
-        server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=4, grace=0.2)
-        try:
-            found = roam(server, 3.0, 3, terminal.read)
-        finally:
-            server.close()
+    found = attack(HostileUser, "planar3-hold", 3.0, seed=3, pages=4)
     assert found.faults == []
     assert sum(found.actions.values()) > 10
 
