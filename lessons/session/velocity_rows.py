@@ -109,12 +109,12 @@ def write_truth(
     layout: Layout,
     at: Configuration,
     roles: Mapping[str, Task],
-    places: Mapping[str, int],
+    level_index: Mapping[str, int],
     references: Mapping[str, Reference],
 ) -> None:
     """Writes the true positions of the points, their present references, and the errors.
 
-    places: by role, the place of its task in the window, counted from 1.
+    level_index: by role, the place of its task in the window, counted from 1.
     references: by role, the reference of its task, as far as the task is in the window.
     """
     fields = layout.fields
@@ -129,7 +129,7 @@ def write_truth(
         row[fields[f"v_d/{name}"]] = on_axes(along, wanted, wanted.velocity)
         row[fields[f"a_d/{name}"]] = on_axes(along, wanted, wanted.acceleration)
         row[fields[f"error/{name}"]] = task.error(value, wanted.value)
-        row[fields[f"level/{name}"]] = places[name]
+        row[fields[f"level/{name}"]] = level_index[name]
     row[fields["manipulability"]] = manipulability(at)
 
 

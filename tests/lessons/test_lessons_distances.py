@@ -111,7 +111,7 @@ def test_kernel_and_printed_equations_keep_the_same_distances() -> None:
     assert all(" – " in joint for joint in held)
     for _ in range(20):
         leader.tick()
-    given = leader.given
+    given = leader.controller_input
     assert given is not None
     plans = []
     for name in ("himpc", "himpc_printed"):
