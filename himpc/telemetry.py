@@ -164,9 +164,9 @@ def arranged(
 def relaid(rows: Array, old: Layout, new: Layout) -> Array:
     """Converts rows, (k, size), to another layout. A field that the rows do not contain with the same width
     becomes NaN."""
-    found = np.full((len(rows), new.size), math.nan)
+    new_rows = np.full((len(rows), new.size), math.nan)
     for name, where in new.fields.items():
         before = old.fields.get(name)
         if before is not None and before.stop - before.start == where.stop - where.start:
-            found[:, where] = rows[:, before]
-    return found
+            new_rows[:, where] = rows[:, before]
+    return new_rows

@@ -74,16 +74,16 @@ def budget_of(arena: Arena) -> float:
 def write_levels(arena: Arena, levels: Sequence[LevelTable]) -> None:
     """Writes the table of levels."""
     f = arena.f
-    for place, level in enumerate(levels):
+    for index, level in enumerate(levels):
         rho = float(level.R.min())
         metric = np.sqrt(rho / level.R)
-        f["rho"][place], f["metric"][place], f["R"][place] = rho, metric, level.own_R
-        f["accuracy"][place] = min(ACCURACY * rho, KKT_TOLERANCE)
-        arena.i["level"][place] = (
+        f["rho"][index], f["metric"][index], f["R"][index] = rho, metric, level.own_R
+        f["accuracy"][index] = min(ACCURACY * rho, KKT_TOLERANCE)
+        arena.i["level"][index] = (
             level.rows.start,
             level.rows.stop,
             level.knots,
-            place > 0 and bool((f["metric"][place - 1] != metric).any()),
+            index > 0 and bool((f["metric"][index - 1] != metric).any()),
             level.alone,
             level.own_rows.start,
             level.own_rows.stop,
