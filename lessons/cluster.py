@@ -82,14 +82,11 @@ def on_cluster(address: str) -> Iterator[Spread]:
         indices = {future.key: index for index, future in enumerate(futures)}
         try:
             for future in ended(futures):
-                error = future.exception()
+                index, error = indices[future.key], future.exception()
                 if isinstance(error, KilledWorker):
-                    orphans.append(indices[future.key])
+                    orphans.append(index)
                 else:
-                    yield (
-                        indices[future.key],
-                        future.result() if error is None else FailedJob(sentence(error)),
-                    )
+                    yield index, future.result() if error is None else FailedJob(sentence(error))
             # A worker that dies also loses the items that waited for it. The items are therefore repeated one
             # at a time, which shows which item ends its worker.
             for index in sorted(orphans):

@@ -198,15 +198,15 @@ def _label_shared_x(picture: Picture, grid: np.ndarray) -> None:
 
 
 def _legend(figure: Figure, grid: np.ndarray) -> None:
-    handles = {}
+    legend = {}
     for axes in grid.flat:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-            handles.setdefault(label, handle)
-    if len(handles) > 1:
+            legend.setdefault(label, handle)
+    if len(legend) > 1:
         figure.legend(
-            handles.values(),
-            handles.keys(),
+            legend.values(),
+            legend.keys(),
             loc="outside upper center",
-            ncols=min(len(handles), 4),
+            ncols=min(len(legend), 4),
             markerscale=2,
         )

@@ -37,15 +37,8 @@ def script(run: RunSpec, log: Log, duration: float) -> str:
     settings = settings_after(scene.settings, (event for _, event in log[:start]))
     assignments = differences(run.loaded().settings, settings)
     events = log[start:]
-    own = next(
-        (
-            assignment
-            for assignment in assignments
-            if assignment.startswith("controller=") and is_file(assignment)
-        ),
-        None,
-    )
-    assignments = tuple(assignment for assignment in assignments if assignment != own)
+    own = next((text for text in assignments if text.startswith("controller=") and is_file(text)), None)
+    assignments = tuple(text for text in assignments if text != own)
     find = ", ".join(map(repr, _arguments(run))) + (f", hold={run.hold!r}" if run.hold else "")
     parts = [
         _HEAD.format(
@@ -58,7 +51,7 @@ def script(run: RunSpec, log: Log, duration: float) -> str:
         f"SCENE = {'scene_named' if is_file(run.scene) else 'load_scene'}({find})",
         *((f"SCENE = with_tasks(SCENE, {run.tasks!r})",) if run.tasks else ()),
         f"CONTROLLER = {None if own is None else parse_assignment(own)[1]!r}",
-        _tuple("SETTINGS", (repr(assignment) for assignment in assignments)),
+        _tuple("SETTINGS", map(repr, assignments)),
         _tuple("EVENTS", (f"({_literal(float(t))}, {_call(event)})" for t, event in events)),
         f"DURATION = {_literal(float(duration))}  # s",
         f"SEED = {run.seed}",

@@ -145,19 +145,14 @@ class VelocitySettings(SceneSettings):
         """Obstacles that were removed, added or moved; added and moved ones come last, in the order of these
         changes."""
         left = {obstacle.name for obstacle in wanted.htmpc.obstacles}
-        changes = [
-            (f"obstacles.{obstacle.name}", None)
-            for obstacle in self.htmpc.obstacles
-            if obstacle.name not in left
-        ]
-        rest = tuple(obstacle for obstacle in self.htmpc.obstacles if obstacle.name in left)
+        own = self.htmpc.obstacles
+        changes = [(f"obstacles.{obstacle.name}", None) for obstacle in own if obstacle.name not in left]
+        rest = tuple(obstacle for obstacle in own if obstacle.name in left)
         for count in range(len(wanted.htmpc.obstacles) + 1):
             at = len(wanted.htmpc.obstacles) - count
             kept, last = wanted.htmpc.obstacles[:at], wanted.htmpc.obstacles[at:]
-            if (
-                tuple(obstacle for obstacle in rest if obstacle.name not in {moved.name for moved in last})
-                == kept
-            ):
+            moved = {obstacle.name for obstacle in last}
+            if tuple(obstacle for obstacle in rest if obstacle.name not in moved) == kept:
                 return changes + [
                     _as_setting(obstacle) for obstacle in last if not isinstance(obstacle, Floor)
                 ]
@@ -199,19 +194,18 @@ _OF_LEVELS = {
 }  # fmt: skip
 
 
+def _movable(settings: VelocitySettings) -> dict[str, Ball | Box]:
+    obstacles = settings.htmpc.obstacles
+    return {obstacle.name: obstacle for obstacle in obstacles if not isinstance(obstacle, Floor)}
+
+
 def _seen(settings: VelocitySettings, name: str) -> Any:
-    obstacles = [
-        obstacle
-        for obstacle in settings.htmpc.obstacles
-        if obstacle.name == name and not isinstance(obstacle, Floor)
-    ]
-    return _as_setting(obstacles[0])[1] if obstacles else None
+    obstacle = _movable(settings).get(name)
+    return None if obstacle is None else _as_setting(obstacle)[1]
 
 
 def _with_obstacle(settings: VelocitySettings, name: str, value: Any) -> VelocitySettings:
-    known = {
-        obstacle.name: obstacle for obstacle in settings.htmpc.obstacles if not isinstance(obstacle, Floor)
-    }
+    known = _movable(settings)
     if value is not None:
         return settings.with_obstacle(_obstacle(known, f"obstacles.{name}", name, value))
     if name not in known:

@@ -285,18 +285,16 @@ def judge_note(lesson: str, where: str, note: Note, runs: Sequence[RunSpec], out
     if note.measure.over_ghost:
         *values, ghost = values
         values = [value / ghost if ghost else math.nan for value in values]
-    conditions = [_between(interval, unit) for interval in (note.inside, note.outside)]
+    wanted = [_between(interval, unit) for interval in (note.inside, note.outside)]
     missed = [
         f"{_figure(value, unit)}, not {condition}"
-        for value, condition, (low, high) in zip(
-            values, conditions, (note.inside, note.outside), strict=False
-        )
+        for value, condition, (low, high) in zip(values, wanted, (note.inside, note.outside), strict=False)
         if not low <= value <= high
     ]
     other = values[1] if note.without else math.nan
     wrong = ", ".join(note.without)
     fault = "; ".join(missed)
-    return Verdict(lesson, where, what, values[0], unit, conditions[0], wrong, other, fault)
+    return Verdict(lesson, where, what, values[0], unit, wanted[0], wrong, other, fault)
 
 
 def _between(limits: Range, unit: str) -> str:
