@@ -41,7 +41,7 @@ class Avoidance:
     def rows(
         self, near: Clearances, N: int, dt: float, table: ConstraintTable | None = None, row: int = 0
     ) -> ConstraintRows:
-        """Writes the linearised constraint on the change d of the inputs to a table, from row `place` on.
+        """Writes the linearised constraint on the change d of the inputs to a table, from `row` on.
         Returns these rows, one per pair and knot."""
         table = ConstraintTable(N * near.gradient.shape[1]) if table is None else table
         A = table.spread(row, near.knot, near.gradient, integrator(N, dt).T_q)

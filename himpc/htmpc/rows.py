@@ -108,7 +108,7 @@ class ConstraintTable:
         return end
 
     def spread(self, row: int, knot: NDArray[np.int64], slopes: Array, T_q: Array) -> Array:
-        """Writes rows of functions of q, from index `place` on, and returns them. `slopes` (r, n) are the
+        """Writes rows of functions of q, from index `row` on, and returns them. `slopes` (r, n) are the
         derivatives of the functions with respect to q at the knots (r,)."""
         self.reserve(row + len(knot))
         spread(self.A, row, np.asarray(knot, np.intp), np.ascontiguousarray(slopes), T_q)

@@ -11,7 +11,7 @@ from lessons.papers.topics import Measured, Topic, topics
 from lessons.papers.words import number
 from lessons.replay.state import encode
 
-Found = Sequence[tuple[str, Row]]
+ComparedRows = Sequence[tuple[str, Row]]
 """(name of the item, row)."""
 
 _INTRO = """\
@@ -33,11 +33,11 @@ texts below them, is measured by `reproduce` and compared with the stored number
 _NO_TOPIC = Topic("", "Not explained yet", "none.", "not known.", "run the item.")
 
 
-def page(compared: Found) -> str:
+def page(compared: ComparedRows) -> str:
     """Returns the page in Markdown.
 
     Args:
-        found: every row of the items.
+        compared: every row of the items.
     """
     by_topic: dict[str, list[tuple[str, Row]]] = {name: [] for name in topics()}
     for item, row in compared:
@@ -75,7 +75,7 @@ def _tally(rows: Sequence[Row]) -> str:
     )
 
 
-def _section(topic: Topic, rows: Found) -> str:
+def _section(topic: Topic, rows: ComparedRows) -> str:
     lines = [
         f"## {topic.title}",
         "",

@@ -46,7 +46,7 @@ class TorqueSession(Session):
 
     Attributes:
         plan: the last plan, None before the first tick.
-        given: the inputs from which the controller computed it.
+        controller_input: the inputs from which the controller computed it.
         clearance: measures the nearest pair.
     """
 

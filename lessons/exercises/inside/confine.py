@@ -193,7 +193,7 @@ def hide_the_lab() -> None:
 
 def refuse(paths: Sequence[Path], pipe: int) -> None:
     """Makes Python end this process when any thread does one of these: open a file that no import reads,
-    start a program, send a signal, change a file, or use the network. The pipe `told` then names the action.
+    start a program, send a signal, change a file, or use the network. `pipe` then names the action.
     This is needed where the operating system does not refuse these actions. By itself it does not stop
     hostile code."""
     archives = (path for path in sys.path if not os.path.isdir(path))
