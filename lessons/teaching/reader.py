@@ -86,7 +86,7 @@ _FORMS: dict[str, tuple[str, str]] = {
     "integer": (r"(?P<integer>-?\d+)", "1"),
     "real": ("(?P<real>#)", "1.5"),
     "note": (
-        rf"(?P<told>given: .+|tested by \S+::\w+)|{_MEASURE} from (?P<low>#)(?: to (?P<high>#))?"
+        rf"(?P<statement>given: .+|tested by \S+::\w+)|{_MEASURE} from (?P<low>#)(?: to (?P<high>#))?"
         r"(?: in (?P<on>[\w-]+))?(?: for (?P<seconds>#) s)?"
         rf"(?: with (?:(?P<ghost>the ghost's settings)|(?P<set>{_SETTINGS})))?"
         rf"(?:; (?P<effect>but|and) with (?P<without>{_SETTINGS})"
@@ -107,7 +107,7 @@ _TEXT_GROUPS = {
     "choices",
     "numbers",
     "log",
-    "told",
+    "statement",
     "on",
     "ghost",
     "set",
@@ -320,8 +320,8 @@ def _note(part: _Part, item: _Part, says: str) -> Note:
     groups = item.groups()
     label = item.more[2:-1]
     with item.named():
-        if "told" in groups:
-            return Note(label, says, told=groups["told"])
+        if "statement" in groups:
+            return Note(label, says, statement=groups["statement"])
         measure = _measure(item)
         inside = groups["low"], groups.get("high", math.inf)
         outside = groups.get("outside_low", 0.0), groups.get("outside_high", math.inf)
