@@ -119,7 +119,7 @@ def image_of(
     far = np.inf if np.isinf(multiple) else 0.0
     f["widest"][:2] = multiple * robot.tau_limit, multiple * robot.v_limit
     f["widest"][2:] = robot.q_lower - far, robot.q_upper + far
-    f["order"][:] = f["place"][:] = np.arange(len(tables))
+    f["order"][:] = f["solved_index"][:] = np.arange(len(tables))
     f["goal"][:], f["tau_limit"][:], f["weight"][:] = arena.f["limits"], robot.tau_limit, 1.0
     for index, level in enumerate(form.levels):
         calmed = DAMPING_SHARE if level.name == DAMPING_LEVEL.name and not strict else 1.0

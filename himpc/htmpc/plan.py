@@ -14,7 +14,7 @@ from himpc.htmpc.settings import MotionBounds
 from himpc.plan import Binding
 
 Array = NDArray[np.float64]
-Whole = NDArray[np.int64]
+IntArray = NDArray[np.int64]
 
 
 class ActiveMotionRows(NamedTuple):
@@ -22,9 +22,9 @@ class ActiveMotionRows(NamedTuple):
     `name` is the pair of a row of a distance, the coordinate of a row of (12), the cost of a row of (11), and
     "" for the rows of a joint."""
 
-    kind: Whole
-    knot: Whole
-    part: Whole
+    kind: IntArray
+    knot: IntArray
+    part: IntArray
     multiplier: Array
     name: tuple[str, ...]
 

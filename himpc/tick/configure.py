@@ -116,7 +116,7 @@ def write_tasks(
         if is_built_in(task):
             _write_task(arena, robot, task, index, span, frames)
         else:
-            arena.i["task"][index] = kinematics.GIVEN, 0, start, count
+            arena.i["task"][index] = kinematics.PYTHON, 0, start, count
             arena.i["part"][span] = range(python_rows, python_rows + count)
             python_rows += count
         start += count

@@ -10,14 +10,14 @@ from himpc.tasks import Damping, FrameOrientation
 from himpc.telemetry import Layout
 from himpc.tick.configure import Span, is_built_in
 from himpc.tick.kernel.arena import Arena
-from himpc.tick.kernel.arrays import AT, Whole
+from himpc.tick.kernel.arrays import AT, IntArray
 
 _LIMITS = ("tau_lower", "tau_upper", "v_limit", "", "", "", "q_lower", "q_upper")
 """Telemetry fields of the rows of `limits`; an empty name means that the row (stops, decelerations) has no
 field."""
 
 
-def gathered(arena: Arena, layout: Layout, spans: Sequence[Span], levels: Sequence[str]) -> Whole | None:
+def gathered(arena: Arena, layout: Layout, spans: Sequence[Span], levels: Sequence[str]) -> IntArray | None:
     """Returns an index into `arena.data` for every field of a row. It is the index of the field's number if a
     plan or its references fill the field, otherwise the index of a NaN.
 

@@ -73,9 +73,9 @@ class PythonRows:
                 self._ask(span, task.reference_in_task_coordinates(here, previews[task.name]))
             past = Configuration(self._robot, self._data, f["q_was"], f["v_was"], previews=previews)
             for index, task, span, rows in self._tasks:
-                f["given"][: len(knots) + 1, rows] = task.jacobian(here)
+                f["python_jacobian"][: len(knots) + 1, rows] = task.jacobian(here)
                 if not known:
-                    f["given"][-1, rows] = task.jacobian(past)[0]
+                    f["python_jacobian"][-1, rows] = task.jacobian(past)[0]
                 preview, value = previews[task.name], task.value(here)
                 self._note(index, span, value)
                 f["error"][span] = task.error(value, preview.value)

@@ -112,7 +112,7 @@ def sizes(
     bounds: int,
     tasks: int = 1,
     frames: int = 1,
-    given: int = 1,
+    python_rows: int = 1,
     directed: int = 0,
 ) -> Arena:
     """Returns an arena for n joints and N knots.
@@ -121,10 +121,10 @@ def sizes(
         n, N: number of joints and of knots.
         rows, solved: number of rows of all tasks, and of the solved tasks, whose rows come first.
         levels, bounds, tasks, frames: number of each.
-        given: number of rows of tasks that are not built into the kernel, at least 1.
+        python_rows: number of rows of tasks that are not built into the kernel, at least 1.
         directed: number of constraints that are not built into the kernel.
     """
-    numbers = [n, N, rows, solved, levels, tasks, frames, bounds, N * n, 0, given, directed]
+    numbers = [n, N, rows, solved, levels, tasks, frames, bounds, N * n, 0, python_rows, directed]
     arena = Arena(sizes_of(numbers))
     arena.i["sizes"][:] = numbers
     return arena
