@@ -227,7 +227,7 @@ def main() -> int:
                 "ticks": tally.ticks,
                 "episodes": tally.episodes,
                 "faults": dict(tally.faults),
-                "rungs": dict(tally.fallbacks),
+                "fallbacks": dict(tally.fallbacks),
                 "longest_ms": round(tally.longest_ms, 2),
             }
         )

@@ -23,7 +23,7 @@ def header(manifest: dict[str, Any], torques: Sequence[float], prefix: str) -> s
     tasks, levels = manifest["tasks"], manifest["levels"]
     at = {array["name"]: array["offset"] for array in manifest["arrays"]}
     names = {
-        **{name: at[name] for name in ("error", "active", "rung", "solved_index")},
+        **{name: at[name] for name in ("error", "active", "fallback", "solved_index")},
         "digest": f"0x{manifest['digest']}ULL",
         "multiple": f"{MULTIPLE:g}",
         "controller": manifest["controller"],

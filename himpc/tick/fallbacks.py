@@ -41,7 +41,7 @@ def perform(arena: Arena, parts: int, like: Rows) -> int:
     while parts & LEVELS and NOT_FINITE < reached < arena.i["sizes"][4]:
         started = perf_counter_ns()
         fallback = _apply_fallback(arena, reached, like)
-        arena.f["rung"][reached] = FALLBACKS.index(fallback)
+        arena.f["fallback"][reached] = FALLBACKS.index(fallback)
         arena.f["time_us"][reached] += (perf_counter_ns() - started) / 1e3
         unsolved += fallback != "solve"
         reached = control_period(*arena.arguments, parts & ~LINEARIZE, reached + 1, 0.0)
@@ -74,7 +74,7 @@ def _apply_fallback(arena: Arena, index: int, like: Rows) -> Fallback:
             if index:
                 _write(arena, rows)
             return "soften"
-    optimal = bool(arena.i["known"][1]) and f["rung"][index] <= SOFTENED
+    optimal = bool(arena.i["known"][1]) and f["fallback"][index] <= SOFTENED
     fallback, U = last_resort(widened or rows, f["U_was"][index].copy() if optimal else None)
     fallback = _on_the_way(arena, index, widened or rows, fallback, U, wanted)
     _write(arena, rows if index else containing(rows, f["U"][index]))

@@ -59,6 +59,6 @@ def gathered(arena: Arena, layout: Layout, spans: Sequence[Span], levels: Sequen
         for which, field in ((1, "v_d"), (2, "a_d")):
             put(f"{field}/{info.name}", "motion", which * knots + first)
     for index, level in enumerate(levels):
-        for field in ("cost", "kkt", "rung", "time_us", "leak", "active"):
+        for field in ("cost", "kkt", "fallback", "time_us", "leak", "active"):
             put(f"{field}/{level}", field, index)
     return sources

@@ -68,7 +68,7 @@ def increments_of(problem: LevelProblem, rows: Rows) -> Array | None:
 def solutions(names: Sequence[str], snapshot: Snapshot) -> list[LevelSolution]:
     """Returns the evidence of all levels from the results of a tick."""
     U, cost, kkt, leak, left = (snapshot(name) for name in ("U", "cost", "kkt", "leak", "left"))
-    fallbacks: list[Fallback] = [FALLBACKS[int(code)] for code in snapshot("rung")]
+    fallbacks: list[Fallback] = [FALLBACKS[int(code)] for code in snapshot("fallback")]
     times = snapshot("time_us").tolist()
     return [
         LevelSolution(

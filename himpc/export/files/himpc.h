@@ -182,7 +182,7 @@ static inline int himpc_active_rows(const himpc_controller *c, const char *level
 /* Which fallback gave the increments of a level; -1: there is no such level, or it is off. */
 static inline int himpc_level_fallback(const himpc_controller *c, const char *level) {
     int k = himpc_level(level), solved = k < 0 ? -1 : (int)((const double *)((const char *)c + @solved_index@))[k];
-    return solved < 0 ? -1 : (int)((const double *)((const char *)c + @rung@))[solved];
+    return solved < 0 ? -1 : (int)((const double *)((const char *)c + @fallback@))[solved];
 }
 
 #ifdef __cplusplus

@@ -44,7 +44,7 @@ def period_with_fallbacks(
         if reached == t.sizes[4]:
             return worst
         fallback = apply_fallback(t, p, data, where, whole, whole_where, reached)
-        t.rung[reached] = float(fallback)
+        t.fallback[reached] = float(fallback)
         worst = max(worst, fallback)
         parts, i = parts & ~LINEARIZE, reached + 1
 
@@ -75,7 +75,7 @@ def apply_fallback(
         return SOFTEN
     copy_rows(t.U[i], p.trial)  # `missed` uses `wanted`
     fallback = BRAKE
-    if t.known[1] and t.rung[i] <= SOFTENED:
+    if t.known[1] and t.fallback[i] <= SOFTENED:
         shifted(t.U_was[i], t.U[i])
         fallback = PREVIOUS if settled(t.U[i]) and missed(t, p, t.U[i]) == 0.0 else BRAKE
     if fallback == BRAKE:

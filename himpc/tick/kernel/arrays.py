@@ -131,7 +131,7 @@ class TickArrays(NamedTuple):
     at_bound: Annotated[Array, "n", "1", "finish_tick → gather"]
     priority_leak: Annotated[Array, "1", "m/s²", "finish_tick → gather"]
     active: Annotated[Array, "r", "1", "finish_tick → gather"]
-    rung: Annotated[Array, "r", "1", "control_period fallbacks → gather finish_tick problems"]
+    fallback: Annotated[Array, "r", "1", "control_period fallbacks → gather finish_tick problems"]
     time_us: Annotated[Array, "r", "µs", "control_period fallbacks → gather problems tick"]
     nothing: Annotated[Array, "1", "1", "configure → gather"]
     # Scratch.

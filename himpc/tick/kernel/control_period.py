@@ -78,7 +78,7 @@ def perform_parts(
             t.time_us[level] = _clock(t.stamp) - started
             if not solved:
                 return level
-            t.rung[level] = 0.0
+            t.fallback[level] = 0.0
     if parts & FINISH and not finish_tick(data, where, whole, whole_where, parts & REMEMBER):
         return NOT_FINITE
     return t.sizes[4]

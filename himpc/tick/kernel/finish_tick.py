@@ -33,7 +33,7 @@ def remember(t: TickArrays, r: int) -> None:
     t.scalars[PERIOD] = t.scalars[T_S]
     t.known[1] = 1
     for i in range(r):
-        if t.rung[i] > SOFTENED:
+        if t.fallback[i] > SOFTENED:
             continue  # the active rows of a failed attempt are stored already
         t.warm_count[i] = t.active_count[i]
         for p in range(t.active_count[i]):
