@@ -122,16 +122,16 @@ def _at_limits(plant: Plant, distance: float, kept: float) -> str:
     near = np.minimum(plant.q - robot.q_lower, robot.q_upper - plant.q) < _MARGIN
     touching = dict.fromkeys(" touches ".join(map(shortened, contact.between)) for contact in plant.contacts)
     limits = (("torque", at_torque), ("position", near))
-    sentences = [
+    notes = [
         f"{listed(list(compress(robot.joint_names, reached)))} at the {what} limit"
         for what, reached in limits
         if reached.any()
     ]
     if distance < kept + _NEAR:
-        sentences.append(
+        notes.append(
             f"{1e3 * distance:.0f} mm to another link or an object, and {1e3 * kept:.0f} mm are kept"
         )
-    return "; ".join([*list(touching)[:2], *sentences])
+    return "; ".join([*list(touching)[:2], *notes])
 
 
 def target(robot: Robot, drag: float, floor: bool) -> Array | None:

@@ -169,8 +169,6 @@ def perform_all(jobs: Iterable[Work], progress: Callable[[float], None] | None =
 def _work(job: Work) -> float:
     """Returns an estimate of a job's cost, for the order of the jobs and for the progress."""
     spec = job.spec
-    horizons = [
-        float(assignment.partition("=")[2]) for assignment in spec.set if assignment.startswith("horizon=")
-    ]
+    horizons = [float(text.partition("=")[2]) for text in spec.set if text.startswith("horizon=")]
     horizon = horizons[-1] if horizons else 5.0
     return (spec.duration or 8.0) * (1.0 + 0.1 * horizon) * (20.0 if spec.controller == "nhimpc" else 1.0)

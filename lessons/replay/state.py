@@ -118,9 +118,7 @@ def _marked(value: Any) -> Any:
     if not isinstance(value, dict):
         return value
     own = isinstance(value.get("task"), str) and is_file(value["task"])
-    return {
-        key: fingerprint(entry) if own and key == "task" else _marked(entry) for key, entry in value.items()
-    }
+    return {key: fingerprint(item) if own and key == "task" else _marked(item) for key, item in value.items()}
 
 
 def decode(code: str) -> State:

@@ -184,9 +184,7 @@ class _Hidden(importlib.abc.MetaPathFinder):
 
 def hide_the_lab() -> None:
     """Makes every import of the lab's modules fail from now on, except those in `HANDED`."""
-    for name in [
-        module for module in sys.modules if module.partition(".")[0] in LAB and module not in HANDED
-    ]:
+    for name in [name for name in sys.modules if name.partition(".")[0] in LAB and name not in HANDED]:
         del sys.modules[name]
     sys.meta_path.insert(0, _Hidden())
 
@@ -213,9 +211,7 @@ def refuse(paths: Sequence[Path], pipe: int) -> None:
                 raise PermissionError(f"a submission may not read {path}")
         elif not event.startswith(_EVENTS):
             return
-        what = " ".join(
-            (event, *(f"{argument:.60}" for argument in arguments[:1] if isinstance(argument, str)))
-        )
+        what = " ".join((event, *(f"{first:.60}" for first in arguments[:1] if isinstance(first, str))))
         try:
             write(pipe, what.encode(errors="replace"))
         finally:

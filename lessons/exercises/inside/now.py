@@ -112,12 +112,10 @@ def rebuilt(shape: dict[str, Any], data: bytes, ask: Ask) -> Now:
     for index, (name, tasks, values, horizon) in enumerate(shape["levels"]):
         parts: dict[str, Any] = {field: next(following) for field in OF_LEVEL}
         parts["x"] = {key: next(following) for key in values}
-        parts["jacobian"] = partial(_ask_lab, ask, "jacobian", index)
+        parts["jacobian"] = partial(_fetch, ask, "jacobian", index)
         levels.append(Part(name=name, tasks=tuple(tasks), horizon=horizon, **parts))
     further = [Part(**{field: next(following) for field in OF_FURTHER}) for _ in range(shape["further"])]
-    nominal = Part(
-        mass_matrix=partial(_ask_lab, ask, "mass_matrix", 0), bias=partial(_ask_lab, ask, "bias", 0)
-    )
+    nominal = Part(mass_matrix=partial(_fetch, ask, "mass_matrix", 0), bias=partial(_fetch, ask, "bias", 0))
     return Now(
         **tick,
         T_s=shape["T_s"],
@@ -130,5 +128,5 @@ def rebuilt(shape: dict[str, Any], data: bytes, ask: Ask) -> Now:
     )
 
 
-def _ask_lab(ask: Ask, name: str, level: int, *args: Any) -> Array:
+def _fetch(ask: Ask, name: str, level: int, *args: Any) -> Array:
     return ask(name, level, [np.asarray(argument, float) for argument in args])

@@ -42,10 +42,8 @@ def smoothness(run: JobResult, benchmark: JobResult) -> float:
 def _section(results: Results, quick: bool) -> Section:
     paper = printed("himpc_table_8")
     benchmark = results[resolution_job(paper["benchmark"], quick)]
-    measured = [
-        smoothness(results[resolution_job(resolution, quick)], benchmark)
-        for resolution in paper["resolution"]
-    ]
+    runs = [results[resolution_job(resolution, quick)] for resolution in paper["resolution"]]
+    measured = [smoothness(run, benchmark) for run in runs]
     rows = tuple(
         Row(
             f"S at {resolution:g}e-3° (benchmark {paper['benchmark']:g}e-3°)",
