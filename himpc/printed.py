@@ -40,10 +40,10 @@ class Controller:
         """Returns the torque of every level, (n,) N·m. now: see `himpc.controllers.view.View`."""
         path = knots(self.predicted, now.q, now.q_dot, now.N, now.T_s)
         problems = [problem(now, level, path) for level in now.levels]
-        found = cascade(problems, *bounds(now), np.zeros((now.N, now.n)))
-        U = found[-1].U if found else np.zeros((now.N, now.n))
+        optima = cascade(problems, *bounds(now), np.zeros((now.N, now.n)))
+        U = optima[-1].U if optima else np.zeros((now.N, now.n))
         self.predicted = predict(now.q, now.q_dot, now.q_ddot, U, now.M_bar, now.T_s)
-        return [now.tau_0 + each.U[0] for each in found] or now.tau_0
+        return [now.tau_0 + solution.U[0] for solution in optima] or now.tau_0
 
 
 def knots(predicted: Array | None, q: Array, q_dot: Array, N: int, T_s: float) -> Array:
@@ -102,7 +102,8 @@ def bounds(now: Any) -> tuple[Array, Array, Array]:
     further = now.further
     return (
         np.vstack(
-            [np.kron(each, eye) for each in profiles] + [np.kron(f.profile, f.directions) for f in further]
+            [np.kron(profile, eye) for profile in profiles]
+            + [np.kron(f.profile, f.directions) for f in further]
         ),
         np.vstack(
             [*side(limit.tau_lower, limit.v_lower, limit.q_lower), *(f.lower for f in further)]
@@ -155,15 +156,15 @@ def cascade(
     A level without an optimum keeps the increments of the levels above, which meet all bounds and
     priorities.
     """
-    found: list[Optimum] = []
+    optima: list[Optimum] = []
     for i in range(first, len(problems)):
         if i:
             # U meets the bounds only up to rounding, but must be feasible for the levels below (Theorem 2).
             at = A @ U.ravel()
             lower, upper = np.minimum(lower, at), np.maximum(upper, at)
-        found.append(optimum(problems[i], U, problems[:i], A, lower, upper, solver))
-        U = found[-1].U
-    return found
+        optima.append(optimum(problems[i], U, problems[:i], A, lower, upper, solver))
+        U = optima[-1].U
+    return optima
 
 
 def optimum(
@@ -184,7 +185,7 @@ def optimum(
     """
     K, n = level.knots, U.shape[1]
     root_R, root_Q, at = np.tile(np.sqrt(level.R), K), np.tile(level.root_Q, K), A @ U.ravel()
-    Z = block_diagonal([null_space([each.B[j] / root_R[:n] for each in above], n) for j in range(K)])
+    Z = block_diagonal([null_space([higher.B[j] / root_R[:n] for higher in above], n) for j in range(K)])
     if not Z.shape[1]:
         return Optimum(U, np.zeros(len(A)), 0.0, "empty")
     T = Z / root_R[:, None]
@@ -204,15 +205,15 @@ def optimum(
         wider = solve_qp(np.eye(c.size), c, rows, low - room, high + room, solver)
         return sharpened(wider, c, rows, low, high)
 
-    found = attempt(0.0 * length)
-    found = found if found.solved else attempt(_ROOM / length)
-    if not found.solved:
-        status = "unsolved" if found.status == "optimal" else found.status
-        return Optimum(U, np.zeros(len(A)), 0.0, status, found.time_us)
+    solution = attempt(0.0 * length)
+    solution = solution if solution.solved else attempt(_ROOM / length)
+    if not solution.solved:
+        status = "unsolved" if solution.status == "optimal" else solution.status
+        return Optimum(U, np.zeros(len(A)), 0.0, status, solution.time_us)
     multipliers = np.zeros(len(A))
-    multipliers[kept] = found.multipliers / length
-    step = np.vstack([(P @ found.x).reshape(K, n), np.zeros((len(U) - K, n))])
-    return Optimum(U + step, multipliers, found.kkt_residual, "optimal", found.time_us)
+    multipliers[kept] = solution.multipliers / length
+    step = np.vstack([(P @ solution.x).reshape(K, n), np.zeros((len(U) - K, n))])
+    return Optimum(U + step, multipliers, solution.kkt_residual, "optimal", solution.time_us)
 
 
 def null_space(rows: Sequence[Array], n: int) -> Array:
@@ -224,22 +225,22 @@ def null_space(rows: Sequence[Array], n: int) -> Array:
     return Z
 
 
-def sharpened(found: QPSolution, c: Array, A: Array, low: Array, high: Array) -> QPSolution:
+def sharpened(solution: QPSolution, c: Array, A: Array, low: Array, high: Array) -> QPSolution:
     """Returns the optimum of ½‖y + c‖² on the rows that are active at a solver's point, if it is better than
     this point: a solver's tolerance is 1e-9."""
-    active = found.multipliers != 0.0
-    if not (active.any() and np.isfinite(found.x).all()):
-        return found
-    rows, bound = A[active], np.where(found.multipliers > 0, high, low)[active]
+    active = solution.multipliers != 0.0
+    if not (active.any() and np.isfinite(solution.x).all()):
+        return solution
+    rows, bound = A[active], np.where(solution.multipliers > 0, high, low)[active]
     if not np.isfinite(bound).all():
-        return found
+        return solution
     y = np.linalg.lstsq(rows, bound + rows @ c)[0] - c
     multipliers = np.zeros(len(A))
     multipliers[active] = np.linalg.lstsq(rows.T, -c - y)[0]
     residual = kkt_residual(np.eye(c.size), c, A, low, high, y, multipliers)
-    if not residual < found.kkt_residual:
-        return found
-    return QPSolution(y, multipliers, residual, "optimal", found.time_us)
+    if not residual < solution.kkt_residual:
+        return solution
+    return QPSolution(y, multipliers, residual, "optimal", solution.time_us)
 
 
 def block_diagonal(blocks: Sequence[Array]) -> Array:

@@ -192,9 +192,9 @@ def _qpoases(
     # Every QP gets a new solver object. With a warm start, the point would depend on the QPs solved before.
     with redirect_stdout(StringIO()):  # qpOASES prints its licence
         qp = casadi.conic("qp", "qpoases", shapes, options)
-        found = qp(h=H, g=f, a=A, lba=lower, uba=upper)
+        solution = qp(h=H, g=f, a=A, lba=lower, uba=upper)
     status = str(qp.stats()["return_status"])
-    x, multipliers = (np.array(found[key], float).ravel() for key in ("x", "lam_a"))
+    x, multipliers = (np.array(solution[key], float).ravel() for key in ("x", "lam_a"))
     return x, multipliers, "optimal" if status == "Successful return." else status.lower()
 
 

@@ -31,7 +31,7 @@ def quaternion(R: Array) -> Array:
 
 def from_quaternion(xyzw: Array) -> Array:
     """Returns the rotation matrix of a quaternion (x, y, z, w) of any non-zero length."""
-    given = np.asarray(xyzw, float)
-    near_one = np.ldexp(given, -math.frexp(float(np.abs(given).max()))[1])  # exact; squares stay in range
+    xyzw = np.asarray(xyzw, float)
+    near_one = np.ldexp(xyzw, -math.frexp(float(np.abs(xyzw).max()))[1])  # exact; squares stay in range
     x, y, z, w = near_one / math.sqrt(float(near_one.dot(near_one)))
     return pin.Quaternion(w, x, y, z).toRotationMatrix()

@@ -104,7 +104,7 @@ def ranks(stack: Stack, configuration: Configuration) -> dict[str, tuple[int, in
     this number is smaller than the number of rows, the levels above or the arm itself leave too few
     directions.
     """
-    found: dict[str, tuple[int, int]] = {}
+    by_level: dict[str, tuple[int, int]] = {}
     J, before = np.zeros((0, configuration.q.size)), 0
     for level in stack:
         if not level.enabled:
@@ -112,9 +112,9 @@ def ranks(stack: Stack, configuration: Configuration) -> dict[str, tuple[int, in
         rows = [task.jacobian(configuration)[0] for task in level.tasks]
         J = np.vstack([J, *rows])
         rank = int(np.linalg.matrix_rank(J, tol=_RANK)) if np.isfinite(J).all() else before
-        found[level.name] = (rank - before, sum(map(len, rows)))
+        by_level[level.name] = (rank - before, sum(map(len, rows)))
         before = rank
-    return found
+    return by_level
 
 
 _RANK = 1e-6

@@ -62,7 +62,7 @@ _PER_JOINT = (
     "v_measured",
     "v_limit_lowered",
 )
-PER_LEVEL = ("cost", "kkt", "rung", "time_us", "leak", "active")
+PER_LEVEL = ("cost", "kkt", "fallback", "time_us", "leak", "active")
 """The fields of each level, one number each, in this order."""
 
 
@@ -92,7 +92,7 @@ class Layout:
 
     Fields of a task: `x/<task>` and `x_d/<task>` contain its coordinates, or a quaternion x y z w.
     `error/<task>`, `v_d/<task>` and `a_d/<task>` have one number per coordinate; for a task that points an
-    axis at a point, `v_d` and `a_d` have three numbers. Fields of a level: cost, kkt, rung (index into
+    axis at a point, `v_d` and `a_d` have three numbers. Fields of a level: cost, kkt, fallback (index into
     FALLBACKS), time_us, leak and active (number of active constraints); NaN for a level that was not solved.
     """
 
@@ -164,9 +164,9 @@ def arranged(
 def relaid(rows: Array, old: Layout, new: Layout) -> Array:
     """Converts rows, (k, size), to another layout. A field that the rows do not contain with the same width
     becomes NaN."""
-    found = np.full((len(rows), new.size), math.nan)
+    new_rows = np.full((len(rows), new.size), math.nan)
     for name, where in new.fields.items():
         before = old.fields.get(name)
         if before is not None and before.stop - before.start == where.stop - where.start:
-            found[:, where] = rows[:, before]
-    return found
+            new_rows[:, where] = rows[:, before]
+    return new_rows

@@ -17,10 +17,10 @@ from robots import InputError
 T = TypeVar("T")
 U = TypeVar("U")
 
-PATIENCE = 60.0
+WORKER_TIMEOUT_S = 60.0
 """Time, s, that a scheduler may be without workers before the work is given up. A worker that died is usually
 replaced sooner."""
-_ASK = 1.0  # time between two checks for workers, s
+_CHECK_PERIOD_S = 1.0  # time between two checks for workers, s
 
 
 @contextmanager
@@ -30,7 +30,7 @@ def on_cluster(address: str) -> Iterator[Spread]:
 
     Raises:
         InputError: dask.distributed is not installed, or no scheduler answers at the address. Later: the
-            connection to the scheduler is lost, or the scheduler has no worker for `PATIENCE` s.
+            connection to the scheduler is lost, or the scheduler has no worker for `WORKER_TIMEOUT_S` s.
     """
     try:
         from distributed import Client
@@ -55,20 +55,20 @@ def on_cluster(address: str) -> Iterator[Spread]:
 
     def ended(futures: list[Any]) -> Iterator[Any]:
         coming = as_they_end(futures)
-        asked = worked = time.monotonic()
+        checked = worked = time.monotonic()
         while not coming.is_empty():
             if coming.has_ready():
                 yield next(coming)
                 continue
             time.sleep(0.05)
-            if time.monotonic() - asked < _ASK:
+            if time.monotonic() - checked < _CHECK_PERIOD_S:
                 continue
-            asked = time.monotonic()
+            checked = time.monotonic()
             if client.nthreads():
-                worked = asked
-            elif asked - worked >= PATIENCE:
+                worked = checked
+            elif checked - worked >= WORKER_TIMEOUT_S:
                 raise InputError(
-                    f"--scheduler {address}: no worker for {PATIENCE:.0f} s. Start a worker with "
+                    f"--scheduler {address}: no worker for {WORKER_TIMEOUT_S:.0f} s. Start a worker with "
                     f'"dask worker {address}", then repeat the command'
                 )
 
@@ -79,22 +79,22 @@ def on_cluster(address: str) -> Iterator[Spread]:
         # scheduler gives its work to another worker, up to its `allowed-failures` (3) times.
         orphans: list[int] = []
         futures = [client.submit(guarded, function, item, pure=False) for item in items]
-        places = {future.key: place for place, future in enumerate(futures)}
+        indices = {future.key: index for index, future in enumerate(futures)}
         try:
             for future in ended(futures):
-                error = future.exception()
+                index, error = indices[future.key], future.exception()
                 if isinstance(error, KilledWorker):
-                    orphans.append(places[future.key])
+                    orphans.append(index)
                 else:
-                    yield places[future.key], future.result() if error is None else FailedJob(sentence(error))
+                    yield index, future.result() if error is None else FailedJob(sentence(error))
             # A worker that dies also loses the items that waited for it. The items are therefore repeated one
             # at a time, which shows which item ends its worker.
-            for place in sorted(orphans):
-                alone = client.submit(guarded, function, items[place], pure=False)
+            for index in sorted(orphans):
+                alone = client.submit(guarded, function, items[index], pure=False)
                 futures.append(alone)
                 for future in ended([alone]):
                     error = future.exception()
-                    yield place, future.result() if error is None else FailedJob(sentence(error))
+                    yield index, future.result() if error is None else FailedJob(sentence(error))
         except (OSError, CancelledError):
             raise InputError(
                 f"--scheduler {address}: the scheduler no longer answers. Start it, then repeat the command"

@@ -20,8 +20,8 @@ def write_files(files: Mapping[Path | str, bytes | str]) -> None:
     parts: list[tuple[Path, Path]] = []
     direct: list[tuple[Path, bytes]] = []
     try:
-        for given, content in files.items():
-            path, data = check_target(given), content.encode() if isinstance(content, str) else content
+        for target, content in files.items():
+            path, data = check_target(target), content.encode() if isinstance(content, str) else content
             if path.exists() and not path.is_file():
                 direct.append((path, data))
                 continue
@@ -40,16 +40,16 @@ def write_files(files: Mapping[Path | str, bytes | str]) -> None:
                 part.unlink()
 
 
-def check_target(given: Path | str) -> Path:
+def check_target(target: Path | str) -> Path:
     """Returns the path of the file that a name refers to. Raises OSError if the name is that of a folder, if
     its folder does not exist, or if the old file may not be changed."""
-    path = Path(os.path.realpath(given))
-    if path.is_dir() or os.fspath(given).endswith(os.sep):
-        raise OSError(errno.EISDIR, os.strerror(errno.EISDIR), str(given))
+    path = Path(os.path.realpath(target))
+    if path.is_dir() or os.fspath(target).endswith(os.sep):
+        raise OSError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))
     if not path.parent.is_dir():
-        raise OSError(errno.ENOENT, os.strerror(errno.ENOENT), str(given))
+        raise OSError(errno.ENOENT, os.strerror(errno.ENOENT), str(target))
     if path.exists() and not os.access(path, os.W_OK):
-        raise OSError(errno.EACCES, os.strerror(errno.EACCES), str(given))
+        raise OSError(errno.EACCES, os.strerror(errno.EACCES), str(target))
     return path
 
 

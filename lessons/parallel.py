@@ -70,8 +70,8 @@ def on_cores(
         orphans = yield from _until_one_dies(function, items, waiting)
         # A process that dies also ends the other work of its pool. The items are therefore repeated one at a
         # time, which shows which item ends its process.
-        for place in sorted(orphans):
-            yield place, _alone(function, items[place])
+        for index in sorted(orphans):
+            yield index, _alone(function, items[index])
 
 
 def _until_one_dies(
@@ -91,11 +91,11 @@ def _until_one_dies(
                     future = pool.submit(guarded, function, items[waiting[0]])
                     under_way[future] = waiting.popleft()
             for future in wait(under_way, return_when=FIRST_COMPLETED).done:
-                place = under_way.pop(future)
+                index = under_way.pop(future)
                 if isinstance(future.exception(), BrokenProcessPool):
-                    orphans.append(place)
+                    orphans.append(index)
                 else:
-                    yield place, future.result()
+                    yield index, future.result()
     return [*orphans, *under_way.values()]
 
 
@@ -103,8 +103,8 @@ def one_by_one(
     function: Callable[[T], U], items: Sequence[T]
 ) -> Generator[tuple[int, U | FailedJob], None, None]:
     """As `on_cores`, but in this process and in order: for measuring times, and for tests."""
-    for place, item in enumerate(items):
-        yield place, guarded(function, item)
+    for index, item in enumerate(items):
+        yield index, guarded(function, item)
 
 
 def guarded(function: Callable[[T], U], item: T) -> U | FailedJob:

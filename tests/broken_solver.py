@@ -50,7 +50,7 @@ def break_kernel(monkeypatch: pytest.MonkeyPatch, place: int | None = None) -> N
             data[where[AT["U"]] + level * whole[whole_where[WHOLE_AT["sizes"]] + 8]] = np.nan
             if place is None or level == place or healthy(*arena, ONE_LEVEL, level, 0.0) == level:
                 return level
-            data[where[AT["rung"]] + level] = 0.0
+            data[where[AT["fallback"]] + level] = 0.0
         return healthy(*arena, parts & ~(LINEARIZE | LEVELS), 0, room)
 
     monkeypatch.setattr(fallbacks, "control_period", broken)

@@ -50,7 +50,7 @@ def _lines(who: str, member: Member, gathering: Gathering) -> Iterator[dict[str,
 
 
 def _voted(who: str, held: Held) -> dict[str, object]:
-    asked, rounds = held.poll.asked, held.poll.rounds
+    asked, rounds = held.poll.question, held.poll.rounds
     first, second = (rounds[k].get(who) if k < len(rounds) else None for k in (0, 1))
     last = first if second is None else second
     hit = None if last is None else asked.hits(last, held.truth)
@@ -66,4 +66,4 @@ def answer(held: Held, vote: float | None) -> str:
     """Returns a vote as text: the letter of an option, or a number."""
     if vote is None:
         return ""
-    return LETTERS[int(vote)] if isinstance(held.poll.asked, Choice) else f"{vote:.3g}"
+    return LETTERS[int(vote)] if isinstance(held.poll.question, Choice) else f"{vote:.3g}"

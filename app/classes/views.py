@@ -97,7 +97,7 @@ def _bars(gathering: Gathering) -> list[list[View]]:
     if poll is None:
         return []
     over = range(len(poll.rounds) - poll.is_open)
-    choice = isinstance(poll.asked, Choice)
+    choice = isinstance(poll.question, Choice)
     return [
         [
             {
@@ -117,7 +117,7 @@ def _result(gathering: Gathering) -> str:
     poll, truth = gathering.poll, gathering.truth
     if poll is None or math.isnan(truth):
         return ""
-    measured = f"The run gave {figure(truth, poll.asked.measure.unit)}."
+    measured = f"The run gave {figure(truth, poll.question.measure.unit)}."
     counts = [
         f"{right} of {len(votes)}"
         for number, votes in enumerate(poll.rounds)

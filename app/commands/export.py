@@ -146,7 +146,7 @@ def recorded(scene: TorqueScene, ticks: int, seed: int) -> Recorded:
             moves.append(Move(k, names.index(name), value))
         applied = session.plant.tau.copy()
         session.tick()
-        given, plan = session.given, session.plan
+        given, plan = session.controller_input, session.plan
         assert given is not None and plan is not None
         rows[k] = given.q, given.v, applied, plan.tau
     return Recorded(moves, rows)

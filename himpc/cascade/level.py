@@ -39,8 +39,8 @@ class LevelProblem(NamedTuple):
 
     def residual(self, U: Array) -> Array:
         """Returns e at knots 1 … N under U, (N, m)."""
-        pushed = np.matmul(self.B, U[:, :, None])[:, :, 0]
-        return self.free + np.matmul(self.C.transpose(1, 0, 2), pushed.T[:, :, None])[:, :, 0].T
+        B_U = np.matmul(self.B, U[:, :, None])[:, :, 0]
+        return self.free + np.matmul(self.C.transpose(1, 0, 2), B_U.T[:, :, None])[:, :, 0].T
 
     @property
     def G(self) -> Array:
@@ -85,7 +85,7 @@ class ActiveRows:
             directions = rows.directions_of(row)
             return joints[column] if directions is None else directions.names[column]
 
-        columns = (each.tolist() for each in (self.row, self.joint, self.multiplier, self.slack))
+        columns = (column.tolist() for column in (self.row, self.joint, self.multiplier, self.slack))
         return [
             (rows.constraint(row, a, m > 0).label, rows.knot(row), name(row, a), m, s)
             for row, a, m, s in zip(*columns, strict=True)

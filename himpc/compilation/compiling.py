@@ -41,15 +41,15 @@ def compile_all(tell: Callable[[int, int], None]) -> None:
 def compiled_functions() -> dict[str, frozenset[str]]:
     """Returns, for each module, the dotted names of the functions that have a decorator of
     `himpc.compilation.compiled`. They are read from the sources, because importing the modules takes long."""
-    found = {}
+    functions = {}
     for path in sorted(_PACKAGE.rglob("*.py")):
         text = path.read_text()
         if _DOOR in text:
             module = ".".join((_PACKAGE.name, *path.relative_to(_PACKAGE).with_suffix("").parts))
             names = _decorated(ast.parse(text))
             if names:
-                found[module] = frozenset(f"{module}.{name}" for name in names)
-    return found
+                functions[module] = frozenset(f"{module}.{name}" for name in names)
+    return functions
 
 
 def _decorated(tree: ast.Module) -> list[str]:

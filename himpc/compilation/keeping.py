@@ -69,7 +69,7 @@ class Kept:
 
     def save_overload(self, signature: Any, result: Any) -> None:
         """Writes a compiled function to the first folder that accepts it, if any does."""
-        if result.library.has_dynamic_globals or any(not each.can_cache for each in result.lifted):
+        if result.library.has_dynamic_globals or any(not loop.can_cache for loop in result.lifted):
             return
         name, made_for = self._file(signature, result.codegen)
         body = made_for + dumps(result._reduce())
@@ -155,23 +155,23 @@ def _users_cache() -> Path:
 def _make(folder: Path, above: bool) -> None:
     """Creates a folder for this user alone, if possible. With `above`, all missing parents are created
     too."""
-    missing = [each for each in (folder, *folder.parents) if not os.path.lexists(each)]
+    missing = [path for path in (folder, *folder.parents) if not os.path.lexists(path)]
     with suppress(OSError):
-        for each in reversed(missing if above else missing[:2]):
-            each.mkdir(mode=0o700)
+        for path in reversed(missing if above else missing[:2]):
+            path.mkdir(mode=0o700)
 
 
 def _ours(folder: Path) -> bool:
     """Returns whether a folder exists, belongs to this user and cannot be written to by anybody else."""
     try:
-        found = folder.lstat()
+        status = folder.lstat()
     except OSError:
         return False
-    return stat.S_ISDIR(found.st_mode) and _safe(found)
+    return stat.S_ISDIR(status.st_mode) and _safe(status)
 
 
-def _safe(found: os.stat_result) -> bool:
-    return not _POSIX or (found.st_uid == os.getuid() and not found.st_mode & 0o022)
+def _safe(status: os.stat_result) -> bool:
+    return not _POSIX or (status.st_uid == os.getuid() and not status.st_mode & 0o022)
 
 
 def _read(file: Path) -> bytes | None:
@@ -179,8 +179,8 @@ def _read(file: Path) -> bytes | None:
     another user."""
     try:
         with open(os.open(file, os.O_RDONLY | _PLAIN), "rb") as stream:
-            found = os.fstat(stream.fileno())
-            data = stream.read() if stat.S_ISREG(found.st_mode) and _safe(found) else b""
+            status = os.fstat(stream.fileno())
+            data = stream.read() if stat.S_ISREG(status.st_mode) and _safe(status) else b""
     except OSError:
         return None
     digest, body = data[:32], data[32:]

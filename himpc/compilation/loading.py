@@ -18,10 +18,10 @@ def load(function: Any, arguments: tuple[Any, ...]) -> bool:
     disk."""
     with global_compiler_lock:
         rtsys.initialize(function.targetctx)  # functions that the machine code calls
-        found = function._cache.load_overload(arguments, function.targetctx)
-        if found is None:
+        overload = function._cache.load_overload(arguments, function.targetctx)
+        if overload is None:
             return False
         function._cache_hits[arguments] += 1
-        function.targetctx.insert_user_function(found.entry_point, found.fndesc, [found.library])
-        function.add_overload(found)
+        function.targetctx.insert_user_function(overload.entry_point, overload.fndesc, [overload.library])
+        function.add_overload(overload)
         return True

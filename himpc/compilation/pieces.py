@@ -21,9 +21,9 @@ class _Linking(JITCodeLibrary, ABC):
     def add_linking_library(self, library: Any) -> None:
         """Adds a library whose functions this library calls."""
         # Callers are added first, because code that nothing refers to would not be linked.
-        for each in (library, *library.called) if isinstance(library, _Loose) else (library,):
-            if each not in self._linking_libraries:
-                super().add_linking_library(each)
+        for piece in (library, *library.called) if isinstance(library, _Loose) else (library,):
+            if piece not in self._linking_libraries:
+                super().add_linking_library(piece)
 
 
 class _Linked(_Linking):
@@ -52,7 +52,7 @@ class _Loose(_Linking):
     @property
     def codegen(self) -> Any:
         """The object whose `set_env` Numba calls with the function's environment. It is this library, which
-        ignores the call; `Whole` sets the environments of all functions later."""
+        ignores the call; `LinkedCompiler` sets the environments of all functions later."""
         return self
 
     def set_env(self, name: str, environment: Any) -> None:
@@ -71,17 +71,17 @@ class _Compiling(Compiler, ABC):
         return super().compile_extra(func)
 
 
-class Whole(_Compiling):
+class LinkedCompiler(_Compiling):
     """Compiles a function that Python calls."""
 
     library = _Linked
 
     def compile_extra(self, func: Any) -> Any:
         """Overrides Numba's entry point, to set the addresses of all environments as well."""
-        found = super().compile_extra(func)
-        for each in found._find_referenced_environments():
-            found.library.codegen.set_env(each.env_name, each)
-        return found
+        compiled = super().compile_extra(func)
+        for environment in compiled._find_referenced_environments():
+            compiled.library.codegen.set_env(environment.env_name, environment)
+        return compiled
 
 
 class Piece(_Compiling):

@@ -19,7 +19,7 @@ from himpc.compilation.compiler import compile_apart, compiles_here
 from himpc.compilation.keeping import Kept
 from himpc.compilation.loading import load
 from himpc.compilation.options import OPTIONS, Function
-from himpc.compilation.pieces import Open, Piece, Whole
+from himpc.compilation.pieces import LinkedCompiler, Open, Piece
 from himpc.compilation.sources import digest_of
 
 try:
@@ -52,9 +52,9 @@ def always_inline_kernel(function: Function) -> Any:
     return _as_inline(njit(**_PIECE, forceinline=True)(function))
 
 
-def _as_inline(found: Any) -> Any:
-    found.__class__ = _Inline
-    return found
+def _as_inline(function: Any) -> Any:
+    function.__class__ = _Inline
+    return function
 
 
 def kernel(*arguments: Any) -> Callable[[Function], Any]:
@@ -67,7 +67,7 @@ def kernel(*arguments: Any) -> Callable[[Function], Any]:
     """
 
     def compile_now(function: Function) -> Any:
-        fast: Any = njit(**_OPTIONS, pipeline_class=Whole)(function)
+        fast: Any = njit(**_OPTIONS, pipeline_class=LinkedCompiler)(function)
         fast._cache = Kept(Path(function.__code__.co_filename), function.__qualname__, digest_of(function))
         return _compiled_now(fast, arguments)
 
@@ -76,18 +76,18 @@ def kernel(*arguments: Any) -> Callable[[Function], Any]:
 
 def _compiled_now(fast: Any, arguments: tuple[Any, ...]) -> Any:
     module = fast.py_func.__module__
-    found = load(fast, arguments)
-    if not found:
-        place = fast.stats.cache_path
+    loaded = load(fast, arguments)
+    if not loaded:
+        cache_path = fast.stats.cache_path
         if not compiles_here() and module != "__main__" and fast._cache.has_room():
             _FIRST_WORD.say()
-            with _one_at_a_time(place, "waiting"):
-                found = load(fast, arguments)  # another process may have compiled it meanwhile
-                if not found:
+            with _one_at_a_time(cache_path, "waiting"):
+                loaded = load(fast, arguments)  # another process may have compiled it meanwhile
+                if not loaded:
                     compile_apart(module, lambda name: event.end_event(_APART, name))
-                    found = load(fast, arguments)
-        if not found:
-            with _one_at_a_time(place, f"compiling-{module}"):
+                    loaded = load(fast, arguments)
+        if not loaded:
+            with _one_at_a_time(cache_path, f"compiling-{module}"):
                 if not load(fast, arguments):  # another process may have compiled it meanwhile
                     fast.compile(arguments)
     fast.disable_compile()
@@ -107,9 +107,11 @@ def intermediate(function: Function, arguments: tuple[Any, ...]) -> tuple[str, l
     """
     fast: Any = njit(**_OPEN)(function)
     fast.compile(arguments)
-    (found,) = fast.overloads.values()
-    modules = [str(each._get_module_for_linking()) for each in (found.library, *found.library.called)]
-    return found.fndesc.llvm_func_name, modules
+    (overload,) = fast.overloads.values()
+    modules = [
+        str(library._get_module_for_linking()) for library in (overload.library, *overload.library.called)
+    ]
+    return overload.fndesc.llvm_func_name, modules
 
 
 def kept(function: Function, key: str, make: Callable[[], bytes]) -> bytes:
@@ -122,14 +124,14 @@ def kept(function: Function, key: str, make: Callable[[], bytes]) -> bytes:
         make: makes the bytes.
     """
     store = Kept(Path(function.__code__.co_filename), function.__qualname__, digest_of(function))
-    found = store.load_bytes(key)
-    if found is None:
+    data = store.load_bytes(key)
+    if data is None:
         with _one_at_a_time(store.cache_path, key):
-            found = store.load_bytes(key)  # another process may have made them meanwhile
-            if found is None:
-                found = make()
-                store.save_bytes(key, found)
-    return found
+            data = store.load_bytes(key)  # another process may have made them meanwhile
+            if data is None:
+                data = make()
+                store.save_bytes(key, data)
+    return data
 
 
 @contextmanager

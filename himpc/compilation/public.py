@@ -27,13 +27,17 @@ def kernel(*arguments: Any) -> Callable[[Function], Any]:
     def compile_now(function: Function) -> Any:
         # Numba's cache checks the function's own file only; the name of the folder contains the digest of all
         # other files.
-        given: str = config.CACHE_DIR
-        kept = Path(given) if given else Path(function.__code__.co_filename).parent / "__pycache__" / "public"
+        cache_dir: str = config.CACHE_DIR
+        kept = (
+            Path(cache_dir)
+            if cache_dir
+            else Path(function.__code__.co_filename).parent / "__pycache__" / "public"
+        )
         config.CACHE_DIR = str(kept / digest_of(function).hex()[:16])
         try:
             return njit(arguments, cache=True, **OPTIONS)(function)
         finally:
-            config.CACHE_DIR = given
+            config.CACHE_DIR = cache_dir
 
     return compile_now
 

@@ -27,8 +27,10 @@ def sources_of(function: Callable[..., Any]) -> list[Path]:
     define the inline kernels and constants that the function uses. Only files of this package, of the
     function's package and of the packages of its inline kernels are included. The files of the tool chain,
     which set the compiler's options, are included too."""
-    pieces = (getattr(each, "py_func", None) for each in function.__globals__.values())
-    packages = {each.__module__.partition(".")[0] for each in (function, *filter(None, pieces))} | {_PACKAGE}
+    pieces = (getattr(value, "py_func", None) for value in function.__globals__.values())
+    packages = {piece.__module__.partition(".")[0] for piece in (function, *filter(None, pieces))} | {
+        _PACKAGE
+    }
     # The text of a function of `as_function` is made by its module, which is then the file to begin with.
     file = Path(function.__code__.co_filename)
     files = {file if file.is_file() else Path(str(sys.modules[function.__module__].__file__))}
@@ -48,6 +50,6 @@ def _read(file: Path) -> tuple[bytes, tuple[str, ...]]:
     """Returns the digest of a file's content, and the dotted names that the file imports: modules and other
     names."""
     text = file.read_bytes() if file.is_file() else b""
-    found = _IMPORTS.findall(text.decode(errors="replace"))
-    names = [(module, f"{module}.{name}") for module, line in found for name in re.findall(r"\w+", line)]
-    return sha256(text).digest(), tuple(dict.fromkeys(each for pair in names for each in pair))
+    imports = _IMPORTS.findall(text.decode(errors="replace"))
+    names = [(module, f"{module}.{name}") for module, line in imports for name in re.findall(r"\w+", line)]
+    return sha256(text).digest(), tuple(dict.fromkeys(name for pair in names for name in pair))

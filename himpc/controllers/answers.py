@@ -25,18 +25,18 @@ def checked(answer: Any, levels: int, n: int, where: str) -> Array:
     value."""
     what = f"a torque has shape ({n},)" + (f", or ({levels}, {n}) with a row per level" if levels > 1 else "")
     try:
-        found = np.array(answer if answer is not None else "", float)
+        torques = np.array(answer if answer is not None else "", float)
     except (TypeError, ValueError):
         raise OwnFault(f"{where}: it returned {_short(answer)} where numbers are needed: {what}") from None
-    if found.shape == (n,):
-        found = found[None]
-    if found.shape not in ((1, n), (levels, n)):
-        raise OwnFault(f"{where}: it returned an array of shape {found.shape}: {what}")
-    if not usable(found.ravel()):
-        worst = int(np.argmax(~np.isfinite(found[-1]))) if not np.isfinite(found[-1]).all() else None
+    if torques.shape == (n,):
+        torques = torques[None]
+    if torques.shape not in ((1, n), (levels, n)):
+        raise OwnFault(f"{where}: it returned an array of shape {torques.shape}: {what}")
+    if not usable(torques.ravel()):
+        worst = int(np.argmax(~np.isfinite(torques[-1]))) if not np.isfinite(torques[-1]).all() else None
         which = f" for joint {worst + 1}" if worst is not None else ""
         raise OwnFault(f"{where}: it returned a torque that is not finite, or is too large{which}")
-    return found
+    return torques
 
 
 def next_cost(level: LevelView, effort: Array, T_s: float) -> float:

@@ -98,22 +98,22 @@ class DistanceFilter:
             directions=(None, block.directions),
         )
         bounded = np.flatnonzero(np.isfinite(block.lower[0]))
-        asked = np.clip(wanted, force.tau_lower, force.tau_upper)
+        demand = np.clip(wanted, force.tau_lower, force.tau_upper)
         # With a = M̄⁻¹(τ − τ_nom) the cost is ‖a‖², and the rows are ∇d·a and M̄ a.
         A = D[bounded] * M_bar
-        lower = block.lower[0, bounded] - D[bounded] @ (asked - tau_0)
+        lower = block.lower[0, bounded] - D[bounded] @ (demand - tau_0)
         if (lower <= 0.0).all() or not np.isfinite(lower).all():
-            return Filtered(asked, rows, NO_ROWS, bool(np.isfinite(lower).all()))
-        box = force.tau_lower - asked, force.tau_upper - asked
-        found, slack = _closest(A, lower, np.diag(M_bar), box), np.zeros(len(bounded))
-        met = found is not None
-        if found is None:
+            return Filtered(demand, rows, NO_ROWS, bool(np.isfinite(lower).all()))
+        box = force.tau_lower - demand, force.tau_upper - demand
+        optimum, slack = _closest(A, lower, np.diag(M_bar), box), np.zeros(len(bounded))
+        met = optimum is not None
+        if optimum is None:
             slack = _given_way(D[bounded], lower, box)
-            found = _closest(A, lower - slack, np.diag(M_bar), box)
-        if found is None:
-            return Filtered(asked, rows, NO_ROWS, False)
-        a, multiplier = found
-        tau = np.clip(asked + M_bar * a, force.tau_lower, force.tau_upper)
+            optimum = _closest(A, lower - slack, np.diag(M_bar), box)
+        if optimum is None:
+            return Filtered(demand, rows, NO_ROWS, False)
+        a, multiplier = optimum
+        tau = np.clip(demand + M_bar * a, force.tau_lower, force.tau_upper)
         binding = np.flatnonzero(np.abs(multiplier) > _MET)
         of_torque = binding >= len(bounded)
         column = np.where(of_torque, binding - len(bounded), bounded[np.minimum(binding, len(bounded) - 1)])
@@ -130,10 +130,10 @@ def _closest(A: Array, lower: Array, M: Array, box: tuple[Array, Array]) -> tupl
     """Returns the shortest vector a, (n,) rad/s², with A a ≥ lower and M a within the box, and the
     multipliers; None if no such vector exists."""
     upper = np.concatenate([np.full(len(lower), np.inf), box[1]])
-    found = solve_qp(
+    solution = solve_qp(
         np.eye(len(M)), np.zeros(len(M)), np.vstack([A, M]), np.concatenate([lower, box[0]]), upper
     )
-    return (found.x, found.multipliers) if found.solved else None
+    return (solution.x, solution.multipliers) if solution.solved else None
 
 
 def _given_way(D: Array, lower: Array, box: tuple[Array, Array]) -> Array:
@@ -143,6 +143,6 @@ def _given_way(D: Array, lower: Array, box: tuple[Array, Array]) -> Array:
     H = np.diag(np.concatenate([np.full(n, _FAINT), np.ones(r)]))
     rows = np.block([[D, np.eye(r)], [np.eye(n), np.zeros((n, r))]])
     upper = np.concatenate([np.full(r, np.inf), box[1]])
-    found = solve_qp(H, np.zeros(n + r), rows, np.concatenate([lower, box[0]]), upper)
-    delta = np.clip(found.x[:n], *box) if found.solved else np.zeros(n)
+    solution = solve_qp(H, np.zeros(n + r), rows, np.concatenate([lower, box[0]]), upper)
+    delta = np.clip(solution.x[:n], *box) if solution.solved else np.zeros(n)
     return np.maximum(lower - D @ delta, 0.0) * (1.0 + _MET) + _MET

@@ -118,8 +118,8 @@ class HIMPC(TorqueController):
             self._adapt(q, self._load)
         self._limits = ramp(self._limits, self._goal, self._tau_0, q, v, self._settings.T_s)
         if self._weight:
-            for place, level in enumerate(self._form.levels):
-                self.kernel.fade(place, self._faded(level))
+            for index, level in enumerate(self._form.levels):
+                self.kernel.fade(index, self._faded(level))
         plan = self.kernel.step(q, v, previews, self._tau_0, self._slowed(v), started)
         if plan is None:
             return self._hold(q, started)

@@ -41,7 +41,7 @@ class FilteredHIMPC(HIMPC):
     @property
     def settings(self) -> Settings:
         """The settings that were given. The levels have the same settings, but with `avoidance.on` false."""
-        return self._given
+        return self._original_settings
 
     def _apply(self, settings: Settings) -> None:
         limits = settings.limits
@@ -49,7 +49,7 @@ class FilteredHIMPC(HIMPC):
         avoidance = replace(limits.avoidance, on=False)
         guard = limits.stall_guard and not limits.avoidance.on
         super()._apply(replace(settings, limits=replace(limits, avoidance=avoidance, stall_guard=guard)))
-        self._given, self._filter = settings, distance_filter
+        self._original_settings, self._filter = settings, distance_filter
 
     def step(
         self, q: Array, v: Array, previews: Mapping[str, Preview], tau_applied: Array | None = None
@@ -62,33 +62,33 @@ class FilteredHIMPC(HIMPC):
             self._filter.forget()
             return plan
         started = perf_counter_ns()
-        found = self._filter(q, v, plan.tau_0, plan.tau, self._M_bar, plan.limits, observed_by(previews))
-        self._tau_0 = found.tau
+        filtered = self._filter(q, v, plan.tau_0, plan.tau, self._M_bar, plan.limits, observed_by(previews))
+        self._tau_0 = filtered.tau
         done = None if plan.at_once is None else plan.at_once()
         time_us = (perf_counter_ns() - started) / 1e3
         return replace(
             plan,
-            tau=found.tau,
+            tau=filtered.tau,
             step_us=plan.step_us + time_us,
-            unsolved=plan.unsolved + (not found.met),
-            at_once=None if done is None else lambda: _with_filter(done, found.tau - plan.tau_0),
-            behind=Behind(self._evidence(found, plan, done, time_us), found.rows),
+            unsolved=plan.unsolved + (not filtered.met),
+            at_once=None if done is None else lambda: _with_filter(done, filtered.tau - plan.tau_0),
+            behind=Behind(self._evidence(filtered, plan, done, time_us), filtered.rows),
         )
 
-    def _evidence(self, found: Filtered, plan: Plan, done: AtOnce | None, time_us: float) -> LevelSolution:
-        increment, leak = found.tau - plan.tau_0, 0.0
+    def _evidence(self, filtered: Filtered, plan: Plan, done: AtOnce | None, time_us: float) -> LevelSolution:
+        increment, leak = filtered.tau - plan.tau_0, 0.0
         if done is not None and len(done.increments):
             accelerations = (increment - done.increments) / self._M_bar
             pairs = zip(done.jacobians, accelerations, strict=False)
             leak = max((float(np.abs(J @ a).max()) for J, a in pairs if len(J)), default=0.0)
-        change = (found.tau - plan.tau) / self._M_bar
-        fallback: Fallback = "solve" if found.met else "soften"
-        status = "optimal" if found.met else "rows give way"
+        change = (filtered.tau - plan.tau) / self._M_bar
+        fallback: Fallback = "solve" if filtered.met else "soften"
+        status = "optimal" if filtered.met else "rows give way"
         return LevelSolution(
             FILTER,
             increment[None],
             float(change @ change),
-            found.active,
+            filtered.active,
             0.0,
             status,
             fallback,

@@ -73,18 +73,18 @@ class HQP(OneStepController):
             if self._by_acceleration:
                 R = (inverse * demand.form.level.R) @ inverse
             fallback: Fallback = "solve"
-            found = (
+            optimum = (
                 self._optimum(demand, B, R, y, free, rows)
                 if free.shape[1]
                 else VerifiedOptimum(y, status="empty")
             )
-            if not found.usable:
+            if not optimum.usable:
                 # A lower level keeps the solution of the levels above, which satisfies every priority. The
                 # first level, which has no level above, brings the robot to rest.
                 braking = np.clip(-_REST * (M @ v), rows.lower[0], rows.upper[0])
                 fallback = "inherit" if i else "brake"
-                found = VerifiedOptimum(y if i else braking, status=found.status, qp_us=found.qp_us)
-            y = found.y
+                optimum = VerifiedOptimum(y if i else braking, status=optimum.status, qp_us=optimum.qp_us)
+            y = optimum.y
             if i + 1 < len(demands):
                 free = free @ split(B @ free, float(np.linalg.norm(B)))[3]
             accelerations.append(inverse @ y)
@@ -95,12 +95,12 @@ class HQP(OneStepController):
                     name=demand.form.level.name,
                     U=y[None],
                     cost=float(error @ error + increment @ R @ increment),
-                    active=found.active,
-                    kkt_residual=found.kkt_residual,
-                    status=found.status,
+                    active=optimum.active,
+                    kkt_residual=optimum.kkt_residual,
+                    status=optimum.status,
                     fallback=fallback,
                     time_us=(perf_counter_ns() - started) / 1e3,
-                    qp_us=found.qp_us,
+                    qp_us=optimum.qp_us,
                     leak=leak(demands, accelerations, i),
                 )
             )

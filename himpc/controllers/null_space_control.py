@@ -62,16 +62,16 @@ def prioritised_torques(
     root = np.linalg.cholesky(M)
     free = np.eye(len(M))
     force = np.zeros(len(M))
-    found = []
+    projected = []
     for J, wanted in zip(jacobians, accelerations, strict=True):
         W = np.linalg.solve(root, J.T).T
         size = float(np.linalg.norm(W))
         left, sigma, right, rest = split(W @ free, size)
         gain = sigma / np.maximum(sigma, damping * size) ** 2
         force = force + free @ (right @ (gain * (left.T @ (wanted - W @ force))))
-        found.append(Projected(root @ force, min(len(J), free.shape[1]) - sigma.size))
+        projected.append(Projected(root @ force, min(len(J), free.shape[1]) - sigma.size))
         free = free @ rest
-    return found
+    return projected
 
 
 def projected_law(M: Array, bias: Array, tau_0: Array, demands: list[Demand], damping: float) -> Law:
@@ -87,20 +87,20 @@ def projected_law(M: Array, bias: Array, tau_0: Array, demands: list[Demand], da
     started = perf_counter_ns()
     projected = prioritised_torques(M, [d.J for d in demands], [d.acceleration for d in demands], damping)
     inverse = np.asarray(np.linalg.inv(M), np.float64)
-    accelerations = [inverse @ each.torque for each in projected]
+    accelerations = [inverse @ projection.torque for projection in projected]
     time_us = (perf_counter_ns() - started) / 1e3 / max(len(demands), 1)
     levels = []
-    for i, (demand, each) in enumerate(zip(demands, projected, strict=True)):
+    for i, (demand, projection) in enumerate(zip(demands, projected, strict=True)):
         error = demand.residual(demand.J @ accelerations[i])
-        increment = bias + each.torque - tau_0
+        increment = bias + projection.torque - tau_0
         levels.append(
             LevelSolution(
                 name=demand.form.level.name,
-                U=each.torque[None],
+                U=projection.torque[None],
                 cost=float(error @ error + (demand.form.R * increment) @ increment),
                 active=NO_ROWS,
                 kkt_residual=float("nan"),
-                status=f"directions lost: {each.lost}" if each.lost else "optimal",
+                status=f"directions lost: {projection.lost}" if projection.lost else "optimal",
                 fallback="solve",
                 time_us=time_us,
                 qp_us=0.0,

@@ -188,7 +188,7 @@ class OneStepController(TorqueController):
             error = measure(form.tasks, here, previews, values, errors)
             if self._off:
                 measure(self._off, here, previews, values, errors)
-        previews = form.asked(here, previews)
+        previews = form.references_in_task_coordinates(here, previews)
         wanted = np.zeros((2, error.size))
         start = 0
         for task, rows in zip(form.tasks, form.sizes, strict=True):
@@ -269,4 +269,4 @@ def leak(demands: Sequence[WithJacobian], accelerations: list[Array], level: int
     accelerations: q̈_p (n,) that the levels down to each p cause in the model.
     """
     moved = (demands[p].J @ (accelerations[level] - accelerations[p]) for p in range(level))
-    return max((float(np.abs(each).max()) for each in moved), default=0.0)
+    return max((float(np.abs(change).max()) for change in moved), default=0.0)

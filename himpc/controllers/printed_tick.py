@@ -77,9 +77,9 @@ class PrintedTick:
         """Sets the largest error on which tasks act, m or rad."""
         self._pull = largest_error
 
-    def fade(self, place: int, share: float | Array) -> None:
+    def fade(self, index: int, share: float | Array) -> None:
         """Multiplies a level's √Q by `share`, one number or one per row."""
-        self._shares[place] = share
+        self._shares[index] = share
 
     def take_M_bar(self, M_bar: Array) -> None:
         """Sets the diagonal of M̄, (n,) kg·m²."""
@@ -112,7 +112,9 @@ class PrintedTick:
                 for level, prepared, share in zip(now.levels, form.levels, self._shares, strict=False)
             ]
             problems = [printed.problem(now, level, path) for level in levels]
-            if not all(math.isfinite(float(each.free.sum()) + float(each.B.sum())) for each in problems):
+            if not all(
+                math.isfinite(float(problem.free.sum()) + float(problem.B.sum())) for problem in problems
+            ):
                 return None
             moment = self._viewer.now
             rows = build_rows(moment.state, tau_0, M_bar, settings.limits, limits, N, T_s, moment.near)
@@ -183,24 +185,24 @@ def solve(
         fallback, held = last_resort(rows, before.U if before is not None and optimal else None)
         best, rows = Optimum(held, np.zeros(len(A)), 0.0, "unsolved", best.qp_us), containing(rows, held)
     times.append(perf_counter_ns())
-    found = [best]
+    optima = [best]
     for i in range(1, len(problems)):
-        found.append(cascade(rows, i + 1, found[-1].U, i)[0])
+        optima.append(cascade(rows, i + 1, optima[-1].U, i)[0])
         times.append(perf_counter_ns())
     return [
         LevelSolution(
             name=problem.name,
-            U=each.U,
-            cost=problem.cost(each.U),
-            active=_active(each, rows),
-            kkt_residual=each.residual,
-            status=each.status,
-            fallback="solve" if each.solved and i else "inherit" if i else fallback,
+            U=optimum.U,
+            cost=problem.cost(optimum.U),
+            active=_active(optimum, rows),
+            kkt_residual=optimum.residual,
+            status=optimum.status,
+            fallback="solve" if optimum.solved and i else "inherit" if i else fallback,
             time_us=(times[i + 1] - times[i]) / 1e3,
-            qp_us=each.qp_us,
-            leak=max((_change(problems[p].B, each.U - found[p].U) for p in range(i)), default=0.0),
+            qp_us=optimum.qp_us,
+            leak=max((_change(problems[p].B, optimum.U - optima[p].U) for p in range(i)), default=0.0),
         )
-        for i, (problem, each) in enumerate(zip(problems, found, strict=True))
+        for i, (problem, optimum) in enumerate(zip(problems, optima, strict=True))
     ]
 
 
@@ -209,8 +211,8 @@ def _change(B: Array, U: Array) -> float:
     return float(np.abs(B @ U[:, :, None]).max(initial=0.0))
 
 
-def _active(found: Optimum, rows: Rows) -> ActiveRows:
-    multipliers, value = found.multipliers.reshape(rows.lower.shape), rows.values(found.U)
+def _active(optimum: Optimum, rows: Rows) -> ActiveRows:
+    multipliers, value = optimum.multipliers.reshape(rows.lower.shape), rows.values(optimum.U)
     slack = np.where(multipliers > 0, rows.upper - value, value - rows.lower)
     # Some solvers leave tiny multipliers at all rows.
     row, column = np.nonzero((np.abs(multipliers) > _BINDING) & (slack < 1e3 * _BINDING))

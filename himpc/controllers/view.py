@@ -177,11 +177,11 @@ class View:
         for level in self.levels:
             if level.name == name:
                 return level
-        raise KeyError(f"no level '{name}' is on: there are {', '.join(each.name for each in self.levels)}")
+        raise KeyError(f"no level '{name}' is on: there are {', '.join(level.name for level in self.levels)}")
 
 
 def read_only(values: Array) -> Array:
     """Returns a read-only copy of an array."""
-    found = np.array(values, float)
-    found.flags.writeable = False
-    return found
+    array = np.array(values, float)
+    array.flags.writeable = False
+    return array

@@ -101,7 +101,9 @@ class Viewer:
             before = form.jacobian(past)[0] @ memory.v
         x_ddot = (x_dot - before) / memory.period
         drift = form.drift(robot, self._elsewhere, q, v, previews, h)
-        displacement, velocity, acceleration = wanted(form, form.asked(here, previews), N)
+        displacement, velocity, acceleration = wanted(
+            form, form.references_in_task_coordinates(here, previews), N
+        )
         levels = [
             LevelView(
                 name=level.name,
@@ -191,21 +193,21 @@ class Viewer:
         )
 
     def _further(self) -> tuple[Further, ...]:
-        found = []
+        further = []
         for constraint in imposed(self._settings.limits):
             if constraint not in (TORQUE, VELOCITY, POSITION):
                 block = constraint.bounds(self.now)
                 D = np.eye(self._robot.n) if block.directions is None else block.directions.D
-                found.append(Further(constraint.profile(self.now.N), D, block.lower, block.upper))
-        return tuple(found)
+                further.append(Further(constraint.profile(self.now.N), D, block.lower, block.upper))
+        return tuple(further)
 
 
 def wanted(form: StackForm, previews: Mapping[str, Preview], N: int) -> tuple[Array, Array, Array]:
     """Returns x_d(k+j) − x_d(k), ẋ_d and ẍ_d of all rows at k … k+N, (N+1, m) each."""
-    found: tuple[list[Array], list[Array], list[Array]] = ([], [], [])
+    motion: tuple[list[Array], list[Array], list[Array]] = ([], [], [])
     for task, rows in zip(form.tasks, form.sizes, strict=True):
         preview = still(N, rows) if isinstance(task, Damping) else previews[task.name]
-        for column, each in zip(found, preview[1:], strict=True):
-            column.append(each[: N + 1])
-    displacement, velocity, acceleration = (np.concatenate(column, axis=1) for column in found)
+        for column, samples in zip(motion, preview[1:], strict=True):
+            column.append(samples[: N + 1])
+    displacement, velocity, acceleration = (np.concatenate(column, axis=1) for column in motion)
     return displacement, velocity, acceleration

@@ -42,9 +42,9 @@ class Weighted(HIMPC):
         form, idle, off = prepared
         levels = [] if idle else list(accumulated(form.levels))
         tick = CompiledTick(self.robot, settings, form, off, levels)
-        for place, level in enumerate(form.levels):
+        for index, level in enumerate(form.levels):
             if level.name == DAMPING_LEVEL.name:
-                tick.fade(place, math.sqrt(DAMPING_SHARE))
+                tick.fade(index, math.sqrt(DAMPING_SHARE))
         return tick
 
     def _faded(self, level: LevelForm) -> float | Array:
@@ -84,7 +84,7 @@ def compromise(problems: Sequence[LevelProblem], rows: Rows) -> Array | None:
     no solution."""
     share = math.sqrt(DAMPING_SHARE)
     calmed = [
-        each._replace(root_Q=share * each.root_Q) if each.name == DAMPING_LEVEL.name else each
-        for each in problems
+        problem._replace(root_Q=share * problem.root_Q) if problem.name == DAMPING_LEVEL.name else problem
+        for problem in problems
     ]
     return increments_of(sum_of_costs(calmed), rows)

@@ -34,11 +34,11 @@ def digest_of(image: bytes) -> int:
     """Returns the digest of an image, 64 bits: FNV-1a over words of 8 bytes, with the word DIGEST as 0. After
     each word the upper half is folded into the lower half. Each step can be inverted, so two images that
     differ in one word have different digests."""
-    whole, found = (1 << 64) - 1, _START
-    for place, (word,) in enumerate(struct.iter_unpack("<Q", image)):
-        found = ((found ^ (0 if place == DIGEST else word)) * _PRIME) & whole
-        found ^= found >> 32
-    return found
+    whole, digest = (1 << 64) - 1, _START
+    for index, (word,) in enumerate(struct.iter_unpack("<Q", image)):
+        digest = ((digest ^ (0 if index == DIGEST else word)) * _PRIME) & whole
+        digest ^= digest >> 32
+    return digest
 
 
 def kernel_text() -> tuple[str, list[str]]:
@@ -128,8 +128,8 @@ no:
     )
 
 
-def _word(place: int, name: str, align: int = 8) -> str:
-    where = f"  %{name}.at = getelementptr i8, ptr %c, i64 {8 * place}\n"
+def _word(index: int, name: str, align: int = 8) -> str:
+    where = f"  %{name}.at = getelementptr i8, ptr %c, i64 {8 * index}\n"
     return where + f"  %{name} = load i64, ptr %{name}.at, align {align}\n"
 
 
@@ -143,15 +143,15 @@ def _entry(
     before: str,
     control_name: str,
     what: tuple[str, str],
-    given: list[tuple[str, str]],
+    array_arguments: list[tuple[str, str]],
 ) -> str:
     """Returns a function that calls `control`. It returns 6 (HOLD) if `control` ends with a fault."""
     body, passed = _word(JOINTS, "n"), []
-    for place, array in enumerate(ARRAYS):
-        body += _word(FIRST + 2 * place, f"{array}.offset") + _word(FIRST + 2 * place + 1, f"{array}.count")
+    for index, array in enumerate(ARRAYS):
+        body += _word(FIRST + 2 * index, f"{array}.offset") + _word(FIRST + 2 * index + 1, f"{array}.count")
         body += f"  %{array} = getelementptr i8, ptr %c, i64 %{array}.offset\n"
         passed.append(_array(f"%{array}", f"%{array}.count"))
-    passed += [*what, *(_array(*each) for each in given)]
+    passed += [*what, *(_array(*argument) for argument in array_arguments)]
     return f"""
 define i32 @{name}(ptr %c, {arguments}) {{
 {before}{body}  %result = alloca i64

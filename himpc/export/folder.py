@@ -80,7 +80,7 @@ def files_of(
         "controller.bin": image.memory,
         "controller.json": (json.dumps(manifest, indent=1, allow_nan=False) + "\n").encode(),
         f"{prefix}.h": header(image.manifest, torques, prefix).encode(),
-        **{each: renamed((FILES / each).read_text("utf-8"), prefix).encode() for each in own},
+        **{name: renamed((FILES / name).read_text("utf-8"), prefix).encode() for name in own},
         "vector.bin": vector_of(recorded),
         "plant.mjb": plant,
         "README.md": _readme(image, target, name, object_name, len(recorded.rows), prefix).encode(),

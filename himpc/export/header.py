@@ -21,9 +21,9 @@ def header(manifest: dict[str, Any], torques: Sequence[float], prefix: str) -> s
         prefix: see `renamed`.
     """
     tasks, levels = manifest["tasks"], manifest["levels"]
-    at = {each["name"]: each["offset"] for each in manifest["arrays"]}
+    at = {array["name"]: array["offset"] for array in manifest["arrays"]}
     names = {
-        **{name: at[name] for name in ("error", "active", "rung", "place")},
+        **{name: at[name] for name in ("error", "active", "fallback", "solved_index")},
         "digest": f"0x{manifest['digest']}ULL",
         "multiple": f"{MULTIPLE:g}",
         "controller": manifest["controller"],
@@ -36,28 +36,28 @@ def header(manifest: dict[str, Any], torques: Sequence[float], prefix: str) -> s
         "fallbacks": ", ".join(f"{prefix.upper()}_{name.upper()}" for name in FALLBACKS),
         "fallback_names": _strings(FALLBACKS),
         "tasks": "; ".join(
-            f"{_plain(each['name'])} ({each['rows']} rows, {each['target']} target)" for each in tasks
+            f"{_plain(task['name'])} ({task['rows']} rows, {task['target']} target)" for task in tasks
         ),
         "task_count": len(tasks),
-        "task_names": _strings([each["name"] for each in tasks]),
-        "task_first": ", ".join(str(each["first"]) for each in tasks),
-        "task_rows": ", ".join(str(each["rows"]) for each in tasks),
-        "levels": "; ".join(_plain(each["name"]) for each in levels),
+        "task_names": _strings([task["name"] for task in tasks]),
+        "task_first": ", ".join(str(task["first"]) for task in tasks),
+        "task_rows": ", ".join(str(task["rows"]) for task in tasks),
+        "levels": "; ".join(_plain(level["name"]) for level in levels),
         "level_count": len(levels),
-        "level_names": _strings([each["name"] for each in levels]),
-        "level_rows": ", ".join(str(each["rows"]) for each in levels),
-        "torques": ", ".join(repr(float(each)) if each < 1e300 else "HUGE_VAL" for each in torques),
-        "most_rows": max([len(manifest["joints"]), *(each["rows"] for each in (*tasks, *levels))]),
+        "level_names": _strings([level["name"] for level in levels]),
+        "level_rows": ", ".join(str(level["rows"]) for level in levels),
+        "torques": ", ".join(repr(float(torque)) if torque < 1e300 else "HUGE_VAL" for torque in torques),
+        "most_rows": max([len(manifest["joints"]), *(entry["rows"] for entry in (*tasks, *levels))]),
     }
     text = renamed((Path(__file__).parent / "files" / "himpc.h").read_text("utf-8"), prefix)
-    return re.sub(r"@(\w+)@", lambda found: str(names[found[1]]), text)
+    return re.sub(r"@(\w+)@", lambda match: str(names[match[1]]), text)
 
 
 def renamed(text: str, prefix: str) -> str:
     """Returns the text of a file with `prefix` in place of himpc in all names of functions, constants and
     files."""
     return re.sub(
-        r"\b(himpc|HIMPC)(?=[_.])", lambda found: prefix if found[1].islower() else prefix.upper(), text
+        r"\b(himpc|HIMPC)(?=[_.])", lambda match: prefix if match[1].islower() else prefix.upper(), text
     )
 
 
@@ -72,7 +72,7 @@ def check_prefix(prefix: str) -> None:
 
 def _plain(name: str) -> str:
     """Returns a name for a comment, without characters that would end the comment."""
-    return "".join(each if each.isalnum() or each in "_-. +" else "?" for each in name)
+    return "".join(character if character.isalnum() or character in "_-. +" else "?" for character in name)
 
 
 def _strings(names: Sequence[str]) -> str:

@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from hashlib import sha256
-from typing import Any, get_type_hints
+from typing import Any, NamedTuple, get_type_hints
 
 import numpy as np
 
@@ -100,7 +100,7 @@ def image_of(
     settings = controller.settings
     check(controller, settings)
     strict = not isinstance(controller, Weighted)
-    form, off, tables = _levels(robot, settings, strict)
+    form, off, tables = _exported_levels(robot, settings, strict)
     arena, spans = arena_for(robot, settings, form, off, tables)
     force = in_force(robot, settings.limits)
     write_limits(arena, force, settings.limits.position == "paper")
@@ -119,21 +119,21 @@ def image_of(
     far = np.inf if np.isinf(multiple) else 0.0
     f["widest"][:2] = multiple * robot.tau_limit, multiple * robot.v_limit
     f["widest"][2:] = robot.q_lower - far, robot.q_upper + far
-    f["order"][:] = f["place"][:] = np.arange(len(tables))
+    f["order"][:] = f["solved_index"][:] = np.arange(len(tables))
     f["goal"][:], f["tau_limit"][:], f["weight"][:] = arena.f["limits"], robot.tau_limit, 1.0
-    for place, level in enumerate(form.levels):
+    for index, level in enumerate(form.levels):
         calmed = DAMPING_SHARE if level.name == DAMPING_LEVEL.name and not strict else 1.0
         f["Q"][level.rows] = calmed * level.root_Q**2
         R = level.R * np.array(settings.M_bar) ** 2 if settings.R_on == "acceleration" else level.R
-        f["R"][place], f["enabled"][place] = R, level.level.enabled
-        f["table"][place] = arena.i["level"][place]
+        f["R"][index], f["enabled"][index] = R, level.level.enabled
+        f["table"][index] = arena.i["level"][index]
     if strict:
         f["damped"][: 1 << len(settings.stack)] = _damped(robot, settings)
     tasks = [_write_reference(arena, f, span, references) for span in spans]
     levels = [
-        {"name": level.name, "index": place, "rows": level.rows.stop - level.rows.start}
+        {"name": level.name, "index": index, "rows": level.rows.stop - level.rows.start}
         | {"tasks": [task.name for task in level.level.tasks], "enabled": level.level.enabled}
-        for place, level in enumerate(form.levels)
+        for index, level in enumerate(form.levels)
     ]
     named = {
         "budget": float(f["setup"][BUDGET]),
@@ -153,7 +153,15 @@ def image_of(
     return Image(memory, named | made | {"arrays": _listed(arena, f, loop_where, offsets)})
 
 
-def _levels(robot: Robot, settings: Settings, strict: bool) -> tuple[StackForm, list[Task], list[LevelTable]]:
+class ExportedLevels(NamedTuple):
+    """The levels to export, the tasks that are off, and the tables of the levels."""
+
+    form: StackForm
+    off: list[Task]
+    tables: list[LevelTable]
+
+
+def _exported_levels(robot: Robot, settings: Settings, strict: bool) -> ExportedLevels:
     """Returns the levels to export: for a strict hierarchy all levels, otherwise the enabled levels."""
     if strict:
         levels = (*settings.stack, DAMPING_LEVEL) if settings.damping else settings.stack
@@ -164,34 +172,34 @@ def _levels(robot: Robot, settings: Settings, strict: bool) -> tuple[StackForm, 
         if not levels:
             raise InputError("the stack is empty and damping is off: export needs at least one level")
         form = stack_form(robot, levels, settings)
-        return form, [], [LevelTable.of(level) for level in form.levels]
+        return ExportedLevels(form, [], [LevelTable.of(level) for level in form.levels])
     form, idle, off = prepare(robot, settings)
     if idle:
         raise InputError("no level is enabled and damping is off: switch one level on to export it")
-    return form, off, list(accumulated(form.levels))
+    return ExportedLevels(form, off, list(accumulated(form.levels)))
 
 
 def _damped(robot: Robot, settings: Settings) -> list[float]:
     """Returns whether the damping level is added, for every set of enabled levels; bit k of the index stands
     for level k."""
-    found = []
+    damped = []
     for choice in range(1 << len(settings.stack)):
         stack = tuple(
-            replace(level, enabled=bool(choice >> place & 1)) for place, level in enumerate(settings.stack)
+            replace(level, enabled=bool(choice >> index & 1)) for index, level in enumerate(settings.stack)
         )
-        found.append(float(settings.damping and freedom_left(robot, stack) > 0))
-    return found
+        damped.append(float(settings.damping and freedom_left(robot, stack) > 0))
+    return damped
 
 
 def _write_reference(
     arena: Arena, f: dict[str, Array], where: Span, references: Mapping[str, Reference]
 ) -> dict[str, Any]:
     """Writes the reference of a task; returns the task's entry in the manifest."""
-    place, task, span = where
+    index, task, span = where
     rows = span.stop - span.start
-    told: dict[str, Any] = {
+    entry: dict[str, Any] = {
         "name": task.name,
-        "index": place,
+        "index": index,
         "first": span.start,
         "rows": rows,
         "unit": task.unit,
@@ -199,42 +207,42 @@ def _write_reference(
     }
     reference = references.get(task.name)
     if isinstance(task, Damping) or reference is None:
-        return told
+        return entry
     if isinstance(reference, Target):
         value, rotates = reference.raw, reference.raw.ndim == 2
         if rotates and rows < 3:
             # For an orientation on fewer than three axes, the motion of the reference depends on the robot's
             # configuration.
-            arena.f["R_d"][place] = value
-            return told | {"target": "fixed"}
+            arena.f["R_d"][index] = value
+            return entry | {"target": "fixed"}
         m = 3 if rotates else rows
-        f["target"][place, [DRAGGABLE, ROWS, WIDTH]] = 1.0, m, value.size
-        f["raw"][place, : value.size] = value.ravel()
+        f["target"][index, [DRAGGABLE, ROWS, WIDTH]] = 1.0, m, value.size
+        f["raw"][index, : value.size] = value.ravel()
         caps = reference.caps
-        f["caps"][place, :3] = caps.speed, caps.acceleration, caps.jerk
-        f["samples"][place, 0, : value.size], f["samples"][place, 0, value.size + 3 * m] = value.ravel(), 1.0
+        f["caps"][index, :3] = caps.speed, caps.acceleration, caps.jerk
+        f["samples"][index, 0, : value.size], f["samples"][index, 0, value.size + 3 * m] = value.ravel(), 1.0
         kind = "orientation" if rotates else "position" if task.unit == "m" else "joints"
-        return told | {"target": kind}
-    if not write_curve(arena, place, span, reference):
+        return entry | {"target": kind}
+    if not write_curve(arena, index, span, reference):
         raise InputError(
             f"task '{task.name}' follows a {type(reference).__name__}, which cannot be exported: choose a "
             "scene whose references are circles, swings, constants or dragged targets"
         )
-    return told | {"target": "fixed"}
+    return entry | {"target": "fixed"}
 
 
 def _joined(
     arena: Arena, loop: Array, loop_where: Array, n: int, names: bytes
 ) -> tuple[bytes, dict[str, int]]:
     """Returns the words that describe where the arrays begin, followed by all arrays."""
-    given = (*arena.arguments, loop, loop_where)
+    arrays = (*arena.arguments, loop, loop_where)
     words, offsets, end = np.zeros(WORDS, np.int64), {}, 8 * WORDS
     pieces = []
-    for place, (name, array) in enumerate(zip(ARRAYS, given, strict=True)):
+    for index, (name, array) in enumerate(zip(ARRAYS, arrays, strict=True)):
         start = -(-end // _LINE) * _LINE
         pieces += [bytes(start - end), array.astype(array.dtype.newbyteorder("<")).tobytes()]
         offsets[name], end = start, start + array.nbytes
-        words[FIRST + 2 * place : FIRST + 2 * place + 2] = start, array.size
+        words[FIRST + 2 * index : FIRST + 2 * index + 2] = start, array.size
     words[[MAGIC, LAYOUT, SIZE, JOINTS]] = SIGN, layout_number(), end, n
     words[NAMES] = int.from_bytes(names[:8], "little", signed=True)
     return words.astype("<i8").tobytes() + b"".join(pieces), offsets
@@ -246,23 +254,23 @@ def _listed(
     """Returns the name, type, shape, unit and first byte of every array."""
     tick = get_type_hints(TickArrays, include_extras=True)
     own = get_type_hints(LoopArrays, include_extras=True)
-    found = []
+    entries = []
     kinds: Sequence[tuple[str, Any, Any, Any]] = (
         ("data", NUMBERS, arena.f, arena.where),
         ("whole", WHOLES, arena.i, arena.whole_where),
         ("loop", SHAPES, f, loop_where),
     )
     for part, names, arrays, where in kinds:
-        for place, name in enumerate(names):
+        for index, name in enumerate(names):
             hint = own[name] if part == "loop" else tick[name]
-            found.append(
+            entries.append(
                 {
                     "name": name,
                     "part": part,
                     "type": "int64" if part == "whole" else "float64",
                     "shape": list(arrays[name].shape),
                     "unit": hint.__metadata__[1],
-                    "offset": offsets[part] + 8 * int(where[place]),
+                    "offset": offsets[part] + 8 * int(where[index]),
                 }
             )
-    return found
+    return entries

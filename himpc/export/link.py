@@ -27,13 +27,13 @@ def linked(code: bytes) -> bytes:
     linker."""
     check_linker()
     with tempfile.TemporaryDirectory() as folder:
-        given, made = Path(folder, "himpc.o"), Path(folder, "himpc.wasm")
-        given.write_bytes(code)
+        object_file, made = Path(folder, "himpc.o"), Path(folder, "himpc.wasm")
+        object_file.write_bytes(code)
         subprocess.run(
             [
                 *(
                     *_linker(),
-                    str(given),
+                    str(object_file),
                     "-o",
                     str(made),
                     "--no-entry",
@@ -52,5 +52,5 @@ def linked(code: bytes) -> bytes:
 def _linker() -> list[str]:
     if find_spec("ziglang") is not None:
         return [sys.executable, "-m", "ziglang", "wasm-ld"]
-    found = shutil.which("wasm-ld")
-    return [found] if found else []
+    linker = shutil.which("wasm-ld")
+    return [linker] if linker else []

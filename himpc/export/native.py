@@ -69,7 +69,7 @@ class NativeController:
         self.memory[:] = np.frombuffer(image, np.uint8)
         self._at = self.memory.ctypes.data
         self._numbers = np.zeros((4, self.n))
-        self._places = [row.ctypes.data for row in self._numbers]
+        self._addresses = [row.ctypes.data for row in self._numbers]
         if self.check(len(image)) != 0:
             raise ValueError("this image is damaged, or it is for another controller or another kernel")
         self.reset()
@@ -85,7 +85,7 @@ class NativeController:
     def reset(self, tau: Array | None = None) -> None:
         """Clears everything except the settings. tau: the torque that acts now, (n,) N·m; None: zero."""
         self._numbers[3] = 0.0 if tau is None else tau
-        self._c.himpc_reset(self._at, self._places[3])
+        self._c.himpc_reset(self._at, self._addresses[3])
 
     def tick(self, q: Array, v: Array, tau_applied: Array | None = None) -> tuple[Array, int]:
         """Performs one control period.
@@ -97,12 +97,12 @@ class NativeController:
         Returns:
             (the torque to apply, (n,) N·m; which fallback acted, an index of `FALLBACKS`).
         """
-        numbers, places = self._numbers, self._places
+        numbers, addresses = self._numbers, self._addresses
         numbers[0], numbers[1] = q, v
-        given = None
+        applied = None
         if tau_applied is not None:
-            numbers[2], given = tau_applied, places[2]
-        fallback = self._c.himpc_tick(self._at, places[0], places[1], given, places[3])
+            numbers[2], applied = tau_applied, addresses[2]
+        fallback = self._c.himpc_tick(self._at, addresses[0], addresses[1], applied, addresses[3])
         return numbers[3].copy(), fallback
 
     def set(self, what: int, index: int, values: Any) -> int:
@@ -112,7 +112,7 @@ class NativeController:
 
     def view(self, name: str) -> np.ndarray:
         """Returns an array of the manifest as a view of the controller's memory, not as a copy."""
-        (found,) = (each for each in self.manifest["arrays"] if each["name"] == name)
-        count = int(np.prod(found["shape"]))
-        part = self.memory[found["offset"] : found["offset"] + 8 * count]
-        return part.view(found["type"]).reshape(found["shape"])
+        (array,) = (array for array in self.manifest["arrays"] if array["name"] == name)
+        count = int(np.prod(array["shape"]))
+        part = self.memory[array["offset"] : array["offset"] + 8 * count]
+        return part.view(array["type"]).reshape(array["shape"])

@@ -86,8 +86,8 @@ def _made(target: Target, prefix: str) -> bytes:
     whole = llvm.parse_assembly(text)
     whole.verify()
     _optimise(whole, machine, llvm.create_pipeline_tuning_options(speed_level=2))
-    foreign = {each.name for each in whole.functions if each.is_declaration}
-    foreign = {each for each in foreign if not each.startswith("llvm.")} - MATHEMATICS - _MEMORY
+    foreign = {symbol.name for symbol in whole.functions if symbol.is_declaration}
+    foreign = {name for name in foreign if not name.startswith("llvm.")} - MATHEMATICS - _MEMORY
     if foreign:
         raise RuntimeError(f"the exported code must not call {', '.join(sorted(foreign))}")
     return machine.emit_object(whole)
@@ -107,9 +107,9 @@ def _portable() -> str:
         whole = llvm.parse_assembly(head + entries_text(name, layout_number()))
         for part in parts:
             whole.link_in(llvm.parse_assembly(_retargeted(part, head)))
-        for each in (*whole.functions, *whole.global_variables):
-            if not each.is_declaration and each.name not in EXPORTED:
-                each.linkage = "internal"
+        for symbol in (*whole.functions, *whole.global_variables):
+            if not symbol.is_declaration and symbol.name not in EXPORTED:
+                symbol.linkage = "internal"
         tuning = llvm.create_pipeline_tuning_options(speed_level=2)
         tuning.loop_vectorization = tuning.slp_vectorization = tuning.loop_unrolling = False
         _optimise(whole, machine, tuning)
@@ -133,11 +133,11 @@ def _machine(target: Target) -> tuple[llvm.TargetMachine, str]:
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
     try:
-        found = llvm.Target.from_triple(target.triple)
+        llvm_target = llvm.Target.from_triple(target.triple)
     except RuntimeError:
         raise InputError(f"the LLVM of this llvmlite makes no code for {target.triple}") from None
     reloc = "static" if target.bits == 32 else "pic"
-    machine = found.create_target_machine(features=target.features, opt=3, reloc=reloc)
+    machine = llvm_target.create_target_machine(features=target.features, opt=3, reloc=reloc)
     return machine, f'target datalayout = "{machine.target_data}"\ntarget triple = "{target.triple}"\n'
 
 

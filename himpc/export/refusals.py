@@ -27,10 +27,10 @@ def check(controller: Controller, settings: Settings) -> None:
         )
     if settings.limits.stall_guard:
         raise InputError("the guard of a blocked robot is not exported: set limits.stall_guard to false")
-    given = python_constraints(imposed(settings.limits))
-    if given:
+    constraints = python_constraints(imposed(settings.limits))
+    if constraints:
         raise InputError(
-            f"the limit '{given[0].label}' is computed in Python, which is not exported: switch it off"
+            f"the limit '{constraints[0].label}' is computed in Python, which is not exported: switch it off"
         )
     for level in settings.stack:
         for task in level.tasks:

@@ -100,16 +100,19 @@ class StackForm:
         )
         return (on - back) @ v / (2 * h)
 
-    def asked(self, configuration: Configuration, previews: Mapping[str, Preview]) -> Mapping[str, Preview]:
-        """Returns the references in the coordinates of the tasks, see `Task.asked`."""
-        asked = {}
+    def references_in_task_coordinates(
+        self, configuration: Configuration, previews: Mapping[str, Preview]
+    ) -> Mapping[str, Preview]:
+        """As `Task.reference_in_task_coordinates`, for all tasks."""
+        changed = {}
         for task in self.tasks:
-            if type(task).asked is not Task.asked and task.name in previews:
+            own = type(task).reference_in_task_coordinates
+            if own is not Task.reference_in_task_coordinates and task.name in previews:
                 preview = previews[task.name]
-                found = task.asked(configuration, preview)
-                if found is not preview:
-                    asked[task.name] = found
-        return {**previews, **asked} if asked else previews
+                reference = task.reference_in_task_coordinates(configuration, preview)
+                if reference is not preview:
+                    changed[task.name] = reference
+        return {**previews, **changed} if changed else previews
 
     def lengths(self, errors: Mapping[str, Array]) -> Array:
         """Returns the length of each task's error, m or rad."""
@@ -154,7 +157,7 @@ def measure(
     errors: dict[str, Array],
 ) -> Array:
     """Returns x̃ of tasks, (m,); writes x and x̃ of each task to `values` and `errors`."""
-    found = []
+    parts = []
     for task in tasks:
         value = task.value(configuration)
         error = (
@@ -163,8 +166,8 @@ def measure(
             else task.error(value, previews[task.name].value)
         )
         values[task.name], errors[task.name] = value, error
-        found.append(error)
-    return found[0] if len(found) == 1 else np.concatenate(found)
+        parts.append(error)
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
 def stack_form(robot: Robot, levels: Sequence[Level], settings: Settings) -> StackForm:

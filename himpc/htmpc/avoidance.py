@@ -39,12 +39,12 @@ class Avoidance:
         return self.model.between(joints, self.margin + _LOOK, gradients)
 
     def rows(
-        self, near: Clearances, N: int, dt: float, table: ConstraintTable | None = None, place: int = 0
+        self, near: Clearances, N: int, dt: float, table: ConstraintTable | None = None, row: int = 0
     ) -> ConstraintRows:
-        """Writes the linearised constraint on the change d of the inputs to a table, from row `place` on.
+        """Writes the linearised constraint on the change d of the inputs to a table, from `row` on.
         Returns these rows, one per pair and knot."""
         table = ConstraintTable(N * near.gradient.shape[1]) if table is None else table
-        A = table.spread(place, near.knot, near.gradient, integrator(N, dt).T_q)
+        A = table.spread(row, near.knot, near.gradient, integrator(N, dt).T_q)
         room = self.margin - near.distance
         free = np.full(len(room), np.inf)
         return ConstraintRows(A, room, free, np.full(len(room), COLLISION), near.knot + 1, near.pair)

@@ -45,8 +45,8 @@ class Clearances:
     @property
     def pairs(self) -> list[tuple[str, str]]:
         """The (sphere's link, obstacle's name) of each distance."""
-        found = zip(self.sphere.tolist(), self.shape.tolist(), strict=True)
-        return [(self.links[sphere], self.names[shape]) for sphere, shape in found]
+        indices = zip(self.sphere.tolist(), self.shape.tolist(), strict=True)
+        return [(self.links[sphere], self.names[shape]) for sphere, shape in indices]
 
 
 class CollisionModel:
@@ -90,5 +90,5 @@ class CollisionModel:
             *(around.thickness, around.meets, within, np.empty((K, S, 3)), np.empty((K, S, 3))),
             *(knot, sphere, shape, np.empty(most + 1), distance, normal, gradient),
         )
-        found = (knot[:count], distance[:count], gradient[:count], sphere[:count], shape[:count])
-        return Clearances(*found, around.links, around.names)
+        columns = (knot[:count], distance[:count], gradient[:count], sphere[:count], shape[:count])
+        return Clearances(*columns, around.links, around.names)

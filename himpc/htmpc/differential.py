@@ -133,7 +133,8 @@ class DifferentialController(ABC):
 def wanted(task: Task, here: Configuration, previews: Mapping[str, Preview], gain: float) -> Array:
     """Returns ẋ = ṙ + gain · (r − x), (m,)."""
     preview = previews[task.name]
-    return task.asked(here, preview).velocity[0] - gain * task.error(task.value(here), preview.value)
+    velocity = task.reference_in_task_coordinates(here, preview).velocity[0]
+    return velocity - gain * task.error(task.value(here), preview.value)
 
 
 def reachable(q: Array, last: Array, limits: MotionBounds, T: float) -> Box:

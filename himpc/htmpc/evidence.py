@@ -16,7 +16,7 @@ from himpc.htmpc.tracking import Tracking
 
 Array = NDArray[np.float64]
 
-_FELT = 1e-6
+_ROUNDING = 1e-6
 """A multiplier whose magnitude is smaller than this is a rounding error."""
 
 
@@ -57,11 +57,11 @@ def _active_rows(
     """Returns the active rows. The bounds of the slacks, whose multipliers are the last ones, are left
     out."""
     multipliers = multipliers[: len(rows.kind)]
-    some = np.flatnonzero(np.abs(multipliers) > _FELT)
+    some = np.flatnonzero(np.abs(multipliers) > _ROUNDING)
     kind, part = rows.kind[some], rows.part[some]
     of_guards = dict(zip(np.flatnonzero(rows.kind == LEXICOGRAPHIC).tolist(), guards, strict=True))
     names = tuple(
-        named(each) if is_pair and named else of_guards.get(row, "")
-        for row, is_pair, each in zip(some.tolist(), (kind == COLLISION).tolist(), part.tolist(), strict=True)
+        named(pair) if is_pair and named else of_guards.get(row, "")
+        for row, is_pair, pair in zip(some.tolist(), (kind == COLLISION).tolist(), part.tolist(), strict=True)
     )
     return ActiveMotionRows(kind, rows.knot[some], part, multipliers[some], names)

@@ -39,9 +39,9 @@ def placed(tree: Geometry, q: Array) -> Placed:
     """Computes the placements of all joints at configurations q (K, n)."""
     q = np.array(q, float)
     joints = len(tree.parent)
-    found = Placed(np.empty((len(q), joints, 12)), np.empty((len(q), joints, 3)))
-    place_all(tree.parent, tree.is_revolute, tree.rotation, tree.translation, tree.axis, q, *found)
-    return found
+    placements = Placed(np.empty((len(q), joints, 12)), np.empty((len(q), joints, 3)))
+    place_all(tree.parent, tree.is_revolute, tree.rotation, tree.translation, tree.axis, q, *placements)
+    return placements
 
 
 class Frames(NamedTuple):
@@ -56,15 +56,15 @@ class Frames(NamedTuple):
 def frame_at(robot: Robot, where: Placed, name: str) -> Frames:
     """Returns a frame of the robot for given placements of the joints; an empty name means the tip."""
     tree, K = geometry(robot), len(where.at)
-    found = Frames(np.empty((K, 3, 3)), np.empty((K, 3)), np.empty((K, 6, robot.n)))
-    frame_along(_TASK, _PART, tree.parent, tree.is_revolute, *where, *_mounted(robot, name), *found)
-    return found
+    frames = Frames(np.empty((K, 3, 3)), np.empty((K, 3)), np.empty((K, 6, robot.n)))
+    frame_along(_TASK, _PART, tree.parent, tree.is_revolute, *where, *_mounted(robot, name), *frames)
+    return frames
 
 
 @per_robot
 def _mounted(robot: Robot, name: str) -> tuple[Indices, Array, Array]:
     """Returns the joint that carries a frame, and the frame's axes and origin in the joint's frame."""
     frame = robot.model.frames[robot.frame_id(name or robot.tip)]
-    place = frame.placement
-    joint, origin = np.array([frame.parentJoint], np.intp), np.array([place.translation])
-    return joint, np.ascontiguousarray(place.rotation), origin
+    placement = frame.placement
+    joint, origin = np.array([frame.parentJoint], np.intp), np.array([placement.translation])
+    return joint, np.ascontiguousarray(placement.rotation), origin

@@ -183,10 +183,10 @@ class HTMPC:
         for level in self._levels:
             last = level is self._levels[-1]
             absolute = last or self._settings.formulation == "paper"
-            found = solve_level(Problem(tick, level, tuple(guards), absolute), at)
-            at = found.at
+            solution = solve_level(Problem(tick, level, tuple(guards), absolute), at)
+            at = solution.at
             guards.append(Guard(level, at.errors(level)))
-            solved.append(found)
+            solved.append(solution)
         return solved
 
     def _decided(

@@ -56,10 +56,10 @@ class Knots:
         return task.jacobian(self._path)
 
     def _frame(self, name: str) -> Frames:
-        found = self._frames.get(name)
-        if found is None:
-            found = self._frames[name] = frame_at(self._robot, self.joints, name)
-        return found
+        frames = self._frames.get(name)
+        if frames is None:
+            frames = self._frames[name] = frame_at(self._robot, self.joints, name)
+        return frames
 
     @cached_property
     def _path(self) -> Configuration:
@@ -76,8 +76,8 @@ class Knots:
         ]
 
     def _placement(self, knot: int, frame: str) -> pin.SE3:
-        found = self._frame(frame)
-        return pin.SE3(found.R[knot], found.p[knot])
+        frames = self._frame(frame)
+        return pin.SE3(frames.R[knot], frames.p[knot])
 
 
 def desired_values(task: Task, preview: Preview, N: int) -> Desired:
@@ -94,4 +94,4 @@ def desired_values(task: Task, preview: Preview, N: int) -> Desired:
     if preview.value.ndim == 1:
         return preview.value + preview.displacement
     turn = task.spread(preview.displacement) if isinstance(task, OrientationTask) else preview.displacement
-    return [exp3(each) @ preview.value for each in turn]
+    return [exp3(vector) @ preview.value for vector in turn]

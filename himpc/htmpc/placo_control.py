@@ -85,10 +85,10 @@ class Placo(DifferentialController):
         T, notice, command, outside = self._settings.period, None, box.rest, 0.0
         goals: list[Array] = []
         for index, level in enumerate(self._levels):
-            each = [wanted(task, here, previews, self._gain(index)) for task in level.tasks]
-            for task, velocity in zip(level.tasks, each, strict=True):
+            velocities = [wanted(task, here, previews, self._gain(index)) for task in level.tasks]
+            for task, velocity in zip(level.tasks, velocities, strict=True):
                 self._aims[task.name](here, T * velocity)
-            goals.append(np.concatenate(each))
+            goals.append(np.concatenate(velocities))
         begun = perf_counter_ns()
         steps = T * np.clip(box, -_FASTEST, _FASTEST)
         self._rows.b = np.concatenate([here.q + steps[1], -here.q - steps[0]])
@@ -159,11 +159,11 @@ def _added(robot: Robot, solver: placo.KinematicsSolver, task: Task, priority: s
                 theirs.R_world_frame = turn @ here.placement(task.frame).rotation
         case Joints() | Posture() | Damping():
             theirs = solver.add_joints_task()
-            places = joint_indices(robot, task.joints)
-            names = [robot.joint_names[place] for place in places]
+            indices = joint_indices(robot, task.joints)
+            names = [robot.joint_names[index] for index in indices]
 
             def aim(here: Configuration, step: Array) -> None:
-                theirs.set_joints(dict(zip(names, (here.q[places] + step).tolist(), strict=True)))
+                theirs.set_joints(dict(zip(names, (here.q[indices] + step).tolist(), strict=True)))
 
             theirs.set_joints(dict.fromkeys(names, 0.0))
         case _:

@@ -14,7 +14,7 @@ from himpc.htmpc.settings import MotionBounds
 from himpc.plan import Binding
 
 Array = NDArray[np.float64]
-Whole = NDArray[np.int64]
+IntArray = NDArray[np.int64]
 
 
 class ActiveMotionRows(NamedTuple):
@@ -22,9 +22,9 @@ class ActiveMotionRows(NamedTuple):
     `name` is the pair of a row of a distance, the coordinate of a row of (12), the cost of a row of (11), and
     "" for the rows of a joint."""
 
-    kind: Whole
-    knot: Whole
-    part: Whole
+    kind: IntArray
+    knot: IntArray
+    part: IntArray
     multiplier: Array
     name: tuple[str, ...]
 
@@ -64,14 +64,14 @@ class LevelEvidence(NamedTuple):
 
     def binding(self, joint_names: Sequence[str]) -> list[Binding]:
         """Returns the active constraints with the names of joints and kinds."""
-        found: list[Binding] = []
+        bindings: list[Binding] = []
         kinds, knots, parts, values, names = self.active
-        each = zip(kinds.tolist(), knots.tolist(), parts.tolist(), values.tolist(), names, strict=True)
-        for kind, knot, part, multiplier, name in each:
+        rows = zip(kinds.tolist(), knots.tolist(), parts.tolist(), values.tolist(), names, strict=True)
+        for kind, knot, part, multiplier, name in rows:
             joint = name or joint_names[int(part)]
             side = "upper" if multiplier > 0 else "lower"
-            found.append(Binding(self.name, joint, KINDS[kind], side, knot, abs(multiplier), 0.0))
-        return found
+            bindings.append(Binding(self.name, joint, KINDS[kind], side, knot, abs(multiplier), 0.0))
+        return bindings
 
 
 class VelocityPlan(NamedTuple):
@@ -107,7 +107,7 @@ class VelocityPlan(NamedTuple):
 
     def binding(self, joint_names: Sequence[str]) -> list[Binding]:
         """Returns all active constraints, level by level."""
-        return [each for level in self.levels for each in level.binding(joint_names)]
+        return [bound for level in self.levels for bound in level.binding(joint_names)]
 
     @property
     def unsolved(self) -> int:

@@ -41,12 +41,12 @@ def integrator(N: int, dt: float) -> Integrator:
     before = s < k
     T_v = np.where(before, dt, 0.0)
     T_q = np.where(before, dt * dt * (k - s - 0.5), 0.0)
-    found = Integrator(
+    matrices = Integrator(
         T_v, T_q, np.eye(N) - np.eye(N, k=-1), np.asarray(dt * np.arange(1, N + 1), np.float64)
     )
-    for matrix in found:
+    for matrix in matrices:
         matrix.setflags(write=False)
-    return found
+    return matrices
 
 
 class Start(NamedTuple):

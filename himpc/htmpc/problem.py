@@ -104,10 +104,10 @@ class Iterate:
 
     def errors(self, level: Tracking) -> Array:
         """Returns e at knots 1 … N, (N, m)."""
-        found = self._errors.get(level.name)
-        if found is None:
-            found = self._errors[level.name] = level.errors(self.knots, self.tick.desired)
-        return found
+        errors = self._errors.get(level.name)
+        if errors is None:
+            errors = self._errors[level.name] = level.errors(self.knots, self.tick.desired)
+        return errors
 
     def jacobian(self, level: Tracking) -> Array:
         """Returns ∂e_k/∂q_k at knots 1 … N, (N, m, n)."""
@@ -117,16 +117,16 @@ class Iterate:
 
     def effort(self, absolute: bool) -> tuple[float, Array]:
         """Returns value and gradient (N·n,) of J_eff: (10) itself, or its proximal form."""
-        found = self._efforts.get(absolute)
-        if found is None:
+        effort = self._efforts.get(absolute)
+        if effort is None:
             tick = self.tick
             if absolute:
-                found = tick.effort.about(tick.rest, self.U)
+                effort = tick.effort.about(tick.rest, self.U)
             else:
                 value, slope = tick.effort.relative(self.U, tick.plan)
-                found = PROXIMAL * value, PROXIMAL * slope
-            self._efforts[absolute] = found
-        return found
+                effort = PROXIMAL * value, PROXIMAL * slope
+            self._efforts[absolute] = effort
+        return effort
 
     @cached_property
     def near(self) -> Clearances | None:
@@ -213,40 +213,40 @@ class Problem:
         the rows after (7d).
         """
         tick, table = self.tick, self.tick.table
-        first = place = len(tick.rows.A)
+        first = row = len(tick.rows.A)
         if not self.softened:
-            table.about(at.U.ravel(), place)
+            table.about(at.U.ravel(), row)
             first = 0
         for above in self.guards:
-            place = self._guarded(above, place, at, slopes)
+            row = self._guarded(above, row, at, slopes)
         if self.guards and not self.softened and at.near is not None and len(at.near.knot):
             # Below the first level, the present violation is allowed: d = 0 satisfies the rows.
-            rows = self._avoidance_rows(at, place)
-            place = table.put(place, rows.widened(np.zeros(at.U.size)))
-        return table.changes(first, place)
+            rows = self._avoidance_rows(at, row)
+            row = table.put(row, rows.widened(np.zeros(at.U.size)))
+        return table.changes(first, row)
 
-    def _guarded(self, above: Guard, place: int, at: Iterate, slopes: Iterate | None) -> int:
+    def _guarded(self, above: Guard, row: int, at: Iterate, slopes: Iterate | None) -> int:
         """Writes (12) or (11) for a level above into the table; returns the index after its rows."""
         tick, table, strict = self.tick, self.tick.table, slopes is not None
         e, J = at.errors(above.tracking), (slopes or at).jacobian(above.tracking)
         if tick.settings.lexicographic == "per_coordinate":
-            table.reserve(place + e.size)
-            guard(J, e, above.best, strict, tick.T_q, place, table.A, table.room, table.labels)
-            return place + e.size
+            table.reserve(row + e.size)
+            guard(J, e, above.best, strict, tick.T_q, row, table.A, table.room, table.labels)
+            return row + e.size
         pull = np.einsum("km,kmj->kj", above.tracking.Q * e, J)
-        table.reserve(place + 1)
-        table.A[place] = (tick.T_q.T @ pull).ravel()
-        table.room[:, place] = -np.inf, above.gap(e, strict)
-        table.labels[:, place] = LEXICOGRAPHIC, tick.settings.horizon, 0
-        return place + 1
+        table.reserve(row + 1)
+        table.A[row] = (tick.T_q.T @ pull).ravel()
+        table.room[:, row] = -np.inf, above.gap(e, strict)
+        table.labels[:, row] = LEXICOGRAPHIC, tick.settings.horizon, 0
+        return row + 1
 
     def with_slack(self, at: Iterate, rows: ConstraintRows) -> tuple[ConstraintRows, int]:
         """Returns `rows` of an iterate and the number of rows of (7c). On the first level, the rows of (7c),
         which slacks may relax, are appended to `rows`."""
         if not self.forced or at.near is None or not len(at.near.knot):
             return rows, 0
-        slack, place = self._avoidance_rows(at, len(rows.A)), len(rows.A)
-        return self.tick.table.changes(0, self.tick.table.put(place, slack)), len(slack.A)
+        slack, row = self._avoidance_rows(at, len(rows.A)), len(rows.A)
+        return self.tick.table.changes(0, self.tick.table.put(row, slack)), len(slack.A)
 
     @property
     def unchanging(self) -> int:
@@ -267,11 +267,11 @@ class Problem:
             above.excess(at.errors(above.tracking), per_coordinate, delta) <= 0.0 for above in self.guards
         )
 
-    def _avoidance_rows(self, at: Iterate, place: int) -> ConstraintRows:
+    def _avoidance_rows(self, at: Iterate, row: int) -> ConstraintRows:
         avoidance, tick = self.tick.avoidance, self.tick
         assert avoidance is not None
         assert at.near is not None
-        return avoidance.rows(at.near, len(at.U), tick.settings.dt, tick.table, place)
+        return avoidance.rows(at.near, len(at.U), tick.settings.dt, tick.table, row)
 
     def _soft_rows(self, at: Iterate) -> ConstraintRows:
         """Returns (7d) and (7c) on the inputs."""

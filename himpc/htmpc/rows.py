@@ -76,8 +76,8 @@ class ConstraintTable:
         if missing > 0:
             self.A = np.vstack([self.A, np.zeros((missing + 100, self.A.shape[1]))])
             self.bounds, self.room, self.labels = (
-                np.hstack([each, np.zeros((len(each), missing + 100), each.dtype)])
-                for each in (self.bounds, self.room, self.labels)
+                np.hstack([array, np.zeros((len(array), missing + 100), array.dtype)])
+                for array in (self.bounds, self.room, self.labels)
             )
 
     def absolute(self, count: int) -> ConstraintRows:
@@ -99,20 +99,20 @@ class ConstraintTable:
         lower, upper = self.room[:, :count]
         return max(0.0, float(lower.max(initial=0.0)), -float(upper.min(initial=0.0)))
 
-    def put(self, place: int, rows: ConstraintRows) -> int:
+    def put(self, row: int, rows: ConstraintRows) -> int:
         """Writes bounds and labels of rows on d to the table, which already contains their A. Returns the
         index after the rows."""
-        end = place + len(rows.A)
-        self.room[:, place:end] = rows.lower, rows.upper
-        self.labels[:, place:end] = rows.kind, rows.knot, rows.part
+        end = row + len(rows.A)
+        self.room[:, row:end] = rows.lower, rows.upper
+        self.labels[:, row:end] = rows.kind, rows.knot, rows.part
         return end
 
-    def spread(self, place: int, knot: NDArray[np.int64], slopes: Array, T_q: Array) -> Array:
-        """Writes rows of functions of q, from index `place` on, and returns them. `slopes` (r, n) are the
+    def spread(self, row: int, knot: NDArray[np.int64], slopes: Array, T_q: Array) -> Array:
+        """Writes rows of functions of q, from index `row` on, and returns them. `slopes` (r, n) are the
         derivatives of the functions with respect to q at the knots (r,)."""
-        self.reserve(place + len(knot))
-        spread(self.A, place, np.asarray(knot, np.intp), np.ascontiguousarray(slopes), T_q)
-        return self.A[place : place + len(knot)]
+        self.reserve(row + len(knot))
+        spread(self.A, row, np.asarray(knot, np.intp), np.ascontiguousarray(slopes), T_q)
+        return self.A[row : row + len(knot)]
 
 
 def limit_rows(

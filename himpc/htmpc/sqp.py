@@ -73,33 +73,33 @@ def solve_level(problem: Problem, at: Iterate) -> Solved:
     started = perf_counter_ns()
     steps: list[float] = []
     residual, fallback, unsolved = 0.0, "solve", 0
-    found = None
+    direction = None
     for _ in range(problem.tick.settings.max_iter):
-        found = _direction(problem, at)
-        unsolved += found.fallback != "solve"
-        if found.fallback != "solve":
-            fallback = found.fallback
-        if found.fallback == "keep":
+        direction = _direction(problem, at)
+        unsolved += direction.fallback != "solve"
+        if direction.fallback != "solve":
+            fallback = direction.fallback
+        if direction.fallback == "keep":
             steps.append(0.0)
             at = at if problem.guards else problem.tick.iterate(problem.tick.brake)
             break
-        residual = max(residual, found.solution.kkt_residual)
+        residual = max(residual, direction.solution.kkt_residual)
         before = at.U
-        alpha, at = _line_search(problem, at, found)
+        alpha, at = _line_search(problem, at, direction)
         steps.append(alpha)
         if float(np.abs(at.U - before).max()) < _STILL:
             break
-    assert found is not None
+    assert direction is not None
     return Solved(
         at,
-        found.solution.status,
+        direction.solution.status,
         fallback,
         residual,
         tuple(steps),
         unsolved,
         (perf_counter_ns() - started) / 1e3,
-        found.rows,
-        found.solution.multipliers,
+        direction.rows,
+        direction.solution.multipliers,
     )
 
 
@@ -169,7 +169,7 @@ def _price(solution: QPSolution, rows: ConstraintRows, bought: int) -> float:
     return float(paid.max())
 
 
-def _line_search(problem: Problem, at: Iterate, found: _Direction) -> tuple[float, Iterate]:
+def _line_search(problem: Problem, at: Iterate, direction: _Direction) -> tuple[float, Iterate]:
     """Returns the largest step of 1, β, β², … that satisfies (13) and sufficiently lowers the merit, and its
     iterate. The step is 0 if none of them does."""
     tick = problem.tick
@@ -179,26 +179,28 @@ def _line_search(problem: Problem, at: Iterate, found: _Direction) -> tuple[floa
     returning = problem.forced and tick.table.outside(len(tick.rows.A)) > _FEASIBLE
     alpha = 1.0
     for attempt in range(BACKTRACKS + 1):
-        trial = tick.iterate(at.U + alpha * found.d)
+        trial = tick.iterate(at.U + alpha * direction.d)
         if returning:
             return alpha, trial
-        enough = merit + DECREASE * alpha * min(found.slope, 0.0) + _ROUNDING * (1.0 + abs(merit))
+        enough = merit + DECREASE * alpha * min(direction.slope, 0.0) + _ROUNDING * (1.0 + abs(merit))
         bends = problem.corrects and attempt < CORRECTIONS
         fine = bends and problem.allowed(trial, UNCORRECTED)
         if bends and not fine:
-            trial = _led_back(problem, at, found, trial)
+            trial = _led_back(problem, at, direction, trial)
         if (fine or problem.allowed(trial)) and problem.merit(trial) <= enough:
             return alpha, trial
         alpha *= SHRINK
     return 0.0, at
 
 
-def _led_back(problem: Problem, at: Iterate, found: _Direction, trial: Iterate) -> Iterate:
+def _led_back(problem: Problem, at: Iterate, direction: _Direction, trial: Iterate) -> Iterate:
     """Returns the iterate after a correction of a step. The correction is the smallest one, in the Hessian's
     norm, that removes the errors which the step has added to the levels above.
 
     The levels' errors are nonlinear. A step along their linear rows violates (13) by an amount that grows
     with the square of the step's length. Without this second-order correction only short steps are accepted.
     """
-    solution = _solve(problem, found.H, np.zeros_like(found.g), problem.rows(trial, at), 0, found.own)
+    solution = _solve(
+        problem, direction.H, np.zeros_like(direction.g), problem.rows(trial, at), 0, direction.own
+    )
     return problem.tick.iterate(trial.U + solution.x.reshape(trial.U.shape)) if solution.solved else trial

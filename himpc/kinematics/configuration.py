@@ -66,20 +66,20 @@ class Configuration:
         """Returns (N, 6, n) frame Jacobians, linear over angular, world axes, at the frame's origin."""
         if self._known is not None:
             return self._known(frame)
-        found = self._jacobians.get(frame)
-        if found is None:
+        jacobians = self._jacobians.get(frame)
+        if jacobians is None:
             model, data = self.robot.model, self._data
             index = self.robot.frame_id(frame or self.robot.tip)
             compute, axes = pin.computeFrameJacobian, pin.LOCAL_WORLD_ALIGNED
-            found = np.empty((self.horizon, 6, self.q.size))
+            jacobians = np.empty((self.horizon, 6, self.q.size))
             # For a single joint Pinocchio returns the Jacobian as a one-dimensional array.
-            columns = found if self.q.size > 1 else found[:, :, 0]
+            columns = jacobians if self.q.size > 1 else jacobians[:, :, 0]
             placed = self._placements[frame] = []
             for j, q in enumerate((self.q, *self.knots)):
                 columns[j] = compute(model, data, q, index, axes)
                 placed.append(data.oMf[index].copy())
-            self._jacobians[frame] = found
-        return found
+            self._jacobians[frame] = jacobians
+        return jacobians
 
     def placement(self, frame: str = "") -> pin.SE3:
         """Returns the placement of a frame in the world at the measured state."""
@@ -102,18 +102,18 @@ class Configuration:
         With R of the root and d = p − p_root: Rᵀ(J_p − J_p,root + [d]× J_ω,root) and Rᵀ(J_ω − J_ω,root).
         """
         key = f"{frame}\0{root}"
-        found = self._jacobians.get(key)
-        if found is None:
+        jacobians = self._jacobians.get(key)
+        if jacobians is None:
             seen, sees = self.frame_jacobians(frame), self.frame_jacobians(root)
-            found = seen - sees
+            jacobians = seen - sees
             for j, (far, near) in enumerate(zip(self.placements(frame), self.placements(root), strict=True)):
                 x, y, z = far.translation - near.translation
                 turn = near.rotation.T
                 across = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
-                found[j, :3] = turn @ (found[j, :3] + across @ sees[j, 3:])
-                found[j, 3:] = turn @ found[j, 3:]
-            self._jacobians[key] = found
-        return found
+                jacobians[j, :3] = turn @ (jacobians[j, :3] + across @ sees[j, 3:])
+                jacobians[j, 3:] = turn @ jacobians[j, 3:]
+            self._jacobians[key] = jacobians
+        return jacobians
 
     def centre_of_mass(self) -> Array:
         """Returns the centre of all moving masses at the measured state, (3,) m, world, from the robot's

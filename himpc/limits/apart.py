@@ -38,10 +38,10 @@ def kept_apart(rows: Rows, joints: int, U: Array) -> Array:
     least = np.minimum(low[:joints].max(axis=0), 0.0)
     most = np.maximum(high[:joints].min(axis=0), 0.0)
     D, lower, upper = [], [], []
-    for place in range(joints // N, len(rows.constraints)):
+    for index in range(joints // N, len(rows.constraints)):
         directions, block = (
-            rows.directions[place] if rows.directions else None,
-            slice(place * N, (place + 1) * N),
+            rows.directions[index] if rows.directions else None,
+            slice(index * N, (index + 1) * N),
         )
         D.append(np.eye(n) if directions is None else directions.D)
         lower.append(low[block].max(axis=0))
@@ -54,8 +54,8 @@ def kept_apart(rows: Rows, joints: int, U: Array) -> Array:
     c = len(normals)
     H = np.diag(np.r_[np.full(n, _FAINT), np.ones(c)])
     A = np.block([[np.eye(n), np.zeros((n, c))], [normals, np.eye(c)]])
-    found = solve_qp(H, np.zeros(n + c), A, np.r_[least, lower], np.r_[most, upper], "daqp", _ITERATIONS)
+    solution = solve_qp(H, np.zeros(n + c), A, np.r_[least, lower], np.r_[most, upper], "daqp", _ITERATIONS)
     moved = U.copy()
-    if np.isfinite(found.x).all():
-        moved[0] += np.minimum(np.maximum(found.x[:n], least), most)
+    if np.isfinite(solution.x).all():
+        moved[0] += np.minimum(np.maximum(solution.x[:n], least), most)
     return moved

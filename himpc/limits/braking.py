@@ -40,16 +40,16 @@ def braking(rows: Rows) -> Array:
     rest = np.zeros((N, n)) if rows.rest is None else rows.rest
     own = _own(rows)
     if own < len(rows.constraints):
-        if not all(each.yields_first for each in rows.constraints[own:]):
+        if not all(constraint.yields_first for constraint in rows.constraints[own:]):
             return closest_to_rest(rows, rest)
         return kept_apart(rows, own * N, braking(_first(rows, own)))
     w = _walk(rows, rest)
     U = steps(steps(w))
     if len(rows.constraints) == 3:
         for joint in np.flatnonzero(missed(rows, U).max(axis=0) > MET).tolist():
-            found = _closest(rows, joint, rest[:, joint])
-            if found is not None:
-                w[:, joint] = found
+            closest = _closest(rows, joint, rest[:, joint])
+            if closest is not None:
+                w[:, joint] = closest
         U = steps(steps(w))
     return U
 
@@ -58,7 +58,7 @@ def _own(rows: Rows) -> int:
     """Returns the number of constraints, from the first on, whose rows do not couple joints and can be
     handled here."""
     known = list(map(is_, rows.constraints, (TORQUE, VELOCITY, POSITION)))
-    return next((place for place, each in enumerate(known) if not each), len(known))
+    return next((index for index, is_own in enumerate(known) if not is_own), len(known))
 
 
 def _first(rows: Rows, count: int) -> Rows:
@@ -122,13 +122,13 @@ def _closest(rows: Rows, joint: int, rest: Array) -> Array | None:
     # No increment moves the first position row.
     kept = np.r_[0 : 2 * N, 2 * N + 1 : 3 * N]
     lower, upper = rows.lower[kept, joint], rows.upper[kept, joint]
-    found = solve_qp(np.eye(N), -rest, A, lower, upper, "daqp", _ITERATIONS)
-    value = A @ found.x
+    solution = solve_qp(np.eye(N), -rest, A, lower, upper, "daqp", _ITERATIONS)
+    value = A @ solution.x
     met = bool(((value <= upper + MET) & (value >= lower - MET)).all())
     if not met:
         return None
     # Small violations of the torque rows by the solver are removed: these rows are satisfied exactly.
     w, before = np.empty(N), 0.0
     for j in range(N):
-        before = w[j] = min(max(found.x[j], before + rows.lower[j, joint]), before + rows.upper[j, joint])
+        before = w[j] = min(max(solution.x[j], before + rows.lower[j, joint]), before + rows.upper[j, joint])
     return w

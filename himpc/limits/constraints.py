@@ -22,7 +22,7 @@ CONSTRAINTS: tuple[Constraint, ...] = (
 
 def imposed(limits: Limits) -> tuple[Constraint, ...]:
     """Returns the constraints that have rows under these limits."""
-    return tuple(each for each in CONSTRAINTS if each.is_on(limits))
+    return tuple(constraint for constraint in CONSTRAINTS if constraint.is_on(limits))
 
 
 def bit_of(constraint: Constraint) -> int:

@@ -58,9 +58,9 @@ class Rows(NamedTuple):
 
     def _turned(self, value: Array, absolute: bool) -> Array:
         N = self.L.shape[1]
-        for place, directions in enumerate(self.directions):
+        for index, directions in enumerate(self.directions):
             if directions is not None:
-                block = slice(place * N, (place + 1) * N)
+                block = slice(index * N, (index + 1) * N)
                 D = np.abs(directions.D) if absolute else directions.D
                 value[block] = value[block] @ D.T
         return value
@@ -71,21 +71,21 @@ class Rows(NamedTuple):
         the rows."""
         N, n = self.L.shape[1], self.lower.shape[1]
         A = np.kron(self.L, np.eye(n))
-        for place, directions in enumerate(self.directions):
+        for index, directions in enumerate(self.directions):
             if directions is not None:
-                block = slice(place * N, (place + 1) * N)
+                block = slice(index * N, (index + 1) * N)
                 A[block.start * n : block.stop * n] = np.kron(self.L[block], directions.D)
         return np.asarray(A, np.float64)
 
     @property
     def bits(self) -> NDArray[np.intp]:
         """The bit of each row in `at_bound`, (r,)."""
-        return np.repeat([bit_of(each) for each in self.constraints], self.L.shape[1])
+        return np.repeat([bit_of(constraint) for constraint in self.constraints], self.L.shape[1])
 
     @property
     def is_hard(self) -> NDArray[np.bool_]:
         """Whether each row is hard, (r,): hard rows never give way."""
-        return np.repeat([each.hard for each in self.constraints], self.L.shape[1])
+        return np.repeat([constraint.hard for constraint in self.constraints], self.L.shape[1])
 
     def directions_of(self, row: int) -> Directions | None:
         """Returns the directions of a row's columns; None if the columns are the joints."""
@@ -120,7 +120,7 @@ second."""
 @lru_cache(maxsize=64)
 def profiles(N: int, constraints: tuple[Constraint, ...]) -> Array:
     """L of `Rows`."""
-    return np.vstack([each.profile(N) for each in constraints])
+    return np.vstack([constraint.profile(N) for constraint in constraints])
 
 
 def build_rows(
@@ -144,7 +144,7 @@ def build_rows(
     """
     now = Moment(state, tau_0, M_bar, limits, force, N, T_s, near)
     constraints = imposed(limits)
-    blocks = [each.bounds(now) for each in constraints]
+    blocks = [constraint.bounds(now) for constraint in constraints]
     directions = tuple(block.directions for block in blocks)
     return Rows(
         L=profiles(N, constraints),
@@ -153,7 +153,7 @@ def build_rows(
         constraints=constraints,
         stopping=next((block.stopping for block in blocks if block.stopping is not None), None),
         rest=coming_to_rest(state, M_bar, N, T_s),
-        directions=directions if any(each is not None for each in directions) else (),
+        directions=directions if any(direction is not None for direction in directions) else (),
     )
 
 

@@ -82,18 +82,18 @@ def closest_to_rest(rows: Rows, rest: Array) -> Array:
 
 def groups(rows: Rows, n: int) -> list[list[int]]:
     """Returns groups of joints. Two joints are in one group if a bounded direction couples them."""
-    found = [{joint} for joint in range(n)]
+    coupled = [{joint} for joint in range(n)]
     N = rows.L.shape[1]
     bounded = np.isfinite(rows.lower) | np.isfinite(rows.upper)
-    for place, directions in enumerate(rows.directions):
+    for index, directions in enumerate(rows.directions):
         if directions is None:
             continue
-        used = bounded[place * N : (place + 1) * N].any(axis=0)
+        used = bounded[index * N : (index + 1) * N].any(axis=0)
         for along in directions.D[used]:
             joints = set(np.flatnonzero(along).tolist())
-            apart = [each for each in found if not each & joints]
-            found = [*apart, joints.union(*(each for each in found if each & joints))]
-    return [sorted(each) for each in found]
+            apart = [group for group in coupled if not group & joints]
+            coupled = [*apart, joints.union(*(group for group in coupled if group & joints))]
+    return [sorted(group) for group in coupled]
 
 
 def _part(rows: Rows, group: list[int]) -> _Part:
@@ -106,9 +106,9 @@ def _part(rows: Rows, group: list[int]) -> _Part:
         T = np.eye(N)[:, np.linspace(0, N - 1, moves).astype(int)]
         G = summed_twice(N) @ T
     A, lower, upper, ranks = [], [], [], []
-    for place, constraint in enumerate(rows.constraints):
-        block = slice(place * N, (place + 1) * N)
-        directions = rows.directions[place] if rows.directions else None
+    for index, constraint in enumerate(rows.constraints):
+        block = slice(index * N, (index + 1) * N)
+        directions = rows.directions[index] if rows.directions else None
         D = np.eye(c) if directions is None else directions.D[:, group]
         columns = group if directions is None else np.flatnonzero(D.any(axis=1))
         own = np.kron(rows.L[block] @ T, D if directions is None else D[columns])
@@ -132,9 +132,9 @@ def _closest(part: _Part, rest: Array) -> Array | None:
     rows are infeasible."""
     c = rest.shape[1]
     H = np.asarray(np.kron(part.G.T @ part.G, np.eye(c)), np.float64)
-    found = solve_qp(H, -(part.G.T @ rest).ravel(), part.A, part.lower, part.upper, "daqp", _ITERATIONS)
-    value = part.A @ found.x
-    return found.x if bool(((value <= part.upper + MET) & (value >= part.lower - MET)).all()) else None
+    solution = solve_qp(H, -(part.G.T @ rest).ravel(), part.A, part.lower, part.upper, "daqp", _ITERATIONS)
+    value = part.A @ solution.x
+    return solution.x if bool(((value <= part.upper + MET) & (value >= part.lower - MET)).all()) else None
 
 
 def _up_to(part: _Part, rank: int) -> _Part:
@@ -159,8 +159,8 @@ def _given_way(part: _Part, rank: int) -> _Part:
     slack = np.zeros((len(A), yields.size))
     slack[yields, np.arange(yields.size)] = 1.0
     H = np.diag(np.r_[np.full(A.shape[1], _FAINT), np.ones(yields.size)])
-    found = solve_qp(H, np.zeros(len(H)), np.hstack([A, slack]), lower, upper, "daqp", _ITERATIONS)
-    value = A @ found.x[: A.shape[1]]
+    solution = solve_qp(H, np.zeros(len(H)), np.hstack([A, slack]), lower, upper, "daqp", _ITERATIONS)
+    value = A @ solution.x[: A.shape[1]]
     missed = np.maximum(np.maximum(value - upper, lower - value), 0.0)
     missed[counted.ranks < rank] = 0.0
     missed[missed > 0.0] += MET  # with rounding errors, the widened rows stay feasible
@@ -175,7 +175,7 @@ def _within(rows: Rows, wanted: Array) -> Array:
     `viable`.
     """
     N = len(wanted)
-    blocks = {each: slice(k * N, (k + 1) * N) for k, each in enumerate(rows.constraints)}
+    blocks = {constraint: slice(k * N, (k + 1) * N) for k, constraint in enumerate(rows.constraints)}
     infinite = np.full(wanted.shape, np.inf)
     least, most = -infinite, infinite
     if TORQUE_RATE in blocks:

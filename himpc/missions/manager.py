@@ -49,14 +49,14 @@ class Progress:
 
     Attributes:
         mission: all tasks, including completed ones.
-        place: l₀, the index of the first task in the window; the number of tasks when all are completed.
+        l_0: l₀, the index of the first task in the window; the number of tasks when all are completed.
         window: the tasks that the controller receives, highest priority first.
         released: names of tasks whose hold was ended by `release`.
         completed: (name, time in s) of every completed task, in order.
     """
 
     mission: Mission
-    place: int = 0
+    l_0: int = 0
     window: tuple[Active, ...] = ()
     released: frozenset[str] = frozenset()
     completed: tuple[tuple[str, float], ...] = ()
@@ -67,7 +67,7 @@ class Progress:
     @property
     def done(self) -> bool:
         """Whether every task is completed."""
-        return self.place == len(self.mission)
+        return self.l_0 == len(self.mission)
 
 
 def advanced(
@@ -92,7 +92,7 @@ def advanced(
             return replace(progress, window=window)
         progress = replace(
             progress,
-            place=progress.place + 1,
+            l_0=progress.l_0 + 1,
             window=window,
             completed=(*progress.completed, (first.task.name, t)),
         )
@@ -103,7 +103,7 @@ def _window(progress: Progress, L: int, t: float, points: Mapping[str, Array]) -
     known = {active.task: active for active in progress.window}
     return tuple(
         known.get(task) or Active(task, *task.motion.planned(points[task.role], t))
-        for task in progress.mission[progress.place : progress.place + max(L, 1)]
+        for task in progress.mission[progress.l_0 : progress.l_0 + max(L, 1)]
     )
 
 
@@ -152,10 +152,10 @@ def move(progress: Progress, name: str, goal: Point) -> Progress:
         InputError: there is no such task, the task is completed or follows a given trajectory, or the goal
             does not fit.
     """
-    place = _ahead(progress, name)
-    task = progress.mission[place]
+    index = _ahead(progress, name)
+    task = progress.mission[index]
     moved = replace(task, motion=_elsewhere(task, goal))
-    return replace(progress, mission=_spliced(progress.mission, place, place + 1, moved))
+    return replace(progress, mission=_spliced(progress.mission, index, index + 1, moved))
 
 
 def _elsewhere(task: MissionTask, goal: Point) -> Go | Follow:
@@ -175,8 +175,8 @@ def insert(progress: Progress, task: MissionTask, before: str | None = None) -> 
     Raises:
         InputError: the other task is unknown or completed, or the new task's name already exists.
     """
-    place = len(progress.mission) if before is None else _ahead(progress, before)
-    return replace(progress, mission=_spliced(progress.mission, place, place, task))
+    index = len(progress.mission) if before is None else _ahead(progress, before)
+    return replace(progress, mission=_spliced(progress.mission, index, index, task))
 
 
 def reorder(progress: Progress, name: str, to: int) -> Progress:
@@ -186,12 +186,12 @@ def reorder(progress: Progress, name: str, to: int) -> Progress:
     Raises:
         InputError: there is no such task, the task is completed, or there is no such index.
     """
-    place = _ahead(progress, name)
-    left = len(progress.mission) - progress.place
+    index = _ahead(progress, name)
+    left = len(progress.mission) - progress.l_0
     if not 0 <= to < left:
         raise InputError(f"task '{name}' cannot move to index {to}: give an index from 0 to {left - 1}")
     mission = list(progress.mission)
-    mission.insert(progress.place + to, mission.pop(place))
+    mission.insert(progress.l_0 + to, mission.pop(index))
     return replace(progress, mission=tuple(mission))
 
 
@@ -201,15 +201,15 @@ def remove(progress: Progress, name: str) -> Progress:
     Raises:
         InputError: there is no such task, the task is completed, or it is the only task.
     """
-    place = _ahead(progress, name)
-    return replace(progress, mission=_spliced(progress.mission, place, place + 1))
+    index = _ahead(progress, name)
+    return replace(progress, mission=_spliced(progress.mission, index, index + 1))
 
 
 def _ahead(progress: Progress, name: str) -> int:
-    place = find(progress.mission, name)
-    if place < progress.place:
+    index = find(progress.mission, name)
+    if index < progress.l_0:
         raise InputError(f"task '{name}' is completed: choose a task that is not completed")
-    return place
+    return index
 
 
 def _spliced(mission: Mission, start: int, end: int, *tasks: MissionTask) -> Mission:

@@ -156,7 +156,7 @@ class Plan:
     def binding(self, joint_names: tuple[str, ...]) -> list[Binding]:
         """Returns all active constraints, with names instead of indices: level by level, then those of a
         filter that follows the levels."""
-        found = [(level, self.rows) for level in self.levels]
+        pairs = [(level, self.rows) for level in self.levels]
         return [
             Binding(
                 level.name,
@@ -167,6 +167,6 @@ class Plan:
                 abs(multiplier),
                 slack,
             )
-            for level, rows in (found if self.behind is None else [*found, self.behind])
+            for level, rows in (pairs if self.behind is None else [*pairs, self.behind])
             for label, knot, direction, multiplier, slack in level.active.labelled(rows, joint_names)
         ]

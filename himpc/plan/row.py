@@ -106,8 +106,8 @@ def _write_by_field(row: Array, layout: Layout, plan: Plan) -> None:
 
 
 def _mark_bounds(marks: list[int], active: ActiveRows, rows: Rows) -> None:
-    found = zip(active.row.tolist(), active.joint.tolist(), active.multiplier.tolist(), strict=True)
-    for row, column, multiplier in found:
+    entries = zip(active.row.tolist(), active.joint.tolist(), active.multiplier.tolist(), strict=True)
+    for row, column, multiplier in entries:
         bit = bit_of(rows.constraint(row, column, multiplier > 0))
         for joint in rows.joints_of(row, column):
             marks[joint] |= bit

@@ -21,7 +21,7 @@ class Outlook(Mapping[str, Preview]):
         observed: the objects around the robot.
     """
 
-    __slots__ = ("N", "T_s", "_found", "observed", "references", "t")
+    __slots__ = ("N", "T_s", "_previews", "observed", "references", "t")
 
     def __init__(
         self,
@@ -33,13 +33,13 @@ class Outlook(Mapping[str, Preview]):
     ) -> None:
         self.references, self.t, self.T_s, self.N = references, t, T_s, N
         self.observed = observed
-        self._found: dict[str, Preview] = {}
+        self._previews: dict[str, Preview] = {}
 
     def __getitem__(self, name: str) -> Preview:
-        found = self._found.get(name)
-        if found is None:
-            found = self._found[name] = self.references[name].preview(self.t, self.T_s, self.N)
-        return found
+        preview = self._previews.get(name)
+        if preview is None:
+            preview = self._previews[name] = self.references[name].preview(self.t, self.T_s, self.N)
+        return preview
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.references)

@@ -46,7 +46,7 @@ class OnAxes(Task):
     def coordinates(self, robot: Robot) -> tuple[str, ...]:
         return tuple(self.axes)
 
-    def asked(self, configuration: Configuration, preview: Preview) -> Preview:
+    def reference_in_task_coordinates(self, configuration: Configuration, preview: Preview) -> Preview:
         """Returns the components of a reference along the task's axes. Only a rotation has components along
         all three axes."""
         if preview.value.ndim == 1 or preview.velocity.shape[1] == len(self.axes):

@@ -24,7 +24,7 @@ class FrameOrientation(OrientationTask, FrameTask):
         return configuration.placement(self.frame).rotation
 
     def rotations(self, configuration: Configuration) -> list[Array]:
-        return [each.rotation for each in configuration.placements(self.frame)]
+        return [placement.rotation for placement in configuration.placements(self.frame)]
 
     def angular_jacobian(self, configuration: Configuration) -> Array:
         return configuration.frame_jacobians(self.frame)[:, 3:]

@@ -65,7 +65,7 @@ class OrientationTask(OnAxes):
         """Returns ∂ẋ/∂ω, (N, m, 3), for R and R_d at every knot."""
         return np.array([slope(R @ R_d.T, self.axes) for R, R_d in zip(rotations, desired, strict=True)])
 
-    def asked(self, configuration: Configuration, preview: Preview) -> Preview:
+    def reference_in_task_coordinates(self, configuration: Configuration, preview: Preview) -> Preview:
         """Returns the desired motion in the coordinates of x̃. On fewer than three axes, a reference that
         rotates with ω_d changes x̃ at the rate −slope(E) E ω_d. This is also true after a rotation about the
         free axis."""
@@ -73,7 +73,7 @@ class OrientationTask(OnAxes):
             return preview
         if rests(preview):
             return at_rest(preview, len(self.axes))
-        moved, omega_d, alpha_d = (self.spread(each) for each in preview[1:])
+        moved, omega_d, alpha_d = (self.spread(samples) for samples in preview[1:])
         rotations = self.rotations(configuration)
         omega = self.angular_jacobian(configuration)[0] @ configuration.v
         G, change = np.zeros((2, len(moved), len(self.axes), 3))
@@ -92,28 +92,28 @@ class OrientationTask(OnAxes):
         chosen axes only."""
         if motion.shape[1] == len(AXES):
             return motion
-        found = np.zeros((len(motion), len(AXES)))
-        found[:, self.components] = motion
-        return found
+        full = np.zeros((len(motion), len(AXES)))
+        full[:, self.components] = motion
+        return full
 
 
 def rotation_error(E: Array, axes: str) -> Array:
     """Returns x̃ of E = R R_dᵀ on some axes, (m,) rad; see `OrientationTask`."""
     if len(axes) != 2:
-        found = log3(E)
-        return found if axes == AXES else found[[AXES.index(axis) for axis in axes]]
-    free = next(place for place, axis in enumerate(AXES) if axis not in axes)
+        error = log3(E)
+        return error if axes == AXES else error[[AXES.index(axis) for axis in axes]]
+    free = next(index for index, axis in enumerate(AXES) if axis not in axes)
     first, second = (free + 1) % 3, (free + 2) % 3
     aside, ahead = math.hypot(E[first, free], E[second, free]), E[free, free]
-    found = np.zeros(3)
+    error = np.zeros(3)
     if aside > _UPRIGHT:
         share = math.atan2(aside, ahead) / aside
-        found[first], found[second] = -share * E[second, free], share * E[first, free]
+        error[first], error[second] = -share * E[second, free], share * E[first, free]
     elif ahead > 0.0:
-        found[first], found[second] = -E[second, free], E[first, free]
+        error[first], error[second] = -E[second, free], E[first, free]
     else:
-        found[first] = math.pi
-    return found[[AXES.index(axis) for axis in axes]]
+        error[first] = math.pi
+    return error[[AXES.index(axis) for axis in axes]]
 
 
 def slope(E: Array, axes: str) -> Array:

@@ -100,37 +100,37 @@ class Pointing(Task):
         return x, slope
 
     def value(self, configuration: Configuration) -> Array:
-        place = configuration.placement(self.frame)
-        return self._seen(place.actInv(self._point(configuration)))[0]
+        placement = configuration.placement(self.frame)
+        return self._seen(placement.actInv(self._point(configuration)))[0]
 
     def error(self, value: Array, desired: Array) -> Array:
         return value
 
     def jacobian(self, configuration: Configuration) -> Array:
         point, rows = self._point(configuration), configuration.frame_jacobians(self.frame)
-        found = np.empty((len(rows), 2, rows.shape[2]))
-        for j, place in enumerate(configuration.placements(self.frame)):
-            s, turn = place.actInv(point), place.rotation.T
+        jacobian = np.empty((len(rows), 2, rows.shape[2]))
+        for j, placement in enumerate(configuration.placements(self.frame)):
+            s, turn = placement.actInv(point), placement.rotation.T
             # ṡ = −Rᵀṗ − Rᵀω × s
             moved = np.cross(s, turn @ rows[j, 3:], axisb=0).T - turn @ rows[j, :3]
-            found[j] = self._seen(s)[1] @ moved
-        return found
+            jacobian[j] = self._seen(s)[1] @ moved
+        return jacobian
 
-    def asked(self, configuration: Configuration, preview: Preview) -> Preview:
+    def reference_in_task_coordinates(self, configuration: Configuration, preview: Preview) -> Preview:
         """Returns the reference that compensates the motion of the point: a velocity ċ of the point changes x
         at the rate ∂x/∂c ċ."""
         if rests(preview):
             return at_rest(preview, 2)
         moved, c_dot, _ = preview[1:]
-        rows, places = configuration.frame_jacobians(self.frame)[0], configuration.placements(self.frame)
+        rows, placements = configuration.frame_jacobians(self.frame)[0], configuration.placements(self.frame)
         p_dot, omega = rows[:3] @ configuration.v, rows[3:] @ configuration.v
         on = exp3(NUDGE * omega)
         G, change = np.zeros((2, len(moved), 2, 3))
         for j, gone in enumerate(moved):
-            place = places[min(j, len(places) - 1)]
+            placement = placements[min(j, len(placements) - 1)]
             R, away, step = (
-                place.rotation,
-                preview.value + gone - place.translation,
+                placement.rotation,
+                preview.value + gone - placement.translation,
                 NUDGE * (c_dot[j] - p_dot),
             )
             G[j] = self._back(R, away)

@@ -33,7 +33,7 @@ def seen(preview: Preview, motion: tuple[Array, Array, Array], G: Array, change:
         G: (N+1, m, 3), the matrix at every knot.
         change: Ġ, (N+1, m, 3), along the motion of robot and target.
     """
-    displacement, velocity, acceleration = (each[:, :, None] for each in motion)
+    displacement, velocity, acceleration = (samples[:, :, None] for samples in motion)
     gone = np.zeros(G.shape[:2])
     gone[1:] = (0.5 * (G[1:] + G[:-1]) @ np.diff(displacement, axis=0))[:, :, 0].cumsum(axis=0)
     return Preview(

@@ -59,7 +59,7 @@ class Task(ABC):
         """Returns the x_d for which the present error is zero. A draggable target starts at this value."""
         return self.value(configuration)
 
-    def asked(self, configuration: Configuration, preview: Preview) -> Preview:
+    def reference_in_task_coordinates(self, configuration: Configuration, preview: Preview) -> Preview:
         """Returns the reference in the task's coordinates. It differs from `preview` only if the target has
         other coordinates."""
         return preview

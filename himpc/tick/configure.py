@@ -65,7 +65,7 @@ def arena_for(
     write_levels(arena, levels)
     limits = settings.limits
     f["L"][:] = profiles(N, constraints)
-    arena.i["bit"][:] = np.repeat([bit_of(each) for each in constraints], N)
+    arena.i["bit"][:] = np.repeat([bit_of(constraint) for constraint in constraints], N)
     f["approach"][:] = approached(N, limits.velocity_approach * settings.T_s)[:, 0]
     f["scalars"][:3] = settings.T_s, settings.T_s, reaction(limits, settings.T_s)
     f["scalars"][PULL] = limits.avoidance.largest_error
@@ -95,7 +95,7 @@ def write_tasks(
         levels, bounds, directed: number of each, see `sizes`.
     """
     frames = sorted({task.frame or robot.tip for task in tasks if isinstance(task, FrameTask)})
-    given = sum(count for task, count in zip(tasks, counts, strict=True) if not is_built_in(task))
+    python_rows = sum(count for task, count in zip(tasks, counts, strict=True) if not is_built_in(task))
     arena = sizes(
         robot.n,
         N,
@@ -105,20 +105,20 @@ def write_tasks(
         bounds or 2 * N,
         len(tasks),
         max(len(frames), 1),
-        max(given, 1),
+        max(python_rows, 1),
         directed,
     )
     _write_geometry(arena, robot, frames)
-    spans, start, given = [], 0, 0
-    for place, (task, count) in enumerate(zip(tasks, counts, strict=True)):
+    spans, start, python_rows = [], 0, 0
+    for index, (task, count) in enumerate(zip(tasks, counts, strict=True)):
         span = slice(start, start + count)
-        spans.append((place, task, span))
+        spans.append((index, task, span))
         if is_built_in(task):
-            _write_task(arena, robot, task, place, span, frames)
+            _write_task(arena, robot, task, index, span, frames)
         else:
-            arena.i["task"][place] = kinematics.GIVEN, 0, start, count
-            arena.i["part"][span] = range(given, given + count)
-            given += count
+            arena.i["task"][index] = kinematics.PYTHON, 0, start, count
+            arena.i["part"][span] = range(python_rows, python_rows + count)
+            python_rows += count
         start += count
     return arena, spans
 
@@ -136,12 +136,12 @@ def write_velocity_limits(arena: Arena, v_limit: Array) -> None:
     arena.f["limits"][2] = v_limit
 
 
-def write_preview(arena: Arena, place: int, span: slice, preview: Preview, reach: int) -> None:
+def write_preview(arena: Arena, index: int, span: slice, preview: Preview, reach: int) -> None:
     """Writes the reference of a task at `reach` knots."""
     f = arena.f
-    arena.i["law"][place] = SAMPLED
+    arena.i["law"][index] = SAMPLED
     if preview.value.ndim == 2:
-        f["R_d"][place] = preview.value
+        f["R_d"][index] = preview.value
     else:
         f["x_d"][span] = preview.value
     write_motion(arena, span, preview, reach)
@@ -156,19 +156,19 @@ def write_motion(arena: Arena, span: slice, preview: Preview, reach: int) -> Non
     motion[2, :, span] = preview.acceleration[:reach]
 
 
-def write_curve(arena: Arena, place: int, span: slice, reference: Reference) -> bool:
+def write_curve(arena: Arena, index: int, span: slice, reference: Reference) -> bool:
     """Makes the kernel evaluate a task's reference from now on; returns False if the kernel does not support
     this reference."""
     curve, f = curve_of(reference), arena.f
     if curve is None or curve.centre.shape not in ((span.stop - span.start,), (3, 3)):
         return False
-    arena.i["law"][place] = SAMPLED
+    arena.i["law"][index] = SAMPLED
     if curve.phase is None:
         zero = np.zeros((1, span.stop - span.start))
-        write_preview(arena, place, span, Preview(curve.centre, zero, zero, zero), 1)
+        write_preview(arena, index, span, Preview(curve.centre, zero, zero, zero), 1)
     else:
-        arena.i["law"][place] = EASED if curve.phase.law == "eased" else UNIFORM
-        f["pace"][place] = curve.phase.omega, curve.phase.offset
+        arena.i["law"][index] = EASED if curve.phase.law == "eased" else UNIFORM
+        f["pace"][index] = curve.phase.omega, curve.phase.offset
         for column, part in enumerate((curve.centre, *curve.swing)):
             f["curve"][span, column] = part
     return True
@@ -178,17 +178,17 @@ def _write_geometry(arena: Arena, robot: Robot, frames: Sequence[str]) -> None:
     f, i, tree = arena.f, arena.i, geometry(robot)
     i["parent"][:], i["is_revolute"][:] = tree.parent, tree.is_revolute
     f["rotation"][:], f["translation"][:], f["axis"][:] = tree.rotation, tree.translation, tree.axis
-    for place, name in enumerate(frames):
+    for index, name in enumerate(frames):
         frame = robot.model.frames[robot.frame_id(name)]
-        i["frame_joint"][place] = frame.parentJoint
-        f["frame_rotation"][place], f["frame_translation"][place] = (
+        i["frame_joint"][index] = frame.parentJoint
+        f["frame_rotation"][index], f["frame_translation"][index] = (
             frame.placement.rotation,
             frame.placement.translation,
         )
 
 
 def _write_task(
-    arena: Arena, robot: Robot, task: Task, place: int, span: slice, frames: Sequence[str]
+    arena: Arena, robot: Robot, task: Task, index: int, span: slice, frames: Sequence[str]
 ) -> None:
     if isinstance(task, FrameTask):
         kind = kinematics.ORIENTATION if isinstance(task, FrameOrientation) else kinematics.POSITION
@@ -197,5 +197,5 @@ def _write_task(
         assert isinstance(task, OnJoints)
         kind = kinematics.DAMPING if isinstance(task, Damping) else kinematics.JOINTS
         frame, part = 0, joint_indices(robot, task.joints)
-    arena.i["task"][place] = kind, frame, span.start, span.stop - span.start
+    arena.i["task"][index] = kind, frame, span.start, span.stop - span.start
     arena.i["part"][span] = part

@@ -105,16 +105,16 @@ def _links(robot: Robot) -> _Links:
     for joints, pairs in between.items():
         only = np.zeros_like(meets)
         only[tuple(np.transpose(pairs))] = True
-        found, close, q = _Pairs(tree, around._replace(meets=only)), np.zeros_like(meets), robot.home.copy()
+        search, close, q = _Pairs(tree, around._replace(meets=only)), np.zeros_like(meets), robot.home.copy()
         for values in product(*(np.linspace(low[j], high[j], _GRID) for j in joints)):
             q[list(joints)] = values
-            found.find(q, _NEVER)
-            close[found.shape[: found.count], found.sphere[: found.count]] = True
+            search.find(q, _NEVER)
+            close[search.shape[: search.count], search.sphere[: search.count]] = True
         meets &= ~only | close
-    kept, found = np.full(meets.shape, np.inf), _Pairs(tree, around._replace(meets=meets))
-    found.find(robot.home, WITHIN)
-    at = found.shape[: found.count], found.sphere[: found.count]
-    kept[at] = _AT_HOME * np.maximum(found.distance[: found.count], 0.0)
+    kept, search = np.full(meets.shape, np.inf), _Pairs(tree, around._replace(meets=meets))
+    search.find(robot.home, WITHIN)
+    at = search.shape[: search.count], search.sphere[: search.count]
+    kept[at] = _AT_HOME * np.maximum(search.distance[: search.count], 0.0)
     return _Links(meets, kept)
 
 

@@ -40,74 +40,74 @@ def perform(arena: Arena, parts: int, like: Rows) -> int:
     reached, unsolved = control_period(*arena.arguments, parts, 0, 0.0), 0
     while parts & LEVELS and NOT_FINITE < reached < arena.i["sizes"][4]:
         started = perf_counter_ns()
-        fallback = _climb_down(arena, reached, like)
-        arena.f["rung"][reached] = FALLBACKS.index(fallback)
+        fallback = _apply_fallback(arena, reached, like)
+        arena.f["fallback"][reached] = FALLBACKS.index(fallback)
         arena.f["time_us"][reached] += (perf_counter_ns() - started) / 1e3
         unsolved += fallback != "solve"
         reached = control_period(*arena.arguments, parts & ~LINEARIZE, reached + 1, 0.0)
     return NOT_FINITE if reached == NOT_FINITE else unsolved
 
 
-def solve_level(arena: Arena, place: int, room: float = 0.0) -> bool:
+def solve_level(arena: Arena, index: int, room: float = 0.0) -> bool:
     """Solves one level; returns whether an optimum was found. room: see the kernel's `solve_level`."""
-    return control_period(*arena.arguments, ONE_LEVEL, place, room) != place
+    return control_period(*arena.arguments, ONE_LEVEL, index, room) != index
 
 
-def _climb_down(arena: Arena, place: int, like: Rows) -> Fallback:
+def _apply_fallback(arena: Arena, index: int, like: Rows) -> Fallback:
     f = arena.f
     rows = like._replace(lower=f["lower"].copy(), upper=f["upper"].copy())
-    wanted = f["U"][place].copy()
-    if place and not arena.i["level"][place, ALONE]:
+    wanted = f["U"][index].copy()
+    if index and not arena.i["level"][index, ALONE]:
         # If U_{i−1} is almost the only feasible point, opposite bounds nearly coincide. A second attempt
         # widens them a little.
-        if solve_level(arena, place, TOLERANCE):
+        if solve_level(arena, index, TOLERANCE):
             return "solve"
-        above = f["U"][place - 1]
-        return _on_the_way(arena, place, containing(rows, above), "inherit", above, f["U"][place].copy())
+        above = f["U"][index - 1]
+        return _on_the_way(arena, index, containing(rows, above), "inherit", above, f["U"][index].copy())
     rows = rows._replace(rest=_coming_to_rest(arena))
     widened = softened(rows)
     if widened is not None:
         _write(arena, widened)
-        solved = solve_level(arena, place)
-        wanted = f["U"][place].copy()
+        solved = solve_level(arena, index)
+        wanted = f["U"][index].copy()
         if solved:
-            if place:
+            if index:
                 _write(arena, rows)
             return "soften"
-    optimal = bool(arena.i["known"][1]) and f["rung"][place] <= SOFTENED
-    fallback, U = last_resort(widened or rows, f["U_was"][place].copy() if optimal else None)
-    fallback = _on_the_way(arena, place, widened or rows, fallback, U, wanted)
-    _write(arena, rows if place else containing(rows, f["U"][place]))
+    optimal = bool(arena.i["known"][1]) and f["fallback"][index] <= SOFTENED
+    fallback, U = last_resort(widened or rows, f["U_was"][index].copy() if optimal else None)
+    fallback = _on_the_way(arena, index, widened or rows, fallback, U, wanted)
+    _write(arena, rows if index else containing(rows, f["U"][index]))
     return fallback
 
 
 def _on_the_way(
-    arena: Arena, place: int, rows: Rows, fallback: Fallback, U: Array, wanted: Array
+    arena: Arena, index: int, rows: Rows, fallback: Fallback, U: Array, wanted: Array
 ) -> Fallback:
     """Moves U, which satisfies the rows, towards `wanted`, the point that the kernel reached, if this
     improves the cost. Returns "feasible" after a move, otherwise the argument `fallback`."""
     f = arena.f
     on_the_way = towards(rows, U, wanted)
-    if on_the_way is not None and place and not arena.i["level"][place, ALONE]:
-        above = slice(0, int(arena.i["level"][place - 1, LAST]))
+    if on_the_way is not None and index and not arena.i["level"][index, ALONE]:
+        above = slice(0, int(arena.i["level"][index - 1, LAST]))
         if np.abs(f["B"][:, above] @ (on_the_way - U)[:, :, None]).max(initial=0.0) > LEAK:
             on_the_way = None
-    if on_the_way is not None and _cost(arena, place, on_the_way) < _cost(arena, place, U):
+    if on_the_way is not None and _cost(arena, index, on_the_way) < _cost(arena, index, U):
         fallback, U = "feasible", on_the_way
-    f["U"][place], f["kkt"][place], arena.i["active_count"][place] = U, 0.0, 0
+    f["U"][index], f["kkt"][index], arena.i["active_count"][index] = U, 0.0, 0
     return fallback
 
 
-def _cost(arena: Arena, place: int, U: Array) -> float:
+def _cost(arena: Arena, index: int, U: Array) -> float:
     """Returns the value (32a) or (34a) of U, (N, n), for a level of an arena that `linearize` has filled."""
-    f, level = arena.f, arena.i["level"][place]
+    f, level = arena.f, arena.i["level"][index]
     rows, N = slice(int(level[FIRST]), int(level[LAST])), len(U)
     effect = (f["B"][:, rows] @ U[:, :, None])[:, :, 0]
     e = f["root_Q"][rows] * f["free"][:, rows]
     for lag in range(N):
         e[lag:] += f["C"][rows, lag] * effect[: N - lag]
     counted = np.arange(N)[:, None] < arena.i["row_knots"][rows]
-    R = f["rho"][place] / f["metric"][place] ** 2
+    R = f["rho"][index] / f["metric"][index] ** 2
     return float((e[counted] ** 2).sum() + (R * U[: level[KNOTS]] ** 2).sum())
 
 

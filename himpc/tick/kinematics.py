@@ -60,11 +60,11 @@ class Kinematics:
         f = self._arena.f
         f["q"][:], f["v"][:], f["path"][1] = q, v, q
         f["path"][2], f["path"][3] = q + h * v, q - h * v
-        for place, task, span in self._spans:
+        for index, task, span in self._spans:
             if not isinstance(task, Damping):
                 value = previews[task.name].value
                 if value.ndim == 2:
-                    f["R_d"][place] = value
+                    f["R_d"][index] = value
                 else:
                     f["x_d"][span] = value
         if control_period(*self._arena.arguments, LINEARIZE, 0, 0.0) == NOT_FINITE:
@@ -76,8 +76,8 @@ class Kinematics:
             (ahead - behind) @ v / (2 * h),
             error[: self._solved],
             {
-                task.name: R[place] if isinstance(task, FrameOrientation) else value[span]
-                for place, task, span in self._spans
+                task.name: R[index] if isinstance(task, FrameOrientation) else value[span]
+                for index, task, span in self._spans
             },
             {task.name: error[span] for _, task, span in self._spans},
         )

@@ -19,10 +19,10 @@ from himpc.tick.python_rows import PythonRows
 class PreviewWriter:
     """Records the references that the arena of a tick already contains."""
 
-    def __init__(self, arena: Arena, given: PythonRows, settings: Settings) -> None:
-        self._arena, self._given, self._T_s = arena, given, settings.T_s
+    def __init__(self, arena: Arena, python_rows: PythonRows, settings: Settings) -> None:
+        self._arena, self._python_rows, self._T_s = arena, python_rows, settings.T_s
         self._reach = settings.horizon + 1
-        self._led = [each for each in given.spans if not isinstance(each[1], Damping)]
+        self._led = [entry for entry in python_rows.spans if not isinstance(entry[1], Damping)]
         self._read: dict[int, Reference | Preview | None] = {}
 
     def write(self, previews: Mapping[str, Preview]) -> None:
@@ -34,29 +34,31 @@ class PreviewWriter:
         if isinstance(previews, Outlook):
             references, t = previews.references, previews.t
             f["scalars"][NOW] = t
-        for place, task, span in self._led:
-            reference, read = references.get(task.name), self._read.get(place)
+        for index, task, span in self._led:
+            reference, read = references.get(task.name), self._read.get(index)
             target = reference if isinstance(reference, Target) else None
             if (reference is not None and reference is read) or (target and target.stays(t, read)):
                 continue
-            if target and self._shows(place, span, target, t):
-                self._read[place] = None
-            elif reference is not None and not target and write_curve(self._arena, place, span, reference):
-                self._read[place] = reference
+            if target and self._shows(index, span, target, t):
+                self._read[index] = None
+            elif reference is not None and not target and write_curve(self._arena, index, span, reference):
+                self._read[index] = reference
             else:
                 preview = previews[task.name]
                 if preview is not read:
-                    write_preview(self._arena, place, span, self._given.at_first(task, preview), self._reach)
+                    write_preview(
+                        self._arena, index, span, self._python_rows.at_first(task, preview), self._reach
+                    )
                 # A target at rest gives the same preview again; other previews may have changed.
-                self._read[place] = preview if target else None
+                self._read[index] = preview if target else None
 
-    def _shows(self, place: int, span: slice, target: Target, t: float) -> bool:
+    def _shows(self, index: int, span: slice, target: Target, t: float) -> bool:
         """Lets a moving target write its motion to the arrays that the kernel reads; returns whether it
         did."""
         f = self._arena.f
         x_d = target.show(t, self._T_s, f["motion"][:, :, span])
         if x_d is None:
             return False
-        self._arena.i["law"][place] = SAMPLED
-        (f["x_d"][span] if target.raw.ndim == 1 else f["R_d"][place].reshape(9))[:] = x_d
+        self._arena.i["law"][index] = SAMPLED
+        (f["x_d"][span] if target.raw.ndim == 1 else f["R_d"][index].reshape(9))[:] = x_d
         return True

@@ -30,12 +30,12 @@ def arena_of(problems: Sequence[LevelProblem], rows: Rows, previous: Mapping[str
     """Creates an arena and writes the problems into it."""
     N, _, n = problems[0].B.shape
     ends = np.cumsum([0] + [problem.B.shape[1] for problem in problems])
-    given = python_constraints(rows.constraints)
-    arena = sizes(n, N, int(ends[-1]), int(ends[-1]), len(problems), len(rows.L), directed=len(given))
+    constraints = python_constraints(rows.constraints)
+    arena = sizes(n, N, int(ends[-1]), int(ends[-1]), len(problems), len(rows.L), directed=len(constraints))
     f = arena.f
     tables = []
-    for place, problem in enumerate(problems):
-        span = slice(int(ends[place]), int(ends[place + 1]))
+    for index, problem in enumerate(problems):
+        span = slice(int(ends[index]), int(ends[index + 1]))
         f["B"][:, span], f["free"][:, span] = problem.B, problem.free
         K = problem.knots
         weighted_C = problem.root_Q[:, None] * problem.C[:K, :, :K]
@@ -43,15 +43,15 @@ def arena_of(problems: Sequence[LevelProblem], rows: Rows, previous: Mapping[str
         tables.append(LevelTable(span, problem.knots, problem.R, span, problem.knots, problem.R))
         before = previous.get(problem.name)
         if before is not None:
-            write_warm_start(arena, place, before.active)
+            write_warm_start(arena, index, before.active)
             if before.U.shape == (N, n):
-                f["U_was"][place], arena.i["known"][1] = before.U, 1
+                f["U_was"][index], arena.i["known"][1] = before.U, 1
     write_levels(arena, tables)
     f["L"][:], f["lower"][:], f["upper"][:] = rows.L, rows.lower, rows.upper
     f["direction"][:] = np.eye(n)
-    for place, directions in enumerate(rows.directions[len(rows.constraints) - len(given) :]):
+    for index, directions in enumerate(rows.directions[len(rows.constraints) - len(constraints) :]):
         if directions is not None:
-            f["direction"][place] = directions.D
+            f["direction"][index] = directions.D
     arena.i["bit"][:] = rows.bits
     f["M_bar"][:], f["scalars"][:] = 1.0, 1.0
     f["scalars"][PULL] = np.inf
@@ -65,44 +65,44 @@ def increments_of(problem: LevelProblem, rows: Rows) -> Array | None:
     return arena.f["U"][0] if solve_level(arena, 0) else None
 
 
-def solutions(names: Sequence[str], found: Snapshot) -> list[LevelSolution]:
+def solutions(names: Sequence[str], snapshot: Snapshot) -> list[LevelSolution]:
     """Returns the evidence of all levels from the results of a tick."""
-    U, cost, kkt, leak, left = (found(name) for name in ("U", "cost", "kkt", "leak", "left"))
-    fallbacks: list[Fallback] = [FALLBACKS[int(rung)] for rung in found("rung")]
-    times = found("time_us").tolist()
+    U, cost, kkt, leak, left = (snapshot(name) for name in ("U", "cost", "kkt", "leak", "left"))
+    fallbacks: list[Fallback] = [FALLBACKS[int(code)] for code in snapshot("fallback")]
+    times = snapshot("time_us").tolist()
     return [
         LevelSolution(
             name,
-            U[place],
-            float(cost[place]),
-            active_rows(found, place),
-            float(kkt[place]),
-            "unsolved" if fallback not in ("solve", "soften") else "optimal" if left[place] else "empty",
+            U[index],
+            float(cost[index]),
+            active_rows(snapshot, index),
+            float(kkt[index]),
+            "unsolved" if fallback not in ("solve", "soften") else "optimal" if left[index] else "empty",
             fallback,
             time_us,
             0.0,
-            float(leak[place]),
+            float(leak[index]),
         )
-        for place, (name, fallback, time_us) in enumerate(zip(names, fallbacks, times, strict=True))
+        for index, (name, fallback, time_us) in enumerate(zip(names, fallbacks, times, strict=True))
     ]
 
 
-def write_warm_start(arena: Arena, place: int, active: ActiveRows) -> None:
+def write_warm_start(arena: Arena, index: int, active: ActiveRows) -> None:
     """Writes the active rows with which a level starts."""
     fits = active.row < len(arena.f["lower"])
     k = min(int(fits.sum()), arena.f["warm_multiplier"].shape[1])
-    arena.i["warm_count"][place] = k
-    arena.i["warm_row"][place, :k], arena.i["warm_joint"][place, :k] = (
+    arena.i["warm_count"][index] = k
+    arena.i["warm_row"][index, :k], arena.i["warm_joint"][index, :k] = (
         active.row[fits][:k],
         active.joint[fits][:k],
     )
-    arena.f["warm_multiplier"][place, :k] = active.multiplier[fits][:k]
+    arena.f["warm_multiplier"][index, :k] = active.multiplier[fits][:k]
 
 
-def active_rows(found: Snapshot, place: int) -> ActiveRows:
+def active_rows(snapshot: Snapshot, index: int) -> ActiveRows:
     """Returns the active rows of a level's solution."""
-    k = int(found("active_count")[place])
+    k = int(snapshot("active_count")[index])
     if not k:
         return NO_ROWS
     names = ("active_row", "active_joint", "multiplier", "slack")
-    return ActiveRows(*(found(name)[place, :k] for name in names))
+    return ActiveRows(*(snapshot(name)[index, :k] for name in names))

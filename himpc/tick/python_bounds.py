@@ -32,8 +32,8 @@ class PythonBounds:
         self, robot: Robot, arena: Arena, settings: Settings, constraints: Sequence[Constraint]
     ) -> None:
         self._arena, self._settings = arena, settings
-        self._given = python_constraints(constraints)
-        self._known = len(constraints) - len(self._given)
+        self._constraints = python_constraints(constraints)
+        self._known = len(constraints) - len(self._constraints)
         self.distances = Distances(robot, settings.limits.avoidance) if DISTANCE in constraints else None
 
     def write(self, rows: Rows, force: LimitsInForce, observed: Observed) -> Rows:
@@ -45,20 +45,20 @@ class PythonBounds:
             force: the limits in force. The measured state and the memory are read from the arena.
             observed: the objects around the robot.
         """
-        if not self._given:
+        if not self._constraints:
             return rows
         f, N, now = self._arena.f, self._settings.horizon, None
         directions: list[Directions | None] = [None] * self._known
-        for place, constraint in enumerate(self._given):
+        for index, constraint in enumerate(self._constraints):
             if constraint is DISTANCE and self.distances is not None:
                 self.distances.observe(observed)
-                directions.append(Directions(f["direction"][place], self.distances.write(self._arena, place)))
+                directions.append(Directions(f["direction"][index], self.distances.write(self._arena, index)))
                 continue
             now = now or self._moment(force)
             block = constraint.bounds(now)
-            start = (self._known + place) * N
+            start = (self._known + index) * N
             f["lower"][start : start + N], f["upper"][start : start + N] = block.lower, block.upper
-            f["direction"][place] = np.eye(len(f["q"])) if block.directions is None else block.directions.D
+            f["direction"][index] = np.eye(len(f["q"])) if block.directions is None else block.directions.D
             directions.append(block.directions)
         return rows._replace(directions=tuple(directions) if any(directions) else ())
 

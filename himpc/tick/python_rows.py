@@ -29,16 +29,16 @@ class PythonRows:
 
     def __init__(self, robot: Robot, arena: Arena, spans: Sequence[Span]) -> None:
         self._robot, self._data, self._arena = robot, robot.model.createData(), arena
-        self.spans = [each for each in spans if is_built_in(each[1])]
-        self._given: list[tuple[int, Task, slice, slice]] = []
+        self.spans = [entry for entry in spans if is_built_in(entry[1])]
+        self._tasks: list[tuple[int, Task, slice, slice]] = []
         home = Configuration(robot, self._data, robot.home, np.zeros(robot.n))
         self.turning = {task.name for _, task, _ in spans if isinstance(task, FrameOrientation)}
         self._turned: dict[str, bool] = {}
         start = 0
-        for place, task, span in spans:
+        for index, task, span in spans:
             if not is_built_in(task):
                 end = start + span.stop - span.start
-                self._given.append((place, task, span, slice(start, end)))
+                self._tasks.append((index, task, span, slice(start, end)))
                 start = end
                 if task.value(home).ndim == 2:
                     self.turning.add(task.name)
@@ -61,31 +61,31 @@ class PythonRows:
         Args:
             previews: the previews of all tasks.
         """
-        if not self._given and True not in self._turned.values():
+        if not self._tasks and True not in self._turned.values():
             return
-        turned = [each for each in self.spans if self._turned.get(each[1].name)]
+        turned = [entry for entry in self.spans if self._turned.get(entry[1].name)]
         f, known = self._arena.f, bool(self._arena.i["known"][0])
         q, v, path = f["q"], f["v"], f["path"]
         with np.errstate(all="ignore"):
             knots = path[2:] + (q - path[1])
             here = Configuration(self._robot, self._data, q, v, knots, previews)
             for _, task, span in turned:
-                self._ask(span, task.asked(here, previews[task.name]))
+                self._ask(span, task.reference_in_task_coordinates(here, previews[task.name]))
             past = Configuration(self._robot, self._data, f["q_was"], f["v_was"], previews=previews)
-            for place, task, span, rows in self._given:
-                f["given"][: len(knots) + 1, rows] = task.jacobian(here)
+            for index, task, span, rows in self._tasks:
+                f["python_jacobian"][: len(knots) + 1, rows] = task.jacobian(here)
                 if not known:
-                    f["given"][-1, rows] = task.jacobian(past)[0]
+                    f["python_jacobian"][-1, rows] = task.jacobian(past)[0]
                 preview, value = previews[task.name], task.value(here)
-                self._note(place, span, value)
+                self._note(index, span, value)
                 f["error"][span] = task.error(value, preview.value)
-                self._ask(span, task.asked(here, preview))
+                self._ask(span, task.reference_in_task_coordinates(here, preview))
 
-    def _note(self, place: int, span: slice, value: Array) -> None:
+    def _note(self, index: int, span: slice, value: Array) -> None:
         if value.ndim == 2:
-            self._arena.f["R_now"][place] = value
+            self._arena.f["R_now"][index] = value
         else:
             self._arena.f["value"][span] = value
 
-    def _ask(self, span: slice, asked: Preview) -> None:
-        write_motion(self._arena, span, asked, len(self._arena.f["path"]))
+    def _ask(self, span: slice, reference: Preview) -> None:
+        write_motion(self._arena, span, reference, len(self._arena.f["path"]))

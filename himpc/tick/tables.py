@@ -74,16 +74,16 @@ def budget_of(arena: Arena) -> float:
 def write_levels(arena: Arena, levels: Sequence[LevelTable]) -> None:
     """Writes the table of levels."""
     f = arena.f
-    for place, level in enumerate(levels):
+    for index, level in enumerate(levels):
         rho = float(level.R.min())
         metric = np.sqrt(rho / level.R)
-        f["rho"][place], f["metric"][place], f["R"][place] = rho, metric, level.own_R
-        f["accuracy"][place] = min(ACCURACY * rho, KKT_TOLERANCE)
-        arena.i["level"][place] = (
+        f["rho"][index], f["metric"][index], f["R"][index] = rho, metric, level.own_R
+        f["accuracy"][index] = min(ACCURACY * rho, KKT_TOLERANCE)
+        arena.i["level"][index] = (
             level.rows.start,
             level.rows.stop,
             level.knots,
-            place > 0 and bool((f["metric"][place - 1] != metric).any()),
+            index > 0 and bool((f["metric"][index - 1] != metric).any()),
             level.alone,
             level.own_rows.start,
             level.own_rows.stop,
@@ -112,7 +112,7 @@ def sizes(
     bounds: int,
     tasks: int = 1,
     frames: int = 1,
-    given: int = 1,
+    python_rows: int = 1,
     directed: int = 0,
 ) -> Arena:
     """Returns an arena for n joints and N knots.
@@ -121,10 +121,10 @@ def sizes(
         n, N: number of joints and of knots.
         rows, solved: number of rows of all tasks, and of the solved tasks, whose rows come first.
         levels, bounds, tasks, frames: number of each.
-        given: number of rows of tasks that are not built into the kernel, at least 1.
+        python_rows: number of rows of tasks that are not built into the kernel, at least 1.
         directed: number of constraints that are not built into the kernel.
     """
-    numbers = [n, N, rows, solved, levels, tasks, frames, bounds, N * n, 0, given, directed]
+    numbers = [n, N, rows, solved, levels, tasks, frames, bounds, N * n, 0, python_rows, directed]
     arena = Arena(sizes_of(numbers))
     arena.i["sizes"][:] = numbers
     return arena

@@ -70,7 +70,7 @@ class CompiledTick:
     ) -> None:
         self._form, self._settings, self._levels = form, settings, levels
         self.arena, self._spans = arena_for(robot, settings, form, off, levels)
-        self._given = PythonRows(robot, self.arena, self._spans)
+        self._python_rows = PythonRows(robot, self.arena, self._spans)
         self._ends = np.array([span.stop for _, _, span in self._spans[: len(form.tasks)]], np.intp)
         constraints, f = imposed(settings.limits), self.arena.f
         self._rows = Rows(f["L"], f["lower"], f["upper"], constraints)
@@ -79,7 +79,7 @@ class CompiledTick:
         self._limits: LimitsInForce | None = None
         self._shares: list[float | Array] = [1.0] * len(form.levels)
         self._started = self._looked = False
-        self._writer = PreviewWriter(self.arena, self._given, settings)
+        self._writer = PreviewWriter(self.arena, self._python_rows, settings)
         self._gathered: tuple[Layout, Array | None] | None = None
         self._ticks, self.budget = 0, budget_of(self.arena)
 
@@ -97,12 +97,12 @@ class CompiledTick:
             f["path"][:] = memory.predicted_q  # unchanged numbers stay bitwise the same
         else:
             f["path"][1], f["path"][2 : N + 1] = q, knots(memory.predicted_q, q, v, N, T_s)[1:]
-        for place, level in enumerate(self._form.levels if self._levels else ()):
+        for index, level in enumerate(self._form.levels if self._levels else ()):
             before = memory.solutions.get(level.name)
             if before is not None:
-                write_warm_start(self.arena, place, before.active)
-                if before.U.shape == f["U"][place].shape:
-                    f["U_was"][place], i["known"][1] = before.U, 1
+                write_warm_start(self.arena, index, before.active)
+                if before.U.shape == f["U"][index].shape:
+                    f["U_was"][index], i["known"][1] = before.U, 1
         self._started = True
 
     def forget(self) -> None:
@@ -142,11 +142,11 @@ class CompiledTick:
         """Sets the largest error on which tasks act, m or rad."""
         self.arena.f["scalars"][PULL] = largest_error
 
-    def fade(self, place: int, share: float | Array) -> None:
+    def fade(self, index: int, share: float | Array) -> None:
         """Multiplies a level's √Q by `share`, one number or one per row."""
-        if not np.array_equal(share, self._shares[place]):
-            level = self._form.levels[place]
-            self._shares[place] = share
+        if not np.array_equal(share, self._shares[index]):
+            level = self._form.levels[index]
+            self._shares[index] = share
             by_row = np.broadcast_to(share, level.root_Q.shape)
             write_effects(self.arena, level.rows, by_row * level.root_Q, by_row[:, None] * level.weighted_C)
 
@@ -194,7 +194,7 @@ class CompiledTick:
                 before = arena.f["U"].copy()
             else:
                 before = None
-            self._given.write(previews)
+            self._python_rows.write(previews)
             self._rows = self._python_bounds.write(self._rows, limits, observed_by(previews))
             unsolved = perform(arena, parts, self._rows)
             if unsolved == NOT_FINITE:
@@ -225,8 +225,8 @@ class CompiledTick:
             self._limits = limits
         self._writer.write(previews)
 
-    def _solutions(self, found: Snapshot) -> list[LevelSolution]:
-        return solutions([level.name for level in self._form.levels], found) if self._levels else []
+    def _solutions(self, snapshot: Snapshot) -> list[LevelSolution]:
+        return solutions([level.name for level in self._form.levels], snapshot) if self._levels else []
 
     def _plan(
         self, unsolved: int, tau_0: Array, limits: LimitsInForce, iterations: int, started: int
@@ -256,22 +256,24 @@ class CompiledTick:
         )
 
     def _evidence(self) -> Evidence:
-        found = self.arena.snapshot()
-        R, value, error = found("R_now"), found("value"), found("error")
-        stopping = found("stopping") > 0.0 if self._settings.limits.position == "viability" else None
+        snapshot = self.arena.snapshot()
+        R, value, error = snapshot("R_now"), snapshot("value"), snapshot("error")
+        stopping = snapshot("stopping") > 0.0 if self._settings.limits.position == "viability" else None
         return Evidence(
-            levels=tuple(self._solutions(found)),
-            q=found("predicted"),
+            levels=tuple(self._solutions(snapshot)),
+            q=snapshot("predicted"),
             errors={task.name: error[span] for _, task, span in self._spans},
             values={
-                task.name: R[place] if task.name in self._given.turning else value[span]
-                for place, task, span in self._spans
+                task.name: R[index] if task.name in self._python_rows.turning else value[span]
+                for index, task, span in self._spans
             },
             rows=self._rows._replace(
-                lower=found("lower"),
-                upper=found("upper"),
+                lower=snapshot("lower"),
+                upper=snapshot("upper"),
                 stopping=stopping,
-                directions=tuple(each and each._replace(D=each.D.copy()) for each in self._rows.directions),
+                directions=tuple(
+                    block and block._replace(D=block.D.copy()) for block in self._rows.directions
+                ),
             ),
         )
 

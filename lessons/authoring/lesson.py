@@ -37,14 +37,14 @@ def _refuse(lesson: Lesson, source: Source, number: int, error: InputError) -> N
     """Raises InputError with the place of the setting with which a step cannot be run; for any other
     reason, with the number of the step."""
     chosen: tuple[str, ...] = ()
-    for step, place, setting in assignments(source.path, source.text):
+    for step, location, setting in assignments(source.path, source.text):
         if step in (0, number):
             chosen = (*chosen, setting)
             try:
                 RunSpec(lesson.scene, lesson.urdf, set=chosen).prepared()
             except InputError as fault:
                 if len(chosen) > 1 or _runs(lesson):
-                    raise InputError(f"{place}: {fault}") from None
+                    raise InputError(f"{location}: {fault}") from None
     raise InputError(f"{source.path}: step {number}, '{lesson.steps[number - 1].title}': {error}") from None
 
 

@@ -30,17 +30,17 @@ def load_exercise(name: str) -> Exercise:
     """Returns the exercise with this name. Raises InputError with the nearest valid name if there is none."""
     if name not in EXERCISES:
         raise unknown_name("exercise", name, EXERCISES)
-    found: Exercise = import_module(f"lessons.exercises.{name.replace('-', '_')}").EXERCISE
-    return found
+    exercise: Exercise = import_module(f"lessons.exercises.{name.replace('-', '_')}").EXERCISE
+    return exercise
 
 
 def exercises_of(lesson: str) -> tuple[Exercise, ...]:
     """Returns the exercises that belong to a lesson, in order."""
-    return tuple(each for each in map(load_exercise, EXERCISES) if each.lesson == lesson)
+    return tuple(exercise for exercise in map(load_exercise, EXERCISES) if exercise.lesson == lesson)
 
 
 def start_of(name: str) -> str:
     """Returns the file with missing lines. Raises InputError if no exercise has this name."""
     load_exercise(name)
-    place = Path(str(files("lessons.exercises") / "starts" / f"{name.replace('-', '_')}.py"))
-    return place.read_text(encoding="utf-8")
+    path = Path(str(files("lessons.exercises") / "starts" / f"{name.replace('-', '_')}.py"))
+    return path.read_text(encoding="utf-8")

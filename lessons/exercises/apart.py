@@ -65,7 +65,7 @@ class Apart:
         self._slept = self._before = 0.0
         self._original: Original | None = None
         self._copy: Copy | None = None
-        self._asked = False
+        self._waiting = False
         self._scheduling = _scheduling()
         self.protection: tuple[str, ...] = ()
         self.exercise, self.line = "", 1
@@ -125,10 +125,10 @@ class Apart:
     def fresh(self) -> Callable[[View], Any]:
         """Returns the control law of the file, loaded in a process without memory of earlier runs. Raises
         OwnFault, Exhausted and Refused."""
-        if self._copy is None or self._asked:
+        if self._copy is None or self._waiting:
             self._end()
             self._start()
-            self._asked = False
+            self._waiting = False
         return self.torque
 
     def _start(self) -> None:
@@ -164,15 +164,15 @@ class Apart:
         the call fails, takes too long, or the process has ended."""
         if self._copy is None:
             raise OwnFault(f"{self._source.path}: its process has ended")
-        self._asked = True
+        self._waiting = True
         message, arrays = b"", numbers_of(now)
         marks = [now.T_s, now.N, now.bounds.approach, now.bounds.paper, len(now.further)]
         marks += [mark for level in now.levels for mark in (level.name, level.horizon)]
         marks += [now.near.names, now.near.reaction, now.near.deceleration]
-        marks += [each.shape for each in arrays]
+        marks += [array.shape for array in arrays]
         if marks != self._marks:
             message, self._marks = wire.packed(wire.SHAPE, wire.of_json(shape_of(now))), marks
-        message += wire.packed(wire.TICK, b"".join([each.tobytes() for each in arrays]))
+        message += wire.packed(wire.TICK, b"".join([array.tobytes() for array in arrays]))
         watch = ProcessDeadline(self._copy.pid, LONGEST_TICK, "one call")
         if watch.began - self._looked > LOOK:
             self._looked = watch.began
@@ -195,19 +195,19 @@ class Apart:
         """Calls a function of the model for the submission, and returns the message with the result."""
         try:
             name, level, arguments = json.loads(data)
-            given = [np.array(each, float) for each in arguments]
-            knots = name == "jacobian" and given[0].shape == (now.N, now.n)  # at all knots at once
-            given = given if knots else [each.reshape(now.n) for each in given]
+            arrays = [np.array(argument, float) for argument in arguments]
+            knots = name == "jacobian" and arrays[0].shape == (now.N, now.n)  # at all knots at once
+            arrays = arrays if knots else [array.reshape(now.n) for array in arrays]
             functions: Mapping[str, Any] = {
                 "jacobian": now.levels[int(level)].jacobian,
                 "mass_matrix": now.nominal.mass_matrix,
                 "bias": now.nominal.bias,
             }
-            found = np.asarray(functions[name](*given), float)
+            result = np.asarray(functions[name](*arrays), float)
         except Exception as error:
-            said = f"this cannot be computed ({type(error).__name__}: {shortened(str(error), 100)})"
-            return wire.packed(wire.FAULT, said.encode())
-        return wire.packed(wire.REPLY, wire.of_array(found))
+            text = f"this cannot be computed ({type(error).__name__}: {shortened(str(error), 100)})"
+            return wire.packed(wire.FAULT, text.encode())
+        return wire.packed(wire.REPLY, wire.of_array(result))
 
     def _answered(self, message: bytes, watch: ProcessDeadline) -> tuple[bytes, bytes]:
         """Sends one message and returns the answer. If this takes too long, ends the process and raises
@@ -278,12 +278,12 @@ class Apart:
         return OwnFault(f"{self._source.path}: it writes into the pipe for its answers: leave that out")
 
     def _fault(self, kind: bytes, data: bytes, n: int = 0) -> OwnFault:
-        said = shortened(" ".join(data.decode(errors="replace").split()), 1000)
+        text = shortened(" ".join(data.decode(errors="replace").split()), 1000)
         if kind == wire.OTHER and n:
             return OwnFault(
-                f"{self.where}: it returned {said} instead of numbers: return a torque of shape ({n},)"
+                f"{self.where}: it returned {text} instead of numbers: return a torque of shape ({n},)"
             )
-        return OwnFault(said) if kind == wire.FAULT else self._nonsense()
+        return OwnFault(text) if kind == wire.FAULT else self._nonsense()
 
 
 def _scheduling() -> tuple[Any, ...]:

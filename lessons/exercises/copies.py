@@ -87,16 +87,16 @@ class Original:
 
     def copy(self) -> Copy:
         """Starts a copy. Raises OSError."""
-        (heard, to), (of, told), (refused, refuses) = [os.pipe() for _ in range(3)]
+        (requests, to), (of, replies), (refused, refuses) = [os.pipe() for _ in range(3)]
         try:
-            socket.send_fds(self._calls, [wire.READY], [heard, told, refuses])
+            socket.send_fds(self._calls, [wire.READY], [requests, replies, refuses])
             pid = self._answer()
         except OSError:
             for pipe in (to, of, refused):
                 os.close(pipe)
             raise
         finally:
-            for pipe in (heard, told, refuses):
+            for pipe in (requests, replies, refuses):
                 os.close(pipe)
         for pipe in (to, of, refused):
             os.set_blocking(pipe, False)

@@ -97,10 +97,10 @@ class Exercise:
     @property
     def before(self) -> str:
         """The sentence that says what to set on the page before a solution is watched; "" if nothing."""
-        pairs = [each.split("=", 1) for each in self.live]
-        labels = {each.path: each.shown.label for each in settings_of(TorqueSettings)}
-        said = [f"“{labels[path]}” to {value}" for path, value in pairs]
-        return f"On the page, first set {', '.join(said)}." if said else ""
+        pairs = [assignment.split("=", 1) for assignment in self.live]
+        labels = {setting.path: setting.shown.label for setting in settings_of(TorqueSettings)}
+        changes = [f"“{labels[path]}” to {value}" for path, value in pairs]
+        return f"On the page, first set {', '.join(changes)}." if changes else ""
 
     @property
     def file(self) -> str:

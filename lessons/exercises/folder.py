@@ -48,7 +48,7 @@ def grade_folder(
     Raises:
         InputError: there is no such exercise, the folder has no Python file, or the table cannot be written.
     """
-    asked = exercise if exercise is None or not is_file(exercise) else fingerprint(exercise)
+    mark = exercise if exercise is None or not is_file(exercise) else fingerprint(exercise)
     files = sorted(path for path in folder.iterdir() if path.suffix == SUFFIX and path.is_file())
     if not files:
         raise InputError(f"{folder}: has no Python file; give a folder of submissions")
@@ -60,42 +60,42 @@ def grade_folder(
         try:
             source = read(str(path))
         except InputError as error:
-            done[path] = row_of(Grade(str(path), "", exercise or "", error=str(error)), seed, asked)
+            done[path] = row_of(Grade(str(path), "", exercise or "", error=str(error)), seed, mark)
             continue
-        row = held.get((_text(path.name), source.digest, str(seed), asked or ""))
+        row = held.get((_text(path.name), source.digest, str(seed), mark or ""))
         if row is None:
             left.append(source)
         else:
             done[path] = row
     work = spread(grade_apart, [replace(model, source=source) for source in left])
     with closing(work) as outcomes:
-        for place, outcome in outcomes:
-            source = left[place]
+        for index, outcome in outcomes:
+            source = left[index]
             if isinstance(outcome, FailedJob):
                 outcome = Grade(source.path, source.digest, exercise or "", error=outcome.reason)
-            done[Path(source.path)] = row_of(outcome, seed, asked)
-            _write(out, [done[each] for each in files if each in done])
+            done[Path(source.path)] = row_of(outcome, seed, mark)
+            _write(out, [done[path] for path in files if path in done])
             progress(len(done) / len(files))
-    found = [done[path] for path in files]
-    _write(out, found)
-    return found
+    rows = [done[path] for path in files]
+    _write(out, rows)
+    return rows
 
 
-def row_of(found: Grade, seed: int, asked: str | None) -> Row:
+def row_of(grade: Grade, seed: int, mark: str | None) -> Row:
     """Returns a grade as a row of the table."""
-    missed = "; ".join(f"{line.check} {line.why}" for line in found.lines if line.why)
-    name = Path(found.file).name
+    missed = "; ".join(f"{line.check} {line.why}" for line in grade.lines if line.why)
+    name = Path(grade.file).name
     values = (
         name,
-        found.exercise,
-        str(found.points),
-        str(found.of),
-        _one_line(missed.replace(found.file, name)),
-        _one_line(found.error.replace(found.file, name)),
+        grade.exercise,
+        str(grade.points),
+        str(grade.of),
+        _one_line(missed.replace(grade.file, name)),
+        _one_line(grade.error.replace(grade.file, name)),
         str(seed),
-        asked or "",
-        found.digest,
-        " ".join(found.protection),
+        mark or "",
+        grade.digest,
+        " ".join(grade.protection),
     )
     return dict(zip(COLUMNS, map(_text, values), strict=True))
 

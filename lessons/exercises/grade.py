@@ -72,9 +72,9 @@ class Submission:
             load_exercise(exercise)
             return cls(source, exercise, seed, within)
         own = read(exercise)
-        found = exercise_of(own)
-        possible = sum(check.points for check in found.checks(seed))
-        return cls(source, found.name, seed, within, own=own, possible=possible)
+        definition = exercise_of(own)
+        possible = sum(check.points for check in definition.checks(seed))
+        return cls(source, definition.name, seed, within, own=own, possible=possible)
 
 
 class Shown(Protocol):
@@ -113,8 +113,8 @@ def grade_only(path: Path, exercise: str | None = None, seed: int = 0) -> Grade:
     source, error = Source(str(files[0] if len(files) == 1 else path), ""), ""
     try:
         if len(files) != 1:
-            said = ", ".join(each.name for each in files[:5]) or "none"
-            raise InputError(f"hand in one Python file: found {said}")
+            names = ", ".join(file.name for file in files[:5]) or "none"
+            raise InputError(f"hand in one Python file: found {names}")
         source = read(str(files[0]))
     except InputError as refusal:
         error = str(refusal)
@@ -130,7 +130,7 @@ def grade_only(path: Path, exercise: str | None = None, seed: int = 0) -> Grade:
 
 def grade_apart(submission: Submission) -> Grade:
     """Grades a submission in a separate process. If this process fails, the grade contains the error."""
-    source, asked = submission.source, submission.exercise
+    source, name = submission.source, submission.exercise
     # Only the time in the submission's own process counts, not the time of the checks.
     within = replace(submission.within, seconds=PATIENCE * submission.within.seconds)
     try:
@@ -139,7 +139,7 @@ def grade_apart(submission: Submission) -> Grade:
         error = f"{source.path}: {fault}"
     except InputError as refusal:
         error = str(refusal)
-    return Grade(source.path, source.digest, asked or "", error=error, possible=submission.possible)
+    return Grade(source.path, source.digest, name or "", error=error, possible=submission.possible)
 
 
 def graded(submission: Submission) -> Grade:
@@ -190,8 +190,8 @@ def judged_by(exercise: Exercise, shown: Shown, seed: int) -> tuple[CheckResult,
         if not check.holds(value) and not fault:
             general.append((len(lines) - 1, begins))
     if diagnosis.says:
-        for place, begins in general:
-            lines[place] = replace(lines[place], why=begins + diagnosis.says)
+        for index, begins in general:
+            lines[index] = replace(lines[index], why=begins + diagnosis.says)
     return tuple(lines)
 
 
@@ -220,12 +220,12 @@ def _measured(
             recordings[check.run] = record(session, checked_duration(scene.duration))
         except InputError as error:
             recordings[check.run] = str(error)
-    found = recordings[check.run]
-    if isinstance(found, str):
-        raise InputError(found)
-    if found.session.diverged_at is not None:
-        raise _Lost(f"the robot was out of control at {found.session.diverged_at:.2f} s")
-    return check.measure.value(found)
+    recording = recordings[check.run]
+    if isinstance(recording, str):
+        raise InputError(recording)
+    if recording.session.diverged_at is not None:
+        raise _Lost(f"the robot was out of control at {recording.session.diverged_at:.2f} s")
+    return check.measure.value(recording)
 
 
 def _scene(run: RunSpec, controller: str | None = None) -> TorqueScene:
@@ -273,9 +273,9 @@ def beside(run: RunSpec, controller: str | Law, shown: Shown, diagnosis: Diagnos
         session.drain()
         applied = session.plant.tau.copy()
         session.tick()
-        given, plan = session.given, session.plan
-        assert given is not None and plan is not None
-        answer = other.step(given.q, given.v, given.previews, applied)
+        controller_input, plan = session.controller_input, session.plan
+        assert controller_input is not None and plan is not None
+        answer = other.step(controller_input.q, controller_input.v, controller_input.previews, applied)
         if answer.notice is not None:
             raise InputError(answer.notice)
         worst = max(worst, float(np.abs(answer.tau - plan.tau).max()))

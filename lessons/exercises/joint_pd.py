@@ -31,7 +31,7 @@ PLANAR = RunSpec("planar3-hold", set=(*ALONE, *QUICK), duration=1.2)
 
 def checks(seed: int) -> tuple[GradeCheck, ...]:
     # A configuration whose gravity torques differ from those at the start.
-    moved = tuple(radians(each) for each in (0.0, 55.0, 0.0, -60.0, 0.0, 60.0, 0.0))
+    moved = tuple(radians(angle) for angle in (0.0, 55.0, 0.0, -60.0, 0.0, 60.0, 0.0))
     sent = replace(IIWA, set=(*ALONE, *STIFF), events=((0.02, MoveTarget("posture", moved)),), duration=1.0)
     return (
         GradeCheck(

@@ -78,7 +78,7 @@ def hierarchy(
     or switch terms off."""
     chosen = now.levels[::order][:levels]
     first: Array | None = None
-    found = now.tau_0
+    tau = now.tau_0
     for level in chosen:
         H, linear = _quadratic(now, level, ahead, Q, R, M_bar)
         rows, lower, upper = _bounds(now, limits)
@@ -94,8 +94,8 @@ def hierarchy(
         else:
             step = solve_qp(H, f * linear, rows, lower, upper).x
         first = step if first is None else first
-        found = step if alone else now.tau_0 + step
-    return found
+        tau = step if alone else now.tau_0 + step
+    return tau
 
 
 def _quadratic(now: View, level: LevelView, ahead: int, Q: bool, R: bool, M_bar: bool) -> tuple[Array, Array]:

@@ -43,7 +43,7 @@ class Diagnosis:
 
     def begin(self) -> None:
         """Prepares the comparison for a new run."""
-        self._laws, self._seen = [each.make() for each in self._left], 0
+        self._laws, self._seen = [mistake.make() for mistake in self._left], 0
 
     def see(self, now: View, answer: Any) -> None:
         """Compares the torque of a submission with those of the mistakes. After the first ticks of a run,
@@ -52,8 +52,8 @@ class Diagnosis:
         if self._seen > _FIRST and self._seen % _EVERY:
             return
         alike = [_alike(law(now), answer) for law in self._laws]
-        self._left = [each for each, same in zip(self._left, alike, strict=True) if same]
-        self._laws = [each for each, same in zip(self._laws, alike, strict=True) if same]
+        self._left = [mistake for mistake, same in zip(self._left, alike, strict=True) if same]
+        self._laws = [law for law, same in zip(self._laws, alike, strict=True) if same]
 
     @property
     def says(self) -> str:

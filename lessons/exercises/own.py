@@ -129,11 +129,11 @@ def exercise_of(source: Source) -> Exercise:
         )
     module = load(source)
     expected(module, "exercise")
-    found = vars(module)["EXERCISE"]
-    if not isinstance(found, Exercise) or not found.solution:
+    exercise = vars(module)["EXERCISE"]
+    if not isinstance(exercise, Exercise) or not exercise.solution:
         raise InputError(f"{source.path}: EXERCISE must be made with own_exercise(…)")
-    _checked(source.path, found)
-    return found
+    _checked(source.path, exercise)
+    return exercise
 
 
 def _makes_one(source: Source) -> bool:
@@ -142,28 +142,28 @@ def _makes_one(source: Source) -> bool:
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         return False
     return any(
-        isinstance(each, ast.Assign)
-        and isinstance(each.value, ast.Call)
-        and ast.unparse(each.value.func).rpartition(".")[2] == "own_exercise"
-        and any(isinstance(to, ast.Name) and to.id == "EXERCISE" for to in each.targets)
-        for each in body
+        isinstance(statement, ast.Assign)
+        and isinstance(statement.value, ast.Call)
+        and ast.unparse(statement.value.func).rpartition(".")[2] == "own_exercise"
+        and any(isinstance(to, ast.Name) and to.id == "EXERCISE" for to in statement.targets)
+        for statement in body
     )
 
 
-def _checked(path: str, found: Exercise) -> None:
+def _checked(path: str, exercise: Exercise) -> None:
     """Raises InputError if a field has the wrong type, or a check cannot be judged."""
     texts = ("name", "equation", "plain", "lesson")
-    wrong = [each.name for each in fields(found) if each.name in texts]
-    wrong = [name for name in wrong if not isinstance(getattr(found, name), str)]
+    wrong = [field.name for field in fields(exercise) if field.name in texts]
+    wrong = [name for name in wrong if not isinstance(getattr(exercise, name), str)]
     if wrong:
         raise InputError(f"{path}: {wrong[0]} of the exercise must be a text")
-    if not found.name or not isinstance(found.card, Card):
+    if not exercise.name or not isinstance(exercise.card, Card):
         raise InputError(f"{path}: the exercise needs a name, and a card made with card_of(__doc__)")
-    checks = found.checks(0)
-    if not checks or not all(isinstance(each, GradeCheck) for each in checks):
+    checks = exercise.checks(0)
+    if not checks or not all(isinstance(check, GradeCheck) for check in checks):
         raise InputError(f"{path}: checks(seed) must return one GradeCheck or more, as a tuple")
-    for each in checks:
-        if each.measure is None and not each.beside:
-            raise InputError(f"{path}: the check '{each.text}' needs measure=…, or a controller as beside=…")
-        if each.points < 1:
-            raise InputError(f"{path}: the check '{each.text}' must give one point or more")
+    for check in checks:
+        if check.measure is None and not check.beside:
+            raise InputError(f"{path}: the check '{check.text}' needs measure=…, or a controller as beside=…")
+        if check.points < 1:
+            raise InputError(f"{path}: the check '{check.text}' must give one point or more")

@@ -34,33 +34,33 @@ class Proof:
     @property
     def faults(self) -> tuple[str, ...]:
         """Sentences that say what must be corrected; () if the exercise can be used."""
-        found: list[str] = []
+        faults: list[str] = []
         for name, grade in (("the solution", self.solution), ("the start", self.start)):
             if grade.error:
-                found.append(f"{name} cannot be run: {grade.error}")
-        found += [
+                faults.append(f"{name} cannot be run: {grade.error}")
+        faults += [
             f"the solution misses the check '{line.check}': {line.why}"
             for line in self.solution.lines
             if line.why
         ]
         if self.start.passed:
-            found.append("the start already gets all points: leave something to be written")
+            faults.append("the start already gets all points: leave something to be written")
         for says, grade in self.mistakes:
             if grade.error:
-                found.append(f"the mistake '{says}' cannot be run: {grade.error}")
+                faults.append(f"the mistake '{says}' cannot be run: {grade.error}")
             elif grade.passed:
-                found.append(
+                faults.append(
                     f"the mistake '{says}' gets all points: add a check that this mistake does not pass"
                 )
             elif not any(says in line.why for line in grade.lines):
-                found.append(f"the mistake '{says}' is not named: another mistake returns the same torques")
-        missed = {place for _, grade in self.mistakes for place, line in enumerate(grade.lines) if line.why}
-        found += [
+                faults.append(f"the mistake '{says}' is not named: another mistake returns the same torques")
+        missed = {index for _, grade in self.mistakes for index, line in enumerate(grade.lines) if line.why}
+        faults += [
             f"the check '{check.text}' is passed by every mistake: add a mistake that does not pass it"
-            for place, check in enumerate(self.exercise.checks(0))
-            if place not in missed
+            for index, check in enumerate(self.exercise.checks(0))
+            if index not in missed
         ]
-        return tuple(found)
+        return tuple(faults)
 
 
 def prove(path: str, seed: int, spread: Spread, progress: Callable[[float], None]) -> Proof:
@@ -79,14 +79,14 @@ def prove(path: str, seed: int, spread: Spread, progress: Callable[[float], None
     exercise = exercise_in(path)
     model = Submission.to(path, read(path), seed)
     texts = [("solution", exercise.solution), ("start", exercise.start)]
-    texts += [(f"mistake {k}", each.text) for k, each in enumerate(exercise.mistakes, start=1)]
+    texts += [(f"mistake {k}", mistake.text) for k, mistake in enumerate(exercise.mistakes, start=1)]
     work = [replace(model, source=Source(f"{path}, {name}", text)) for name, text in texts]
     grades: dict[int, Grade] = {}
     with closing(spread(grade_apart, work)) as outcomes:
-        for place, outcome in outcomes:
+        for index, outcome in outcomes:
             if isinstance(outcome, FailedJob):
-                outcome = Grade(work[place].source.path, "", exercise.name, error=outcome.reason)
-            grades[place] = outcome
+                outcome = Grade(work[index].source.path, "", exercise.name, error=outcome.reason)
+            grades[index] = outcome
             progress(len(grades) / len(work))
-    mistakes = tuple((each.says, grades[k]) for k, each in enumerate(exercise.mistakes, start=2))
+    mistakes = tuple((mistake.says, grades[k]) for k, mistake in enumerate(exercise.mistakes, start=2))
     return Proof(exercise, grades[0], grades[1], mistakes)

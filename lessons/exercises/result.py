@@ -64,18 +64,18 @@ class Grade:
         return not self.error and self.points == self.of
 
 
-def as_data(found: Grade) -> dict[str, Any]:
+def as_data(grade: Grade) -> dict[str, Any]:
     """JSON-ready."""
     return {
-        "file": found.file,
-        "sha256": found.digest,
-        "exercise": found.exercise,
-        "points": found.points,
-        "of": found.of,
-        "error": found.error,
-        "protection": list(found.protection),
+        "file": grade.file,
+        "sha256": grade.digest,
+        "exercise": grade.exercise,
+        "points": grade.points,
+        "of": grade.of,
+        "error": grade.error,
+        "protection": list(grade.protection),
         "checks": [
             {**vars(line), "measured": line.measured if math.isfinite(line.measured) else None}
-            for line in found.lines
+            for line in grade.lines
         ],
     }

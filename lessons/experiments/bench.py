@@ -65,10 +65,10 @@ def bench(
     """
     loaded = as_torque_scene(RunSpec(scene).for_export().prepared(), "bench's")
     timings = []
-    for place, N in enumerate(horizons):
+    for index, N in enumerate(horizons):
         sessions = {}
         contenders = CONTENDERS if N <= _LONGEST_PRINTED else CONTENDERS[:1]
-        for controller, solver in (each for each in contenders if is_installed(each[1])):
+        for controller, solver in (contender for contender in contenders if is_installed(contender[1])):
             settings = replace(loaded.settings, horizon=N, controller=controller, solver=solver)
             sessions[controller, solver] = TorqueSession(replace(loaded, settings=settings))
         steps: dict[tuple[str, str], list[float]] = {key: [] for key in sessions}
@@ -89,7 +89,7 @@ def bench(
             for (name, solver), times in steps.items()
         ]
         if progress is not None:
-            progress((place + 1) / len(horizons))
+            progress((index + 1) / len(horizons))
     return timings
 
 
@@ -112,19 +112,19 @@ def _spread(times: list[float]) -> dict[str, float]:
 def ratios(timings: Sequence[Timing]) -> dict[str, Any]:
     """Returns, for each horizon, the ratio of the step time of himpc_printed to that of himpc, and the ratio
     of ProxQP's QP time to DAQP's."""
-    found = {(t.horizon, t.controller, t.solver): t for t in timings}
+    by_case = {(t.horizon, t.controller, t.solver): t for t in timings}
     result = {}
     for N in sorted({t.horizon for t in timings}):
-        compiled = found[N, "himpc", "daqp"].step_ms["median"]
-        if (N, "himpc_printed", "daqp") not in found:
+        compiled = by_case[N, "himpc", "daqp"].step_ms["median"]
+        if (N, "himpc_printed", "daqp") not in by_case:
             continue
-        daqp, proxqp = found[N, "himpc_printed", "daqp"], found[N, "himpc_printed", "proxqp"]
+        daqp, proxqp = by_case[N, "himpc_printed", "daqp"], by_case[N, "himpc_printed", "proxqp"]
         result[str(N)] = {
             "printed_daqp_over_compiled": daqp.step_ms["median"] / compiled,
             "printed_proxqp_over_compiled": proxqp.step_ms["median"] / compiled,
             "proxqp_qp_over_daqp_qp": proxqp.qp_ms / daqp.qp_ms if daqp.qp_ms else None,
         }
-        qpoases = found.get((N, "himpc_printed", "qpoases"))
+        qpoases = by_case.get((N, "himpc_printed", "qpoases"))
         if qpoases is not None and daqp.qp_ms:
             result[str(N)]["qpoases_qp_over_daqp_qp"] = qpoases.qp_ms / daqp.qp_ms
     return result

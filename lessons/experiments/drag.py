@@ -87,14 +87,14 @@ def dragged(robot: Robot) -> Motion:
     there, home = target(robot, length, bool(scene.world)), _points(robot, robot.home)[-1]
     if there is None:
         return Motion(0.0)
-    places, drag = (there, home), float(np.linalg.norm(there - home))
+    points, drag = (there, home), float(np.linalg.norm(there - home))
     events = tuple(
-        (START + k * HOLD, MoveTarget("position", tuple(map(float, place)))) for k, place in enumerate(places)
+        (START + k * HOLD, MoveTarget("position", tuple(map(float, point)))) for k, point in enumerate(points)
     )
     session = begin(replace(scene, events=events), 0)
     errors, torque, speed, why, began = [], 0.0, 0.0, "", process_time()
     at, row = session.layout.fields, np.empty(0)
-    for place in places:
+    for point in points:
         while session.t < START + (len(errors) + 1) * HOLD - 0.5 * session.settings.T_s:
             row = session.tick()
             torque = max(torque, float(np.abs(row[at["tau"]] / robot.tau_limit).max()))
@@ -103,7 +103,7 @@ def dragged(robot: Robot) -> Motion:
                 return Motion(drag, lost=max(session.diverged_at - START, 0.0))
             if process_time() - began > _SECONDS:
                 return Motion(drag, over=True)
-        errors.append(float(np.linalg.norm(session.plant.frame_pose(robot.tip)[1] - place)))
+        errors.append(float(np.linalg.norm(session.plant.frame_pose(robot.tip)[1] - point)))
         why = why or ("" if errors[-1] <= FOLLOWS * drag else _at_limits(session.plant, *_distance(row, at)))
     still = float(np.abs(session.plant.v / robot.v_limit).max()) < _STILL
     return Motion(drag, *errors, torque=torque, speed=speed, rest=still, why=why)
@@ -120,16 +120,18 @@ def _at_limits(plant: Plant, distance: float, kept: float) -> str:
     robot = plant.robot
     at_torque = np.abs(plant.tau) > 0.99 * robot.tau_limit
     near = np.minimum(plant.q - robot.q_lower, robot.q_upper - plant.q) < _MARGIN
-    touching = dict.fromkeys(" touches ".join(map(shortened, each.between)) for each in plant.contacts)
+    touching = dict.fromkeys(" touches ".join(map(shortened, contact.between)) for contact in plant.contacts)
     limits = (("torque", at_torque), ("position", near))
-    told = [
-        f"{listed(list(compress(robot.joint_names, found)))} at the {what} limit"
-        for what, found in limits
-        if found.any()
+    notes = [
+        f"{listed(list(compress(robot.joint_names, reached)))} at the {what} limit"
+        for what, reached in limits
+        if reached.any()
     ]
     if distance < kept + _NEAR:
-        told.append(f"{1e3 * distance:.0f} mm to another link or an object, and {1e3 * kept:.0f} mm are kept")
-    return "; ".join([*list(touching)[:2], *told])
+        notes.append(
+            f"{1e3 * distance:.0f} mm to another link or an object, and {1e3 * kept:.0f} mm are kept"
+        )
+    return "; ".join([*list(touching)[:2], *notes])
 
 
 def target(robot: Robot, drag: float, floor: bool) -> Array | None:
@@ -146,8 +148,8 @@ def target(robot: Robot, drag: float, floor: bool) -> Array | None:
     low, high = robot.q_lower + _MARGIN, robot.q_upper - _MARGIN
     home = _points(robot, robot.home)
     least = min(0.5 * drag, float(home[:, 2].min())) - 1e-3 if floor else -math.inf
-    found: list[tuple[bool, float, int, Array]] = []
-    for place, signs in enumerate(each for each in product((0.0, 1.0, -1.0), repeat=3) if any(each)):
+    candidates: list[tuple[bool, float, int, Array]] = []
+    for index, signs in enumerate(corner for corner in product((0.0, 1.0, -1.0), repeat=3) if any(corner)):
         way = np.array(signs) / np.linalg.norm(signs)
         result = judge.solve(home[-1] + drag * way)
         q = np.clip(result.q, np.minimum(low, robot.home), np.maximum(high, robot.home))
@@ -156,8 +158,8 @@ def target(robot: Robot, drag: float, floor: bool) -> Array | None:
         if far and float(points[:, 2].min()) >= least:
             turn = float((np.abs(q - robot.home) / span).max())
             far_off = float(np.linalg.norm(points[-1] - home[-1] - drag * way)) > 0.1 * drag
-            found.append((far_off, turn, place, points[-1]))
-    return min(found)[3] if found else None
+            candidates.append((far_off, turn, index, points[-1]))
+    return min(candidates)[3] if candidates else None
 
 
 def _points(robot: Robot, q: Array) -> Array:

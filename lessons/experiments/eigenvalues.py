@@ -57,14 +57,14 @@ class EigenvalueJob(Work):
                 break
         t: Array = session.settings.T_s * np.arange(len(errors), dtype=float)
         distance = np.linalg.norm(errors, axis=1)[t >= 1.0]
-        told: dict[str, Any] = {
+        figures: dict[str, Any] = {
             "diverged": session.diverged_at is not None,
             "diverged_at_s": session.diverged_at,
             "rms_mm": 1e3 * float(np.sqrt((distance**2).mean())) if len(distance) else math.nan,
             "largest": max(largest),
             "beyond_2": longest(np.array(largest) > 2.0),
         }
-        return JobResult(self, told, {"t": t[:, None], "largest": np.array(largest)[:, None]})
+        return JobResult(self, figures, {"t": t[:, None], "largest": np.array(largest)[:, None]})
 
 
 def longest(flags: NDArray[np.bool_]) -> int:

@@ -103,13 +103,13 @@ class JobResult:
     def figure(self, *path: str | int) -> float:
         """Returns a number of the summary, e.g. figure("limits", "torque", "max_ratio"); NaN where there is
         none."""
-        found: Any = self.summary
+        value: Any = self.summary
         try:
             for key in path:
-                found = found[key]
+                value = value[key]
         except (KeyError, IndexError):
             return float("nan")
-        return float("nan") if found is None else float(found)
+        return float("nan") if value is None else float(value)
 
     def error_of(self, task: str, coordinate: int = 0, measure: str = "rmse_after_1s") -> float:
         """Returns an error figure of one coordinate of a task, m or deg; NaN if there is none or control was
@@ -117,8 +117,8 @@ class JobResult:
         if not self.completed:
             return float("nan")
         tasks = self.summary.get("tasks", ())
-        place = next((k for k, each in enumerate(tasks) if each["name"] == task), -1)
-        return self.figure("tasks", place, measure, coordinate) if place >= 0 else float("nan")
+        index = next((k for k, entry in enumerate(tasks) if entry["name"] == task), -1)
+        return self.figure("tasks", index, measure, coordinate) if index >= 0 else float("nan")
 
 
 Results = Mapping[Any, JobResult]
@@ -151,24 +151,24 @@ def perform_all(jobs: Iterable[Work], progress: Callable[[float], None] | None =
     shared = [job for job in unique if not job.timed]
     timed = [job for job in unique if job.timed]
     total = sum(map(_work, unique))
-    found: dict[Work, JobResult] = {}
+    results: dict[Work, JobResult] = {}
     done = 0.0
     for batch, spread in ((shared, on_cores), (timed, one_by_one)):
         with closing(spread(_do, batch)) as outcomes:
-            for place, outcome in outcomes:
-                job = batch[place]
-                found[job] = (
+            for index, outcome in outcomes:
+                job = batch[index]
+                results[job] = (
                     JobResult(job, {}, {}, outcome.reason) if isinstance(outcome, FailedJob) else outcome
                 )
                 done += _work(job)
                 if progress is not None:
                     progress(done / total)
-    return found
+    return results
 
 
 def _work(job: Work) -> float:
     """Returns an estimate of a job's cost, for the order of the jobs and for the progress."""
     spec = job.spec
-    horizons = [float(each.partition("=")[2]) for each in spec.set if each.startswith("horizon=")]
+    horizons = [float(text.partition("=")[2]) for text in spec.set if text.startswith("horizon=")]
     horizon = horizons[-1] if horizons else 5.0
     return (spec.duration or 8.0) * (1.0 + 0.1 * horizon) * (20.0 if spec.controller == "nhimpc" else 1.0)

@@ -44,7 +44,7 @@ def ellipsoids(configuration: Configuration, stack: Stack) -> list[Ellipsoid]:
     An ellipsoid has only the axes that its task controls. If the task controls x alone, it is a line along x.
     """
     n = configuration.q.size
-    free, found = np.eye(n), []
+    free, shapes = np.eye(n), []
     for level in stack:
         if not level.enabled:
             continue
@@ -58,9 +58,9 @@ def ellipsoids(configuration: Configuration, stack: Stack) -> list[Ellipsoid]:
                 axes, radii = _axes(own @ free)
                 turns = isinstance(task, FrameOrientation)
                 position = np.array(configuration.placement(task.frame).translation)
-                found.append(Ellipsoid(level.name, task.name, turns, position, axes, radii))
+                shapes.append(Ellipsoid(level.name, task.name, turns, position, axes, radii))
         free = free @ _null_space(np.vstack(rows) @ free)
-    return found
+    return shapes
 
 
 def _axes(J: Array) -> tuple[Array, Array]:

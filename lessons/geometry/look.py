@@ -99,8 +99,8 @@ def matrix_of(session: TorqueSession, level: str) -> Matrix:
     """
     tick = tick_of(session)
     names = [problem.name for problem in tick.problems]
-    place = names.index(level) if level in names else 0
-    return matrix(tick.problems[place], tick.plan.rows, tick.strict[place])
+    index = names.index(level) if level in names else 0
+    return matrix(tick.problems[index], tick.plan.rows, tick.strict[index])
 
 
 def _weighted(session: TorqueSession, tick: TickProblems) -> Array | None:
@@ -112,10 +112,10 @@ def _weighted(session: TorqueSession, tick: TickProblems) -> Array | None:
 
 def _osf(session: TorqueSession, plan: Plan) -> Array | None:
     """Returns the change of torque that OSF would demand at the same state, (n,) N·m."""
-    given = session.given
-    if given is None:
+    controller_input = session.controller_input
+    if controller_input is None:
         return None
     osf = OSF(session.robot, session.settings.for_controller())
     osf.reset(plan.tau_0)
-    demand = osf.step(given.q, given.v, given.previews, plan.tau_0)
+    demand = osf.step(controller_input.q, controller_input.v, controller_input.previews, plan.tau_0)
     return None if demand.unsolved else demand.tau - plan.tau_0

@@ -77,7 +77,7 @@ def matrix(problem: LevelProblem, rows: Rows, solution: LevelSolution) -> Matrix
 
 
 def _active(rows: Rows, solution: LevelSolution, N: int) -> Sequence[ActiveRow]:
-    found = solution.active
+    active = solution.active
     return [
         ActiveRow(
             joint=joint,
@@ -86,6 +86,6 @@ def _active(rows: Rows, solution: LevelSolution, N: int) -> Sequence[ActiveRow]:
             upper=bool(multiplier > 0),
             multiplier=abs(float(multiplier)),
         )
-        for row, column, multiplier in zip(found.row, found.joint, found.multiplier, strict=True)
+        for row, column, multiplier in zip(active.row, active.joint, active.multiplier, strict=True)
         for joint in rows.joints_of(int(row), int(column))
     ]

@@ -168,7 +168,7 @@ def cut(
         leaves = _left(B, wanted, pair, held[0])
         away = U - held
         away[0, pair] = 0.0
-        felt = np.abs(B @ away[0]).max() / max(float(np.linalg.norm(B)), 1e-300)
+        effect = np.abs(B @ away[0]).max() / max(float(np.linalg.norm(B)), 1e-300)
         levels.append(
             LevelCut(
                 name=problem.name,
@@ -178,7 +178,7 @@ def cut(
                 allowed=allowed,
                 optimum=best(P, centre, allowed, box),
                 solved=U[0, pair],
-                apart=float(max(felt, np.abs(away[1:]).max(initial=0.0))),
+                apart=float(max(effect, np.abs(away[1:]).max(initial=0.0))),
                 leaves=leaves,
             )
         )
@@ -257,8 +257,8 @@ def best(P: Array, centre: Array, allowed: Allowed, box: TorqueBox) -> Array | N
                 corner = np.zeros(2)
                 corner[axis] = end
                 edges.append(_best_on(P, centre, corner, np.eye(2)[1 - axis], box))
-    found = [w for w in edges if w is not None]
-    return min(found, key=lambda w: float((w - centre) @ P @ (w - centre)), default=None)
+    points = [w for w in edges if w is not None]
+    return min(points, key=lambda w: float((w - centre) @ P @ (w - centre)), default=None)
 
 
 def _best_on(P: Array, centre: Array, at: Array, along: Array, box: TorqueBox) -> Array | None:

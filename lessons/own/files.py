@@ -64,8 +64,8 @@ class Source:
     @property
     def module(self) -> str:
         """The name of the file's module in Python."""
-        place = hashlib.sha256(os.fsencode(Path(self.path).absolute())).hexdigest()[:12]
-        return f"himpc_lab_own_{place}"
+        digest = hashlib.sha256(os.fsencode(Path(self.path).absolute())).hexdigest()[:12]
+        return f"himpc_lab_own_{digest}"
 
 
 def read(path: str) -> Source:
@@ -111,10 +111,10 @@ def with_fingerprint(mark: str, files: Iterable[str], kind: str) -> str:
     """Returns the file, among several, that has a given fingerprint. kind: the kind of file, which is also
     the name of its option. Raises InputError if no file has this fingerprint."""
     name = mark.partition("@")[0]
-    alike = [each for each in files if is_file(each) and Path(each).name == name]
-    for each in alike:
-        if fingerprint(each) == mark:
-            return each
+    alike = [file for file in files if is_file(file) and Path(file).name == name]
+    for file in alike:
+        if fingerprint(file) == mark:
+            return file
     if alike:
         raise InputError(
             f"{Path(alike[0]).name} differs from the {shortened(name, 60)} with which this was made: "
@@ -159,8 +159,8 @@ def _shown(error: SyntaxError) -> str:
     if not line.strip() or not error.offset:
         return ""
     indent = len(line) - len(line.lstrip())
-    place = max(error.offset - 1 - indent, 0)
-    return f"\n  {line.strip()[:_LONGEST_LINE]}\n  {' ' * place}^" if place < _LONGEST_LINE else ""
+    column = max(error.offset - 1 - indent, 0)
+    return f"\n  {line.strip()[:_LONGEST_LINE]}\n  {' ' * column}^" if column < _LONGEST_LINE else ""
 
 
 _LONGEST_LINE = 100
@@ -172,12 +172,12 @@ def sentence(path: str, error: BaseException) -> str:
         return f"{path}, line {error.lineno}: {error.msg}{_shown(error)}"
     steps = traceback.walk_tb(error.__traceback__)
     lines = [line for frame, line in steps if frame.f_code.co_filename == path]
-    place = f"{path}, line {lines[-1]}" if lines else path
+    location = f"{path}, line {lines[-1]}" if lines else path
     if isinstance(error, SystemExit):
-        return f"{place}: it ends the program (SystemExit): leave that out"
+        return f"{location}: it ends the program (SystemExit): leave that out"
     if isinstance(error, MemoryError):
-        return f"{place}: it needs more memory than is available"
-    said = " ".join(str(error).split())
+        return f"{location}: it needs more memory than is available"
+    message = " ".join(str(error).split())
     if isinstance(error, InputError):
-        return f"{place}: {shortened(said, 1000)}"
-    return f"{place}: {type(error).__name__}: {shortened(said, 200)}"
+        return f"{location}: {shortened(message, 1000)}"
+    return f"{location}: {type(error).__name__}: {shortened(message, 200)}"

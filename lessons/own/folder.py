@@ -42,11 +42,11 @@ class Folder:
             InputError: the path leads outside the folder. The message does not reveal whether there is such a
                 file.
         """
-        given = str(self.path / name)
-        if not self.holds(given):
+        file = str(self.path / name)
+        if not self.holds(file):
             raise InputError(
                 f"{shortened(name, 100)}: the page opens only files below the folder in which himpc-lab was "
                 "started, or below the folder of --own-files DIR"
             )
-        path, here = Path(os.path.realpath(given)), Path(os.path.realpath(Path.cwd()))
+        path, here = Path(os.path.realpath(file)), Path(os.path.realpath(Path.cwd()))
         return str(path.relative_to(here) if path.is_relative_to(here) else path)

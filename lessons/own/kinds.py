@@ -29,22 +29,22 @@ def kind_of(module: ModuleType) -> Kind:
         # In a student's solution, EXERCISE is only the name of an exercise.
         "exercise": not isinstance(names.get("EXERCISE", ""), str),
     }
-    found: list[Kind] = [kind for kind in KINDS if defined[kind]]
-    if not found:
+    kinds: list[Kind] = [kind for kind in KINDS if defined[kind]]
+    if not kinds:
         raise InputError(
             f"{path}: defines neither a controller nor a scene, task or exercise: "
             + "; ".join(f"{_a(kind)} is {what}" for kind, what in _DEFINES.items())
         )
-    if len(found) > 1:
-        raise InputError(f"{path}: defines a {' and a '.join(found)}: put each into a file of its own")
-    return found[0]
+    if len(kinds) > 1:
+        raise InputError(f"{path}: defines a {' and a '.join(kinds)}: put each into a file of its own")
+    return kinds[0]
 
 
 def expected(module: ModuleType, kind: Kind) -> None:
     """Raises InputError if a file is not of the expected kind."""
-    found = kind_of(module)
-    if found != kind:
-        raise InputError(f"{module.__file__}: is {_a(found)}, but {_a(kind)} is needed: {_DEFINES[kind]}")
+    actual = kind_of(module)
+    if actual != kind:
+        raise InputError(f"{module.__file__}: is {_a(actual)}, but {_a(kind)} is needed: {_DEFINES[kind]}")
 
 
 def _a(kind: Kind) -> str:

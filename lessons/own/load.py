@@ -135,7 +135,7 @@ def _is_code(value: Any) -> bool:
 
 def _restored(before: dict[str, dict[str, Any]]) -> list[str]:
     """Restores the objects that were replaced, and returns their names."""
-    found = []
+    restored = []
     for name, names in before.items():
         module = sys.modules.get(name)
         if module is None:
@@ -144,8 +144,8 @@ def _restored(before: dict[str, dict[str, Any]]) -> list[str]:
         for key, value in names.items():
             if now.get(key) is not value:
                 now[key] = value
-                found.append(f"{name}.{key}")
-    return found
+                restored.append(f"{name}.{key}")
+    return restored
 
 
 def _handlers() -> dict[int, Any]:

@@ -46,9 +46,9 @@ def by_controller(
             scale,
             label=name(run.controller),
             colour=run.controller,
-            weight=weights[0] if place == 0 and len(shown) > 1 else weights[1],
+            weight=weights[0] if index == 0 and len(shown) > 1 else weights[1],
         )
-        for place, run in enumerate(shown)
+        for index, run in enumerate(shown)
     )
 
 
@@ -59,7 +59,7 @@ BAND = 0.05
 def banded(panel: Panel) -> Panel:
     """Returns the panel with each curve as a band between the least and the largest value in windows of BAND.
     A signal that chatters would fill an area if it were drawn as a line."""
-    return replace(panel, curves=tuple(_band(each) for each in panel.curves))
+    return replace(panel, curves=tuple(_band(plot_curve) for plot_curve in panel.curves))
 
 
 def _band(curve: PlotCurve) -> PlotCurve:
@@ -73,9 +73,11 @@ def _band(curve: PlotCurve) -> PlotCurve:
 def excerpt(panel: Panel, start: float, end: float) -> Panel:
     """Returns the panel for a short interval of time, with values shown as steps."""
     curves = []
-    for each in panel.curves:
-        inside = (each.x >= start) & (each.x <= end)
-        curves.append(replace(each, x=each.x[inside], y=each.y[inside], style="steps", weight=1.0))
+    for plot_curve in panel.curves:
+        inside = (plot_curve.x >= start) & (plot_curve.x <= end)
+        curves.append(
+            replace(plot_curve, x=plot_curve.x[inside], y=plot_curve.y[inside], style="steps", weight=1.0)
+        )
     return replace(panel, curves=tuple(curves), y_label="")
 
 
@@ -101,8 +103,8 @@ def log_error_panels(
     panels = []
     for panel in error_panels(runs, tasks):
         curves = tuple(
-            replace(_largest(each), weight=2.6 if place < len(panel.curves) / 2 else 1.0)
-            for place, each in enumerate(panel.curves)
+            replace(_largest(plot_curve), weight=2.6 if index < len(panel.curves) / 2 else 1.0)
+            for index, plot_curve in enumerate(panel.curves)
         )
         label = "size of " + panel.y_label
         panels.append(Panel(label, curves, log_y=True, y_range=(FAINTEST, 10.0)))

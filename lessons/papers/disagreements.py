@@ -11,7 +11,7 @@ from lessons.papers.topics import Measured, Topic, topics
 from lessons.papers.words import number
 from lessons.replay.state import encode
 
-Found = Sequence[tuple[str, Row]]
+ComparedRows = Sequence[tuple[str, Row]]
 """(name of the item, row)."""
 
 _INTRO = """\
@@ -33,21 +33,21 @@ texts below them, is measured by `reproduce` and compared with the stored number
 _NO_TOPIC = Topic("", "Not explained yet", "none.", "not known.", "run the item.")
 
 
-def page(found: Found) -> str:
+def page(compared: ComparedRows) -> str:
     """Returns the page in Markdown.
 
     Args:
-        found: every row of the items.
+        compared: every row of the items.
     """
     by_topic: dict[str, list[tuple[str, Row]]] = {name: [] for name in topics()}
-    for item, row in found:
+    for item, row in compared:
         if row.verdict not in ("differs", "opposite"):
             continue
         by_topic.setdefault(row.topic if row.topic in topics() else "", []).append((item, row))
-    parts = [_INTRO.format(tally=_tally([row for _, row in found]))]
-    measured = {**_remembered(), **{(item, row.quantity): (row.ours, row.ratio) for item, row in found}}
+    parts = [_INTRO.format(tally=_tally([row for _, row in compared]))]
+    measured = {**_remembered(), **{(item, row.quantity): (row.ours, row.ratio) for item, row in compared}}
     parts += [
-        _section(topics().get(name, _NO_TOPIC).told(measured), rows)
+        _section(topics().get(name, _NO_TOPIC).with_numbers(measured), rows)
         for name, rows in by_topic.items()
         if rows
     ]
@@ -65,7 +65,7 @@ def _remembered() -> Measured:
 
 def _tally(rows: Sequence[Row]) -> str:
     counts = Counter(row.verdict for row in rows)
-    compared = sum(counts[each] for each in ("agrees", "differs", "opposite"))
+    compared = sum(counts[verdict] for verdict in ("agrees", "differs", "opposite"))
     copied = sum(row.copied and row.verdict == "agrees" for row in rows)
     return (
         f"Of {compared} comparisons with numbers and statements of the papers, {counts['agrees']} agree, "
@@ -75,7 +75,7 @@ def _tally(rows: Sequence[Row]) -> str:
     )
 
 
-def _section(topic: Topic, rows: Found) -> str:
+def _section(topic: Topic, rows: ComparedRows) -> str:
     lines = [
         f"## {topic.title}",
         "",

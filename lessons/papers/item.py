@@ -170,12 +170,12 @@ class Item:
 
 
 def figures(
-    *each: tuple[int, str, str, tuple[Work, ...], Callable[[Results, bool], Section]],
+    *rows: tuple[int, str, str, tuple[Work, ...], Callable[[Results, bool], Section]],
 ) -> tuple[Item, ...]:
     """Returns the items of figures of HIMPC's paper: (number, title, source, runs, report)."""
     return tuple(
         Item(f"himpc-fig-{number}", title, source, partial(_always, runs), report)
-        for number, title, source, runs, report in each
+        for number, title, source, runs, report in rows
     )
 
 

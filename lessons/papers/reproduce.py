@@ -66,27 +66,27 @@ def reproduce(
 def recalled(items: Sequence[Item]) -> list[Report]:
     """Returns the reports without a run, from the stored numbers; items that were never stored are left
     out."""
-    found = []
+    reports = []
     for quick in (True, False):
         for name, memory in stored(quick).items():
-            item = next((each for each in items if each.name == name), None)
+            item = next((item for item in items if item.name == name), None)
             if item is not None:
                 section = from_memory(item, memory, quick)
-                found.append(Report(item, section, (), judged(section, memory)))
+                reports.append(Report(item, section, (), judged(section, memory)))
     # If both versions are stored, the whole version counts.
-    latest = {report.item.name: report for report in found}
+    latest = {report.item.name: report for report in reports}
     return [latest[item.name] for item in items if item.name in latest]
 
 
 def _troubles(item: Item, quick: bool, results: Results) -> list[str]:
-    found = []
+    troubles = []
     for job in dict.fromkeys(item.jobs(quick)):
         run = results[job]
         if run.error is not None:
-            found.append(f"`{job.spec.command_line()}` could not be run: {run.error}")
+            troubles.append(f"`{job.spec.command_line()}` could not be run: {run.error}")
         elif run.lost_at is not None:
-            found.append(f"`{job.spec.command_line()}` lost control at {run.lost_at:.3f} s")
-    return found
+            troubles.append(f"`{job.spec.command_line()}` lost control at {run.lost_at:.3f} s")
+    return troubles
 
 
 def write(reports: Sequence[Report], folder: Path, quick: bool) -> None:

@@ -89,15 +89,15 @@ def judged(section: Section, memory: StoredItem | None) -> tuple[PaperCheck, ...
     stored number may be missing now, and no number may be new. Without stored numbers only the topics are
     checked.
     """
-    found = [_explained(row) for row in section.rows if row.verdict in ("differs", "opposite")]
+    lines = [_explained(row) for row in section.rows if row.verdict in ("differs", "opposite")]
     if memory is None:
-        return tuple(found)
-    found += [_row(row, memory) for row in section.rows]
-    found += [_check(check, memory) for check in section.checks if check.band is not None]
+        return tuple(lines)
+    lines += [_row(row, memory) for row in section.rows]
+    lines += [_check(check, memory) for check in section.checks if check.band is not None]
     names = {row.quantity for row in section.rows} | {check.text for check in section.checks}
     gone = [name for name in (*memory.rows, *memory.checks) if name not in names]
     return (
-        *found,
+        *lines,
         *(PaperCheck(f"“{name}” was stored and is still measured", math.nan, False) for name in gone),
     )
 

@@ -72,9 +72,9 @@ class Topic:
     numbers: Mapping[str, Quoted] = field(default_factory=dict)
     given: tuple[str, ...] = ()
 
-    def told(self, measured: Measured) -> Topic:
+    def with_numbers(self, measured: Measured) -> Topic:
         """Returns the topic with the measured numbers in its texts."""
-        words = {name: each.words(measured) for name, each in self.numbers.items()}
+        words = {name: quoted.words(measured) for name, quoted in self.numbers.items()}
         return replace(self, evidence=self.evidence.format_map(words), cause=self.cause.format_map(words))
 
     @property
@@ -87,7 +87,7 @@ class Topic:
 def topics() -> dict[str, Topic]:
     """Returns all topics by name, in the order of the file."""
     text = Path(__file__).with_name("topics.toml").read_text(encoding="utf-8")
-    return {name: _topic(name, each) for name, each in tomllib.loads(text).items()}
+    return {name: _topic(name, entry) for name, entry in tomllib.loads(text).items()}
 
 
 def _topic(name: str, data: dict[str, Any]) -> Topic:
@@ -99,6 +99,6 @@ def _topic(name: str, data: dict[str, Any]) -> Topic:
         look=data["look"],
         scene=data.get("scene", ""),
         set=tuple(data.get("set", ())),
-        numbers={key: Quoted(**each) for key, each in data.get("numbers", {}).items()},
+        numbers={key: Quoted(**entry) for key, entry in data.get("numbers", {}).items()},
         given=tuple(data.get("given", ())),
     )

@@ -21,8 +21,10 @@ def number(value: float | None) -> str:
 
 def tally(rows: Sequence[Row]) -> str:
     """Says how many rows agree, differ and are opposite; "–" if there are none."""
-    found = [row.verdict for row in rows]
-    counted = [f"{found.count(each)} {words}" for each, words in _VERDICTS.items() if each in found]
+    verdicts = [row.verdict for row in rows]
+    counted = [
+        f"{verdicts.count(verdict)} {words}" for verdict, words in _VERDICTS.items() if verdict in verdicts
+    ]
     return ", ".join(counted) or "–"
 
 

@@ -42,11 +42,11 @@ def draw(picture: Picture, folder: Path) -> Path:
         figure = Figure(figsize=(WIDTH, sum(heights) + 0.35), dpi=DPI, layout="constrained")
         FigureCanvasAgg(figure)
         grid = figure.subplots(rows, picture.columns, squeeze=False, height_ratios=heights)
-        for place, axes in enumerate(grid.flat):
-            if place >= len(picture.panels):
+        for index, axes in enumerate(grid.flat):
+            if index >= len(picture.panels):
                 axes.set_axis_off()
                 continue
-            panel = picture.panels[place]
+            panel = picture.panels[index]
             _draw_bars(axes, panel) if isinstance(panel, Bars) else _draw_panel(axes, panel)
         _label_shared_x(picture, grid)
         figure.align_ylabels(grid)
@@ -108,15 +108,15 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
 def _draw_lines(axes: Axes, panel: Panel) -> None:
     """Draws bounds, marked instants, shaded intervals and notes. The legend names the first of each kind."""
     dotted = (0, (4, 1.5, 1, 1.5))
-    for place, bound in enumerate(panel.bounds):
-        label = panel.bound_label if place == 0 else ""
+    for index, bound in enumerate(panel.bounds):
+        label = panel.bound_label if index == 0 else ""
         axes.axhline(bound, color="white", linewidth=1.6, zorder=0.9)  # otherwise the grid fills the gaps
         axes.axhline(bound, color=BOUND, linewidth=1.2, linestyle=dotted, zorder=1, label=label)
-    for place, mark in enumerate(panel.marks):
-        label = panel.mark_label if place == 0 else ""
+    for index, mark in enumerate(panel.marks):
+        label = panel.mark_label if index == 0 else ""
         axes.axvline(mark, color=REFERENCE, linewidth=0.9, linestyle=":", zorder=1, label=label)
-    for place, (start, end) in enumerate(panel.spans):
-        label = panel.span_label if place == 0 else ""
+    for index, (start, end) in enumerate(panel.spans):
+        label = panel.span_label if index == 0 else ""
         axes.axvspan(start, end, color=BOUND, alpha=0.25, linewidth=0, zorder=0, label=label)
     for x, y, text in panel.notes:
         behind = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.6}
@@ -125,7 +125,7 @@ def _draw_lines(axes: Axes, panel: Panel) -> None:
 
 def _positive(values: Iterable[np.ndarray]) -> bool:
     """Returns whether there is a positive value for a logarithmic axis."""
-    return any(bool((each[np.isfinite(each)] > 0).any()) for each in values)
+    return any(bool((series[np.isfinite(series)] > 0).any()) for series in values)
 
 
 def _draw_curve(axes: Axes, curve: PlotCurve) -> None:
@@ -157,8 +157,8 @@ def _draw_curve(axes: Axes, curve: PlotCurve) -> None:
 def _draw_bars(axes: Axes, panel: Bars) -> None:
     width = 0.8 / len(panel.series)
     middle = np.arange(len(panel.groups))
-    for place, (label, key, values) in enumerate(panel.series):
-        offset = (place - 0.5 * (len(panel.series) - 1)) * width
+    for index, (label, key, values) in enumerate(panel.series):
+        offset = (index - 0.5 * (len(panel.series) - 1)) * width
         axes.bar(middle + offset, values, 0.92 * width, color=colour(key), label=label, zorder=3)
     axes.set_xticks(middle, panel.groups)
     axes.grid(visible=False, axis="x")
@@ -171,8 +171,8 @@ def _draw_bars(axes: Axes, panel: Bars) -> None:
 
 def _mark_zeros(axes: Axes, panel: Bars, width: float) -> None:
     """Draws a dash for a bar of height zero, which a logarithmic axis cannot show."""
-    for place, (_, key, values) in enumerate(panel.series):
-        offset = (place - 0.5 * (len(panel.series) - 1)) * width
+    for index, (_, key, values) in enumerate(panel.series):
+        offset = (index - 0.5 * (len(panel.series) - 1)) * width
         for group, value in enumerate(values):
             if value <= 0:
                 axes.annotate(
@@ -198,11 +198,15 @@ def _label_shared_x(picture: Picture, grid: np.ndarray) -> None:
 
 
 def _legend(figure: Figure, grid: np.ndarray) -> None:
-    found = {}
+    legend = {}
     for axes in grid.flat:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-            found.setdefault(label, handle)
-    if len(found) > 1:
+            legend.setdefault(label, handle)
+    if len(legend) > 1:
         figure.legend(
-            found.values(), found.keys(), loc="outside upper center", ncols=min(len(found), 4), markerscale=2
+            legend.values(),
+            legend.keys(),
+            loc="outside upper center",
+            ncols=min(len(legend), 4),
+            markerscale=2,
         )

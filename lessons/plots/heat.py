@@ -96,7 +96,7 @@ def _two(
     z: Array,
     marks: Marks,
 ) -> None:
-    x, y = (_edges(each, is_log) for each, is_log in zip(values, log, strict=True))
+    x, y = (_edges(axis, is_log) for axis, is_log in zip(values, log, strict=True))
     shown = axes.pcolormesh(x, y, np.ma.masked_invalid(z.T), norm=_norm(z), cmap="viridis_r", rasterized=True)
     for mask, how in marks:
         for i, j in np.argwhere(mask):

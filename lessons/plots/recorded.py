@@ -37,11 +37,11 @@ def run_picture(name: str, run: Recorded, ghost: Recorded | None, T_s: float) ->
     """
     both = [(run, "line")] if ghost is None else [(run, "line"), (ghost, "dashed")]
     panels = [
-        Panel("error (mm or °)", tuple(c for each, style in both for c in _errors(each, style)), log_y=True),
+        Panel("error (mm or °)", tuple(c for run, style in both for c in _errors(run, style)), log_y=True),
         *(
             Panel(
                 f"{words} (% of bound)",
-                tuple(c for each, style in both for c in _shares(each, style, field, lower, upper)),
+                tuple(c for run, style in both for c in _shares(run, style, field, lower, upper)),
                 bounds=(-100.0, 100.0),
             )
             for words, field, lower, upper in (
@@ -54,8 +54,8 @@ def run_picture(name: str, run: Recorded, ghost: Recorded | None, T_s: float) ->
         Panel(
             "control step (ms)",
             tuple(
-                PlotCurve(each["t"][:, 0], 1e-3 * each["step_us"][:, 0], "control step", "7", style)
-                for each, style in both
+                PlotCurve(run["t"][:, 0], 1e-3 * run["step_us"][:, 0], "control step", "7", style)
+                for run, style in both
             ),
             bounds=(1e3 * T_s,),
             log_y=True,
@@ -67,12 +67,12 @@ def run_picture(name: str, run: Recorded, ghost: Recorded | None, T_s: float) ->
 
 def _errors(run: Recorded, style: str) -> list[PlotCurve]:
     curves: list[PlotCurve] = []
-    for place, task in enumerate(run.layout.tasks):
+    for index, task in enumerate(run.layout.tasks):
         unit, factor = ("mm", 1e3) if task.unit == "m" else ("°", 180 / np.pi)
         # Smaller errors are cut, because they would extend the logarithmic axis too far.
         size = np.maximum(factor * np.linalg.norm(run[f"error/{task.name}"], axis=1), _FLOOR)
         label = f"{task.name} ({unit})" + (", ghost" if style == "dashed" else "")
-        curves.append(PlotCurve(run["t"][:, 0], size, label, str(place), style))
+        curves.append(PlotCurve(run["t"][:, 0], size, label, str(index), style))
     return curves
 
 

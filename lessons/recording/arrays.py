@@ -66,19 +66,19 @@ def named(
     data: dict[str, Any] = {name: rows[:, where] for name, where in layout.fields.items()}
     together = {*_PER_JOINT, *(f"{name}/{task.name}" for task in layout.tasks for name in _PER_TASK)}
     data = {
-        name: found[:, 0] if found.shape[1] == 1 and name not in together else found
-        for name, found in data.items()
+        name: values[:, 0] if values.shape[1] == 1 and name not in together else values
+        for name, values in data.items()
     }
     unknown = np.full((len(rows), robot.n), np.nan)
     data |= {name: unknown for name in _PER_JOINT if name not in data}
-    place = {level.name: index for index, level in enumerate(settings.levels, start=1)}
+    level_index = {level.name: index for index, level in enumerate(settings.levels, start=1)}
     for task in layout.tasks:
-        data.setdefault(f"level/{task.name}", np.array(place[task.level]))
+        data.setdefault(f"level/{task.name}", np.array(level_index[task.level]))
     data["joint_names"] = np.array(robot.joint_names)
     data["tip"] = np.array(robot.tip)
     data |= constants(robot, settings)
-    told = {**how, "in_force": settings.as_data()}
+    metadata = {**how, "in_force": settings.as_data()}
     if events is not None:
-        told["events"] = [{"t": t, **as_data(event)} for t, event in events]
-    data["settings"] = np.array(json.dumps(finite(told)))
+        metadata["events"] = [{"t": t, **as_data(event)} for t, event in events]
+    data["settings"] = np.array(json.dumps(finite(metadata)))
     return data

@@ -51,7 +51,7 @@ def qp_figures(recording: Recording, fallbacks: Sequence[str]) -> dict[str, Any]
     layout = recording.layout
     counts: Counter[str] = Counter()
     for name in layout.levels:
-        codes = recording[f"rung/{name}"][:, 0]
+        codes = recording[f"fallback/{name}"][:, 0]
         counts.update(fallbacks[int(code)] for code in codes[np.isfinite(codes)] if code > 0)
     return {
         "solves": int(sum(np.isfinite(recording[f"kkt/{name}"]).sum() for name in layout.levels)),

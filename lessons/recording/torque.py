@@ -20,11 +20,11 @@ Array = NDArray[np.float64]
 def block(recording: Recording) -> dict[str, Any]:
     """Returns the part of `lessons.recording.summary.summary` for the torque level."""
     settings, layout = recording.session.settings, recording.layout
-    place = {level.name: index for index, level in enumerate(settings.levels, start=1)}
-    tasks = sorted(layout.tasks, key=lambda task: place[task.level])
+    level_index = {level.name: index for index, level in enumerate(settings.levels, start=1)}
+    tasks = sorted(layout.tasks, key=lambda task: level_index[task.level])
     iterations = recording["iterations"]
     return {
-        "tasks": [task_figures(recording, task, place[task.level]) for task in tasks],
+        "tasks": [task_figures(recording, task, level_index[task.level]) for task in tasks],
         "levels": _levels(recording),
         "average_cost": [_average_cost(recording, level.name) for level in settings.levels if level.enabled],
         "limits": _limits(recording),
@@ -58,19 +58,19 @@ def _contact(recording: Recording) -> dict[str, float]:
 def _levels(recording: Recording) -> list[dict[str, Any]]:
     """Returns, per enabled level, the number of its rows, and the number of directions that the level can
     control at the robot's final pose."""
-    found = recording.session.ranks()
-    return [{"name": name, "rank": rank, "rows": rows} for name, (rank, rows) in found.items()]
+    ranks = recording.session.ranks()
+    return [{"name": name, "rank": rank, "rows": rows} for name, (rank, rows) in ranks.items()]
 
 
 def _average_cost(recording: Recording, level: str) -> float:
     """Returns the cost of (41): the mean of ‖e(x(k))‖²_Q + ‖Δτ(k)‖²_R with e from measurements."""
     session = recording.session
-    found = next(each for each in session.settings.levels if each.name == level)
+    stack_level = next(candidate for candidate in session.settings.levels if candidate.name == level)
     T_s = session.settings.T_s
     total = np.zeros(max(len(recording.rows) - 1, 1))
-    Q = np.asarray(found.Q, float)
+    Q = np.asarray(stack_level.Q, float)
     start = 0
-    for task in found.tasks:
+    for task in stack_level.tasks:
         error = recording[f"error/{task.name}"]
         m = error.shape[1]
         K_p, K_v = task.gains(m)
@@ -80,7 +80,7 @@ def _average_cost(recording: Recording, level: str) -> float:
         weight = Q if Q.ndim == 0 else Q[start : start + m]
         total += (weight * e**2).sum(axis=1)
         start += m
-    total += (np.asarray(found.R, float) * recording["delta_tau"][: len(total)] ** 2).sum(axis=1)
+    total += (np.asarray(stack_level.R, float) * recording["delta_tau"][: len(total)] ** 2).sum(axis=1)
     return float(total.mean())
 
 

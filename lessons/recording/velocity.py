@@ -31,8 +31,8 @@ def block(recording: Recording) -> dict[str, Any]:
     return {
         "tasks": [
             # A role that is not in the window has no error.
-            task_figures(recording, task, place, np.isfinite(recording[f"error/{task.name}"].sum(axis=1)))
-            for place, task in enumerate(layout.tasks, start=1)
+            task_figures(recording, task, index, np.isfinite(recording[f"error/{task.name}"].sum(axis=1)))
+            for index, task in enumerate(layout.tasks, start=1)
         ],
         "average_cost": [_mean(recording[f"cost/{name}"]) for name in layout.levels],
         "limits": _limits(recording),
@@ -44,8 +44,8 @@ def block(recording: Recording) -> dict[str, Any]:
         "dynamic_leak_max": None,
         "bound_active_share": float((active > 0).any(axis=1).mean()),
         "parts": [
-            _part(recording, name, place * options.part_s, (place + 1) * options.part_s)
-            for place, name in enumerate(options.parts)
+            _part(recording, name, index * options.part_s, (index + 1) * options.part_s)
+            for index, name in enumerate(options.parts)
         ],
         "line_search": {"mean_step": _mean(steps), "zero_share": _mean((steps == 0).astype(float))},
         **way,
@@ -59,8 +59,8 @@ def block(recording: Recording) -> dict[str, Any]:
 
 
 def _mean(values: Array) -> float | None:
-    found = values[np.isfinite(values)]
-    return float(found.mean()) if found.size else None
+    numbers = values[np.isfinite(values)]
+    return float(numbers.mean()) if numbers.size else None
 
 
 def _part(recording: Recording, name: str, start: float, end: float) -> dict[str, Any]:
@@ -90,14 +90,14 @@ def _report(recording: Recording) -> dict[str, Any] | None:
     t, (start, end) = recording["t"][:, 0], wrong
     spans = {"before": t < start - 1e-9, "after": t >= end - 1e-9}
     spans["wrong"] = ~spans["before"] & ~spans["after"]
-    told: dict[str, Any] = {"wrong_from_s": start, "wrong_until_s": end}
+    report: dict[str, Any] = {"wrong_from_s": start, "wrong_until_s": end}
     for task in recording.layout.tasks:
         error = np.linalg.norm(recording[f"error/{task.name}"], axis=1)
-        told[task.name] = {
+        report[task.name] = {
             **{f"max_{name}_m": peak(error[spans[name]]) for name in ("before", "wrong", "after")},
             "end_m": float(error[-1]),
         }
-    return told
+    return report
 
 
 def _limits(recording: Recording) -> dict[str, dict[str, float | None]]:

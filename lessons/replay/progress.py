@@ -36,30 +36,30 @@ class LearnerProgress:
     """The steps whose run a learner has seen, and the points of challenges.
 
     Attributes:
-        seen: per lesson the places of the steps whose run was seen.
+        seen: per lesson the indices of the steps whose run was seen.
         best: per lesson the best points (0 to 100) of its challenge.
     """
 
     seen: Mapping[str, frozenset[int]] = field(default_factory=dict)
     best: Mapping[str, float] = field(default_factory=dict)
 
-    def with_step(self, lesson: str, place: int) -> LearnerProgress:
+    def with_step(self, lesson: str, step: int) -> LearnerProgress:
         """Returns the progress after the run of a step."""
-        return replace(self, seen={**self.seen, lesson: self.seen.get(lesson, frozenset()) | {place}})
+        return replace(self, seen={**self.seen, lesson: self.seen.get(lesson, frozenset()) | {step}})
 
     def with_points(self, lesson: str, points: float) -> LearnerProgress:
         """Returns the progress after a challenge was passed; only the best attempt counts."""
         return replace(self, best={**self.best, lesson: max(points, self.best.get(lesson, 0.0))})
 
-    def next_place(self, lesson: str, steps: int) -> int:
+    def next_step(self, lesson: str, steps: int) -> int:
         """Returns the first step that was not seen; 0 if all steps were seen."""
         seen = self.seen.get(lesson, frozenset())
-        return next((place for place in range(steps) if place not in seen), 0)
+        return next((step for step in range(steps) if step not in seen), 0)
 
     def dumped(self) -> str:
         """Returns the progress as text."""
         return json.dumps(
-            {"seen": {name: sorted(places) for name, places in self.seen.items()}, "best": dict(self.best)}
+            {"seen": {name: sorted(steps) for name, steps in self.seen.items()}, "best": dict(self.best)}
         )
 
 
@@ -88,27 +88,27 @@ def _of(account: str, text: str) -> bytes:
 def progress_from(text: str | None) -> LearnerProgress:
     """Reads the browser's storage, which anybody may have written; invalid entries are left out."""
     try:
-        found = json.loads(text or "{}")
+        data = json.loads(text or "{}")
     except (ValueError, RecursionError):
         return LearnerProgress()
-    if not isinstance(found, dict):
+    if not isinstance(data, dict):
         return LearnerProgress()
     return LearnerProgress(
         {
-            name: frozenset(place for place in places if type(place) is int and 0 <= place < 100)
-            for name, places in _of_lessons(found.get("seen"))
-            if isinstance(places, list)
+            name: frozenset(step for step in steps if type(step) is int and 0 <= step < 100)
+            for name, steps in _of_lessons(data.get("seen"))
+            if isinstance(steps, list)
         },
         {
             name: float(points)
-            for name, points in _of_lessons(found.get("best"))
+            for name, points in _of_lessons(data.get("best"))
             if type(points) in (int, float) and math.isfinite(points) and 0 <= points <= 100
         },
     )
 
 
-def _of_lessons(found: Any) -> list[tuple[str, Any]]:
-    return [(name, found[name]) for name in COURSE if name in found] if isinstance(found, dict) else []
+def _of_lessons(data: Any) -> list[tuple[str, Any]]:
+    return [(name, data[name]) for name in COURSE if name in data] if isinstance(data, dict) else []
 
 
 # ------------------------------------------------------------------ handed in
@@ -136,9 +136,9 @@ class HandedIn:
 
 def written(handed: HandedIn, key: bytes | None) -> str:
     """Returns the text that a learner hands in; it has only letters, digits, "-" and "_"."""
-    given = {"n": handed.name[:LONGEST_NAME], "t": handed.at, "p": handed.progress.dumped(), "c": handed.code}
-    given |= {"a": handed.account} if handed.account else {}
-    body = base64.urlsafe_b64encode(zlib.compress(json.dumps(given, ensure_ascii=False).encode(), 9))
+    data = {"n": handed.name[:LONGEST_NAME], "t": handed.at, "p": handed.progress.dumped(), "c": handed.code}
+    data |= {"a": handed.account} if handed.account else {}
+    body = base64.urlsafe_b64encode(zlib.compress(json.dumps(data, ensure_ascii=False).encode(), 9))
     text = f"hp{VERSION}{'s' if key is not None else ''}-{body.decode().rstrip('=')}"
     return f"{text}-{_seal(text.encode(), key)}"
 
@@ -165,11 +165,11 @@ def read_handed_in(text: str, key: bytes | None) -> tuple[HandedIn, Proof]:
     try:
         unpacking = zlib.decompressobj()
         packed = unpacking.decompress(base64.urlsafe_b64decode(body + "=" * (-len(body) % 4)), _LONGEST_TEXT)
-        given = json.loads(packed.decode())
-        name, at, progress, code = (str(given[key]) for key in "ntpc")
+        data = json.loads(packed.decode())
+        name, at, progress, code = (str(data[key]) for key in "ntpc")
     except (ValueError, binascii.Error, zlib.error, RecursionError, KeyError, TypeError):
         raise _damaged() from None
-    account = _plain(str(given["a"]))[:LONGEST_NAME] if "a" in given else ""
+    account = _plain(str(data["a"]))[:LONGEST_NAME] if "a" in data else ""
     name, at = _plain(name)[:LONGEST_NAME], _plain(at)[:40]
     handed = HandedIn(name, at, progress_from(progress), code[:20_000], account)
     if not signed or key is None:

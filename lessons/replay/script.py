@@ -32,13 +32,13 @@ def script(run: RunSpec, log: Log, duration: float) -> str:
         InputError: the run cannot be prepared, or its settings cannot be written as assignments.
     """
     scene = run.prepared()
-    resets = [place for place, (_, event) in enumerate(log) if isinstance(event, Reset)]
+    resets = [index for index, (_, event) in enumerate(log) if isinstance(event, Reset)]
     start = resets[-1] + 1 if resets else 0
     settings = settings_after(scene.settings, (event for _, event in log[:start]))
     assignments = differences(run.loaded().settings, settings)
     events = log[start:]
-    own = next((each for each in assignments if each.startswith("controller=") and is_file(each)), None)
-    assignments = tuple(each for each in assignments if each != own)
+    own = next((text for text in assignments if text.startswith("controller=") and is_file(text)), None)
+    assignments = tuple(text for text in assignments if text != own)
     find = ", ".join(map(repr, _arguments(run))) + (f", hold={run.hold!r}" if run.hold else "")
     parts = [
         _HEAD.format(
@@ -51,7 +51,7 @@ def script(run: RunSpec, log: Log, duration: float) -> str:
         f"SCENE = {'scene_named' if is_file(run.scene) else 'load_scene'}({find})",
         *((f"SCENE = with_tasks(SCENE, {run.tasks!r})",) if run.tasks else ()),
         f"CONTROLLER = {None if own is None else parse_assignment(own)[1]!r}",
-        _tuple("SETTINGS", (repr(each) for each in assignments)),
+        _tuple("SETTINGS", map(repr, assignments)),
         _tuple("EVENTS", (f"({_literal(float(t))}, {_call(event)})" for t, event in events)),
         f"DURATION = {_literal(float(duration))}  # s",
         f"SEED = {run.seed}",
@@ -117,12 +117,12 @@ def _tuple(name: str, items: Iterable[str]) -> str:
 
 def _call(event: Event) -> str:
     """Returns the Python call that creates an event, without arguments that have their default value."""
-    given = [
-        f"{field.name}={_literal(value)}" if place > 1 else _literal(value)
-        for place, field in enumerate(fields(event))
+    arguments = [
+        f"{field.name}={_literal(value)}" if index > 1 else _literal(value)
+        for index, field in enumerate(fields(event))
         if (value := getattr(event, field.name)) != field.default
     ]
-    return f"{type(event).__name__}({', '.join(given)})"
+    return f"{type(event).__name__}({', '.join(arguments)})"
 
 
 def _literal(value: Any) -> str:
@@ -130,6 +130,6 @@ def _literal(value: Any) -> str:
     if isinstance(value, (np.ndarray, np.generic)):
         return _literal(value.tolist())
     if isinstance(value, (list, tuple)):
-        inner = ", ".join(_literal(each) for each in value)
+        inner = ", ".join(_literal(element) for element in value)
         return f"[{inner}]" if isinstance(value, list) else f"({inner},)" if len(value) == 1 else f"({inner})"
     return repr(value)

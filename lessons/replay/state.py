@@ -92,13 +92,13 @@ def encode(state: State) -> str:
         )
     if is_file(run.scene):
         raise InputError("a code cannot contain a scene from a file: pass on the file and the command line")
-    told = run.set if run.controller is None else (assignment("controller", run.controller), *run.set)
-    told = tuple(map(_carried, told))
-    known = {**vars(run), "set": told, "lesson": state.lesson, "step": state.step}
-    given = {short: known[name] for name, short in _KEYS.items() if known[name] not in (None, (), 0)}
-    text = json.dumps(given, ensure_ascii=False, separators=(",", ":")).encode()
+    assignments = run.set if run.controller is None else (assignment("controller", run.controller), *run.set)
+    assignments = tuple(map(_carried, assignments))
+    known = {**vars(run), "set": assignments, "lesson": state.lesson, "step": state.step}
+    data = {short: known[name] for name, short in _KEYS.items() if known[name] not in (None, (), 0)}
+    text = json.dumps(data, ensure_ascii=False, separators=(",", ":")).encode()
     code = f"hl{VERSION}-" + base64.urlsafe_b64encode(zlib.compress(text, 9)).decode().rstrip("=")
-    if len(code) > MAX_CODE or len(text) > _MAX_TEXT or not _fits(told):
+    if len(code) > MAX_CODE or len(text) > _MAX_TEXT or not _fits(assignments):
         raise InputError("this setting is too long for a code: use the command line or the script instead")
     return code
 
@@ -114,11 +114,11 @@ def _carried(text: str) -> str:
 
 def _marked(value: Any) -> Any:
     if isinstance(value, list):
-        return [_marked(each) for each in value]
+        return [_marked(element) for element in value]
     if not isinstance(value, dict):
         return value
     own = isinstance(value.get("task"), str) and is_file(value["task"])
-    return {key: fingerprint(each) if own and key == "task" else _marked(each) for key, each in value.items()}
+    return {key: fingerprint(item) if own and key == "task" else _marked(item) for key, item in value.items()}
 
 
 def decode(code: str) -> State:
@@ -137,95 +137,95 @@ def decode(code: str) -> State:
         text = unpacking.decompress(packed, _MAX_TEXT)
         if not unpacking.eof or unpacking.unused_data:
             raise ValueError
-        given = json.loads(text.decode(), parse_constant=_no_constant)
+        data = json.loads(text.decode(), parse_constant=_no_constant)
     except (ValueError, binascii.Error, zlib.error, RecursionError):
         raise InputError("the code is incomplete or was changed: copy all of it again") from None
-    return _checked(given)
+    return _checked(data)
 
 
 def _body(code: str) -> str:
-    found = _PREFIX.match(code)
-    if found is None or not re.fullmatch(r"[\w-]+", code, re.ASCII):
+    match = _PREFIX.match(code)
+    if match is None or not re.fullmatch(r"[\w-]+", code, re.ASCII):
         raise InputError(
             f"this is not a state code: a code begins with hl{VERSION}- and has only letters, digits, - and _"
         )
-    if int(found[1]) > VERSION:
+    if int(match[1]) > VERSION:
         raise InputError(
-            f"the code was made by a newer himpc-lab (format {found[1]}, yours reads {VERSION}): update yours"
+            f"the code was made by a newer himpc-lab (format {match[1]}, yours reads {VERSION}): update yours"
         )
-    if int(found[1]) < 1:
-        raise InputError(f"this is not a state code: there is no format {found[1]}, the first one is 1")
+    if int(match[1]) < 1:
+        raise InputError(f"this is not a state code: there is no format {match[1]}, the first one is 1")
     if len(code) > MAX_CODE:
         raise InputError(
             f"the code has {len(code)} characters and at most {MAX_CODE} are allowed: copy it again"
         )
-    return code[found.end() :]
+    return code[match.end() :]
 
 
 def _no_constant(constant: str) -> Any:
     raise ValueError(constant)
 
 
-def _checked(given: Any) -> State:
-    if not isinstance(given, dict) or not given.keys() <= set(_KEYS.values()):
+def _checked(data: Any) -> State:
+    if not isinstance(data, dict) or not data.keys() <= set(_KEYS.values()):
         raise InputError("the code does not contain a state of himpc-lab: copy it again")
-    scene = _text(given, "s", "scene") or ""
+    scene = _text(data, "s", "scene") or ""
     if scene not in SCENES and scene not in VELOCITY_SCENES:
         raise unknown_name("scene", scene, (*SCENES, *VELOCITY_SCENES))
-    urdf = _text(given, "r", "robot")
+    urdf = _text(data, "r", "robot")
     if urdf is not None and urdf not in CATALOG:
         raise InputError(
             "the code names a robot that is not in the catalog, and a code may not open files: "
             "start with --urdf and your own file instead"
         )
-    assignments, hold = _texts(given, "a", "settings"), _texts(given, "h", "joints to hold")
-    lesson = _text(given, "l", "lesson")
+    assignments, hold = _texts(data, "a", "settings"), _texts(data, "h", "joints to hold")
+    lesson = _text(data, "l", "lesson")
     if lesson is not None and lesson not in COURSE:
         raise unknown_name("lesson", lesson, COURSE)
     run = RunSpec(
         scene,
         urdf,
-        _text(given, "t", "tip"),
+        _text(data, "t", "tip"),
         set=tuple(_of_today(assignments)),
-        seed=_whole(given, "n", "seed", MAX_SEED) or 0,
+        seed=_whole(data, "n", "seed", MAX_SEED) or 0,
         hold=tuple(hold),
     )
-    return State(run, lesson, _whole(given, "p", "step", 100))
+    return State(run, lesson, _whole(data, "p", "step", 100))
 
 
 def _of_today(assignments: list[str]) -> list[str]:
     """Codes of earlier versions may name a solver for a controller that has none today."""
     without = {f"controller={name}" for name in ("hiqp", "nhimpc", "weighted", "himpc_filtered")}
     gone = "route=explicit" in assignments and not without.isdisjoint(assignments)
-    return [each for each in assignments if not (gone and each.startswith("solver="))]
+    return [text for text in assignments if not (gone and text.startswith("solver="))]
 
 
 def _fits(assignments: tuple[str, ...] | list[str]) -> bool:
-    return len(assignments) <= _MAX_ASSIGNMENTS and all(len(each) <= _MAX_ASSIGNMENT for each in assignments)
+    return len(assignments) <= _MAX_ASSIGNMENTS and all(len(text) <= _MAX_ASSIGNMENT for text in assignments)
 
 
 def _wrong(what: str) -> InputError:
     return InputError(f"the {what} in the code is not valid: copy it again")
 
 
-def _text(given: Mapping[str, Any], key: str, what: str) -> str | None:
-    value = given.get(key)
+def _text(data: Mapping[str, Any], key: str, what: str) -> str | None:
+    value = data.get(key)
     if value is not None and not (isinstance(value, str) and len(value) <= 200 and value.isprintable()):
         raise _wrong(what)
     return value
 
 
-def _texts(given: Mapping[str, Any], key: str, what: str) -> list[str]:
-    value = given.get(key, [])
-    if not isinstance(value, list) or not all(isinstance(each, str) for each in value):
+def _texts(data: Mapping[str, Any], key: str, what: str) -> list[str]:
+    value = data.get(key, [])
+    if not isinstance(value, list) or not all(isinstance(text, str) for text in value):
         raise _wrong(f"list of {what}")
     if not _fits(value):
         raise _wrong(f"number or length of {what}")
     return value
 
 
-def _whole(given: Mapping[str, Any], key: str, what: str, largest: int) -> int | None:
-    value = given.get(key)
+def _whole(data: Mapping[str, Any], key: str, what: str, largest: int) -> int | None:
+    value = data.get(key)
     if value is not None and not (type(value) is int and 0 <= value <= largest):
         raise _wrong(what)
     return value

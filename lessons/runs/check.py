@@ -17,20 +17,20 @@ def check_scene(scene: Scene) -> None:
     from lessons.session.start import begin  # only here: to find a scene by name must load no controller
 
     check_duration(scene.duration)
-    for each in scene.events:
-        if not (isinstance(each, tuple) and len(each) == 2 and isinstance(each[1], get_args(Event))):
+    for entry in scene.events:
+        if not (isinstance(entry, tuple) and len(entry) == 2 and isinstance(entry[1], get_args(Event))):
             raise InputError(
-                f"an event is {shortened(repr(each), 80)}: give (seconds, event of lessons.events), e.g. "
+                f"an event is {shortened(repr(entry), 80)}: give (seconds, event of lessons.events), e.g. "
                 '(1.0, Push("link_3", force=(0.0, 5.0, 0.0)))'
             )
     make: Any = getattr(scene, "references", None)
     if make is not None:
-        given = make(scene.robot, scene.settings.levels)
+        references = make(scene.robot, scene.settings.levels)
         names = [task.name for level in scene.settings.levels for task in level.tasks]
-        if not isinstance(given, dict) or not given.keys() <= set(names):
+        if not isinstance(references, dict) or not references.keys() <= set(names):
             raise InputError(
-                f"its references are {shortened(repr(given), 80)}: return a dict of references by task name; "
-                f"the tasks are {', '.join(names)}"
+                f"its references are {shortened(repr(references), 80)}: return a dict of references by task "
+                f"name; the tasks are {', '.join(names)}"
             )
     session = begin(scene)
     for _, event in scene.events:

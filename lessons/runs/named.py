@@ -53,25 +53,25 @@ def _scene_of(source: Source) -> Scene:
     if kind_of(module) == "task":
         return with_task(load_scene(TASK_SCENE), source.path)
     expected(module, "scene")
-    given = vars(module).get("SCENE")
-    found = called(source, vars(module)["scene"]) if given is None else given
-    if not isinstance(found, Scene):
+    constant = vars(module).get("SCENE")
+    scene = called(source, vars(module)["scene"]) if constant is None else constant
+    if not isinstance(scene, Scene):
         raise InputError(
-            f"{source.path}: its scene is a {type(found).__name__}: make it with TorqueScene or "
+            f"{source.path}: its scene is a {type(scene).__name__}: make it with TorqueScene or "
             "VelocityScene, or change a scene from lessons.load_scene"
         )
-    called(source, partial(check_scene, found))
-    return replace(found, name=source.path)
+    called(source, partial(check_scene, scene))
+    return replace(scene, name=source.path)
 
 
 def task_in(name: str) -> Task:
     """Returns the task of a file. Raises InputError if the file cannot be used."""
     module = module_of(read(name))
     expected(module, "task")
-    found = vars(module)["TASK"]
-    if not isinstance(found, Task):
-        raise InputError(f"{name}: TASK is a {type(found).__name__}: make it with a subclass of Task")
-    return found
+    task = vars(module)["TASK"]
+    if not isinstance(task, Task):
+        raise InputError(f"{name}: TASK is a {type(task).__name__}: make it with a subclass of Task")
+    return task
 
 
 def with_task(scene: Scene, name: str) -> TorqueScene:
@@ -110,13 +110,13 @@ def with_files(scene: Scene, controllers: Iterable[str], tasks: Iterable[str]) -
 
 def misfits(robot: Robot, files: Iterable[str]) -> dict[str, str]:
     """Returns the error messages of the files whose task cannot be used on a robot, by file."""
-    found = {}
+    messages = {}
     for name in files:
         try:
             _task_for(robot, name)
         except InputError as error:
-            found[name] = str(error)
-    return found
+            messages[name] = str(error)
+    return messages
 
 
 def _task_for(robot: Robot, name: str) -> Task:

@@ -135,7 +135,7 @@ def admitted(settings: AnySettings, files: Iterable[str]) -> AnySettings:
     Raises:
         InputError: the scene takes velocities, but a user's controller gives torques.
     """
-    files = tuple(each for each in files if is_file(each))
+    files = tuple(name for name in files if is_file(name))
     if not files:
         return settings
     if not isinstance(settings, TorqueSettings):

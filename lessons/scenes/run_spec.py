@@ -111,8 +111,8 @@ class RunSpec:
             ["--duration", repr(float(self.duration)).removesuffix(".0")] if self.duration is not None else []
         )
         words += ["--seed", str(self.seed)] if self.seed else []
-        for each in assignments:
-            words += ["--set", each]
+        for assignment in assignments:
+            words += ["--set", assignment]
         return shlex.join(words)
 
 

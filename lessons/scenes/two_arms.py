@@ -84,7 +84,7 @@ def baxter_tray() -> TorqueScene:
         ),
         Level((Posture(name="posture", K_p=K_p, K_v=K_v),)),
     )
-    corners = _place(robot, RIGHT) + SIDE * np.array([[0, 0, 0], [0, 0, 1], [0, 1, 1], [0, 1, 0], [0, 0, 0]])
+    corners = _home(robot, RIGHT) + SIDE * np.array([[0, 0, 0], [0, 0, 1], [0, 1, 1], [0, 1, 0], [0, 0, 0]])
     way = Waypoints(corners, np.array([START_S + EDGE_S * k for k in range(5)]))
     times = [START_S + _SCRIPT_S * k for k in range(1, round(4 * EDGE_S / _SCRIPT_S) + 1)]
     events = tuple((t, MoveTarget("tray", tuple(way.preview(t, 1e-3, 1).value.tolist()))) for t in times)
@@ -102,7 +102,7 @@ def baxter_conflict() -> TorqueScene:
         Level((FramePosition(name="left", frame=LEFT, K_p=K_p, K_v=K_v),)),
         Level((Posture(name="posture", K_p=K_p, K_v=K_v),)),
     )
-    away = _place(robot, LEFT) + np.array([0.0, _APART, 0.0])
+    away = _home(robot, LEFT) + np.array([0.0, _APART, 0.0])
     events = ((0.5, MoveTarget("left", tuple(away.tolist()))),)
     title = "Baxter: the hands keep their relative pose, but have targets at two different places"
     return _scene(robot, "baxter-conflict", title, levels, events)
@@ -121,7 +121,7 @@ def _grip(K_p: float, K_v: float) -> tuple[RelativePosition, RelativeOrientation
     )
 
 
-def _place(robot: Robot, frame: str) -> np.ndarray:
+def _home(robot: Robot, frame: str) -> np.ndarray:
     home = Configuration(robot, robot.model.createData(), robot.home, np.zeros(robot.n))
     return home.placement(frame).translation
 

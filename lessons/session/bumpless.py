@@ -82,8 +82,8 @@ class Handover:
         if self._filter is None or not (usable(q) and usable(v) and usable(tau)):
             return replace(plan, tau=tau, fill=None)
         M_bar = np.array(self.settings.M_bar) if plan.M_bar is None else plan.M_bar
-        found = self._filter(q, v, plan.tau_0, tau, M_bar, plan.limits, observed_by(previews))
-        return replace(plan, tau=found.tau, unsolved=plan.unsolved + (not found.met), fill=None)
+        filtered = self._filter(q, v, plan.tau_0, tau, M_bar, plan.limits, observed_by(previews))
+        return replace(plan, tau=filtered.tau, unsolved=plan.unsolved + (not filtered.met), fill=None)
 
 
 def _filter_of(controller: Controller) -> DistanceFilter | None:

@@ -45,11 +45,11 @@ class Clearance:
         self._plant = plant
         self._furnished = any(not isinstance(thing.shape, Floor) for thing in plant.world)
         self._measures: tuple[Avoidance, Distances] | None = None
-        self.found, self._due = NOTHING, 0
+        self.nearest, self._due = NOTHING, 0
 
     def reset(self) -> None:
         """Begins a new run."""
-        self.found, self._due = NOTHING, 0
+        self.nearest, self._due = NOTHING, 0
 
     def measure(self, q: Array, avoidance: Avoidance) -> tuple[float, float]:
         """Returns the distance of the nearest pair and the distance that it must keep, m, measured every
@@ -60,9 +60,9 @@ class Clearance:
         if not (avoidance.on or self._furnished):
             return math.nan, math.nan
         if self._due == 0:
-            self.found = self._look(q, avoidance) if math.isfinite(q.dot(q)) else NOTHING
+            self.nearest = self._look(q, avoidance) if math.isfinite(q.dot(q)) else NOTHING
         self._due = (self._due + 1) % EVERY
-        return self.found.distance, self.found.kept
+        return self.nearest.distance, self.nearest.kept
 
     def _look(self, q: Array, avoidance: Avoidance) -> Nearest:
         if self._measures is None or self._measures[0] != avoidance:

@@ -45,7 +45,7 @@ def _guarded(source: Source, watch: CallDeadline, function: Callable[..., Any], 
         with alone(source.path):
             return watch.call(function, *args)
     except TooLong as error:
-        told = sentence(source.path, error).split(": ")[0]
-        raise OwnFault(f"{told}: one call takes longer than {LONGEST_TICK:g} s") from None
+        location = sentence(source.path, error).split(": ")[0]
+        raise OwnFault(f"{location}: one call takes longer than {LONGEST_TICK:g} s") from None
     except (Exception, SystemExit) as error:
         raise OwnFault(sentence(source.path, error)) from None

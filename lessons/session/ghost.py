@@ -91,10 +91,10 @@ class GhostDriver:
         before = self._leader
         settings = self._leader = before.after(event)
         try:
-            found = _with(self._scene, settings, self._own).settings
+            merged = _with(self._scene, settings, self._own).settings
             # A leader configures its controller even if a setting does not change; so does a ghost.
-            if found != self.session.settings or settings == before:
-                self.session.adopt(found)
+            if merged != self.session.settings or settings == before:
+                self.session.adopt(merged)
         except InputError as error:
             self.session.notices.append(str(error))
 
@@ -113,15 +113,15 @@ def swapped(settings: SceneSettings, own: Sequence[str]) -> tuple[tuple[str, ...
     Raises:
         InputError: an assignment sets more than one value, or has an unknown path.
     """
-    given = [parse_assignment(text) for text in own]
+    pairs = [parse_assignment(text) for text in own]
     table = settings.table()
-    if any(path not in table or table[path].shorthand for path, _ in given):
+    if any(path not in table or table[path].shorthand for path, _ in pairs):
         raise InputError(
             f"{', '.join(own)} cannot be swapped between robot and ghost: name a level or a task, "
             "e.g. levels.position.Q=50"
         )
-    kept = tuple(assignment(path, settings.value_at(path)) for path, _ in given)
-    return kept, tuple(Set(path, value) for path, value in given)
+    kept = tuple(assignment(path, settings.value_at(path)) for path, _ in pairs)
+    return kept, tuple(Set(path, value) for path, value in pairs)
 
 
 def _with(scene: Scene, settings: SceneSettings, own: Sequence[str]) -> Scene:

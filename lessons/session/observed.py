@@ -26,9 +26,9 @@ def objects_of(plant: Plant) -> Observed:
         return Observed(tuple(shapes))
     poses, velocities = iter(plant.objects()), iter(moving)
     velocity = np.zeros((len(plant.world), 3))
-    for place, thing in enumerate(plant.world):
+    for index, thing in enumerate(plant.world):
         if thing.free:
-            shapes[place], velocity[place] = _moved(thing, next(poses)), next(velocities)
+            shapes[index], velocity[index] = _moved(thing, next(poses)), next(velocities)
     return Observed(tuple(shapes), velocity)
 
 

@@ -26,7 +26,7 @@ class ObstacleDistances:
         """settings: contain the obstacles at their true places."""
         self._robot, self._self_collision = robot, settings.self_collision
         self._obstacles = self._reported = settings.obstacles
-        self._true = self._told = CollisionModel(robot, settings.obstacles, settings.self_collision)
+        self._true = self._assumed = CollisionModel(robot, settings.obstacles, settings.self_collision)
 
     def tell(self, obstacles: tuple[Obstacle, ...]) -> None:
         """Sets the reported obstacles, which may differ from the true ones."""
@@ -34,13 +34,13 @@ class ObstacleDistances:
             return
         self._reported = obstacles
         same = obstacles == self._obstacles
-        self._told = self._true if same else CollisionModel(self._robot, obstacles, self._self_collision)
+        self._assumed = self._true if same else CollisionModel(self._robot, obstacles, self._self_collision)
 
     def at(self, q: Array) -> Array:
         """Distances to the nearest true and to the nearest reported obstacle, (2,) m; negative inside,
         infinite if none is within WITHIN. q: (n,), the true positions."""
         true = _least(self._true, q)
-        return np.array([true, true if self._told is self._true else _least(self._told, q)])
+        return np.array([true, true if self._assumed is self._true else _least(self._assumed, q)])
 
 
 def _least(model: CollisionModel, q: Array) -> float:

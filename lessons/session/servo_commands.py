@@ -34,14 +34,14 @@ class Commands:
         """before: the last command of the previous period, (n,)."""
         self.plan, self.period = plan, period
         self._count, self.h = command_step(period)
-        self._given = 0
+        self._returned = 0
         self.last = before
         self.sharpest = np.zeros_like(before)
 
     def next(self) -> Array:
         """Returns the next command, (n,)."""
-        self._given += 1
-        command = self.plan.motion.velocity(self._given * self.h)
+        self._returned += 1
+        command = self.plan.motion.velocity(self._returned * self.h)
         self.sharpest = np.maximum(self.sharpest, np.abs((command - self.last) / self.h))
         self.last = command
         return command
@@ -49,4 +49,4 @@ class Commands:
     @property
     def done(self) -> bool:
         """Whether all commands of the period were returned."""
-        return self._given == self._count
+        return self._returned == self._count

@@ -20,9 +20,9 @@ from lessons.events import Event, MoveTarget, Push
 from lessons.scenes.torque_scene import TorqueScene
 from lessons.session.bumpless import Handover, settled
 from lessons.session.clearance import Clearance
+from lessons.session.controller_input import ControllerInput
 from lessons.session.controllers import controller_of
 from lessons.session.deadline import DelayedTorque
-from lessons.session.given import Given
 from lessons.session.leak import at_once, dynamic_leak
 from lessons.session.observed import observed
 from lessons.session.places import Places
@@ -46,7 +46,7 @@ class TorqueSession(Session):
 
     Attributes:
         plan: the last plan, None before the first tick.
-        given: the inputs from which the controller computed it.
+        controller_input: the inputs from which the controller computed it.
         clearance: measures the nearest pair.
     """
 
@@ -95,17 +95,17 @@ class TorqueSession(Session):
         self.clearance.reset()
         self.references = self._fresh_references()
         self.plan: Plan | None = None
-        self.given: Given | None = None
+        self.controller_input: ControllerInput | None = None
         self._push_until, self._ticks = math.inf, 0
         self._outbox = DelayedTorque()
         self._truth = (math.nan, math.nan, math.nan)
 
     def _fresh_references(self) -> dict[str, Reference]:
         motion = self.settings.options or self.scene
-        given = motion.references(self.robot, self.settings.levels)
+        references = motion.references(self.robot, self.settings.levels)
         start = Configuration(self.robot, self._data, self.scene.q_0, self.scene.v_0)
         return {
-            task.name: kept(task, given.get(task.name), task.target(start))
+            task.name: kept(task, references.get(task.name), task.target(start))
             for task in _tasks(self.settings.levels)
         }
 
@@ -116,22 +116,22 @@ class TorqueSession(Session):
         old = {task.name: task for task in _tasks(self.settings.levels)}
         new = {task.name for task in _tasks(stack)}
         gone = {about(task): task for task in old.values() if task.name not in new}
-        found = {}
+        references = {}
         for task in _tasks(stack):
             before = old.get(task.name) or gone.get(about(task))
             value = task.target(here)
-            found[task.name] = (
+            references[task.name] = (
                 target_at(task, value)
                 if before is None
                 else carried(before, self.references[before.name], task, value)
             )
-        return found
+        return references
 
     @property
     def M_bar(self) -> Array:
         """Diagonal of the M̄ in force, (n,) kg·m²."""
-        found = None if self.plan is None else self.plan.M_bar
-        return np.array(self.settings.M_bar) * self.settings.M_bar_scale if found is None else found
+        M_bar = None if self.plan is None else self.plan.M_bar
+        return np.array(self.settings.M_bar) * self.settings.M_bar_scale if M_bar is None else M_bar
 
     def target(self, task: str) -> Target | None:
         """Returns the draggable target of a task, None if its reference is a fixed motion."""
@@ -147,7 +147,7 @@ class TorqueSession(Session):
     def _happen(self, event: Event) -> None:
         match event:
             case MoveTarget(task, value):
-                tasks = {each.name: each for each in _tasks(self.settings.levels)}
+                tasks = {candidate.name: candidate for candidate in _tasks(self.settings.levels)}
                 move_target(tasks, self.references, task, value)
             case Push(body, force, torque, seconds):
                 if not (math.isfinite(seconds) and seconds > 0):
@@ -178,7 +178,7 @@ class TorqueSession(Session):
         if model is not None:
             self.plant.configure(settings.plant, model)
         if recomposed:
-            self.layout, self.references, self.plan, self.given = layout, references, None, None
+            self.layout, self.references, self.plan, self.controller_input = layout, references, None, None
             self._row, self._at = np.full(layout.size, np.nan), Places.of(layout)
         self.settings = settings
 
@@ -210,7 +210,7 @@ class TorqueSession(Session):
         row[at.t], row[at.q], row[at.v] = t, q, v
         row[at.q_measured], row[at.v_measured] = state.q, state.v
         row[at.v_limit], row[at.v_limit_lowered] = plan.limits.user_v_limit, plan.limits.v_limit
-        self.plan, self.given = plan, Given(state.q, state.v, ahead)
+        self.plan, self.controller_input = plan, ControllerInput(state.q, state.v, ahead)
         row[at.truth], row[at.truth + 1], row[at.truth + 2] = self._true(plan, q, ahead)
         if plan.notice is not None:
             self.failure = plan.notice
@@ -257,14 +257,14 @@ class TorqueSession(Session):
         """Returns one period of a periodic position reference, (points, 3) m; None for other references."""
         reference = self.references.get(task)
         phase = getattr(reference, "phase", None)
-        tasks = {each.name: each for each in _tasks(self.settings.levels)}
-        found = tasks.get(task)
-        if reference is None or phase is None or not isinstance(found, FramePosition):
+        tasks = {candidate.name: candidate for candidate in _tasks(self.settings.levels)}
+        followed = tasks.get(task)
+        if reference is None or phase is None or not isinstance(followed, FramePosition):
             return None
         preview = reference.preview(0.0, 2 * np.pi / phase.omega / (points - 1), points - 1)
         start = Configuration(self.robot, self._data, self.scene.q_0, self.scene.v_0)
-        path = np.tile(start.placement(found.frame).translation, (points, 1))
-        path[:, found.components] = preview.value + preview.displacement
+        path = np.tile(start.placement(followed.frame).translation, (points, 1))
+        path[:, followed.components] = preview.value + preview.displacement
         return path
 
     def ranks(self) -> dict[str, tuple[int, int]]:

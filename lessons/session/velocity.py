@@ -136,8 +136,8 @@ class VelocitySession(Session):
             # goal behind it.
             still = set(range(self.robot.n)) - set(base) if driving else set(base[:2])
             hold = (*hold, *(self.robot.joint_names[joint] for joint in sorted(still)))
-        told = settings.options.reported(settings.htmpc.obstacles, self.t)
-        return replace(settings.htmpc, stack=self._stack, delay_s=lag, hold=hold, obstacles=told)
+        obstacles = settings.options.reported(settings.htmpc.obstacles, self.t)
+        return replace(settings.htmpc, stack=self._stack, delay_s=lag, hold=hold, obstacles=obstacles)
 
     def predicted_path(self, role: str) -> Array:
         """Returns the positions of a role's point in the last plan, knots 0 … N, (N+1, m) m; empty before the
@@ -198,12 +198,12 @@ class VelocitySession(Session):
         row[fields["t"]], row[fields["q"]], row[fields["v"]] = t, q, v
         row[fields["q_measured"]], row[fields["v_measured"]] = state.q, state.v
         row[fields["tau_0"]] = self._commanded
-        place = row[fields["place"]] = self.progress.place
-        row[fields["left"]] = len(self.progress.mission) - place
+        l_0 = row[fields["place"]] = self.progress.l_0
+        row[fields["left"]] = len(self.progress.mission) - l_0
         write_plan(row, self.layout, plan, settings.lexicographic_delta)
         at = Configuration(self.robot, self._data, q, v)
-        places = {level.name: place for place, level in enumerate(self._stack, start=1)}
-        write_truth(row, self.layout, at, self.roles, places, references)
+        level_index = {level.name: index for index, level in enumerate(self._stack, start=1)}
+        write_truth(row, self.layout, at, self.roles, level_index, references)
         return Commands(plan, htmpc.period, self._commanded)
 
     def _finish(self, row: Array, commands: Commands) -> None:
@@ -222,11 +222,11 @@ class VelocitySession(Session):
         """Returns the controller, with the window as its stack, and the references of its tasks by name."""
         stack: list[Level] = []
         references: dict[str, Reference] = {}
-        for place, active in enumerate(self.progress.window, start=1):
+        for index, active in enumerate(self.progress.window, start=1):
             level = self._level(active.task.role)
             if level.name in references:
                 # The window holds this role twice: the second one is a level of its own.
-                task = replace(self.roles[active.task.role], name=f"{active.task.role} {place}")
+                task = replace(self.roles[active.task.role], name=f"{active.task.role} {index}")
                 level = replace(level, tasks=(task,))
             stack.append(level)
             references[level.name] = active.reference

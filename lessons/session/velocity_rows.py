@@ -51,7 +51,7 @@ _PER_JOINT = (
     "q_measured",
     "v_measured",
 )
-_PER_LEVEL = ("cost", "kkt", "rung", "time_us", "step", "active", "bound")
+_PER_LEVEL = ("cost", "kkt", "fallback", "time_us", "step", "active", "bound")
 
 
 def layout_of(robot: Robot, roles: Stack) -> Layout:
@@ -63,7 +63,7 @@ def layout_of(robot: Robot, roles: Stack) -> Layout:
     usual fields: `tau` is the velocity commanded from that tick on, `tau_demand` the same, `tau_0` the
     velocity commanded until then, `acceleration` and `jerk` those of the command, `at_bound` the bits
     AT_ACCELERATION, AT_VELOCITY and AT_POSITION. Per role the fields of a task and `level/<role>`, its place
-    in the window (NaN: it is not in the window). Per level of the stack cost, kkt, rung, time_us, the
+    in the window (NaN: it is not in the window). Per level of the stack cost, kkt, fallback, time_us, the
     accepted line-search step, the number of active constraints and `bound`, see `write_plan`.
     `manipulability` is w = √det(J Jᵀ) of the hand's position under the arm's joints alone, m³.
     """
@@ -98,7 +98,7 @@ def write_plan(row: Array, layout: Layout, plan: VelocityPlan, delta: float | No
         if role in layout.levels:
             row[fields[f"cost/{role}"]] = level.cost
             row[fields[f"kkt/{role}"]] = level.kkt_residual
-            row[fields[f"rung/{role}"]] = FALLBACKS.index(level.fallback)
+            row[fields[f"fallback/{role}"]] = FALLBACKS.index(level.fallback)
             row[fields[f"time_us/{role}"]] = level.time_us
             row[fields[f"step/{role}"]] = float(np.mean(level.steps)) if level.steps else np.nan
             row[fields[f"active/{role}"]] = len(level.active.kind)
@@ -109,12 +109,12 @@ def write_truth(
     layout: Layout,
     at: Configuration,
     roles: Mapping[str, Task],
-    places: Mapping[str, int],
+    level_index: Mapping[str, int],
     references: Mapping[str, Reference],
 ) -> None:
     """Writes the true positions of the points, their present references, and the errors.
 
-    places: by role, the place of its task in the window, counted from 1.
+    level_index: by role, the place of its task in the window, counted from 1.
     references: by role, the reference of its task, as far as the task is in the window.
     """
     fields = layout.fields
@@ -129,7 +129,7 @@ def write_truth(
         row[fields[f"v_d/{name}"]] = on_axes(along, wanted, wanted.velocity)
         row[fields[f"a_d/{name}"]] = on_axes(along, wanted, wanted.acceleration)
         row[fields[f"error/{name}"]] = task.error(value, wanted.value)
-        row[fields[f"level/{name}"]] = places[name]
+        row[fields[f"level/{name}"]] = level_index[name]
     row[fields["manipulability"]] = manipulability(at)
 
 

@@ -85,18 +85,18 @@ def differences(own: SceneSettings, settings: SceneSettings) -> tuple[str, ...]:
     Raises:
         InputError: assignments cannot express the difference.
     """
-    now, found = own, list[str]()
+    now, texts = own, list[str]()
 
     def tell(path: str, value: Any) -> None:
         nonlocal now
-        found.append(assignment(path, value))
-        now = now.changed(*parse_assignment(found[-1]))
+        texts.append(assignment(path, value))
+        now = now.changed(*parse_assignment(texts[-1]))
 
     if settings.controller != own.controller:
         tell("controller", settings.controller)
     for path, value in own.recomposed(settings):
         tell(path, value)
-    for path in sorted(path for path, each in now.table().items() if not each.shorthand):
+    for path in sorted(path for path, setting in now.table().items() if not setting.shorthand):
         value = settings.value_at(path)
         if value != now.value_at(path):
             tell(path, value)
@@ -104,4 +104,4 @@ def differences(own: SceneSettings, settings: SceneSettings) -> tuple[str, ...]:
         tell(path, value)
     if now != settings:
         raise InputError("these settings cannot be written as assignments: reset them and try again")
-    return tuple(found)
+    return tuple(texts)

@@ -20,10 +20,10 @@ def ordered(stack: Stack, names: Any) -> Stack:
         InputError: a name is missing, unknown or given twice.
     """
     levels = {level.name: level for level in stack}
-    given = names.split(",") if isinstance(names, str) else names
-    if not isinstance(given, (list, tuple)) or sorted(map(str, given)) != sorted(levels):
+    order = names.split(",") if isinstance(names, str) else names
+    if not isinstance(order, (list, tuple)) or sorted(map(str, order)) != sorted(levels):
         raise InputError(f"order is {names!r}: give every level once, e.g. order={','.join(levels)}")
-    return tuple(levels[str(name)] for name in given)
+    return tuple(levels[str(name)] for name in order)
 
 
 def moved(stack: Stack, name: str, to: int) -> Stack:

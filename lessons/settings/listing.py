@@ -35,22 +35,22 @@ class SettingLine:
 def lines(settings: SceneSettings) -> list[SettingLine]:
     """Returns every setting of a scene in the order of the page. Levels are listed by their names only,
     although a path may also contain a level's place."""
-    return [_line(settings, each, each.path) for each in _listed(settings)]
+    return [_line(settings, setting, setting.path) for setting in _listed(settings)]
 
 
 def reference(scenes: Sequence[SceneSettings]) -> list[SettingLine]:
     """Returns every setting of several scenes of a kind, with "*" for names; `now` is the value of the first
     scene that has it."""
-    found: dict[str, SettingLine] = {}
+    by_pattern: dict[str, SettingLine] = {}
     for settings in scenes:
-        for each in _listed(settings):
-            if each.pattern not in found:
-                found[each.pattern] = _line(settings, each, each.pattern)
-    return sorted(found.values(), key=lambda line: scenes[0].rank(line.path))
+        for setting in _listed(settings):
+            if setting.pattern not in by_pattern:
+                by_pattern[setting.pattern] = _line(settings, setting, setting.pattern)
+    return sorted(by_pattern.values(), key=lambda line: scenes[0].rank(line.path))
 
 
 def _listed(settings: SceneSettings) -> list[Setting]:
-    return [each for each in settings.table().values() if not _BY_PLACE.fullmatch(each.path)]
+    return [setting for setting in settings.table().values() if not _BY_PLACE.fullmatch(setting.path)]
 
 
 def _line(settings: SceneSettings, setting: Setting, path: str) -> SettingLine:

@@ -106,10 +106,10 @@ class ArchitectureOptions(MissionOptions):
     def decoupled(self) -> bool:
         return self.architecture == "decoupled"
 
-    def drive(self, name: str, place: Go) -> MissionTask:
+    def drive(self, name: str, goal: Go) -> MissionTask:
         """Returns a task of the base."""
         rest = REST if self.base_at_rest else math.inf
-        return MissionTask(name, "base", place, self.base_tolerance, rest=rest)
+        return MissionTask(name, "base", goal, self.base_tolerance, rest=rest)
 
 
 @dataclass(frozen=True)
@@ -289,8 +289,8 @@ class DeliveryOptions(ArchitectureOptions):
     def mission(self, home: Home) -> Mission:
         tasks: list[MissionTask] = []
         for visit, seat in enumerate([int(seat) for seat in self.seats] * self.rounds, start=1):
-            hand, place = SEATS[seat]
-            tasks.append(self.drive(_visit("base", visit), Go(place, self.cruise)))
+            hand, stand = SEATS[seat]
+            tasks.append(self.drive(_visit("base", visit), Go(stand, self.cruise)))
             tasks.append(MissionTask(_visit("ee", visit), "ee", Go(hand), HAND_TOLERANCE, self.hold_s))
         return tuple(tasks)
 

@@ -89,7 +89,7 @@ class PerceptionOptions(OrderOptions):
         # Times are multiples of the control period, except for rounding errors.
         if self.misreported is None or not self.report_start <= t + 1e-9 < self.report_end:
             return obstacles
-        return tuple(self._moved(each) for each in obstacles)
+        return tuple(self._moved(obstacle) for obstacle in obstacles)
 
     def _moved(self, obstacle: Obstacle) -> Obstacle:
         if isinstance(obstacle, Floor) or obstacle.name != CRATE:

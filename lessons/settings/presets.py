@@ -9,4 +9,4 @@ from lessons.settings.settings import SceneSettings
 def usual_settings(settings: SceneSettings) -> list[Setting]:
     """Returns the settings of a scene that are often compared, except the controllers, in the order of the
     page."""
-    return [each for each in settings.table().values() if each.shown.tries and not each.shorthand]
+    return [setting for setting in settings.table().values() if setting.shown.tries and not setting.shorthand]

@@ -74,13 +74,13 @@ class Setting:
     shorthand: bool = False
     element: Shown | None = None
 
-    def at(self, place: str, count: int) -> Setting:
+    def at(self, number: str, count: int) -> Setting:
         """Returns the setting of one of the `count` numbers of a list; the first has the place 1. If the
         settings have fewer numbers, the list is first filled up with its last number."""
-        path, form = f"{self.path}.{place}", Form(NUMBER, range=self.form.range)
-        if not 1 <= int(place[:4]) <= count:
-            raise InputError(f"{path}: there is no place {place[:9]}; give a place from 1 to {count}")
-        index = int(place) - 1
+        path, form = f"{self.path}.{number}", Form(NUMBER, range=self.form.range)
+        if not 1 <= int(number[:4]) <= count:
+            raise InputError(f"{path}: there is no place {number[:9]}; give a place from 1 to {count}")
+        index = int(number) - 1
 
         def spread(settings: Any) -> list[Any]:
             now = self.read(settings)
@@ -92,7 +92,7 @@ class Setting:
             numbers[index] = form.fit(path, value)
             return self.change(settings, numbers)
 
-        shown = Shown(place, name=path) if self.element is None else self.element.of(place)
+        shown = Shown(number, name=path) if self.element is None else self.element.of(number)
         return Setting(path, shown, form, lambda settings: spread(settings)[index], change, path, True)
 
 

@@ -83,11 +83,11 @@ class SceneSettings(ABC):
         table = self.table()
         if path in table:
             return table[path]
-        whole, _, place = path.rpartition(".")
-        count = self.elements(whole) if place.isdecimal() and whole in table else 0
+        whole, _, number = path.rpartition(".")
+        count = self.elements(whole) if number.isdecimal() and whole in table else 0
         if not count:
             raise unknown_name("setting", path, table)
-        return table[whole].at(place, count)
+        return table[whole].at(number, count)
 
     def special_differences(self, wanted: Any) -> list[tuple[str, Any]]:
         """Paths and values that turn these settings into `wanted`. Only paths that are not in `table` are

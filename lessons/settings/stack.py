@@ -80,21 +80,21 @@ def _tasks(stack: Stack) -> dict[str, list[Task]]:
 def level_of(entry: Any, before: Stack, taken: list[str], own: Own) -> Level:
     """Returns a level from an entry; see `read_stack`. taken: names of tasks, to which the names of the new
     level's tasks are added."""
-    given = (
+    data = (
         {"tasks": list(entry)}
         if isinstance(entry, (list, tuple))
         else entry_of(entry, "a level of the stack")
     )
-    keys = {key: given.pop(key) for key in _LEVEL_KEYS if key in given}
-    if "tasks" in given:
-        entries = given.pop("tasks")
-        if given or not isinstance(entries, (list, tuple)) or not entries:
+    keys = {key: data.pop(key) for key in _LEVEL_KEYS if key in data}
+    if "tasks" in data:
+        entries = data.pop("tasks")
+        if data or not isinstance(entries, (list, tuple)) or not entries:
             raise InputError(f"a level of the stack is {quoted(entry)}: give its tasks as a list")
     else:
-        entries = [given]
+        entries = [data]
     if len(entries) > MOST_TASKS:
         raise InputError(f"a level of the stack has {len(entries)} tasks: give at most {MOST_TASKS}")
-    tasks = tuple(task for each in entries for task in _made(each, before, taken, own))
+    tasks = tuple(task for entry in entries for task in _made(entry, before, taken, own))
     hints = field_types(Level)
     weights = {key: form_of(hints[key]).fit(f"{key} of a level", value) for key, value in keys.items()}
     return Level(tasks, **weights)
@@ -102,22 +102,22 @@ def level_of(entry: Any, before: Stack, taken: list[str], own: Own) -> Level:
 
 def _made(entry: Any, before: Stack, taken: list[str], own: Own) -> list[Task]:
     """Returns the task of an entry, or the two tasks of a pose."""
-    given = entry_of(entry, "a task of the stack")
-    word = given.pop("task", None)
+    data = entry_of(entry, "a task of the stack")
+    word = data.pop("task", None)
     template = _of_file(word, own)
     if template is not None:
-        name = name_of(given.pop("name", None), _free(template.name, ("",), taken))
+        name = name_of(data.pop("name", None), _free(template.name, ("",), taken))
         taken.append(name)
-        changes = fields_of(type(template), given, f"the task of {word}")
+        changes = fields_of(type(template), data, f"the task of {word}")
         return [replace(template, name=name, **changes)]
     if word not in KINDS:
         classes = (type(task).__name__ for task in own.values())
         raise unknown_name("kind of task", shortened(str(word)), (*KINDS, *by_name(own), *classes))
     kind = KINDS[word]
-    name = name_of(given.pop("name", None), _free(word, kind.suffixes, taken))
+    name = name_of(data.pop("name", None), _free(word, kind.suffixes, taken))
     made = []
     for of, suffix in zip(kind.makes, kind.suffixes, strict=True):
-        values = {**_gains(of, name + suffix, before), **fields_of(of, given, f"a task of kind '{word}'")}
+        values = {**_gains(of, name + suffix, before), **fields_of(of, data, f"a task of kind '{word}'")}
         made.append(of(name=name + suffix, **values))
         taken.append(name + suffix)
     return made
@@ -138,20 +138,20 @@ def _of_file(word: Any, own: Own) -> Task | None:
     return own.get(word) or next((task for task in own.values() if type(task).__name__ == word), None)
 
 
-def fields_of(of: type[Task], given: Mapping[str, Any], what: str) -> dict[str, Any]:
+def fields_of(of: type[Task], data: Mapping[str, Any], what: str) -> dict[str, Any]:
     hints = field_types(of)
-    names = [each.name for each in fields(of) if each.name != "name"]
-    for key in given:
+    names = [field.name for field in fields(of) if field.name != "name"]
+    for key in data:
         if key not in names:
             raise unknown_name(f"setting of {what} called", shortened(str(key)), names)
-    return {key: form_of(hints[key]).fit(f"{key} of {what}", value) for key, value in given.items()}
+    return {key: form_of(hints[key]).fit(f"{key} of {what}", value) for key, value in data.items()}
 
 
 def _gains(of: type[Task], name: str, before: Stack) -> dict[str, Any]:
     """Returns the gains of the task of that name, else those of the first task, which suit the robot."""
     known = {task.name: task for level in before for task in level.tasks}
     like = known.get(name) or next(iter(known.values()), None)
-    own = {each.name: each.default for each in fields(of)}
+    own = {field.name: field.default for field in fields(of)}
     if like is None or own["K_p"] == 0.0:
         return {}
     return {key: one(getattr(like, key)) for key in _GAINS}
@@ -214,15 +214,15 @@ def _level_as_data(level: Level, own: Own) -> dict[str, Any]:
 
 
 def _task_as_data(task: Task, own: Own) -> dict[str, Any]:
-    word, usual = kind_name(task), {each.name: each.default for each in fields(task)}
+    word, usual = kind_name(task), {field.name: field.default for field in fields(task)}
     if word == OWN:
-        found = next((path for path, each in own.items() if type(each) is type(task)), None)
-        if found is None:
+        file = next((path for path, template in own.items() if type(template) is type(task)), None)
+        if file is None:
             raise InputError(
                 f"task '{task.name}' is not of a kind of the lab and cannot be written as data: put it into "
                 "a file, and name the file by --task FILE.py"
             )
-        word, usual = found, vars(own[found])
-    values = {each.name: getattr(task, each.name) for each in fields(task) if each.name != "name"}
+        word, usual = file, vars(own[file])
+    values = {field.name: getattr(task, field.name) for field in fields(task) if field.name != "name"}
     kept = {key: value for key, value in values.items() if key in _GAINS or value != usual[key]}
     return {"task": word, "name": task.name, **kept}

@@ -19,26 +19,26 @@ def add(stack: Stack, value: Any, own: Own = NONE) -> Stack:
     """Adds a task: {"task": KIND, …}. The key "level" gives the task a level of its own at that place; place
     1 has the highest priority. The key "with" gives the task the priority of the task or level of that name.
     Without these keys, the task gets a level directly above the last level."""
-    given = entry_of(value, "stack.add")
-    place, beside = given.pop("level", None), given.pop("with", None)
+    data = entry_of(value, "stack.add")
+    number, partner = data.pop("level", None), data.pop("with", None)
     taken = [task.name for level in stack for task in level.tasks]
-    level = level_of(given, stack, taken, own)
-    if beside is not None:
-        at = _place_of(stack, beside)
+    level = level_of(data, stack, taken, own)
+    if partner is not None:
+        at = _place_of(stack, partner)
         return checked((*stack[:at], _joined(stack[at], level), *stack[at + 1 :]))
-    if place is None:
+    if number is None:
         at = max(len(stack) - 1, 0)
     else:
-        at = form_of(int).fit("level of stack.add", place) - 1
+        at = form_of(int).fit("level of stack.add", number) - 1
         if not 0 <= at <= len(stack):
-            raise InputError(f"level of stack.add is {place}: give a place from 1 to {len(stack) + 1}")
+            raise InputError(f"level of stack.add is {number}: give a place from 1 to {len(stack) + 1}")
     return checked((*stack[:at], level, *stack[at:]))
 
 
 def remove(stack: Stack, value: Any) -> Stack:
     """Returns the stack without the task of that name; a level that has no tasks left is removed, too."""
     at, task = _find(stack, value)
-    rest = tuple(each for each in stack[at].tasks if each is not task)
+    rest = tuple(other for other in stack[at].tasks if other is not task)
     kept = (replace(stack[at], tasks=rest, Q=one(stack[at].Q)),) if rest else ()
     if not kept and len(stack) == 1:
         raise InputError(
@@ -58,9 +58,9 @@ def rename(stack: Stack, value: Any) -> Stack:
 
 def edit(stack: Stack, value: Any) -> Stack:
     """Changes fields of a task, e.g. its axes or its frame: {"name": TASK, FIELD: VALUE, …}."""
-    given = entry_of(value, "stack.edit")
-    at, task = _find(stack, given.pop("name", None))
-    changes = fields_of(type(task), given, f"a task of kind '{kind_name(task)}'")
+    data = entry_of(value, "stack.edit")
+    at, task = _find(stack, data.pop("name", None))
+    changes = fields_of(type(task), data, f"a task of kind '{kind_name(task)}'")
     return _with_task(stack, at, task, replace(task, **changes))
 
 
@@ -70,7 +70,7 @@ def split(stack: Stack, value: Any) -> Stack:
     level = stack[at]
     if len(level.tasks) == 1:
         raise InputError(f"task '{task.name}' has a level of its own already")
-    rest = tuple(each for each in level.tasks if each is not task)
+    rest = tuple(other for other in level.tasks if other is not task)
     Q = one(level.Q)
     return (
         *stack[:at],
@@ -85,11 +85,11 @@ def merge(stack: Stack, value: Any) -> Stack:
     INTO]."""
     if not isinstance(value, (list, tuple)) or len(value) != 2:
         raise InputError(f"stack.merge is {quoted(value)}: give two levels, [LEVEL, INTO]")
-    at, into = (_place_of(stack, each) for each in value)
+    at, into = (_place_of(stack, name) for name in value)
     if at == into:
         raise InputError(f"level '{stack[at].name}' cannot be merged with itself: name another one")
     joined = _joined(stack[into], stack[at])
-    levels = [joined if place == into else level for place, level in enumerate(stack) if place != at]
+    levels = [joined if index == into else level for index, level in enumerate(stack) if index != at]
     return tuple(levels)
 
 
@@ -116,7 +116,7 @@ def _place_of(stack: Stack, name: Any) -> int:
 
 
 def _with_task(stack: Stack, at: int, task: Task, new: Task) -> Stack:
-    tasks = tuple(new if each is task else each for each in stack[at].tasks)
+    tasks = tuple(new if other is task else other for other in stack[at].tasks)
     return checked((*stack[:at], replace(stack[at], tasks=tasks, Q=one(stack[at].Q)), *stack[at + 1 :]))
 
 

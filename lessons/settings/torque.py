@@ -95,7 +95,7 @@ class TorqueSettings(ControllerSettings, SceneSettings):
         controller."""
         if self.controller not in self.controllers:
             raise unknown_name("controller", self.controller, by_name(self.controllers))
-        own = {each.name: getattr(self, each.name) for each in fields(ControllerSettings)}
+        own = {entry.name: getattr(self, entry.name) for entry in fields(ControllerSettings)}
         own["M_bar"] = tuple(float(value) * self.M_bar_scale for value in self.M_bar)
         return ControllerSettings(**own)
 

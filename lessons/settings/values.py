@@ -39,12 +39,12 @@ class Form:
 
     def __str__(self) -> str:
         """Returns text for users: "a whole number from 1 to 60"; "viability, paper or off"."""
-        found = [] if self.kind is None else [self._one(self.kind)]
+        parts = [] if self.kind is None else [self._one(self.kind)]
         if self.elements is not None:
-            found.append(
-                f"a list of {self.elements}s {self.range}".strip() if not found else "a list of such"
+            parts.append(
+                f"a list of {self.elements}s {self.range}".strip() if not parts else "a list of such"
             )
-        return " or ".join(found + ["null"] * self.null)
+        return " or ".join(parts + ["null"] * self.null)
 
     def _one(self, kind: str) -> str:
         if kind == SWITCH:
@@ -60,7 +60,7 @@ class Form:
         if value is None and self.null:
             return None
         if isinstance(value, (list, tuple, np.ndarray)) and self.elements is not None:
-            return tuple(self._element(self.elements, path, each) for each in value)
+            return tuple(self._element(self.elements, path, element) for element in value)
         if self.kind is None:
             example = [] if self.elements == WORD else [0.5, 0.5]
             raise InputError(f"{path} is {_quoted(value)}: give a list, e.g. {example}")
@@ -70,18 +70,18 @@ class Form:
         match kind:
             case "switch":
                 fits = isinstance(value, (bool, np.bool_))
-                found: Any = bool(value) if fits else None
+                fitted: Any = bool(value) if fits else None
             case "word":
                 if isinstance(value, str) and self.words and value not in self.words:
                     raise unknown_name(path, value, by_name(self.words))
-                fits, found = isinstance(value, str), value
+                fits, fitted = isinstance(value, str), value
             case _:
                 fits = _is_number(value) and self.range.holds(float(value))
                 fits = fits and (kind == NUMBER or value == int(value))
-                found = (int(value) if kind == WHOLE else float(value)) if fits else None
+                fitted = (int(value) if kind == WHOLE else float(value)) if fits else None
         if not fits:
             raise InputError(f"{path} is {_quoted(value)}: give {self}")
-        return found
+        return fitted
 
 
 @cache
@@ -92,13 +92,13 @@ def form_of(hint: Any) -> Form:
     kind: str | None = None
     elements: str | None = None
     words: tuple[str, ...] = ()
-    for each in alternatives(inner):
-        if get_origin(each) is tuple:
-            elements = form_of(get_args(each)[0]).kind
-        elif get_origin(each) is Literal:
-            kind, words = WORD, get_args(each)
-        elif each is not type(None):
-            kind = {bool: SWITCH, int: WHOLE, str: WORD}.get(each, NUMBER)
+    for alternative in alternatives(inner):
+        if get_origin(alternative) is tuple:
+            elements = form_of(get_args(alternative)[0]).kind
+        elif get_origin(alternative) is Literal:
+            kind, words = WORD, get_args(alternative)
+        elif alternative is not type(None):
+            kind = {bool: SWITCH, int: WHOLE, str: WORD}.get(alternative, NUMBER)
     return Form(kind, elements, words, type(None) in alternatives(inner), allowed)
 
 
@@ -118,14 +118,14 @@ def _quoted(value: Any) -> str:
 
 def peak(values: NDArray[np.float64]) -> float | None:
     """Returns the largest finite value, None if there is none."""
-    found = values[np.isfinite(values)]
-    return float(found.max()) if found.size else None
+    numbers = values[np.isfinite(values)]
+    return float(numbers.max()) if numbers.size else None
 
 
 def finite(value: Any) -> Any:
     """JSON-ready data with None in place of every number that is not finite."""
     if isinstance(value, dict):
-        return {key: finite(each) for key, each in value.items()}
+        return {key: finite(element) for key, element in value.items()}
     if isinstance(value, list):
-        return [finite(each) for each in value]
+        return [finite(element) for element in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value

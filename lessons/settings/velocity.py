@@ -144,15 +144,19 @@ class VelocitySettings(SceneSettings):
     def special_differences(self, wanted: VelocitySettings) -> list[tuple[str, Any]]:
         """Obstacles that were removed, added or moved; added and moved ones come last, in the order of these
         changes."""
-        left = {each.name for each in wanted.htmpc.obstacles}
-        told = [(f"obstacles.{each.name}", None) for each in self.htmpc.obstacles if each.name not in left]
-        rest = tuple(each for each in self.htmpc.obstacles if each.name in left)
+        left = {obstacle.name for obstacle in wanted.htmpc.obstacles}
+        own = self.htmpc.obstacles
+        changes = [(f"obstacles.{obstacle.name}", None) for obstacle in own if obstacle.name not in left]
+        rest = tuple(obstacle for obstacle in own if obstacle.name in left)
         for count in range(len(wanted.htmpc.obstacles) + 1):
             at = len(wanted.htmpc.obstacles) - count
             kept, last = wanted.htmpc.obstacles[:at], wanted.htmpc.obstacles[at:]
-            if tuple(each for each in rest if each.name not in {moved.name for moved in last}) == kept:
-                return told + [_as_setting(each) for each in last if not isinstance(each, Floor)]
-        return told
+            moved = {obstacle.name for obstacle in last}
+            if tuple(obstacle for obstacle in rest if obstacle.name not in moved) == kept:
+                return changes + [
+                    _as_setting(obstacle) for obstacle in last if not isinstance(obstacle, Floor)
+                ]
+        return changes
 
     def with_obstacle(self, obstacle: Obstacle) -> VelocitySettings:
         """Returns the settings with an obstacle added, or with the obstacle of this name replaced."""
@@ -190,13 +194,18 @@ _OF_LEVELS = {
 }  # fmt: skip
 
 
+def _movable(settings: VelocitySettings) -> dict[str, Ball | Box]:
+    obstacles = settings.htmpc.obstacles
+    return {obstacle.name: obstacle for obstacle in obstacles if not isinstance(obstacle, Floor)}
+
+
 def _seen(settings: VelocitySettings, name: str) -> Any:
-    found = [each for each in settings.htmpc.obstacles if each.name == name and not isinstance(each, Floor)]
-    return _as_setting(found[0])[1] if found else None
+    obstacle = _movable(settings).get(name)
+    return None if obstacle is None else _as_setting(obstacle)[1]
 
 
 def _with_obstacle(settings: VelocitySettings, name: str, value: Any) -> VelocitySettings:
-    known = {each.name: each for each in settings.htmpc.obstacles if not isinstance(each, Floor)}
+    known = _movable(settings)
     if value is not None:
         return settings.with_obstacle(_obstacle(known, f"obstacles.{name}", name, value))
     if name not in known:
@@ -210,7 +219,7 @@ def _as_setting(obstacle: Ball | Box) -> tuple[str, Any]:
 
 
 def _without(obstacles: tuple[Obstacle, ...], name: str) -> tuple[Obstacle, ...]:
-    return tuple(each for each in obstacles if each.name != name)
+    return tuple(obstacle for obstacle in obstacles if obstacle.name != name)
 
 
 def _obstacle(known: Mapping[str, Ball | Box], path: str, name: str, value: Any) -> Obstacle:

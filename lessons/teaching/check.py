@@ -106,9 +106,9 @@ def perform(
     """Performs runs, the long ones first, to keep all cores busy until the end."""
     work = sorted(pieces, key=lambda piece: -(piece[0].duration or 0.0))
     outcomes: dict[RunSpec, Outcome] = {}
-    for place, outcome in spread(measured, work):
+    for index, outcome in spread(measured, work):
         done = Outcome({}, 0, outcome.reason) if isinstance(outcome, FailedJob) else outcome
-        outcomes[work[place][0]] = done
+        outcomes[work[index][0]] = done
         if progress is not None:
             progress(len(outcomes) / len(work))
     return outcomes
@@ -131,7 +131,9 @@ def needed(lessons: Sequence[Lesson], notes: Iterable[tuple[Note, Sequence[RunSp
             measures = _measures(step)
             want(run, measures, wanted)
             if step.ghost is not None:
-                want(run.but(*step.ghost.set), [each for each in measures if each.over_ghost], wanted)
+                want(
+                    run.but(*step.ghost.set), [measure for measure in measures if measure.over_ghost], wanted
+                )
             for claim in step.claims:
                 want(run.but(*claim.fails_with), [claim.measure], wanted)
         if lesson.challenge is not None:
@@ -151,29 +153,31 @@ def _runs(lesson: Lesson, step: Step, note: Note) -> tuple[RunSpec, ...]:
 
 
 def _measures(step: Step) -> list[Measure]:
-    found = [claim.measure for claim in step.claims]
+    measures = [claim.measure for claim in step.claims]
     prediction = step.prediction
-    return [*found, prediction.measure] if prediction is not None else found
+    return [*measures, prediction.measure] if prediction is not None else measures
 
 
 def judge(lesson: Lesson, outcomes: Outcomes) -> list[Verdict]:
     """Returns the verdicts on one lesson."""
-    found = []
+    verdicts = []
     for step in lesson.steps:
         run = lesson.run_of(step)
         script = _script(lesson.name, step.title, outcomes[run])
-        found += [script] if script else []
+        verdicts += [script] if script else []
         if outcomes[run].error is not None:
             continue
-        found += [_claim(lesson, step, claim, outcomes) for claim in step.claims]
+        verdicts += [_claim(lesson, step, claim, outcomes) for claim in step.claims]
         if step.prediction is not None:
-            found.append(_prediction(lesson, step, step.prediction, outcomes))
+            verdicts.append(_prediction(lesson, step, step.prediction, outcomes))
         for note in step.notes:
             if note.measure is not None:
-                found.append(judge_note(lesson.name, step.title, note, _runs(lesson, step, note), outcomes))
+                verdicts.append(
+                    judge_note(lesson.name, step.title, note, _runs(lesson, step, note), outcomes)
+                )
     if lesson.challenge is not None:
-        found += _challenge(lesson, lesson.challenge, outcomes)
-    return found
+        verdicts += _challenge(lesson, lesson.challenge, outcomes)
+    return verdicts
 
 
 def _script(lesson: str, where: str, outcome: Outcome) -> Verdict | None:
@@ -224,7 +228,7 @@ def _prediction(lesson: Lesson, step: Step, prediction: Prediction, outcomes: Ou
     value = _value(prediction.measure, lesson.run_of(step), step, lesson, outcomes)
     unit = prediction.measure.unit
     if isinstance(prediction, Choice):
-        fitting = [each for each in prediction.options if each.low <= value < each.high]
+        fitting = [option for option in prediction.options if option.low <= value < option.high]
         condition = fitting[0].text if fitting else "no option"
         tempting = prediction.options[prediction.tempting]
         if len(fitting) != 1:
@@ -242,15 +246,15 @@ def _prediction(lesson: Lesson, step: Step, prediction: Prediction, outcomes: Ou
 
 def _challenge(lesson: Lesson, challenge: Challenge, outcomes: Outcomes) -> list[Verdict]:
     start = lesson.run_of(challenge)
-    found = []
+    verdicts = []
     script = _script(lesson.name, "challenge", outcomes[start])
-    found += [script] if script else []
+    verdicts += [script] if script else []
     for assignments in ((), *challenge.solutions):
         outcome = outcomes[start.but(*assignments)]
-        result = challenge.result([outcome.values.get(each, math.nan) for each in challenge.measures])
+        result = challenge.result([outcome.values.get(measure, math.nan) for measure in challenge.measures])
         name = f"solution {', '.join(assignments)}" if assignments else "start"
         missed = [goal.text for goal, met in zip(challenge.goals, result.met, strict=True) if not met]
-        foreign = [each for each in assignments if not _allowed(challenge, each)]
+        foreign = [assignment for assignment in assignments if not _allowed(challenge, assignment)]
         fault = ""
         if outcome.error is not None:
             fault = f"it cannot be run: {outcome.error}"
@@ -262,12 +266,12 @@ def _challenge(lesson: Lesson, challenge: Challenge, outcomes: Outcomes) -> list
             fault = "it passes with its first settings"
         condition = "misses a goal" if not assignments else "meets all goals"
         value = result.score if assignments else math.nan
-        found.append(
+        verdicts.append(
             Verdict(
                 lesson.name, "challenge", name, value, "points" if assignments else "", condition, fault=fault
             )
         )
-    return found
+    return verdicts
 
 
 def judge_note(lesson: str, where: str, note: Note, runs: Sequence[RunSpec], outcomes: Outcomes) -> Verdict:
@@ -281,16 +285,16 @@ def judge_note(lesson: str, where: str, note: Note, runs: Sequence[RunSpec], out
     if note.measure.over_ghost:
         *values, ghost = values
         values = [value / ghost if ghost else math.nan for value in values]
-    told = [_between(each, unit) for each in (note.inside, note.outside)]
+    wanted = [_between(interval, unit) for interval in (note.inside, note.outside)]
     missed = [
         f"{_figure(value, unit)}, not {condition}"
-        for value, condition, (low, high) in zip(values, told, (note.inside, note.outside), strict=False)
+        for value, condition, (low, high) in zip(values, wanted, (note.inside, note.outside), strict=False)
         if not low <= value <= high
     ]
     other = values[1] if note.without else math.nan
     wrong = ", ".join(note.without)
     fault = "; ".join(missed)
-    return Verdict(lesson, where, what, values[0], unit, told[0], wrong, other, fault)
+    return Verdict(lesson, where, what, values[0], unit, wanted[0], wrong, other, fault)
 
 
 def _between(limits: Range, unit: str) -> str:

@@ -47,7 +47,7 @@ class Control:
 def chosen(settings: SceneSettings, control: Control) -> Any:
     """Returns the choice of a control that is equal to the present setting; None if no choice is equal to
     it."""
-    fitting = (each for each in control.choices if settings.changed(control.path, each) == settings)
+    fitting = (choice for choice in control.choices if settings.changed(control.path, choice) == settings)
     return next(fitting, None)
 
 

@@ -44,13 +44,13 @@ def card_of(docstring: str | None) -> Card:
     Raises:
         ValueError: something is missing.
     """
-    found = _CARD.fullmatch((docstring or "").strip())
-    if found is None:
+    match = _CARD.fullmatch((docstring or "").strip())
+    if match is None:
         raise ValueError(
             "a lesson's docstring is a title, an empty line, a question in one line, an empty line, "
             f"'Minutes: …' and 'You need: …'; this one is {docstring!r}"
         )
-    return Card(found["title"], found["question"], int(found["minutes"]), " ".join(found["needs"].split()))
+    return Card(match["title"], match["question"], int(match["minutes"]), " ".join(match["needs"].split()))
 
 
 @dataclass(frozen=True)

@@ -82,10 +82,10 @@ class Signal:
 
     def over(self, rows: RunRows) -> Array:
         """Returns the signal at every tick, (ticks,); NaN where it is not defined."""
-        found = DERIVED[self.name](rows) if self.name in DERIVED else rows[self.name]
-        one = np.linalg.norm(found, axis=1) if self.column is None else found[:, self.column]
+        values = DERIVED[self.name](rows) if self.name in DERIVED else rows[self.name]
+        one = np.linalg.norm(values, axis=1) if self.column is None else values[:, self.column]
         # The norm of a single component would not keep the sign of the component.
-        one = found[:, 0] if found.shape[1] == 1 else one
+        one = values[:, 0] if values.shape[1] == 1 else one
         return UNITS[self.unit] * one
 
 
@@ -175,24 +175,24 @@ def _deceleration_to_stop(rows: RunRows) -> Array:
     """Returns the largest q̇²/2d, where d is the distance of `_ahead`, (ticks, 1) rad/s². Distances below
     0.05° are left out."""
     ahead = _ahead(rows)
-    found = np.where(ahead > _CLOSE, rows["v"] ** 2 / (2.0 * np.maximum(ahead, _CLOSE)), math.nan)
-    return np.fmax.reduce(found, axis=1, keepdims=True)
+    deceleration = np.where(ahead > _CLOSE, rows["v"] ** 2 / (2.0 * np.maximum(ahead, _CLOSE)), math.nan)
+    return np.fmax.reduce(deceleration, axis=1, keepdims=True)
 
 
 def _speed_near_an_end(rows: RunRows) -> Array:
     """Returns the largest speed of the joints that are less than 5° before an end of their range, (ticks, 1)
     rad/s; NaN if there is no such joint."""
-    found = np.where(_ahead(rows) < _NEAR, np.abs(rows["v"]), math.nan)
-    return np.fmax.reduce(found, axis=1, keepdims=True)
+    speed = np.where(_ahead(rows) < _NEAR, np.abs(rows["v"]), math.nan)
+    return np.fmax.reduce(speed, axis=1, keepdims=True)
 
 
 def _at(bit: int) -> Callable[[RunRows], Array]:
-    def found(rows: RunRows) -> Array:
+    def is_at_bound(rows: RunRows) -> Array:
         bits = rows["at_bound"]
         bits = np.where(np.isfinite(bits), bits, 0).astype(np.int64)
         return (bits & bit != 0).any(axis=1, keepdims=True).astype(float)
 
-    return found
+    return is_at_bound
 
 
 def _joints_moved(rows: RunRows) -> Array:

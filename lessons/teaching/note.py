@@ -27,7 +27,7 @@ class Note:
         without: assignments that remove the cause which the sentence names.
         outside: as `inside`, without the cause. The two ranges are disjoint if the cause has this effect, and
             overlap if the sentence says that it has not.
-        told: what is said instead of a measure: "given: …" or "tested by FILE::NAME".
+        statement: what is said instead of a measure: "given: …" or "tested by FILE::NAME".
     """
 
     label: str
@@ -40,7 +40,7 @@ class Note:
     seconds: float | None = None
     without: tuple[str, ...] = ()
     outside: Range = (0.0, 0.0)
-    told: str = ""
+    statement: str = ""
 
     def runs(self, own: RunSpec | None = None, ghost: tuple[str, ...] = ()) -> tuple[RunSpec, ...]:
         """Returns the run with the cause and, if the note removes the cause, the run without it. A measure

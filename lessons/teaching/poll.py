@@ -38,12 +38,12 @@ class Poll:
     asks for.
 
     Attributes:
-        asked: the question.
+        question: the question.
         rounds: for each round, the votes by voter; the present round is the last.
         is_open: whether the present round accepts votes.
     """
 
-    asked: Choice | Value
+    question: Choice | Value
     rounds: tuple[Mapping[str, float], ...] = ({},)
     is_open: bool = True
 
@@ -60,7 +60,7 @@ class Poll:
         """
         if not self.is_open:
             raise InputError("the vote is closed: your answer was not counted")
-        vote = valid(self.asked, answer)
+        vote = valid(self.question, answer)
         if voter not in self.latest and len(self.latest) >= VOTERS:
             raise InputError(f"{VOTERS} people have voted: this vote accepts no more voters")
         if self.latest.get(voter) == vote:
@@ -84,7 +84,7 @@ class Poll:
         """Returns the most frequent option, or the median of numbers. Without votes, returns the first
         option, or the middle of the scale."""
         votes = sorted(self.latest.values())
-        match self.asked:
+        match self.question:
             case Choice():
                 return Counter(votes).most_common(1)[0][0] if votes else 0
             case Value() as value:
@@ -93,18 +93,18 @@ class Poll:
     def right(self, truth: float, number: int = -1) -> int | None:
         """Returns how many votes of a round are right for the measured number; None if nothing was
         measured."""
-        hits = [self.asked.hits(vote, truth) for vote in self.rounds[number].values()]
-        known = self.asked.hits(self.favourite(), truth) is not None
+        hits = [self.question.hits(vote, truth) for vote in self.rounds[number].values()]
+        known = self.question.hits(self.favourite(), truth) is not None
         return sum(map(bool, hits)) if known else None
 
 
-def valid(asked: Choice | Value, answer: object) -> float:
+def valid(question: Choice | Value, answer: object) -> float:
     """Returns the answer as a vote. Raises InputError if this question has no such answer."""
-    match asked:
-        case Choice() if type(answer) is int and 0 <= answer < len(asked.options):
+    match question:
+        case Choice() if type(answer) is int and 0 <= answer < len(question.options):
             return answer
         case Choice():
-            raise InputError(f"this is not an option: choose one of the {len(asked.options)} options")
+            raise InputError(f"this is not an option: choose one of the {len(question.options)} options")
         case Value() as value:
             if isinstance(answer, (int, float)) and not isinstance(answer, bool):
                 slack = 1 + 1e-9  # the ends of a slider have rounding errors
@@ -118,31 +118,31 @@ def valid(asked: Choice | Value, answer: object) -> float:
 def histogram(poll: Poll, number: int = -1, truth: float = math.nan) -> tuple[Bar, ...]:
     """Returns the bars of a round, by default the present one: one per option, or intervals of equal width on
     the logarithmic scale. truth: the measured number; NaN if it is not known."""
-    asked, votes = poll.asked, poll.rounds[number].values()
-    match asked:
+    question, votes = poll.question, poll.rounds[number].values()
+    match question:
         case Choice():
             counts = Counter(map(int, votes))
-            right = asked.right(truth)
+            right = question.right(truth)
             return tuple(
                 Bar(option.text, counts[k], None if right is None else k == right)
-                for k, option in enumerate(asked.options)
+                for k, option in enumerate(question.options)
             )
         case Value() as value:
-            counts = Counter(_place(value, vote) for vote in votes)
+            counts = Counter(_bar_index(value, vote) for vote in votes)
             known = math.isfinite(truth) and truth > 0
-            right = _place(value, min(max(truth, value.low), value.high)) if known else None
+            right = _bar_index(value, min(max(truth, value.low), value.high)) if known else None
             return tuple(
                 Bar(_interval(value, k), counts[k], None if right is None else k == right)
                 for k in range(_BARS)
             )
 
 
-def _place(value: Value, vote: float) -> int:
+def _bar_index(value: Value, vote: float) -> int:
     share = math.log(vote / value.low) / math.log(value.high / value.low)
     return min(int(share * _BARS), _BARS - 1)
 
 
 def _interval(value: Value, k: int) -> str:
-    ends = (value.low * (value.high / value.low) ** (each / _BARS) for each in (k, k + 1))
+    ends = (value.low * (value.high / value.low) ** (edge / _BARS) for edge in (k, k + 1))
     low, high = (f"{end:.2g}" if end < 100 else f"{end:.0f}" for end in ends)
     return f"{low} to {high} {value.measure.unit}".rstrip()

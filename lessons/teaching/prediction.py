@@ -51,7 +51,7 @@ class Choice:
 
     def right(self, value: float) -> int | None:
         """Returns the index of the right option for a measured number; None if no option is right."""
-        return next((k for k, each in enumerate(self.options) if each.low <= value < each.high), None)
+        return next((k for k, option in enumerate(self.options) if option.low <= value < option.high), None)
 
     def hits(self, picked: float, value: float) -> bool | None:
         """Returns whether an option is right for a measured number; None if no option is right."""

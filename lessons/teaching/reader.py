@@ -86,7 +86,7 @@ _FORMS: dict[str, tuple[str, str]] = {
     "integer": (r"(?P<integer>-?\d+)", "1"),
     "real": ("(?P<real>#)", "1.5"),
     "note": (
-        rf"(?P<told>given: .+|tested by \S+::\w+)|{_MEASURE} from (?P<low>#)(?: to (?P<high>#))?"
+        rf"(?P<statement>given: .+|tested by \S+::\w+)|{_MEASURE} from (?P<low>#)(?: to (?P<high>#))?"
         r"(?: in (?P<on>[\w-]+))?(?: for (?P<seconds>#) s)?"
         rf"(?: with (?:(?P<ghost>the ghost's settings)|(?P<set>{_SETTINGS})))?"
         rf"(?:; (?P<effect>but|and) with (?P<without>{_SETTINGS})"
@@ -107,7 +107,7 @@ _TEXT_GROUPS = {
     "choices",
     "numbers",
     "log",
-    "told",
+    "statement",
     "on",
     "ghost",
     "set",
@@ -190,8 +190,8 @@ class _Part:
         if match is None:
             with self.named():
                 raise InputError(f"'{shortened(text, 100)}' does not have the form '{example}'")
-        found = {name: value for name, value in match.groupdict().items() if value is not None}
-        return {name: value if name in _TEXT_GROUPS else float(value) for name, value in found.items()}
+        texts = {name: value for name, value in match.groupdict().items() if value is not None}
+        return {name: value if name in _TEXT_GROUPS else float(value) for name, value in texts.items()}
 
 
 def read_lesson(name: str, path: str, text: str, marks: bool = False) -> Lesson:
@@ -317,36 +317,36 @@ def _notes(part: _Part) -> tuple[Note, ...]:
 
 
 def _note(part: _Part, item: _Part, says: str) -> Note:
-    found = item.groups()
+    groups = item.groups()
     label = item.more[2:-1]
     with item.named():
-        if "told" in found:
-            return Note(label, says, told=found["told"])
+        if "statement" in groups:
+            return Note(label, says, statement=groups["statement"])
         measure = _measure(item)
-        inside = found["low"], found.get("high", math.inf)
-        outside = found.get("outside_low", 0.0), found.get("outside_high", math.inf)
-        if ("ghost" in found or measure.over_ghost) and part.one("ghost") is None:
+        inside = groups["low"], groups.get("high", math.inf)
+        outside = groups.get("outside_low", 0.0), groups.get("outside_high", math.inf)
+        if ("ghost" in groups or measure.over_ghost) and part.one("ghost") is None:
             raise InputError(
                 "there is no ghost in this step: write a line '- ghost: …' with settings below it"
             )
         if inside[0] > inside[1] or outside[0] > outside[1]:
             raise InputError("a range begins with its smaller number")
-        if "effect" in found:
+        if "effect" in groups:
             apart = inside[1] < outside[0] or outside[1] < inside[0]
-            if apart != (found["effect"] == "but"):
+            if apart != (groups["effect"] == "but"):
                 raise InputError(
                     "after 'but with' stands a range that does not overlap the first one, and after 'and "
                     "with' one that does"
                 )
-        named = (found.get("on", ""), found.get("seconds"))
-        without = _settings(found.get("without", ""))
+        named = (groups.get("on", ""), groups.get("seconds"))
+        without = _settings(groups.get("without", ""))
         return Note(
             label,
             says,
             measure,
             inside,
-            _settings(found.get("set", "")),
-            "ghost" in found,
+            _settings(groups.get("set", "")),
+            "ghost" in groups,
             *named,
             without,
             outside if without else (0.0, 0.0),
@@ -355,10 +355,10 @@ def _note(part: _Part, item: _Part, says: str) -> Note:
 
 def _settings(text: str) -> tuple[str, ...]:
     """Returns the assignments in backticks."""
-    found = tuple(re.findall("`([^`]+)`", text))
-    for each in found:
-        parse_assignment(each)
-    return found
+    texts = tuple(re.findall("`([^`]+)`", text))
+    for assignment in texts:
+        parse_assignment(assignment)
+    return texts
 
 
 def read_note(path: str, line: int, text: str) -> Note:
@@ -368,7 +368,7 @@ def read_note(path: str, line: int, text: str) -> Note:
 
 def _step(part: _Part, notes: tuple[Note, ...]) -> Step:
     duration, script = _run(part)
-    ghost, asked = part.one("ghost"), part.one("predict")
+    ghost, prediction = part.one("ghost"), part.one("predict")
     with part.named():
         return Step(
             part.value,
@@ -379,7 +379,7 @@ def _step(part: _Part, notes: tuple[Note, ...]) -> Step:
             _set(part),
             script,
             duration,
-            _prediction(asked) if asked else None,
+            _prediction(prediction) if prediction else None,
             Ghost(ghost.value, _set(ghost)) if ghost else None,
             tuple(_control(item) for item in part.all("control")),
             tuple(_signal(item) for item in part.all("plot")),
@@ -390,12 +390,12 @@ def _step(part: _Part, notes: tuple[Note, ...]) -> Step:
 def _challenge(part: _Part) -> Challenge:
     duration, script = _run(part)
     score = part.needed("score")
-    found = score.groups()
+    groups = score.groups()
     return Challenge(
         part.text(),
         tuple(_claim(item) for item in part.all("goal")),
         tuple(_control(item) for item in part.all("control")),
-        Score(_measure(score), found["worst"], found["best"]),
+        Score(_measure(score), groups["worst"], groups["best"]),
         tuple(_set(item) for item in part.all("solution")),
         _set(part),
         duration,
@@ -416,22 +416,22 @@ def _run(part: _Part) -> tuple[float, tuple[tuple[float, events.Event], ...]]:
 
 
 def _signal(item: _Part) -> Signal:
-    found = item.groups()
+    groups = item.groups()
     with item.named():
-        column = None if "column" not in found else int(found["column"])
-        return Signal(found["name"], found.get("unit", ""), column)
+        column = None if "column" not in groups else int(groups["column"])
+        return Signal(groups["name"], groups.get("unit", ""), column)
 
 
 def _measure(item: _Part) -> Measure:
-    found = item.groups()
-    window = found.get("after", 0.0), found.get("until", math.inf)
-    return Measure(_signal(item), found.get("statistic", "largest"), *window, "over_ghost" in found)
+    groups = item.groups()
+    window = groups.get("after", 0.0), groups.get("until", math.inf)
+    return Measure(_signal(item), groups.get("statistic", "largest"), *window, "over_ghost" in groups)
 
 
 def _claim(item: _Part) -> Claim:
     test = item.needed("is")
-    found = test.groups()
-    claim = Claim(item.value, _measure(test), found["relation"], found["bound"])
+    groups = test.groups()
+    claim = Claim(item.value, _measure(test), groups["relation"], groups["bound"])
     if item.key == "goal":
         return claim
     if not item.all("fails with"):
@@ -440,11 +440,11 @@ def _claim(item: _Part) -> Claim:
 
 
 def _control(item: _Part) -> Control:
-    found = item.groups()
+    groups = item.groups()
     with item.named():
-        choices = tuple(json.loads(found["choices"])) if "choices" in found else ()
-        ends = found.get("low", 0.0), found.get("high", 0.0)
-        return Control(found["path"], found["words"], *ends, "log" in found, choices)
+        choices = tuple(json.loads(groups["choices"])) if "choices" in groups else ()
+        ends = groups.get("low", 0.0), groups.get("high", 0.0)
+        return Control(groups["path"], groups["words"], *ends, "log" in groups, choices)
 
 
 def _prediction(item: _Part) -> Prediction:
@@ -454,13 +454,13 @@ def _prediction(item: _Part) -> Prediction:
     measure = _measure(item.needed("measure"))
     if number:
         return Value(item.value, measure, **number.groups())
-    tempting = [place for place, option in enumerate(options) if option.key == "tempting"]
+    tempting = [index for index, option in enumerate(options) if option.key == "tempting"]
     with item.named():
         if len(tempting) != 1:
             raise InputError("'- predict:' needs answers '- option (1 to 2): …', and one '- tempting (…): …'")
     ranges = [option.groups("option", option.more) for option in options]
-    low = [found.get("low", found.get("least", -math.inf)) for found in ranges]
-    high = [found.get("high", found.get("below", math.inf)) for found in ranges]
+    low = [groups.get("low", groups.get("least", -math.inf)) for groups in ranges]
+    high = [groups.get("high", groups.get("below", math.inf)) for groups in ranges]
     made = tuple(Option(option.value, *ends) for option, *ends in zip(options, low, high, strict=True))
     return Choice(item.value, made, measure, tempting[0])
 
@@ -469,18 +469,18 @@ def _event(item: _Part) -> events.Event:
     """Returns the event of a line such as `push link_4, force (0, 20, 0), seconds 0.2`: words, the first
     field of the event, and other fields with their names."""
     with item.named():
-        words = next((each for each in EVENTS if f"{item.value} ".startswith(f"{each} ")), None)
+        words = next((event for event in EVENTS if f"{item.value} ".startswith(f"{event} ")), None)
         if words is None:
             raise unknown_name("event", item.value, EVENTS)
         kind, rest = EVENTS[words], item.value.removeprefix(words).strip()
         if kind is events.Set:
             return events.Set(*parse_assignment(rest))
-        known = {each.name: each for each in fields(kind)}
+        known = {parameter.name: parameter for parameter in fields(kind)}
         first, *others = re.split(r", (?=[a-z])", rest)
-        texts = {name: value for name, _, value in (each.partition(" ") for each in others)}
+        texts = {name: value for name, _, value in (part.partition(" ") for part in others)}
         if first and known:
             texts[next(iter(known))] = first
-        needed = [name for name, each in known.items() if each.default is MISSING]
+        needed = [name for name, parameter in known.items() if parameter.default is MISSING]
         if not set(needed) <= texts.keys() <= known.keys() or (first and not known):
             may = f", and can have {', '.join(known)}" if known else ""
             raise InputError(f"'{words}' needs {', '.join(needed) or 'nothing more'}{may}")
@@ -491,7 +491,7 @@ def _event(item: _Part) -> events.Event:
 def _value(item: _Part, kind: str, text: str) -> Any:
     """Returns the value of a field of an event, by the type of the field."""
     if kind == "Vector":
-        return tuple(float(each) for each in item.groups("vector", text)["numbers"].split(","))
+        return tuple(float(number) for number in item.groups("vector", text)["numbers"].split(","))
     if kind == "int":
         return int(item.groups("integer", text)["integer"])
     if kind.startswith("float"):

@@ -55,7 +55,7 @@ def test_a_vote_goes_from_open_to_decided() -> None:
     assert len(for_all(hall)["rounds"]) == 1 and hall.poll and dict(hall.poll.latest) == {"zoe": 0}
     hall = hall.started()
     assert hall.stage == "running" and hall.poll and not hall.poll.is_open
-    asked = hall.poll.asked
+    asked = hall.poll.question
     assert isinstance(asked, Choice)
     truth = next(
         x

@@ -50,8 +50,8 @@ def test_progress_survives_the_browser_and_whatever_stands_there() -> None:
         LearnerProgress().with_step("deadlines", 0).with_step("deadlines", 2).with_points("deadlines", 40.0)
     )
     progress = progress.with_points("deadlines", 30.0)
-    assert progress.best["deadlines"] == 40.0 and progress.next_place("deadlines", 4) == 1
-    assert progress.next_place("one-task", 4) == 0
+    assert progress.best["deadlines"] == 40.0 and progress.next_step("deadlines", 4) == 1
+    assert progress.next_step("one-task", 4) == 0
     assert progress_from(progress.dumped()) == progress
     for text in (None, "", "{", "[]", "3", '{"seen": 3, "best": []}', "[" * 100_000):
         assert progress_from(text) == LearnerProgress()

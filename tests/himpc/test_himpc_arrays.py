@@ -42,7 +42,7 @@ def test_every_view_is_the_array_of_its_name(monkeypatch: pytest.MonkeyPatch) ->
     """`arrays_of` and the arena agree on the index and the shape of every array; so do `loop_arrays_of` and
     the memory of an export."""
     arrays_of = in_python(monkeypatch, arrays.arrays_of, arrays.sizes_of)
-    arena = sizes(n=7, N=5, rows=11, solved=9, levels=3, bounds=15, tasks=4, frames=2, given=6)
+    arena = sizes(n=7, N=5, rows=11, solved=9, levels=3, bounds=15, tasks=4, frames=2, python_rows=6)
     tick = arrays_of(*arena.arguments)
     loop_arrays_of = in_python(monkeypatch, loop_arrays.loop_arrays_of, loop_arrays.sizes_of)
     letters = loop_arrays.sizes_of(7, 5, 11, 3, 4, 15)

@@ -111,7 +111,10 @@ class Motion:
     def slope(self, t: float) -> Array:
         """Returns ẋ − ẋ_d as controllers compute it."""
         here, preview = self.at(t)
-        return self.task.jacobian(here)[0] @ self.v - self.task.asked(here, preview).velocity[0]
+        return (
+            self.task.jacobian(here)[0] @ self.v
+            - self.task.reference_in_task_coordinates(here, preview).velocity[0]
+        )
 
 
 ANGLES = st.one_of(st.floats(0.0, np.pi), st.just(np.radians(179.0)), st.just(0.0)).map(
@@ -162,14 +165,14 @@ def test_accelerations_of_references_are_derivatives_of_their_velocities(
     """ẍ_d = d/dt ẋ_d along the motion of robot and target, and x_d is the integral of ẋ_d over the
     horizon."""
     motion, N = Motion(TASKS[name], seed, angle), 6
-    asked = [motion.task.asked(*motion.at(t, N)) for t in (-H, 0.0, H)]
+    asked = [motion.task.reference_in_task_coordinates(*motion.at(t, N)) for t in (-H, 0.0, H)]
     found = (asked[2].velocity[0] - asked[0].velocity[0]) / (2 * H)
     scale = 1.0 + float(np.abs(asked[1].acceleration).max())
     np.testing.assert_allclose(asked[1].acceleration[0], found, atol=1e-4 * scale**2)
     trapezoid = 0.5e-3 * (asked[1].velocity[1:] + asked[1].velocity[:-1]).cumsum(axis=0)
     np.testing.assert_allclose(asked[1].displacement[1:], trapezoid, atol=2e-5 * scale)
     # The state has one knot less than the reference.
-    later = motion.task.asked(*motion.at(1e-3 * (N - 1), 1)).velocity[0]
+    later = motion.task.reference_in_task_coordinates(*motion.at(1e-3 * (N - 1), 1)).velocity[0]
     np.testing.assert_allclose(asked[1].velocity[N - 1], later, atol=2e-5 * scale)
 
 

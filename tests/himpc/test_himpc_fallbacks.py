@@ -106,7 +106,7 @@ def test_a_broken_solver_falls_to_the_previous_plan(
         assert_within(pressed.rows, solution.U)
 
 
-@pytest.mark.parametrize("stale", ["outside", "rung"])
+@pytest.mark.parametrize("stale", ["outside", "fallback"])
 def test_a_previous_plan_outside_any_row_or_no_optimum_is_not_gone_on_with(
     monkeypatch: pytest.MonkeyPatch, pressed: Hierarchy, stale: str
 ) -> None:
@@ -114,7 +114,7 @@ def test_a_previous_plan_outside_any_row_or_no_optimum_is_not_gone_on_with(
     the joints are braked; otherwise they would continue their motion."""
     rows, (N, n) = pressed.rows, pressed.shape
     sound = {s.name: s._replace(U=np.zeros((N, n))) for s in pressed.solve()}
-    if stale == "rung":
+    if stale == "fallback":
         sound = {name: s._replace(fallback="previous") for name, s in sound.items()}
         moved = pressed
     else:

@@ -168,12 +168,12 @@ def test_whatever_the_robot_does_the_window_is_the_next_L_tasks(L: int, steps: l
     progress, ee, base = Progress(mission), 0.0, 0.0
     for k, (who, where) in enumerate(steps):
         ee, base = (float(where), base) if who == "e" else (ee, float(where))
-        before = progress.place
+        before = progress.l_0
         progress = advanced(progress, L, 0.1 * k, at(ee, base), STILL)
-        assert progress.place >= before
-        assert [name for name, _ in progress.completed] == [task.name for task in mission[: progress.place]]
+        assert progress.l_0 >= before
+        assert [name for name, _ in progress.completed] == [task.name for task in mission[: progress.l_0]]
         if not progress.done:
-            expected = mission[progress.place : progress.place + L]
+            expected = mission[progress.l_0 : progress.l_0 + L]
             assert [active.task for active in progress.window] == list(expected)
 
 
@@ -185,7 +185,7 @@ def test_a_hold_counts_from_arrival_and_starts_again_when_the_point_leaves() -> 
     places = []
     for t, ee in history:
         progress = advanced(progress, 2, t, at(ee, 0), STILL)
-        places.append(progress.place)
+        places.append(progress.l_0)
     assert places == [0, 0, 0, 0, 0, 1]
 
 
@@ -194,7 +194,7 @@ def test_being_at_the_goal_early_does_not_count_as_holding() -> None:
     mission = (MissionTask("base", "base", Go((1.0,))), MissionTask("ee", "ee", Go((2.0,)), hold=1.0))
     progress = advanced(Progress(mission), 2, 0.0, at(2, 0), STILL)
     progress = advanced(progress, 2, 5.0, at(2, 1), STILL)
-    assert progress.place == 1
+    assert progress.l_0 == 1
     assert not advanced(progress, 2, 5.9, at(2, 1), STILL).done
     assert advanced(advanced(progress, 2, 5.9, at(2, 1), STILL), 2, 6.0, at(2, 1), STILL).done
 
@@ -212,9 +212,9 @@ def test_a_hold_of_unknown_length_ends_with_its_release() -> None:
     completed on arrival."""
     progress = Progress(delivery(hold=None)[:2])
     progress = advanced(progress, 2, 100.0, at(0, 1), STILL)
-    assert progress.place == 0
+    assert progress.l_0 == 0
     progress = advanced(release(progress, "base1.0"), 2, 100.1, at(0, 1), STILL)
-    assert progress.place == 1
+    assert progress.l_0 == 1
     progress = advanced(release(progress, "ee2.0"), 2, 100.2, at(0, 1), STILL)
     assert not progress.done
     assert advanced(progress, 2, 100.3, at(2, 1), STILL).done
@@ -301,7 +301,7 @@ def test_a_held_orientation_is_turned_and_goes_on_being_held() -> None:
 def test_what_cannot_be_done_to_a_mission_is_refused_in_a_sentence() -> None:
     """Unknown or completed tasks, duplicate names, and goals that do not fit are refused in one sentence."""
     progress = advanced(Progress(delivery()), 2, 0.0, at(0, 1), STILL)
-    assert progress.place == 1
+    assert progress.l_0 == 1
     wave = MissionTask("wave", "base", Follow(SquareWave(np.ones(1), np.zeros(1))))
     for change, says in (
         (lambda: move(progress, "bse3.0", (0.0,)), "'base3.0'"),

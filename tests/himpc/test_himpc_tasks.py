@@ -130,7 +130,7 @@ def test_pointing_is_told_by_its_angle() -> None:
         told = Configuration(robot, data, robot.home, np.zeros(7), previews=previews)
         assert np.isfinite(task.value(told)).all()
         assert np.isfinite(task.jacobian(told)).all()
-        assert np.isfinite(task.asked(told, previews["look"]).velocity).all()
+        assert np.isfinite(task.reference_in_task_coordinates(told, previews["look"]).velocity).all()
     ahead, aside = place.rotation[:, 2], place.rotation[:, 0]
     previews = {
         "look": Hold(place.translation + np.cos(0.4) * ahead + np.sin(0.4) * aside).preview(0, 1e-3, 1)

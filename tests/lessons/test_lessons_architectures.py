@@ -174,7 +174,7 @@ def test_each_half_of_the_overlap_saves_time(monkeypatch: pytest.MonkeyPatch) ->
     def watched(
         progress: Progress, L: int, t: float, points: Mapping[str, Array], speeds: Mapping[str, float]
     ) -> Progress:
-        role = "" if progress.done else progress.mission[progress.place].role
+        role = "" if progress.done else progress.mission[progress.l_0].role
         return advanced(progress, L if role in when else 1, t, points, speeds)
 
     monkeypatch.setattr(lessons.session.velocity, "advanced", watched)

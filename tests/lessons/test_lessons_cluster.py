@@ -140,7 +140,7 @@ def deserted() -> Iterator[Any]:
 
 
 def test_a_cluster_without_workers_is_not_waited_for(deserted: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("lessons.cluster.PATIENCE", 1.0)
+    monkeypatch.setattr("lessons.cluster.WORKER_TIMEOUT_S", 1.0)
     with (
         pytest.raises(InputError, match=f"no worker for 1 s.*dask worker {deserted.scheduler_address}"),
         on_cluster(deserted.scheduler_address) as spread,

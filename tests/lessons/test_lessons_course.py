@@ -186,7 +186,7 @@ def faults(lesson: Lesson) -> list[str]:
 
 def test_a_sound_lesson_has_no_faults() -> None:
     over = replace(FAR, measure=Measure(HAND, over_ghost=True), inside=(0.02, 0.03), without=())
-    told = Note("b", told="given: a setting")
+    told = Note("b", statement="given: a setting")
     assert not faults(lesson_with(aside(SMALL, notes=(FAR, over, told), ghost=Ghost("g", OFF))))
 
 

@@ -23,8 +23,8 @@ def test_base_and_arm_take_turns() -> None:
     since, place, driven, reached = 0, -1, 0.0, 0.0
     for _ in range(150):
         session.tick()
-        since = since + 1 if session.progress.place == place else 0
-        place = session.progress.place
+        since = since + 1 if session.progress.l_0 == place else 0
+        place = session.progress.l_0
         if session.progress.done or since < SETTLED:
             continue
         speed = np.abs(session.plant.v)

@@ -111,7 +111,7 @@ def test_kernel_and_printed_equations_keep_the_same_distances() -> None:
     assert all(" – " in joint for joint in held)
     for _ in range(20):
         leader.tick()
-    given = leader.given
+    given = leader.controller_input
     assert given is not None
     plans = []
     for name in ("himpc", "himpc_printed"):
@@ -145,7 +145,7 @@ def test_a_filter_behind_the_levels_is_listed_and_recorded() -> None:
     )
     row = session.tick()
     fields = session.layout.fields
-    assert np.isfinite(row[fields["distance"]]) and session.clearance.found.pair
+    assert np.isfinite(row[fields["distance"]]) and session.clearance.nearest.pair
     while not (found := [each for each in session.binding() if each.level == "filter"]):
         row = session.tick()
         assert session.t < 1.5
@@ -157,7 +157,7 @@ def test_a_filter_behind_the_levels_is_listed_and_recorded() -> None:
     assert row[fields["priority_leak"].start] == pytest.approx(plan.behind.solution.leak) != 0.0
     assert row[fields["tau_demand"]] == pytest.approx(plan.tau)
     assert row[fields["delta_tau"]] == pytest.approx(plan.tau - plan.tau_0)
-    near = session.clearance.found
+    near = session.clearance.nearest
     assert near.kept == pytest.approx(0.02)
     assert near.kept < near.distance < 0.25
 

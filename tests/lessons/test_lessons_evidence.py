@@ -147,7 +147,7 @@ def test_a_sentence_with_a_note_stands_there(each: Told) -> None:
     """A document contains the sentence. If the note is no run, the sentence gives a reason, and no run tests
     it."""
     assert each.says in told(each.at)
-    if each.note.told:
+    if each.note.statement:
         (sentence,) = {
             s for at, text in walked() if at == each.at for s in causal(text) if s.startswith(each.says)
         }
@@ -158,7 +158,9 @@ def test_a_sentence_with_a_note_stands_there(each: Told) -> None:
 def test_a_test_that_a_note_names_exists() -> None:
     notes = [each.note for each in documents()]
     notes += [note for name, k in STEPS for note in load_lesson(name).steps[k].notes]
-    named = {note.told.removeprefix("tested by ") for note in notes if note.told.startswith("tested by ")}
+    named = {
+        note.statement.removeprefix("tested by ") for note in notes if note.statement.startswith("tested by ")
+    }
     assert named
     for each in named:
         file, name = each.split("::")
@@ -172,7 +174,9 @@ def test_every_likely_cause_is_held_or_not_known() -> None:
     for name, topic in topics().items():
         cause = " ".join(topic.cause.split())
         held = any(
-            each.says in cause for each in documents() if each.at == "disagreements" and not each.note.told
+            each.says in cause
+            for each in documents()
+            if each.at == "disagreements" and not each.note.statement
         )
         assert held or cause.startswith(("Not known", "Not measured here", *own)), name
 
@@ -204,7 +208,7 @@ def test_the_walk_reaches_every_page_of_the_site() -> None:
 @pytest.mark.nightly("tests/lessons/evidence")
 @pytest.mark.parametrize(
     "each",
-    [each for each in documents() if not each.note.told],
+    [each for each in documents() if not each.note.statement],
     ids=lambda each: f"{each.at} {each.says}"[:70],
 )
 def test_a_run_allows_a_sentence_of_a_document(each: Told, course_runs: CourseRuns) -> None:

@@ -215,8 +215,8 @@ def test_a_measured_number_is_written_into_its_text() -> None:
     dash."""
     numbers = {"a": Quoted("i", "r", scale=1e3), "b": Quoted("i", "r", ratio=True, less=1.0, form="+.0%")}
     topic = Topic("t", "", "{a} mm, {b}", "no number", "", numbers=numbers)
-    assert topic.told({("i", "r"): (2e-3, 0.9)}).evidence == "2 mm, −10 %"
-    assert topic.told({}).evidence == "– mm, –"
+    assert topic.with_numbers({("i", "r"): (2e-3, 0.9)}).evidence == "2 mm, −10 %"
+    assert topic.with_numbers({}).evidence == "– mm, –"
     row = Row(
         "HIMPC: level-1 RMSE in RT2 over RT1", "1", None, 77.0, says="about", topic="conflict-reaches-level-1"
     )

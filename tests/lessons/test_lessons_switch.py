@@ -183,7 +183,7 @@ def test_a_controller_that_keeps_distances_keeps_them_during_the_hand_over(new: 
     for _ in range(TICKS - 1):
         row = session.tick()
         assert isinstance(session.controller, Handover)
-        plan, given = session.plan, session.given
+        plan, given = session.plan, session.controller_input
         assert plan is not None
         assert given is not None
         M_bar, near = np.array(session.settings.M_bar), observed_by(given.previews)

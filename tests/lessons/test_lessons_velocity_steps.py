@@ -201,7 +201,7 @@ def test_the_learner_reads_once_what_placo_says() -> None:
     (notice,) = made.notices
     assert "placo found no velocity, and the robot brakes: Problem: Infeasible QP" in notice
     at = made.layout.fields
-    assert {float(row[at["rung/position"]][0]) for row in rows} == {float(FALLBACKS.index("keep"))}
+    assert {float(row[at["fallback/position"]][0]) for row in rows} == {float(FALLBACKS.index("keep"))}
     np.testing.assert_allclose(rows[-1][at["q"]], made.robot.home, atol=1e-9)
     made.post(Set("first_level", "scaled"))
     rows = [made.tick().copy() for _ in range(150)]

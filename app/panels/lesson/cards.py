@@ -122,7 +122,7 @@ def _offer(lesson: Lesson, progress: LearnerProgress) -> tuple[str, int]:
     opens."""
     seen = progress.seen.get(lesson.name, frozenset())
     parts = len(parts_of(lesson))
-    place = progress.next_place(lesson.name, parts)
+    place = progress.next_step(lesson.name, parts)
     return ("Start" if not seen else "Continue" if place else "Again"), place
 
 

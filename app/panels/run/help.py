@@ -34,7 +34,7 @@ _MARKS = (
         "the leak, computed with the plant's true inertia instead of M̄; it shows the effect of a wrong M̄",
     ),
     (
-        "rung",
+        "fallback",
         "the fallback that was applied when a QP had no valid solution; all values except 'solved' are red",
     ),
     (

@@ -87,7 +87,7 @@ class LevelCard:
 
     def update(self, now: SessionSnapshot[TorqueSettings], level: Level, place: int) -> None:
         errors = [(task.name, now.error(task.name), task.unit) for task in level.tasks]
-        fallback = now.number(f"rung/{level.name}")
+        fallback = now.number(f"fallback/{level.name}")
         failed = level.enabled and fallback == fallback and fallback > 0
         found = now.status.ranks.get(level.name)
         for row in self._rows:

@@ -98,7 +98,7 @@ class _Card:
     def update(self, now: SessionSnapshot[VelocitySettings], level: Level, place: int, inside: bool) -> None:
         task = level.tasks[0]
         error, bound = now.error(task.name), now.number(f"bound/{level.name}")
-        fallback = now.number(f"rung/{level.name}")
+        fallback = now.number(f"fallback/{level.name}")
         for row in self._rows:
             row.update(
                 place + 1,

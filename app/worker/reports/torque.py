@@ -76,7 +76,7 @@ class TorqueRun(SessionReport):
         return self.session.plant.objects()
 
     def nearest(self) -> str:
-        return self.session.clearance.found.pair
+        return self.session.clearance.nearest.pair
 
     def gauge(self) -> tuple[float, float] | None:
         found = self._mechanics()

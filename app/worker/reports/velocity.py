@@ -57,7 +57,7 @@ class VelocityRun(SessionReport):
     def targets(self) -> dict[str, np.ndarray]:
         progress = self.session.progress
         found: dict[str, np.ndarray] = {}
-        for task in progress.mission[progress.place :]:
+        for task in progress.mission[progress.l_0 :]:
             motion = task.motion
             raw = np.array(motion.goal) if isinstance(motion, Go) else motion.rotation
             if task.role not in found and raw is not None:
@@ -95,7 +95,7 @@ class VelocityRun(SessionReport):
                 goal=_goal(task),
                 tolerance=task.tolerance,
                 hold=task.hold,
-                state="done" if place < progress.place else "active" if entered is not None else "ahead",
+                state="done" if place < progress.l_0 else "active" if entered is not None else "ahead",
                 there_s=None if reached is None else session.t - reached,
                 done_at=completed.get(task.name),
             )
@@ -126,7 +126,7 @@ class VelocityRun(SessionReport):
                 beside = np.array(task.motion.goal)
             person = options.person(task.name)
             if person is not None:
-                visits.setdefault(person, []).append((task, place < progress.place))
+                visits.setdefault(person, []).append((task, place < progress.l_0))
                 stands[task.name] = np.zeros(2) if beside is None else beside
         people: list[Person] = []
         for person in sorted(visits):

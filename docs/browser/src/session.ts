@@ -89,10 +89,10 @@ export class Session {
       late: [Number(late)] });
     for (const [name, array, start, width] of scene.fields)
       if (array) put({ [name]: controller.view(array).subarray(start, start + width) });
-    const [active, rung, place] = ["active", "rung", "place"].map((name) => controller.view(name));
-    const solved = this.manifest.levels.filter(({ index }) => place[index] >= 0);
-    for (const { name, index } of solved) put({ [`active/${name}`]: [active[place[index]]] });
-    put({ unsolved: [FALLBACKS[fallback] === "hold" ? 1 : solved.filter(({ index }) => rung[place[index]] !== 0).length] });
+    const [active, fallbacks, solvedIndex] = ["active", "fallback", "solved_index"].map((name) => controller.view(name));
+    const solved = this.manifest.levels.filter(({ index }) => solvedIndex[index] >= 0);
+    for (const { name, index } of solved) put({ [`active/${name}`]: [active[solvedIndex[index]]] });
+    put({ unsolved: [FALLBACKS[fallback] === "hold" ? 1 : solved.filter(({ index }) => fallbacks[solvedIndex[index]] !== 0).length] });
     plant.step(this.applied(tau, late, before));
     put({ tau: plant.tau, contact_force: [plant.force] });
     const wild = v.some((each, a) => !(Math.abs(each) <= LOST_SPEED * limit(this.robot.v_limit[a])));

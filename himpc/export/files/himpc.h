@@ -176,13 +176,13 @@ static inline const double *himpc_error(const himpc_controller *c, const char *t
 }
 /* Number of active rows of a level; -1: there is no such level, or it is off. */
 static inline int himpc_active_rows(const himpc_controller *c, const char *level) {
-    int k = himpc_level(level), place = k < 0 ? -1 : (int)((const double *)((const char *)c + @place@))[k];
-    return place < 0 ? -1 : (int)((const double *)((const char *)c + @active@))[place];
+    int k = himpc_level(level), solved = k < 0 ? -1 : (int)((const double *)((const char *)c + @solved_index@))[k];
+    return solved < 0 ? -1 : (int)((const double *)((const char *)c + @active@))[solved];
 }
 /* Which fallback gave the increments of a level; -1: there is no such level, or it is off. */
 static inline int himpc_level_fallback(const himpc_controller *c, const char *level) {
-    int k = himpc_level(level), place = k < 0 ? -1 : (int)((const double *)((const char *)c + @place@))[k];
-    return place < 0 ? -1 : (int)((const double *)((const char *)c + @rung@))[place];
+    int k = himpc_level(level), solved = k < 0 ? -1 : (int)((const double *)((const char *)c + @solved_index@))[k];
+    return solved < 0 ? -1 : (int)((const double *)((const char *)c + @fallback@))[solved];
 }
 
 #ifdef __cplusplus

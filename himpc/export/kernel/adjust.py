@@ -177,13 +177,13 @@ def reorder(t: TickArrays, p: LoopArrays, values: Array) -> int:
     if not moved:
         return 0
     for i in range(r):
-        if p.place[i] >= 0.0:
-            copy_rows(t.U[int(p.place[i])], p.before[i])
+        if p.solved_index[i] >= 0.0:
+            copy_rows(t.U[int(p.solved_index[i])], p.before[i])
     copy(values, p.order, r)
     arrange(t, p)
     for i in range(r):
-        if p.place[i] >= 0.0 and t.known[1]:
-            copy_rows(p.before[i], t.U_was[int(p.place[i])])
+        if p.solved_index[i] >= 0.0 and t.known[1]:
+            copy_rows(p.before[i], t.U_was[int(p.solved_index[i])])
         t.warm_count[i] = 0
     t.known[0] = 0
     return 0
@@ -202,10 +202,10 @@ def arrange(t: TickArrays, p: LoopArrays) -> None:
             choice += 1 << i
     for at in range(r):
         i = int(p.order[at])
-        p.place[i] = -1.0
+        p.solved_index[i] = -1.0
         if (p.damped[choice] if i == damping else p.enabled[i]) == 0.0:
             continue
-        p.place[i] = count
+        p.solved_index[i] = count
         for column in range(8):
             t.level[count, column] = int(p.table[i, column])
         least = math.inf

@@ -9,7 +9,7 @@ from himpc.compilation.compiled import inline_kernel
 from himpc.export.kernel.braking import bounds_of, braking, missed, soften
 from himpc.export.kernel.loop_arrays import LoopArrays
 from himpc.tick.fallbacks import LEAK
-from himpc.tick.kernel.arrays import Array, TickArrays, Whole
+from himpc.tick.kernel.arrays import Array, IntArray, TickArrays
 from himpc.tick.kernel.bounds import constraint_values
 from himpc.tick.kernel.cascade import ALONE, FIRST, KNOTS, LAST, SOFTENED
 from himpc.tick.kernel.control_period import LINEARIZE, NOT_FINITE, perform_parts
@@ -25,7 +25,13 @@ SOLVE, SOFTEN, FEASIBLE, PREVIOUS, INHERIT, BRAKE, HOLD = range(7)
 
 @inline_kernel
 def period_with_fallbacks(
-    t: TickArrays, p: LoopArrays, data: Array, where: Whole, whole: Whole, whole_where: Whole, parts: int
+    t: TickArrays,
+    p: LoopArrays,
+    data: Array,
+    where: IntArray,
+    whole: IntArray,
+    whole_where: IntArray,
+    parts: int,
 ) -> int:
     """Performs parts of a control period, see `perform_parts`; a level without an optimum gets a fallback, as
     in `himpc.tick.fallbacks.perform`. Returns the last of the fallbacks that acted, SOLVE if none was needed,
@@ -37,15 +43,15 @@ def period_with_fallbacks(
             return HOLD
         if reached == t.sizes[4]:
             return worst
-        found = apply_fallback(t, p, data, where, whole, whole_where, reached)
-        t.rung[reached] = float(found)
-        worst = max(worst, found)
+        fallback = apply_fallback(t, p, data, where, whole, whole_where, reached)
+        t.fallback[reached] = float(fallback)
+        worst = max(worst, fallback)
         parts, i = parts & ~LINEARIZE, reached + 1
 
 
 @inline_kernel
 def apply_fallback(
-    t: TickArrays, p: LoopArrays, data: Array, where: Whole, whole: Whole, whole_where: Whole, i: int
+    t: TickArrays, p: LoopArrays, data: Array, where: IntArray, whole: IntArray, whole_where: IntArray, i: int
 ) -> int:
     """Finds increments of level i that satisfy all rows if the rows are feasible; returns the fallback that
     was used."""
@@ -58,9 +64,9 @@ def apply_fallback(
         copy_rows(t.U[i - 1], t.U[i])
         kept_rows(t, p, True)
         contain(t, t.U[i])
-        found = on_the_way(t, p, i, INHERIT)
+        fallback = on_the_way(t, p, i, INHERIT)
         kept_rows(t, p, False)
-        return found
+        return fallback
     kept_rows(t, p, True)
     widened = soften(t, p)
     if widened and solve_level(data, where, whole, whole_where, i, 0.0):
@@ -68,18 +74,18 @@ def apply_fallback(
             kept_rows(t, p, False)
         return SOFTEN
     copy_rows(t.U[i], p.trial)  # `missed` uses `wanted`
-    found = BRAKE
-    if t.known[1] and t.rung[i] <= SOFTENED:
+    fallback = BRAKE
+    if t.known[1] and t.fallback[i] <= SOFTENED:
         shifted(t.U_was[i], t.U[i])
-        found = PREVIOUS if settled(t.U[i]) and missed(t, p, t.U[i]) == 0.0 else BRAKE
-    if found == BRAKE:
+        fallback = PREVIOUS if settled(t.U[i]) and missed(t, p, t.U[i]) == 0.0 else BRAKE
+    if fallback == BRAKE:
         braking(t, p, t.U[i])
     copy_rows(p.trial, p.wanted)
-    found = on_the_way(t, p, i, found)
+    fallback = on_the_way(t, p, i, fallback)
     kept_rows(t, p, False)
     if i == 0:
         contain(t, t.U[0])
-    return found
+    return fallback
 
 
 @inline_kernel
@@ -169,11 +175,11 @@ def on_the_way(t: TickArrays, p: LoopArrays, i: int, fallback: int) -> int:
 def cost(t: TickArrays, p: LoopArrays, i: int, U: Array) -> float:
     """Returns the cost (32a) or (34a) of level i."""
     first, last = t.level[i, FIRST], t.level[i, LAST]
-    effects(t.B, U, first, last, t.pushed)
+    effects(t.B, U, first, last, t.B_U)
     for j in range(len(U)):
         for row in range(first, last):
             t.e_1[j, row] = t.root_Q[row] * t.free[j, row]
-    add_effects(t.C, t.pushed, first, last, t.row_knots, t.e_1)
+    add_effects(t.C, t.B_U, first, last, t.row_knots, t.e_1)
     for a in range(U.shape[1]):
         p.weights[a] = t.rho[i] / (t.metric[i, a] * t.metric[i, a])
     return cost_of(t.e_1, U, p.weights, first, last, t.row_knots, t.level[i, KNOTS])

@@ -8,7 +8,7 @@ from typing import Annotated, NamedTuple, get_type_hints
 
 from himpc.compilation.compiled import always_inline_kernel
 from himpc.compilation.views import as_function, view
-from himpc.tick.kernel.arrays import Array, TickArrays, Whole
+from himpc.tick.kernel.arrays import Array, IntArray, TickArrays
 
 
 class LoopArrays(NamedTuple):
@@ -30,7 +30,7 @@ class LoopArrays(NamedTuple):
     damped: Annotated[Array, "D", "1", "whether the damping level is added to this choice of levels"]
     table: Annotated[Array, "r 8", "1", "the table of all levels, columns as in `level`"]
     order: Annotated[Array, "r", "1", "the levels, highest priority first"]
-    place: Annotated[Array, "r", "1", "index of each level among the solved levels; -1 if it is off"]
+    solved_index: Annotated[Array, "r", "1", "index of each level among the solved levels; -1 if it is off"]
     weight: Annotated[Array, "M", "1", "share of Q in force for a row that fades in, 0 … 1"]
     target: Annotated[
         Array, "T 4", "1", "of each task: draggable, and the numbers of rows, values and known samples"
@@ -83,7 +83,7 @@ def sizes_of(n: int, N: int, M: int, r: int, T: int, b: int) -> LoopSizes:
 
 
 _VIEWS = (view("loop", f"where[{index}]", shape) for index, shape in enumerate(SHAPES.values()))
-loop_arrays_of: Callable[[Array, Whole, TickArrays], LoopArrays] = always_inline_kernel(
+loop_arrays_of: Callable[[Array, IntArray, TickArrays], LoopArrays] = always_inline_kernel(
     as_function(
         "loop_arrays_of",
         __name__,

@@ -19,7 +19,7 @@ from himpc.export.kernel.loop_arrays import (
     LoopArrays,
     loop_arrays_of,
 )
-from himpc.tick.kernel.arrays import NOW, PERIOD, T_S, Array, TickArrays, Whole, arrays_of
+from himpc.tick.kernel.arrays import NOW, PERIOD, T_S, Array, IntArray, TickArrays, arrays_of
 from himpc.tick.kernel.cascade import finite
 from himpc.tick.kernel.control_period import ALL_PARTS, ITERATION
 from himpc.tick.kernel.finish_tick import finish_tick
@@ -32,11 +32,11 @@ TICK, RESET = -2, -1
 @inline_kernel
 def control(
     data: Array,
-    where: Whole,
-    whole: Whole,
-    whole_where: Whole,
+    where: IntArray,
+    whole: IntArray,
+    whole_where: IntArray,
     loop: Array,
-    loop_where: Whole,
+    loop_where: IntArray,
     what: int,
     index: int,
     x: Array,
@@ -72,9 +72,9 @@ def whole_tick(
     t: TickArrays,
     p: LoopArrays,
     data: Array,
-    where: Whole,
-    whole: Whole,
-    whole_where: Whole,
+    where: IntArray,
+    whole: IntArray,
+    whole_where: IntArray,
     q: Array,
     v: Array,
     tau_applied: Array,
@@ -122,7 +122,9 @@ def whole_tick(
 
 
 @inline_kernel
-def iterate(t: TickArrays, p: LoopArrays, data: Array, where: Whole, whole: Whole, whole_where: Whole) -> int:
+def iterate(
+    t: TickArrays, p: LoopArrays, data: Array, where: IntArray, whole: IntArray, whole_where: IntArray
+) -> int:
     """Solves all levels once; for NHIMPC, it repeats this until no increment changes. Returns the last of the
     fallbacks that acted, HOLD if no torque was computed."""
     t.budget[0] = p.setup[BUDGET]

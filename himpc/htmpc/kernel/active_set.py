@@ -18,7 +18,7 @@ from himpc.tick.kernel.active_set import (
     unscale,
     update_multipliers,
 )
-from himpc.tick.kernel.arrays import Array, Whole
+from himpc.tick.kernel.arrays import Array, IntArray
 from himpc.tick.kernel.goldfarb_idnani import ROUNDED, TOLERANCE, dual_step, release
 from himpc.tick.kernel.linear import copy, copy_rows, dot, factorise, forward, subtract
 
@@ -104,12 +104,12 @@ def solve(
     A: Array,
     lower: Array,
     upper: Array,
-    held: Whole,
+    held: IntArray,
     count: int,
     normals: Array,
     cholesky_factor: Array,
     vectors: Array,
-    watched: Whole,
+    watched: IntArray,
     value: Array,
     x: Array,
     multipliers: Array,

@@ -7,7 +7,7 @@ import math
 from typing import NamedTuple
 
 from himpc.compilation.compiled import inline_kernel
-from himpc.tick.kernel.arrays import Array, Whole
+from himpc.tick.kernel.arrays import Array, IntArray
 from himpc.tick.kernel.linear import backward, close_gap, copy, dot, forward, split, subtract
 
 _DEPENDENT = 1e-10
@@ -48,9 +48,9 @@ class ActiveSet(NamedTuple):
         change: scratch.
     """
 
-    row: Whole
-    joint: Whole
-    side: Whole
+    row: IntArray
+    joint: IntArray
+    side: IntArray
     normal: Array
     scaled_normal: Array
     orthonormal_basis: Array

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from himpc.tick.kernel.arrays import AT, NUMBERS, WHOLE_AT, WHOLES, Array, Sizes, Whole
+from himpc.tick.kernel.arrays import AT, NUMBERS, WHOLE_AT, WHOLES, Array, IntArray, Sizes
 
 _LINE = 8
 """Arrays begin at multiples of this number of elements: a line of the processor's cache."""
@@ -31,18 +31,18 @@ class Arena:
         self.arguments = (self.data, self.where, self.whole, self.whole_where)
         begin, end = self.where[[AT["tau"], AT["placed"]]].tolist()
         whole_begin, whole_end = self.whole_where[[WHOLE_AT["active_row"], WHOLE_AT["end"]]].tolist()
-        self._found = slice(begin, end), slice(whole_begin, whole_end)
+        self._results = slice(begin, end), slice(whole_begin, whole_end)
 
     def snapshot(self) -> Snapshot:
         """Returns a copy of the results of this tick, which the next tick does not change."""
-        numbers, wholes = self._found
+        numbers, wholes = self._results
         return Snapshot(self, self.data[numbers].copy(), self.whole[wholes].copy())
 
     def read(self, snapshot: Snapshot, name: str) -> Any:
         """Returns an array of a snapshot."""
         whole = name in WHOLES
         at, view = (WHOLE_AT, self.i) if whole else (AT, self.f)
-        start = (self.whole_where if whole else self.where)[at[name]] - self._found[whole].start
+        start = (self.whole_where if whole else self.where)[at[name]] - self._results[whole].start
         shape = view[name].shape
         return (snapshot.whole if whole else snapshot.data)[start : start + prod(shape)].reshape(shape)
 
@@ -52,7 +52,7 @@ class Snapshot(NamedTuple):
 
     arena: Arena
     data: Array
-    whole: Whole
+    whole: IntArray
 
     def __call__(self, name: str) -> Any:
         """Returns the array of this name."""
@@ -73,8 +73,8 @@ def laid_out(shapes: dict[str, str], sizes: dict[str, int], kind: type) -> tuple
         name: tuple(sizes[s] if s in sizes else int(s) for s in shape.split())
         for name, shape in shapes.items()
     }
-    for place, shape in enumerate(sized.values()):
-        where[place] = end
+    for index, shape in enumerate(sized.values()):
+        where[index] = end
         end += -(-prod(shape) // _LINE) * _LINE
     data = np.zeros(end, kind)
     for (name, shape), start in zip(sized.items(), where.tolist(), strict=True):

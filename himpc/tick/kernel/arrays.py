@@ -14,7 +14,7 @@ from himpc.compilation.compiled import always_inline_kernel
 from himpc.compilation.views import as_function, view
 
 Array = NDArray[np.float64]
-Whole = Any
+IntArray = Any
 """An array of whole numbers, NDArray[np.intp]. Type checkers do not know that its elements are numbers."""
 
 
@@ -49,7 +49,7 @@ class TickArrays(NamedTuple):
     R_d: Annotated[Array, "T 3 3", "1", "configure kinematics preview_writer → finish_tick linearize"]
     # x_d(k+j) − x_d(k), ẋ_d and ẍ_d
     motion: Annotated[Array, "3 N1 M", "m, m/s, m/s²", "configure linearize preview_writer → gather progress"]
-    given: Annotated[Array, "N1 G n", "m, 1", "python_rows → linearize"]
+    python_jacobian: Annotated[Array, "N1 G n", "m, 1", "python_rows → linearize"]
     curve: Annotated[Array, "M 4", "m, rad", "configure → linearize"]
     pace: Annotated[Array, "T 2", "rad/s, rad", "configure → linearize"]
     # The memory of the previous tick.
@@ -131,7 +131,7 @@ class TickArrays(NamedTuple):
     at_bound: Annotated[Array, "n", "1", "finish_tick → gather"]
     priority_leak: Annotated[Array, "1", "m/s²", "finish_tick → gather"]
     active: Annotated[Array, "r", "1", "finish_tick → gather"]
-    rung: Annotated[Array, "r", "1", "control_period fallbacks → gather finish_tick problems"]
+    fallback: Annotated[Array, "r", "1", "control_period fallbacks → gather finish_tick problems"]
     time_us: Annotated[Array, "r", "µs", "control_period fallbacks → gather problems tick"]
     nothing: Annotated[Array, "1", "1", "configure → gather"]
     # Scratch.
@@ -152,7 +152,7 @@ class TickArrays(NamedTuple):
     fixed: Annotated[Array, "N n", "N·m", "solve_level → distance_rows finish_tick linearize"]
     e_0: Annotated[Array, "N M", "1", "solve_level → itself"]
     e_1: Annotated[Array, "N M", "1", "finish_tick solve_level → itself"]
-    pushed: Annotated[Array, "N M", "m/s²", "solve_level → itself"]
+    B_U: Annotated[Array, "N M", "m/s²", "solve_level → itself"]
     H: Annotated[Array, "w w", "1/(N·m)²", "solve_level → itself"]
     low: Annotated[Array, "b n", "N·m", "solve_level → itself"]
     high: Annotated[Array, "b n", "N·m", "solve_level → itself"]
@@ -174,44 +174,44 @@ class TickArrays(NamedTuple):
     size: Annotated[Array, "2", "1/N·m, 1", "solve_level → itself"]
     budget: Annotated[Array, "1", "1", "solve_level problems tick → itself"]
     sizes: Annotated[
-        Whole,
+        IntArray,
         "12",
         "1",
         "configure tables → control_period distance_rows fallbacks finish_tick linearize solve_level",
     ]
     # The memory, and whether `x_dot_was` and `U_was` are known.
     known: Annotated[
-        Whole, "2", "1", "finish_tick kinematics linearize problems tick → fallbacks python_rows"
+        IntArray, "2", "1", "finish_tick kinematics linearize problems tick → fallbacks python_rows"
     ]
-    warm_row: Annotated[Whole, "r k", "1", "finish_tick solve_level problems → itself"]
-    warm_joint: Annotated[Whole, "r k", "1", "finish_tick solve_level problems → itself"]
-    warm_count: Annotated[Whole, "r", "1", "finish_tick solve_level problems tick → itself"]
+    warm_row: Annotated[IntArray, "r k", "1", "finish_tick solve_level problems → itself"]
+    warm_joint: Annotated[IntArray, "r k", "1", "finish_tick solve_level problems → itself"]
+    warm_count: Annotated[IntArray, "r", "1", "finish_tick solve_level problems tick → itself"]
     # The settings.
-    task: Annotated[Whole, "T 4", "1", "configure → finish_tick linearize"]
-    part: Annotated[Whole, "M", "1", "configure → linearize"]
-    law: Annotated[Whole, "T", "1", "configure preview_writer → linearize"]
-    row_knots: Annotated[Whole, "M", "1", "tables → fallbacks finish_tick solve_level"]
+    task: Annotated[IntArray, "T 4", "1", "configure → finish_tick linearize"]
+    part: Annotated[IntArray, "M", "1", "configure → linearize"]
+    law: Annotated[IntArray, "T", "1", "configure preview_writer → linearize"]
+    row_knots: Annotated[IntArray, "M", "1", "tables → fallbacks finish_tick solve_level"]
     # The bit of `at_bound` of each row.
-    bit: Annotated[Whole, "b", "1", "configure problems → finish_tick"]
-    level: Annotated[Whole, "r 8", "1", "tables → fallbacks finish_tick solve_level"]
+    bit: Annotated[IntArray, "b", "1", "configure problems → finish_tick"]
+    level: Annotated[IntArray, "r 8", "1", "tables → fallbacks finish_tick solve_level"]
     # The robot.
-    parent: Annotated[Whole, "J", "1", "configure → linearize"]
-    is_revolute: Annotated[Whole, "J", "1", "configure → linearize"]
-    frame_joint: Annotated[Whole, "F", "1", "configure → linearize"]
+    parent: Annotated[IntArray, "J", "1", "configure → linearize"]
+    is_revolute: Annotated[IntArray, "J", "1", "configure → linearize"]
+    frame_joint: Annotated[IntArray, "F", "1", "configure → linearize"]
     # Further results of a tick.
-    active_row: Annotated[Whole, "r k", "1", "solve_level → finish_tick problems"]
-    active_joint: Annotated[Whole, "r k", "1", "solve_level → finish_tick problems"]
-    active_count: Annotated[Whole, "r", "1", "fallbacks solve_level → finish_tick problems"]
-    left: Annotated[Whole, "r", "1", "solve_level → problems"]
+    active_row: Annotated[IntArray, "r k", "1", "solve_level → finish_tick problems"]
+    active_joint: Annotated[IntArray, "r k", "1", "solve_level → finish_tick problems"]
+    active_count: Annotated[IntArray, "r", "1", "fallbacks solve_level → finish_tick problems"]
+    left: Annotated[IntArray, "r", "1", "solve_level → problems"]
     # Scratch.
-    end: Annotated[Whole, "N", "1", "solve_level → itself"]
-    start: Annotated[Whole, "N", "1", "solve_level → itself"]
-    offset: Annotated[Whole, "N1", "1", "solve_level → itself"]
-    rest: Annotated[Whole, "N1", "1", "solve_level → itself"]
-    held_row: Annotated[Whole, "k", "1", "solve_level → itself"]
-    held_joint: Annotated[Whole, "k", "1", "solve_level → itself"]
-    held_side: Annotated[Whole, "k", "1", "solve_level → itself"]
-    stamp: Annotated[Whole, "2", "s, ns", "control_period → itself"]
+    end: Annotated[IntArray, "N", "1", "solve_level → itself"]
+    start: Annotated[IntArray, "N", "1", "solve_level → itself"]
+    offset: Annotated[IntArray, "N1", "1", "solve_level → itself"]
+    rest: Annotated[IntArray, "N1", "1", "solve_level → itself"]
+    held_row: Annotated[IntArray, "k", "1", "solve_level → itself"]
+    held_joint: Annotated[IntArray, "k", "1", "solve_level → itself"]
+    held_side: Annotated[IntArray, "k", "1", "solve_level → itself"]
+    stamp: Annotated[IntArray, "2", "s, ns", "control_period → itself"]
 
 
 def _shapes(kind: Any) -> dict[str, str]:
@@ -220,7 +220,7 @@ def _shapes(kind: Any) -> dict[str, str]:
     return {name: hint.__metadata__[0] for name, hint in hints.items() if hint.__origin__ == kind}
 
 
-NUMBERS, WHOLES = _shapes(Array), _shapes(Whole)
+NUMBERS, WHOLES = _shapes(Array), _shapes(IntArray)
 """The shape of every array, by name: arrays of real numbers, and arrays of whole numbers."""
 AT, WHOLE_AT = ({name: index for index, name in enumerate(shapes)} for shapes in (NUMBERS, WHOLES))
 """The index of each array in `Arena.where` and in `Arena.whole_where`, by name."""
@@ -228,7 +228,7 @@ Sizes = namedtuple("Sizes", "n N N1 M r T F G J b g w k")
 """The values of the letters in the shapes, see `TickArrays`."""
 
 
-def sizes_of(s: Whole) -> Sizes:
+def sizes_of(s: IntArray) -> Sizes:
     """Returns the values of the letters for the numbers in the array `sizes`."""
     n, N, M, r, T, F, b, w, G = s[0], s[1], s[2], max(s[4], 1), s[5], s[6], s[7], s[8], s[10]
     return Sizes(n, N, N + 1, M, r, T, F, G, n + 1, b, max(s[11], 1), w, w + 1)
@@ -238,7 +238,7 @@ _VIEWS = (
     *(view("data", f"where[{AT[name]}]", shape) for name, shape in NUMBERS.items()),
     *(view("whole", f"whole_where[{WHOLE_AT[name]}]", shape) for name, shape in WHOLES.items()),
 )
-arrays_of: Callable[[Array, Whole, Whole, Whole], TickArrays] = always_inline_kernel(
+arrays_of: Callable[[Array, IntArray, IntArray, IntArray], TickArrays] = always_inline_kernel(
     as_function(
         "arrays_of",
         __name__,

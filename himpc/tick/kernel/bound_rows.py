@@ -35,8 +35,8 @@ def directed_normal(level: LevelQP, weights: Array, along: Array, normal: Array)
             total = 0.0
             for a in range(n):
                 total += along[a] * level.metric[a] * level.Q[j, a, start + c]
-            place = level.offset[j] + c if c < mine else level.rest[j] + c - mine
-            normal[place] = weights[j] * total
+            coordinate = level.offset[j] + c if c < mine else level.rest[j] + c - mine
+            normal[coordinate] = weights[j] * total
         before += weights[j] * dot(along, level.fixed[j], n)
     return before
 

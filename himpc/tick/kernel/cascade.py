@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from himpc.compilation.compiled import inline_kernel
-from himpc.tick.kernel.arrays import Array, Whole
+from himpc.tick.kernel.arrays import Array, IntArray
 from himpc.tick.kernel.bases import no_directions, projected_rows, take_directions
 from himpc.tick.kernel.bounds import LevelBounds, constraint_values
 from himpc.tick.kernel.level import LevelQP
@@ -21,14 +21,14 @@ SOFTENED = 1.0
 @inline_kernel
 def own_directions(
     index: int,
-    levels: Whole,
+    levels: IntArray,
     B: Array,
     metric: Array,
     reflector: Array,
     Q: Array,
     projected_jacobian: Array,
-    count: Whole,
-    start: Whole,
+    count: IntArray,
+    start: IntArray,
 ) -> None:
     """Computes the directions Q[j] of a level at every knot j. The first start[j] directions belong to the
     levels above; the next ones, up to count[j], belong to the level."""
@@ -82,7 +82,9 @@ def keep_above(level: LevelQP, U_above: Array, knots: int) -> None:
 
 
 @inline_kernel
-def count_coordinates(knots: int, n: int, count: Whole, start: Whole, offset: Whole, rest: Whole) -> int:
+def count_coordinates(
+    knots: int, n: int, count: IntArray, start: IntArray, offset: IntArray, rest: IntArray
+) -> int:
     """Writes the indices of the level's own coordinates and of the others, see `LevelQP`; returns the number
     of both together."""
     N = len(start)
@@ -98,7 +100,7 @@ def count_coordinates(knots: int, n: int, count: Whole, start: Whole, offset: Wh
 @inline_kernel
 def prepare_bounds(
     index: int,
-    levels: Whole,
+    levels: IntArray,
     level: LevelQP,
     bounds: LevelBounds,
     lower: Array,

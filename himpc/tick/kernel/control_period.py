@@ -16,7 +16,7 @@ from himpc.compilation.compiled import (
     inline_kernel,
     kernel,
 )
-from himpc.tick.kernel.arrays import Whole, arrays_of
+from himpc.tick.kernel.arrays import IntArray, arrays_of
 from himpc.tick.kernel.finish_tick import finish_tick
 from himpc.tick.kernel.linearize import linearize
 from himpc.tick.kernel.solve_level import solve_level
@@ -31,13 +31,13 @@ NOT_FINITE = -1
 
 
 @inline_kernel
-def _no_clock(stamp: Whole) -> float:
+def _no_clock(stamp: IntArray) -> float:
     """Replaces the clock where the C library has none."""
     return 0.0
 
 
 @inline_kernel
-def _monotonic_us(stamp: Whole) -> float:
+def _monotonic_us(stamp: IntArray) -> float:
     clock_gettime(_MONOTONIC, stamp.ctypes.data)
     return 1e6 * stamp[0] + 1e-3 * stamp[1]
 
@@ -48,7 +48,7 @@ _clock = _monotonic_us if os.name == "posix" else _no_clock
 
 @inline_kernel
 def perform_parts(
-    data: Any, where: Whole, whole: Whole, whole_where: Whole, parts: int, i: int, room: float
+    data: Any, where: IntArray, whole: IntArray, whole_where: IntArray, parts: int, i: int, room: float
 ) -> int:
     """Performs parts of a control period, in the order in which the constants above are defined.
 
@@ -69,16 +69,16 @@ def perform_parts(
     if parts & ONE_LEVEL and not solve_level(data, where, whole, whole_where, i, room):
         return i
     if parts & LEVELS:
-        for place in range(i, t.sizes[4]):
+        for level in range(i, t.sizes[4]):
             # The point of an earlier tick is made invalid: if the solver fails at once, no fallback may use
             # it.
-            t.U[place, 0, 0] = math.nan
+            t.U[level, 0, 0] = math.nan
             started = _clock(t.stamp)
-            solved = solve_level(data, where, whole, whole_where, place, 0.0)
-            t.time_us[place] = _clock(t.stamp) - started
+            solved = solve_level(data, where, whole, whole_where, level, 0.0)
+            t.time_us[level] = _clock(t.stamp) - started
             if not solved:
-                return place
-            t.rung[place] = 0.0
+                return level
+            t.fallback[level] = 0.0
     if parts & FINISH and not finish_tick(data, where, whole, whole_where, parts & REMEMBER):
         return NOT_FINITE
     return t.sizes[4]
@@ -86,7 +86,7 @@ def perform_parts(
 
 @kernel(VECTOR, INDICES, INDICES, INDICES, WHOLE, WHOLE, NUMBER)
 def control_period(
-    data: Any, where: Whole, whole: Whole, whole_where: Whole, parts: int, i: int, room: float
+    data: Any, where: IntArray, whole: IntArray, whole_where: IntArray, parts: int, i: int, room: float
 ) -> int:
     """Python's entry to `perform_parts`; an exported controller calls the same function."""
     return perform_parts(data, where, whole, whole_where, parts, i, room)

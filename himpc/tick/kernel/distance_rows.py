@@ -8,7 +8,7 @@ from typing import Any
 from himpc.compilation.compiled import INDICES, MATRIX, NUMBER, VECTOR, WHOLE, inline_kernel, kernel
 from himpc.compilation.views import borrowed
 from himpc.constants import FADE, RETREAT, RETURN_RATE, WITHIN
-from himpc.tick.kernel.arrays import DIRECTED, PERIOD, T_S, Array, Whole, arrays_of
+from himpc.tick.kernel.arrays import DIRECTED, PERIOD, T_S, Array, IntArray, arrays_of
 
 
 @inline_kernel
@@ -71,8 +71,8 @@ def soonest(room: float, slope: Any, fastest: Array, moving: float) -> float:
 def nearest(
     count: int,
     distance: Array,
-    sphere: Whole,
-    shape: Whole,
+    sphere: IntArray,
+    shape: IntArray,
     normal: Array,
     slopes: Array,
     shares: Array,
@@ -80,9 +80,9 @@ def nearest(
     fastest: Array,
     d_safe: float,
     time: Array,
-    chosen: Whole,
-    links: Whole,
-    others: Whole,
+    chosen: IntArray,
+    links: IntArray,
+    others: IntArray,
     share: Array,
     moving: Array,
     about: Array,
@@ -109,41 +109,41 @@ def nearest(
         room = distance[r] - d_safe * shares[shape[r], sphere[r]]
         about[ROOM] = min(about[ROOM], room)
         time[r] = soonest(room, slopes[r], fastest, approach(r, shape[r], normal, velocity))
-    found = min(count, chosen.size)
-    for c in range(found):
+    number = min(count, chosen.size)
+    for c in range(number):
         best = -1
         for r in range(count):
             if time[r] < math.inf and (best < 0 or time[r] < time[best]):
                 best = r
         if best < 0:
-            found = c
+            number = c
             break
         time[best] = math.inf
-        place = c
-        while place > 0 and distance[chosen[place - 1]] > distance[best]:
-            chosen[place] = chosen[place - 1]
-            place -= 1
-        chosen[place] = best
+        rank = c
+        while rank > 0 and distance[chosen[rank - 1]] > distance[best]:
+            chosen[rank] = chosen[rank - 1]
+            rank -= 1
+        chosen[rank] = best
     for c in range(chosen.size):
-        s, o = (sphere[chosen[c]], shape[chosen[c]]) if c < found else (-1, -1)
+        s, o = (sphere[chosen[c]], shape[chosen[c]]) if c < number else (-1, -1)
         if links[c] != s or others[c] != o:
             links[c], others[c], about[CHANGED] = s, o, 1.0
         moving[c] = 0.0
-        if c < found:
+        if c < number:
             share[c], moving[c] = shares[o, s], approach(chosen[c], o, normal, velocity)
             about[FASTEST] = max(about[FASTEST], abs(moving[c]))
-    return found
+    return number
 
 
 @kernel(VECTOR, INDICES, INDICES, INDICES, WHOLE, WHOLE, INDICES, VECTOR, MATRIX, VECTOR, VECTOR, VECTOR)
 def distance_rows(
     data: Any,
-    where: Whole,
-    whole: Whole,
-    whole_where: Whole,
+    where: IntArray,
+    whole: IntArray,
+    whole_where: IntArray,
     block: int,
     count: int,
-    chosen: Whole,
+    chosen: IntArray,
     distance: Array,
     slopes: Array,
     moving: Array,

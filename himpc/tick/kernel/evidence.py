@@ -6,13 +6,13 @@ import math
 
 from himpc.compilation.compiled import inline_kernel
 from himpc.constants import AT_POSITION, AT_VELOCITY
-from himpc.tick.kernel.arrays import Array, Whole
+from himpc.tick.kernel.arrays import Array, IntArray
 from himpc.tick.kernel.cascade import OWN_FIRST, OWN_LAST
 from himpc.tick.kernel.kinematics import ORIENTATION
 
 
 @inline_kernel
-def cost_of(e: Array, U: Array, R: Array, first: int, last: int, row_knots: Whole, knots: int) -> float:
+def cost_of(e: Array, U: Array, R: Array, first: int, last: int, row_knots: IntArray, knots: int) -> float:
     """Returns the value of (32a) or (34a): Σ ‖Q^½ e‖² + ‖U‖²_R over a level's own knots."""
     total = 0.0
     for i in range(first, last):
@@ -25,7 +25,7 @@ def cost_of(e: Array, U: Array, R: Array, first: int, last: int, row_knots: Whol
 
 
 @inline_kernel
-def leak_of(index: int, levels: Whole, effect: Array) -> float:
+def leak_of(index: int, levels: IntArray, effect: Array) -> float:
     """Returns ‖J_p M̄⁻¹(Δτ_i − Δτ_p)‖∞ over knots and levels p above level i; effect: J M̄⁻¹ Δτ, (r, N,
     m)."""
     most = 0.0
@@ -40,11 +40,11 @@ def leak_of(index: int, levels: Whole, effect: Array) -> float:
 @inline_kernel
 def bounds_met(
     count: int,
-    row: Whole,
-    column: Whole,
+    row: IntArray,
+    column: IntArray,
     multiplier: Array,
     stopping: Array,
-    bits: Whole,
+    bits: IntArray,
     direction: Array,
     plain: int,
     at_bound: Array,
@@ -73,7 +73,7 @@ def bounds_met(
 
 
 @inline_kernel
-def quaternions(task: Whole, R: Array, out: Array) -> None:
+def quaternions(task: IntArray, R: Array, out: Array) -> None:
     """Computes unit quaternions x y z w, w ≥ 0, of rotations (T, 3, 3), for orientation tasks."""
     for t in range(len(task)):
         if task[t, 0] == ORIENTATION:

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from himpc.compilation.compiled import always_inline_kernel, inline_kernel
-from himpc.tick.kernel.arrays import DIRECTED, PERIOD, T_S, TickArrays, Whole, arrays_of
+from himpc.tick.kernel.arrays import DIRECTED, PERIOD, T_S, IntArray, TickArrays, arrays_of
 from himpc.tick.kernel.cascade import (
     ALONE,
     OWN_FIRST,
@@ -33,7 +33,7 @@ def remember(t: TickArrays, r: int) -> None:
     t.scalars[PERIOD] = t.scalars[T_S]
     t.known[1] = 1
     for i in range(r):
-        if t.rung[i] > SOFTENED:
+        if t.fallback[i] > SOFTENED:
             continue  # the active rows of a failed attempt are stored already
         t.warm_count[i] = t.active_count[i]
         for p in range(t.active_count[i]):
@@ -42,7 +42,7 @@ def remember(t: TickArrays, r: int) -> None:
 
 
 @inline_kernel
-def finish_tick(data: Any, where: Whole, whole: Whole, whole_where: Whole, keep: int) -> bool:
+def finish_tick(data: Any, where: IntArray, whole: IntArray, whole_where: IntArray, keep: int) -> bool:
     """Computes the evidence of all levels, the torque τ₀ + Δτ within its bounds, and the prediction (18).
     Returns False if the torque is not finite. keep: whether the results are stored for the next tick."""
     t = arrays_of(data, where, whole, whole_where)

@@ -5,18 +5,18 @@ from __future__ import annotations
 import math
 
 from himpc.compilation.compiled import inline_kernel
-from himpc.tick.kernel.arrays import Array, Whole
+from himpc.tick.kernel.arrays import Array, IntArray
 from himpc.tick.kernel.linear import copy
 
-POSITION, ORIENTATION, JOINTS, DAMPING, GIVEN = range(5)
-"""Kinds of tasks. The rows, the value and the error of a GIVEN task are input."""
+POSITION, ORIENTATION, JOINTS, DAMPING, PYTHON = range(5)
+"""Kinds of tasks. The rows, the value and the error of a PYTHON task are input."""
 
 
 @inline_kernel
 def forward_kinematics(
     q: Array,
-    parent: Whole,
-    is_revolute: Whole,
+    parent: IntArray,
+    is_revolute: IntArray,
     rotation: Array,
     translation: Array,
     axis: Array,
@@ -56,7 +56,7 @@ def forward_kinematics(
 
 
 @inline_kernel
-def points(placed: Array, frame_joint: Whole, frame_translation: Array, point: Array) -> None:
+def points(placed: Array, frame_joint: IntArray, frame_translation: Array, point: Array) -> None:
     """Computes the origins of the frames in the world, (F, 3) m."""
     for f in range(frame_joint.size):
         on, r = placed[frame_joint[f]], frame_translation[f]
@@ -66,33 +66,33 @@ def points(placed: Array, frame_joint: Whole, frame_translation: Array, point: A
 
 @inline_kernel
 def jacobian(
-    task: Whole,
-    part: Whole,
-    parent: Whole,
-    is_revolute: Whole,
+    task: IntArray,
+    part: IntArray,
+    parent: IntArray,
+    is_revolute: IntArray,
     placed: Array,
     z: Array,
-    frame_joint: Whole,
+    frame_joint: IntArray,
     point: Array,
-    given: Array,
+    python_jacobian: Array,
     J: Array,
 ) -> None:
     """Computes J_i of (3) of all tasks, one below another, (M, n), in world axes at the frames' origins.
 
     Args:
         task: (T, 4) kind, frame, first row and number of rows of each task.
-        part: (M,) for each row, the index of its axis, of its joint, or of its row in `given`.
+        part: (M,) for each row, the index of its axis, of its joint, or of its row in `python_jacobian`.
         parent, is_revolute, placed, z: as in `forward_kinematics`.
         frame_joint, point: the joint that carries each frame, and its origin.
-        given: rows of the tasks that Python computes, (G, n).
+        python_jacobian: rows of the tasks that Python computes, (G, n).
         J: the result.
     """
     J[:] = 0.0
     for t in range(len(task)):
         kind, frame, first, size = task[t, 0], task[t, 1], task[t, 2], task[t, 3]
         for i in range(first, first + size):
-            if kind == GIVEN:
-                copy(given[part[i]], J[i], J.shape[1])
+            if kind == PYTHON:
+                copy(python_jacobian[part[i]], J[i], J.shape[1])
                 continue
             if kind >= JOINTS:
                 J[i, part[i]] = 1.0
@@ -124,13 +124,13 @@ def rotation_of_frame(on: Array, rotation: Array, R: Array) -> None:
 
 @inline_kernel
 def about_one_axis(
-    task: Whole,
-    part: Whole,
-    parent: Whole,
-    is_revolute: Whole,
+    task: IntArray,
+    part: IntArray,
+    parent: IntArray,
+    is_revolute: IntArray,
     placed: Array,
     z: Array,
-    frame_joint: Whole,
+    frame_joint: IntArray,
     frame_rotation: Array,
     R_d: Array,
     R_now: Array,

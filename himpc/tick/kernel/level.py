@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from himpc.compilation.compiled import inline_kernel
 from himpc.tick.kernel.active_set import Quadratic
-from himpc.tick.kernel.arrays import Array, Whole
+from himpc.tick.kernel.arrays import Array, IntArray
 from himpc.tick.kernel.linear import dot, factorise, forward
 from himpc.tick.kernel.residual import add_effects, effects, gather, gather_effects, hessian
 
@@ -27,7 +27,7 @@ class LevelQP(NamedTuple):
         B, free, root_Q: Ĵ M̄⁻¹ (N, m, n), e for Δτ = 0 (N, m) and √Q (m,) of all rows.
         projected_jacobian: B in the coordinates of each knot, (N, m, n).
         e_0, e_1: √Q e for x = 0, and at the point, (N, m).
-        pushed: scratch, (N, m).
+        B_U: scratch, (N, m).
         start: (N,) index of the first own coordinate of a knot among the knot's coordinates.
         offset: (N+1,) index in x of the first own coordinate of a knot.
         rest: (N+1,) index in x of the first other coordinate of a knot; all others come last.
@@ -46,17 +46,17 @@ class LevelQP(NamedTuple):
     accuracy: float
     C: Array
     S: Array
-    row_knots: Whole
+    row_knots: IntArray
     B: Array
     free: Array
     root_Q: Array
     projected_jacobian: Array
     e_0: Array
     e_1: Array
-    pushed: Array
-    start: Whole
-    offset: Whole
-    rest: Whole
+    B_U: Array
+    start: IntArray
+    offset: IntArray
+    rest: IntArray
     fixed: Array
     Q: Array
     metric: Array
@@ -74,19 +74,19 @@ def prepare(level: LevelQP) -> bool:
     first, last = level.first, level.last
     N = len(level.start)
     total = 0.0
-    effects(level.B, level.fixed, first, last, level.pushed)
+    effects(level.B, level.fixed, first, last, level.B_U)
     for i in range(first, last):
         for k in range(N):
             level.e_0[k, i] = level.root_Q[i] * level.free[k, i] if k < level.row_knots[i] else 0.0
-    add_effects(level.C, level.pushed, first, last, level.row_knots, level.e_0)
+    add_effects(level.C, level.B_U, first, last, level.row_knots, level.e_0)
     for k in range(N):
         total += dot(level.e_0[k, first:last], level.e_0[k, first:last], last - first)
     trace = hessian(
         level.S, level.projected_jacobian, first, last, level.start, level.offset, level.rho, level.cost.F
     )
     level.size[0], level.size[1] = math.sqrt(trace), math.sqrt(total)
-    gather_effects(level.C, level.e_0, first, last, level.row_knots, level.pushed)
-    gather(level.projected_jacobian, level.pushed, first, last, level.start, level.offset, level.slope)
+    gather_effects(level.C, level.e_0, first, last, level.row_knots, level.B_U)
+    gather(level.projected_jacobian, level.B_U, first, last, level.start, level.offset, level.slope)
     d = level.cost.d
     if not factorise(level.cost.F, d):
         return False

@@ -6,13 +6,13 @@ import math
 from typing import Any
 
 from himpc.compilation.compiled import always_inline_kernel, inline_kernel
-from himpc.tick.kernel.arrays import NOW, PERIOD, PULL, REACTION, T_S, Array, TickArrays, Whole, arrays_of
+from himpc.tick.kernel.arrays import NOW, PERIOD, PULL, REACTION, T_S, Array, IntArray, TickArrays, arrays_of
 from himpc.tick.kernel.bounds import bounds
 from himpc.tick.kernel.kinematics import (
     DAMPING,
-    GIVEN,
     JOINTS,
     ORIENTATION,
+    PYTHON,
     about_one_axis,
     forward_kinematics,
     jacobian,
@@ -31,14 +31,14 @@ _MODE = 9
 
 
 @always_inline_kernel
-def jacobian_at(t: TickArrays, q: Array, given: Array, J: Array) -> None:
-    """Writes J_i of (3) of all tasks at q to J (M, n); `given` (G, n) contains the rows that Python
+def jacobian_at(t: TickArrays, q: Array, python_jacobian: Array, J: Array) -> None:
+    """Writes J_i of (3) of all tasks at q to J (M, n); `python_jacobian` (G, n) contains the rows that Python
     computes."""
     forward_kinematics(q, t.parent, t.is_revolute, t.rotation, t.translation, t.axis, t.placed, t.axis_now)
     points(t.placed, t.frame_joint, t.frame_translation, t.point)
     jacobian(
         *(t.task, t.part, t.parent, t.is_revolute, t.placed, t.axis_now, t.frame_joint, t.point),
-        *(given, J),
+        *(python_jacobian, J),
     )
     about_one_axis(
         *(t.task, t.part, t.parent, t.is_revolute, t.placed, t.axis_now, t.frame_joint),
@@ -60,7 +60,7 @@ def errors(t: TickArrays) -> None:
                 rotation_error(R, R_d, turned)
         for i in range(first, first + size):
             t.x_dot[i] = dot(t.B[0, i], t.v, t.v.size)
-            if kind == GIVEN:
+            if kind == PYTHON:
                 continue
             if kind == ORIENTATION:
                 t.error[i] = turned[t.part[i]]
@@ -70,7 +70,7 @@ def errors(t: TickArrays) -> None:
 
 
 @inline_kernel
-def linearize(data: Any, where: Whole, whole: Whole, whole_where: Whole) -> bool:
+def linearize(data: Any, where: IntArray, whole: IntArray, whole_where: IntArray) -> bool:
     """Computes the data of all QPs from the measured state and the references: kinematics along the last
     prediction (30), residuals, free motion (15) and bounds (32d)–(32f). Returns False if these data are not
     finite. The knots q*_{k+j|k−1} are the last prediction, shifted to begin at the measured q.
@@ -80,7 +80,7 @@ def linearize(data: Any, where: Whole, whole: Whole, whole_where: Whole) -> bool
     N, n = t.fixed.shape
     period, T_s, reaction = t.scalars[PERIOD], t.scalars[T_S], t.scalars[REACTION]
     if not t.known[0]:
-        jacobian_at(t, t.q_was, t.given[N], t.B[0])
+        jacobian_at(t, t.q_was, t.python_jacobian[N], t.B[0])
         for i in range(M):
             t.x_dot_was[i] = dot(t.B[0, i], t.v_was, n)
         t.known[0] = 1
@@ -88,7 +88,7 @@ def linearize(data: Any, where: Whole, whole: Whole, whole_where: Whole) -> bool
     for j in range(N - 1, -1, -1):
         for a in range(n):
             t.z[a] = t.path[1 + j, a] + (t.q[a] - t.path[1, a]) if j else t.q[a]
-        jacobian_at(t, t.z[:n], t.given[j], t.B[j])
+        jacobian_at(t, t.z[:n], t.python_jacobian[j], t.B[j])
     displacement, velocity_d, acceleration_d = t.motion[0], t.motion[1], t.motion[2]
     curves(
         *(t.scalars[NOW], T_s, t.task, t.law, t.pace, t.curve),

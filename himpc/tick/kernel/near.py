@@ -233,22 +233,22 @@ def near(
                 t = share_of(kind[o], (x, y, h), d, rotation[o], half[o])
                 x, y, h = x + t * d[0], y + t * d[1], h + t * d[2]
                 if kind[o] == FLOOR:
-                    found = h
+                    gap = h
                     u[0], u[1], u[2] = 0.0, 0.0, 1.0
                 elif kind[o] == BOX:
-                    found = from_box(x, y, h, rotation[o], half[o], u)
+                    gap = from_box(x, y, h, rotation[o], half[o], u)
                 elif kind[o] == BALL:
-                    found = from_ball(x, y, h, half[o, 0], u)
+                    gap = from_ball(x, y, h, half[o, 0], u)
                 else:
-                    found = from_segment(x, y, h, half[o], thickness[o], u)
-                found -= radius[s]
+                    gap = from_segment(x, y, h, half[o], thickness[o], u)
+                gap -= radius[s]
                 # A distance that is NaN does not count as near.
-                if not found <= within:
+                if not gap <= within:
                     continue
                 x, y, h = u[0], u[1], u[2]
                 for a in range(3):
                     u[a] = R[3 * a] * x + R[3 * a + 1] * y + R[3 * a + 2] * h
-                knot[count], sphere[count], shape[count], distance[count] = k, s, o, found
+                knot[count], sphere[count], shape[count], distance[count] = k, s, o, gap
                 share[count] = t
                 count += 1
     for r in range(min(count, len(slopes))):

@@ -16,7 +16,7 @@ from himpc.tick.kernel.active_set import (
     unscale,
     update_multipliers,
 )
-from himpc.tick.kernel.arrays import Array, Whole
+from himpc.tick.kernel.arrays import Array, IntArray
 from himpc.tick.kernel.bound_rows import farthest, lengths, most_violated, normal_of
 from himpc.tick.kernel.bounds import LevelBounds, constraint_values
 from himpc.tick.kernel.goldfarb_idnani import ROUNDED, TOLERANCE, dual_step, release
@@ -50,8 +50,8 @@ def warm_start(
     active: ActiveSet,
     bounds: LevelBounds,
     count: int,
-    row: Whole,
-    joint: Whole,
+    row: IntArray,
+    joint: IntArray,
     multiplier: Array,
     budget: Array,
 ) -> int:
@@ -86,13 +86,13 @@ def refine(level: LevelQP, active: ActiveSet, k: int) -> float:
     d, D, x, slope = level.cost.d, level.cost.D, level.x, level.slope
     gradient, violation = math.inf, math.inf
     for attempt in range(_ROUNDS + 1):
-        apply(level.projected_jacobian, x, first, last, level.start, level.offset, level.pushed)
+        apply(level.projected_jacobian, x, first, last, level.start, level.offset, level.B_U)
         for j in range(N):
             for i in range(first, last):
                 level.e_1[j, i] = level.e_0[j, i]
-        add_effects(level.C, level.pushed, first, last, level.row_knots, level.e_1)
-        gather_effects(level.C, level.e_1, first, last, level.row_knots, level.pushed)
-        gather(level.projected_jacobian, level.pushed, first, last, level.start, level.offset, slope)
+        add_effects(level.C, level.B_U, first, last, level.row_knots, level.e_1)
+        gather_effects(level.C, level.e_1, first, last, level.row_knots, level.B_U)
+        gather(level.projected_jacobian, level.B_U, first, last, level.start, level.offset, slope)
         for c in range(d, D):
             slope[c] = 0.0
         subtract(-rho, x, slope, D)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from himpc.compilation.compiled import INDICES, MATRICES, MATRIX, kernel
 from himpc.compilation.views import borrowed
-from himpc.tick.kernel.arrays import Array, Whole
+from himpc.tick.kernel.arrays import Array, IntArray
 from himpc.tick.kernel.kinematics import forward_kinematics
 
 
 @kernel(INDICES, INDICES, MATRICES, MATRIX, MATRIX, MATRIX, MATRICES, MATRICES)
 def place_all(
-    parent: Whole,
-    is_revolute: Whole,
+    parent: IntArray,
+    is_revolute: IntArray,
     rotation: Array,
     translation: Array,
     axis: Array,

@@ -7,11 +7,13 @@ import math
 from typing import Any
 
 from himpc.compilation.compiled import INDICES, VECTOR, kernel
-from himpc.tick.kernel.arrays import Array, Whole, arrays_of
+from himpc.tick.kernel.arrays import Array, IntArray, arrays_of
 
 
 @kernel(VECTOR, INDICES, INDICES, INDICES, INDICES, VECTOR)
-def progress(data: Any, where: Whole, whole: Whole, whole_where: Whole, ends: Whole, lengths: Array) -> float:
+def progress(
+    data: Any, where: IntArray, whole: IntArray, whole_where: IntArray, ends: IntArray, lengths: Array
+) -> float:
     """Writes the length of the last error of each task that has an entry in `ends`, m or rad, and returns the
     largest velocity of a row of a reference, m/s or rad/s.
 

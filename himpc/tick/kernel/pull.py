@@ -6,12 +6,12 @@ import math
 
 from himpc.compilation.compiled import inline_kernel
 from himpc.constants import TURN_PULL
-from himpc.tick.kernel.arrays import Array, Whole
+from himpc.tick.kernel.arrays import Array, IntArray
 from himpc.tick.kernel.kinematics import POSITION
 
 
 @inline_kernel
-def bounded_pull(task: Whole, error: Array, pull: float, K_p: Array, m: int, free: Array) -> None:
+def bounded_pull(task: IntArray, error: Array, pull: float, K_p: Array, m: int, free: Array) -> None:
     """Removes from the free motion the part of the errors beyond `pull`, see `StackForm.pulling`.
 
     Args:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from himpc.compilation.compiled import inline_kernel
-from himpc.tick.kernel.arrays import Array, Whole
+from himpc.tick.kernel.arrays import Array, IntArray
 
 SAMPLED, UNIFORM, EASED = range(3)
 """The source of a task's reference: samples that Python wrote, or a curve whose phase is φ = ωt + φ₀ or φ =
@@ -16,8 +16,8 @@ SAMPLED, UNIFORM, EASED = range(3)
 def curves(
     t: float,
     T_s: float,
-    task: Whole,
-    law: Whole,
+    task: IntArray,
+    law: IntArray,
     pace: Array,
     curve: Array,
     x_d: Array,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from himpc.compilation.compiled import inline_kernel
-from himpc.tick.kernel.arrays import Array, Whole
+from himpc.tick.kernel.arrays import Array, IntArray
 from himpc.tick.kernel.linear import dot
 
 
@@ -48,21 +48,21 @@ def free_motion(
 
 
 @inline_kernel
-def effects(B: Array, U: Array, first: int, last: int, pushed: Array) -> None:
+def effects(B: Array, U: Array, first: int, last: int, B_U: Array) -> None:
     """Computes B_j U_j of some rows, (N, m): the change of ẍ by the increments of one knot."""
     N, _, n = B.shape
     for j in range(N):
         for i in range(first, last):
-            pushed[j, i] = dot(B[j, i], U[j], n)
+            B_U[j, i] = dot(B[j, i], U[j], n)
 
 
 @inline_kernel
-def add_effects(C: Array, pushed: Array, first: int, last: int, row_knots: Whole, e: Array) -> None:
+def add_effects(C: Array, B_U: Array, first: int, last: int, row_knots: IntArray, e: Array) -> None:
     """Computes e_{k+1} += Σ_{j≤k} √Q c_{k−j} pushed_j over the knots of each row's horizon.
 
     Args:
         C: √Q c_l of `ResidualModel`, (m, N): the effect depends on the distance l of two knots only.
-        pushed: (N, m).
+        B_U: (N, m).
         first, last: the rows.
         row_knots: number of knots in the horizon of each row (Remark 8).
         e: (N, m), changed.
@@ -71,12 +71,12 @@ def add_effects(C: Array, pushed: Array, first: int, last: int, row_knots: Whole
         for k in range(row_knots[i]):
             total = e[k, i]
             for j in range(k + 1):
-                total += C[i, k - j] * pushed[j, i]
+                total += C[i, k - j] * B_U[j, i]
             e[k, i] = total
 
 
 @inline_kernel
-def gather_effects(C: Array, e: Array, first: int, last: int, row_knots: Whole, pulled: Array) -> None:
+def gather_effects(C: Array, e: Array, first: int, last: int, row_knots: IntArray, pulled: Array) -> None:
     """Computes the transpose of `add_effects`: pulled_j = Σ_{k≥j} √Q c_{k−j} e_{k+1}."""
     N = len(e)
     for i in range(first, last):
@@ -93,8 +93,8 @@ def hessian(
     projected_jacobian: Array,
     first: int,
     last: int,
-    start: Whole,
-    offset: Whole,
+    start: IntArray,
+    offset: IntArray,
     rho: float,
     H: Array,
 ) -> float:
@@ -131,7 +131,7 @@ def hessian(
 
 @inline_kernel
 def apply(
-    projected_jacobian: Array, x: Array, first: int, last: int, start: Whole, offset: Whole, pushed: Array
+    projected_jacobian: Array, x: Array, first: int, last: int, start: IntArray, offset: IntArray, B_U: Array
 ) -> None:
     """Computes the product of B_j and the own coordinates x, (N, m)."""
     for j in range(len(start)):
@@ -140,12 +140,18 @@ def apply(
             total = 0.0
             for a in range(offset[j], offset[j + 1]):
                 total += projected_jacobian[j, i, begin + a] * x[a]
-            pushed[j, i] = total
+            B_U[j, i] = total
 
 
 @inline_kernel
 def gather(
-    projected_jacobian: Array, pulled: Array, first: int, last: int, start: Whole, offset: Whole, slope: Array
+    projected_jacobian: Array,
+    pulled: Array,
+    first: int,
+    last: int,
+    start: IntArray,
+    offset: IntArray,
+    slope: Array,
 ) -> None:
     """Computes the transpose of `apply`: slope = Σ_i b_ji pulled_ji."""
     for j in range(len(start)):

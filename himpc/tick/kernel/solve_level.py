@@ -7,7 +7,7 @@ from typing import Any
 
 from himpc.compilation.compiled import always_inline_kernel, inline_kernel
 from himpc.tick.kernel.active_set import ActiveSet, Quadratic
-from himpc.tick.kernel.arrays import DIRECTED, TickArrays, Whole, arrays_of
+from himpc.tick.kernel.arrays import DIRECTED, IntArray, TickArrays, arrays_of
 from himpc.tick.kernel.bounds import LevelBounds
 from himpc.tick.kernel.cascade import (
     ALONE,
@@ -41,13 +41,15 @@ def level_of(t: TickArrays, i: int) -> LevelQP:
     cost = Quadratic(t.H, t.ideal, 1.0 / math.sqrt(t.rho[i]), t.offset[-1], t.rest[-1])
     return LevelQP(
         *(t.level[i, FIRST], t.level[i, LAST], t.rho[i], t.accuracy[i], t.C, t.S, t.row_knots),
-        *(t.B, t.free, t.root_Q, t.projected_jacobian, t.e_0, t.e_1, t.pushed, t.start, t.offset),
+        *(t.B, t.free, t.root_Q, t.projected_jacobian, t.e_0, t.e_1, t.B_U, t.start, t.offset),
         *(t.rest, t.fixed, t.Q, t.metric[i], cost, t.x, t.z, t.slope, t.size),
     )
 
 
 @inline_kernel
-def solve_level(data: Any, where: Whole, whole: Whole, whole_where: Whole, i: int, room: float) -> bool:
+def solve_level(
+    data: Any, where: IntArray, whole: IntArray, whole_where: IntArray, i: int, room: float
+) -> bool:
     """Solves Problem i of the cascade after the problems above it; returns False if no optimum was found
     within the remaining budget of the tick.
 

@@ -89,12 +89,12 @@ def limited(memory: int) -> None:
 def readable() -> list[Path]:
     """Returns the paths that imports of a solution may read: Python, libraries, and installed packages except
     the lab's."""
-    found = [Path(each) for each in _SINGLE]
-    folders = [Path(each) for each in (*sys.path, *(f"{base}/lib" for base in (sys.base_prefix, sys.prefix)))]
+    paths = [Path(name) for name in _SINGLE]
+    folders = [Path(name) for name in (*sys.path, *(f"{base}/lib" for base in (sys.base_prefix, sys.prefix)))]
     for folder in dict.fromkeys((*folders, *map(Path, _LIBRARIES))):
         with suppress(OSError):
-            found += (each for each in folder.iterdir() if not _hidden(each))
-    return [each for each in dict.fromkeys(found) if each.exists()]
+            paths += (path for path in folder.iterdir() if not _hidden(path))
+    return [path for path in dict.fromkeys(paths) if path.exists()]
 
 
 def _hidden(path: Path) -> bool:
@@ -104,18 +104,18 @@ def _hidden(path: Path) -> bool:
     return name in (*LAB, "site-packages", "dist-packages") or name.startswith(("python", "tests"))
 
 
-def confine(places: Sequence[Path]) -> Callable[[], tuple[str, ...]]:
-    """Removes this process's access to files until the process ends, except reading in `places`. Returns the
+def confine(paths: Sequence[Path]) -> Callable[[], tuple[str, ...]]:
+    """Removes this process's access to files until the process ends, except reading in `paths`. Returns the
     function with which a copy of this process then also removes its access to all system calls that a
     computation does not need. The result of that function is the names of the mechanisms of the operating
     system that enforce this."""
     calls = _calls()  # Landlock would prevent the search for seccomp's library
-    landlock = ("Landlock",) if _files(places) else ()
+    landlock = ("Landlock",) if _files(paths) else ()
     return lambda: (*landlock, "seccomp") if calls() else landlock
 
 
-def _files(places: Sequence[Path]) -> bool:
-    """Forbids, by Landlock, reading outside `places`, all writing, signals to other processes and TCP.
+def _files(paths: Sequence[Path]) -> bool:
+    """Forbids, by Landlock, reading outside `paths`, all writing, signals to other processes and TCP.
     Returns whether this was possible."""
     try:
         from py_landlock import AccessFs, Landlock
@@ -123,7 +123,7 @@ def _files(places: Sequence[Path]) -> bool:
         return False
     try:
         rules = Landlock(strict=False)
-        for path in places:
+        for path in paths:
             reading = AccessFs.READ_FILE | AccessFs.READ_DIR if path.is_dir() else AccessFs.READ_FILE
             rules.add_path_rule(path, access=reading)
         for folder in filter(os.path.isdir, sys.path):
@@ -147,26 +147,26 @@ def _computing_only(sec: Any) -> bool:
     """Makes the kernel end this process at every system call except those of `ALLOWED` and `UNANSWERED`, and
     a few calls with certain arguments. Returns whether this was possible."""
 
-    def given(place: int, bits: int, value: int) -> Any:
-        return sec.Arg(place, sec.MASKED_EQ, bits, value)
+    def argument(index: int, bits: int, value: int) -> Any:
+        return sec.Arg(index, sec.MASKED_EQ, bits, value)
 
     reading = _CHANGING | getattr(os, "O_PATH", 0)
     rules = [
         *((sec.ALLOW, name) for name in ALLOWED),
         *((sec.ERRNO(error), name) for error, names in UNANSWERED.items() for name in names),
-        (sec.ALLOW, "openat", given(2, reading, 0)),
-        (sec.ALLOW, "open", given(1, reading, 0)),
-        (sec.ALLOW, "clone", given(0, _THREAD | _NAMESPACES, _THREAD)),
-        (sec.ALLOW, "tgkill", given(0, _INT, os.getpid())),  # abort()
-        (sec.ALLOW, "prlimit64", given(0, _INT, 0), sec.Arg(2, sec.EQ, 0)),  # asks, and sets nothing
-        *((sec.ALLOW, "fcntl", given(1, _INT, command)) for command in _FCNTL),
+        (sec.ALLOW, "openat", argument(2, reading, 0)),
+        (sec.ALLOW, "open", argument(1, reading, 0)),
+        (sec.ALLOW, "clone", argument(0, _THREAD | _NAMESPACES, _THREAD)),
+        (sec.ALLOW, "tgkill", argument(0, _INT, os.getpid())),  # abort()
+        (sec.ALLOW, "prlimit64", argument(0, _INT, 0), sec.Arg(2, sec.EQ, 0)),  # asks, and sets nothing
+        *((sec.ALLOW, "fcntl", argument(1, _INT, command)) for command in _FCNTL),
     ]
     try:
-        found = sec.SyscallFilter(sec.KILL_PROCESS)
+        syscall_filter = sec.SyscallFilter(sec.KILL_PROCESS)
         for action, name, *arguments in rules:
             with suppress(OSError, ValueError):  # not every processor has all of these calls
-                found.add_rule(action, name, *arguments)
-        found.load()
+                syscall_filter.add_rule(action, name, *arguments)
+        syscall_filter.load()
     except Exception:
         return False
     return True
@@ -184,24 +184,24 @@ class _Hidden(importlib.abc.MetaPathFinder):
 
 def hide_the_lab() -> None:
     """Makes every import of the lab's modules fail from now on, except those in `HANDED`."""
-    for name in [each for each in sys.modules if each.partition(".")[0] in LAB and each not in HANDED]:
+    for name in [name for name in sys.modules if name.partition(".")[0] in LAB and name not in HANDED]:
         del sys.modules[name]
     sys.meta_path.insert(0, _Hidden())
 
 
-def refuse(places: Sequence[Path], told: int) -> None:
+def refuse(paths: Sequence[Path], pipe: int) -> None:
     """Makes Python end this process when any thread does one of these: open a file that no import reads,
-    start a program, send a signal, change a file, or use the network. The pipe `told` then names the action.
+    start a program, send a signal, change a file, or use the network. `pipe` then names the action.
     This is needed where the operating system does not refuse these actions. By itself it does not stop
     hostile code."""
-    archives = (each for each in sys.path if not os.path.isdir(each))
-    allowed = tuple(os.path.realpath(str(each)) for each in (*places, *archives))
+    archives = (path for path in sys.path if not os.path.isdir(path))
+    allowed = tuple(os.path.realpath(str(path)) for path in (*paths, *archives))
     # A submission may replace these functions in their modules.
     end, write, real, text = os._exit, os.write, os.path.realpath, os.fsdecode
 
-    def hook(event: str, given: Sequence[Any]) -> None:
+    def hook(event: str, arguments: Sequence[Any]) -> None:
         if event == "open":
-            path, mode, flags = given
+            path, mode, flags = arguments
             if isinstance(path, int):
                 return
             writing = bool(set("wax+") & set(mode or "")) or bool((flags or 0) & _CHANGING)
@@ -211,9 +211,9 @@ def refuse(places: Sequence[Path], told: int) -> None:
                 raise PermissionError(f"a submission may not read {path}")
         elif not event.startswith(_EVENTS):
             return
-        what = " ".join((event, *(f"{each:.60}" for each in given[:1] if isinstance(each, str))))
+        what = " ".join((event, *(f"{first:.60}" for first in arguments[:1] if isinstance(first, str))))
         try:
-            write(told, what.encode(errors="replace"))
+            write(pipe, what.encode(errors="replace"))
         finally:
             end(1)
 

@@ -28,15 +28,15 @@ OF_FURTHER = ("profile", "directions", "lower", "upper")
 def numbers_of(now: Any) -> list[Array]:
     """Returns the arrays of a `View`, in this order."""
     bounds = now.bounds
-    found = [getattr(now, name) for name in OF_TICK]
-    found += [getattr(bounds, name) for name in OF_BOUNDS]
-    found += [getattr(now.near, name) for name in OF_NEAR]
+    numbers = [getattr(now, name) for name in OF_TICK]
+    numbers += [getattr(bounds, name) for name in OF_BOUNDS]
+    numbers += [getattr(now.near, name) for name in OF_NEAR]
     for level in now.levels:
-        found += [getattr(level, name) for name in OF_LEVEL]
-        found += level.x.values()
+        numbers += [getattr(level, name) for name in OF_LEVEL]
+        numbers += level.x.values()
     for further in now.further:
-        found += [getattr(further, name) for name in OF_FURTHER]
-    return found
+        numbers += [getattr(further, name) for name in OF_FURTHER]
+    return numbers
 
 
 def shape_of(now: Any) -> dict[str, Any]:
@@ -48,7 +48,7 @@ def shape_of(now: Any) -> dict[str, Any]:
         "near": [now.near.names, now.near.reaction, now.near.deceleration],
         "levels": [[level.name, level.tasks, list(level.x), level.horizon] for level in now.levels],
         "further": len(now.further),
-        "shapes": [each.shape for each in numbers_of(now)],
+        "shapes": [array.shape for array in numbers_of(now)],
     }
 
 
@@ -81,7 +81,7 @@ class Now(SimpleNamespace):
         for level in self.levels:
             if level.name == name:
                 return level
-        raise KeyError(f"no level '{name}' is on: there are {', '.join(each.name for each in self.levels)}")
+        raise KeyError(f"no level '{name}' is on: there are {', '.join(level.name for level in self.levels)}")
 
 
 def rebuilt(shape: dict[str, Any], data: bytes, ask: Ask) -> Now:
@@ -109,13 +109,13 @@ def rebuilt(shape: dict[str, Any], data: bytes, ask: Ask) -> Now:
         deceleration=deceleration,
     )
     levels = []
-    for place, (name, tasks, values, horizon) in enumerate(shape["levels"]):
-        parts: dict[str, Any] = {each: next(following) for each in OF_LEVEL}
-        parts["x"] = {each: next(following) for each in values}
-        parts["jacobian"] = partial(_asked, ask, "jacobian", place)
+    for index, (name, tasks, values, horizon) in enumerate(shape["levels"]):
+        parts: dict[str, Any] = {field: next(following) for field in OF_LEVEL}
+        parts["x"] = {key: next(following) for key in values}
+        parts["jacobian"] = partial(_fetch, ask, "jacobian", index)
         levels.append(Part(name=name, tasks=tuple(tasks), horizon=horizon, **parts))
-    further = [Part(**{each: next(following) for each in OF_FURTHER}) for _ in range(shape["further"])]
-    nominal = Part(mass_matrix=partial(_asked, ask, "mass_matrix", 0), bias=partial(_asked, ask, "bias", 0))
+    further = [Part(**{field: next(following) for field in OF_FURTHER}) for _ in range(shape["further"])]
+    nominal = Part(mass_matrix=partial(_fetch, ask, "mass_matrix", 0), bias=partial(_fetch, ask, "bias", 0))
     return Now(
         **tick,
         T_s=shape["T_s"],
@@ -128,5 +128,5 @@ def rebuilt(shape: dict[str, Any], data: bytes, ask: Ask) -> Now:
     )
 
 
-def _asked(ask: Ask, name: str, level: int, *args: Any) -> Array:
-    return ask(name, level, [np.asarray(each, float) for each in args])
+def _fetch(ask: Ask, name: str, level: int, *args: Any) -> Array:
+    return ask(name, level, [np.asarray(argument, float) for argument in args])

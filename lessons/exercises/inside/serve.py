@@ -63,8 +63,8 @@ def serve(parent: int, memory: int, kernel: bool) -> NoReturn:
             with suppress(ImportError):
                 import_module(name)
     hide_the_lab()
-    places = readable()
-    further = confine(places) if kernel else tuple
+    paths = readable()
+    further = confine(paths) if kernel else tuple
     calls.sendall(wire.packed(wire.READY, b""))
     while True:
         _, pipes, *_ = socket.recv_fds(calls, 1, 3)
@@ -75,7 +75,7 @@ def serve(parent: int, memory: int, kernel: bool) -> NoReturn:
         if child == 0:
             calls.close()
             ends_with(lab)
-            _run(source, places, further, *pipes)
+            _run(source, paths, further, *pipes)
         for pipe in pipes:
             os.close(pipe)
         calls.sendall(wire.packed(wire.READY, wire.of_json(child)))
@@ -87,39 +87,39 @@ def serve(parent: int, memory: int, kernel: bool) -> NoReturn:
 
 def _run(
     source: Source,
-    places: Sequence[Path],
+    paths: Sequence[Path],
     further: Callable[[], tuple[str, ...]],
-    heard: int,
-    told: int,
+    requests: int,
+    replies: int,
     refused: int,
 ) -> NoReturn:
     """Executes a submission and answers ticks until the pipe closes.
 
     Args:
         source: the submission.
-        places: paths that imports may read.
+        paths: paths that imports may read.
         further: the result of `confine`.
-        heard, told: pipes from and to the lab.
+        requests, replies: pipes from and to the lab.
         refused: pipe to the lab for the name of a refused call, see `refuse`.
     """
     try:
         in_force = further()
-        refuse(places, refused)
-        wire.write(told, wire.READY, wire.of_json(in_force))
-        _answer_ticks(source, heard, told)
+        refuse(paths, refused)
+        wire.write(replies, wire.READY, wire.of_json(in_force))
+        _answer_ticks(source, requests, replies)
     finally:
         os._exit(0)
 
 
-def _answer_ticks(source: Source, heard: int, told: int) -> NoReturn:
+def _answer_ticks(source: Source, requests: int, replies: int) -> NoReturn:
     """Raises EOFError when the lab closes the pipe."""
     law: Law = _nothing
     shape: Any = None
 
     def ask(name: str, level: int, arguments: list[Any]) -> Any:
-        lists = [each.tolist() for each in arguments]
-        wire.write(told, wire.ASK, wire.of_json([name, level, lists]))
-        kind, data = wire.read(heard)
+        lists = [argument.tolist() for argument in arguments]
+        wire.write(replies, wire.ASK, wire.of_json([name, level, lists]))
+        kind, data = wire.read(requests)
         if kind != wire.REPLY:
             raise ValueError(data.decode())
         return wire.array_of(data)
@@ -137,11 +137,11 @@ def _answer_ticks(source: Source, heard: int, told: int) -> NoReturn:
             answer = wire.FAULT, str(error).encode(errors="replace")
         except BaseException as error:
             answer = wire.FAULT, sentence(source.path, error).encode(errors="replace")
-        wire.write(told, *answer)
+        wire.write(replies, *answer)
 
     say(loaded)
     while True:
-        kind, data = wire.read(heard)
+        kind, data = wire.read(requests)
         if kind == wire.SHAPE:
             shape = json.loads(data)
         else:
@@ -149,14 +149,14 @@ def _answer_ticks(source: Source, heard: int, told: int) -> NoReturn:
 
 
 def _torque(law: Law, shape: Any, data: bytes, ask: Ask) -> tuple[bytes, bytes]:
-    found = law(rebuilt(shape, data, ask))
+    torque = law(rebuilt(shape, data, ask))
     try:
-        array = np.array("" if found is None else found, float)
+        array = np.array("" if torque is None else torque, float)
         if array.ndim <= 2 and array.size <= 10_000:
             return wire.TORQUE, wire.of_array(array)
         return wire.OTHER, f"an array of shape {array.shape}".encode()
     except (TypeError, ValueError):
-        return wire.OTHER, ("nothing" if found is None else f"a {type(found).__name__}").encode()
+        return wire.OTHER, ("nothing" if torque is None else f"a {type(torque).__name__}").encode()
 
 
 def _nothing(_: Now) -> None:

@@ -77,10 +77,10 @@ def read(pipe: int) -> tuple[bytes, bytes]:
 
 
 def _exactly(pipe: int, count: int) -> bytes:
-    found = b""
-    while len(found) < count:
-        more = os.read(pipe, count - len(found))
+    data = b""
+    while len(data) < count:
+        more = os.read(pipe, count - len(data))
         if not more:
             raise EOFError
-        found += more
-    return found
+        data += more
+    return data

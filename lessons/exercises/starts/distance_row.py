@@ -31,22 +31,22 @@ def torque(now):
 
 def cascade(now, D, least):
     """Returns the torques of the levels under all bounds, including D Δτ ≥ least."""
-    torques, found = [], np.zeros(now.n)
+    torques, step = [], np.zeros(now.n)
     for level in now.levels:
         H, f = quadratic(now, level)
         rows, lower, upper = bounds(now)
         rows, lower = np.vstack([rows, D]), np.r_[lower, least]
         upper = np.r_[upper, np.full(len(D), np.inf)]
         if torques:
-            lower, upper = np.minimum(lower, rows @ found), np.maximum(upper, rows @ found)
+            lower, upper = np.minimum(lower, rows @ step), np.maximum(upper, rows @ step)
         for above in now.levels[: len(torques)]:
             B = above.J / now.M_bar
-            rows, lower, upper = np.vstack([rows, B]), np.r_[lower, B @ found], np.r_[upper, B @ found]
+            rows, lower, upper = np.vstack([rows, B]), np.r_[lower, B @ step], np.r_[upper, B @ step]
         solution = solve_qp(H, f, rows, lower, upper)
         if not solution.solved:  # no torque meets all rows: brake the joints
             return now.tau_0 - now.M_bar * (now.q_ddot + 5.0 * now.q_dot)
-        found = solution.x
-        torques.append(now.tau_0 + found)
+        step = solution.x
+        torques.append(now.tau_0 + step)
     return torques  # one row per level: the last row acts
 
 

@@ -43,8 +43,8 @@ def metrics(sweep: Sweep) -> list[str]:
     """Returns the metrics of a cell, the default first; one tick of the base scene is run to find them."""
     scene = sweep.base.prepared()
     recording = run(scene, scene.settings.T_s, sweep.base.seed)
-    found = dict(_numbers(_without_timing(summary(recording))))
-    names = [name for name in found if not name.endswith(_NO_METRIC)]
+    figures = dict(_numbers(_without_timing(summary(recording))))
+    names = [name for name in figures if not name.endswith(_NO_METRIC)]
     measure = "rmse_after_1s" if scene.duration > 1.0 else "rmse"
     first = min(summary(recording)["tasks"], key=lambda task: task["level"])["name"]
     default = f"tasks.{first}.{measure}"
@@ -65,15 +65,15 @@ def _numbers(data: Any, path: str = "") -> Iterator[tuple[str, float]]:
         for key, value in data.items():
             yield from _numbers(value, f"{path}.{key}" if path else str(key))
     elif isinstance(data, list):
-        if all(isinstance(each, dict) for each in data):
-            for each in data:
-                yield from _numbers(each, f"{path}.{each.get('name')}")
+        if all(isinstance(entry, dict) for entry in data):
+            for entry in data:
+                yield from _numbers(entry, f"{path}.{entry.get('name')}")
         elif path.startswith("average_cost"):
-            for place, each in enumerate(data, start=1):
-                yield f"{path}.{place}", math.nan if each is None else float(each)
-        elif not any(isinstance(each, str) for each in data):
-            known = data and all(each is not None for each in data)
-            yield path, math.sqrt(sum(each**2 for each in data)) if known else math.nan
+            for level, cost in enumerate(data, start=1):
+                yield f"{path}.{level}", math.nan if cost is None else float(cost)
+        elif not any(isinstance(entry, str) for entry in data):
+            known = data and all(number is not None for number in data)
+            yield path, math.sqrt(sum(number**2 for number in data)) if known else math.nan
     elif data is None:
         yield path, math.nan
     elif not isinstance(data, str):
@@ -93,9 +93,9 @@ def unit_of(cells: Sequence[Cell], metric: str) -> str:
     """Returns the unit of a metric of a task; "" for other metrics, whose names contain their unit if they
     have one."""
     kind, _, rest = metric.partition(".")
-    found = next((cell.summary for cell in cells if cell.summary), None)
-    if kind == "tasks" and found is not None:
-        return next(task["unit"] for task in found["tasks"] if rest.startswith(f"{task['name']}."))
+    sample = next((cell.summary for cell in cells if cell.summary), None)
+    if kind == "tasks" and sample is not None:
+        return next(task["unit"] for task in sample["tasks"] if rest.startswith(f"{task['name']}."))
     return ""
 
 

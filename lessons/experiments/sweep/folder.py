@@ -90,16 +90,16 @@ def carry_on(
         progress(len(cells), total)
     work = spread(perform_cell, [sweep.run(index) for index in missing])
     with _written(folder), (folder / "cells.jsonl").open("a") as file, closing(work) as outcomes:
-        for place, outcome in outcomes:
+        for index, outcome in outcomes:
             if sweep.files() != files:
                 raise InputError(
                     f"{', '.join(files['files'])}: was changed during the sweep, and the cells before and "
                     "after this change cannot be compared: repeat the command with another folder for --out"
                 )
             if isinstance(outcome, FailedJob):
-                cell = Cell(missing[place], None, outcome.reason)
+                cell = Cell(missing[index], None, outcome.reason)
             else:
-                cell = Cell(missing[place], outcome, None)
+                cell = Cell(missing[index], outcome, None)
             file.write(json.dumps(asdict(cell), allow_nan=False) + "\n")
             file.flush()
             cells[cell.index] = cell

@@ -66,8 +66,8 @@ class Sweep:
         """Returns the fingerprints of the user's files that the sweep uses; empty if there are none. Raises
         InputError if a file cannot be read."""
         base = self.base
-        own = [each for each in (base.scene, base.controller or "", *base.tasks) if is_file(each)]
-        return {"files": [fingerprint(each) for each in own]} if own else {}
+        own = [name for name in (base.scene, base.controller or "", *base.tasks) if is_file(name)]
+        return {"files": [fingerprint(name) for name in own]} if own else {}
 
 
 def make_sweep(base: RunSpec, over: Sequence[str]) -> Sweep:

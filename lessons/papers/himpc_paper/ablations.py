@@ -65,7 +65,7 @@ def _remark_8(results: Results, quick: bool) -> Section:
         Panel(
             "RMSE / RMSE with all knots",
             tuple(
-                PlotCurve(x, np.array([each[k] / errors[0][k] for each in errors]), label, str(k))
+                PlotCurve(x, np.array([values[k] / errors[0][k] for values in errors]), label, str(k))
                 for k, label in enumerate(("level 1, worst axis", "$o_Z$", "$q_1$"))
             ),
             "knots of levels 2 and 3",
@@ -112,7 +112,7 @@ def _over(
         (f"{value:g}", *(number(_level_1(runs[scene][value])) for scene in runs)) for value in values
     )
     lost = [f"{scene} at {value:g}: {trouble(run)}" for scene in runs for value, run in runs[scene].items()]
-    troubles = "; ".join(each for each in lost if not each.endswith(": "))
+    troubles = "; ".join(text for text in lost if not text.endswith(": "))
     panel = Panel("level-1 RMSE, worst axis (mm)", curves, what, log_x=log, log_y=True)
     return Section(
         notes=(note, *((f"Lost: {troubles}.",) if troubles else ())),

@@ -70,15 +70,15 @@ def model_errors(run: JobResult) -> ModelErrors:
     q, v, tau = run["q"], run["v"], run["tau"]
     acceleration = np.diff(v, axis=0) / settings.T_s
     increments = np.diff(acceleration, axis=0) - np.diff(tau[:-1], axis=0) / M_bar
-    found = []
+    squares = []
     for k in range(math.ceil(1.0 / settings.T_s), len(acceleration), _EVERY):
         gamma = np.linalg.solve(nominal.mass_matrix(q[k]), tau[k] - nominal.bias(q[k], v[k]))
         gamma = gamma - acceleration[k]
         delta = increments[k - 1]
         at = Configuration(robot, data, q[k], v[k])
         J = np.vstack([task.jacobian(at)[0] for task in settings.levels[0].tasks])
-        found.append([float(each @ each) for each in (gamma, delta, J @ gamma, J @ delta)])
-    return ModelErrors(*np.sqrt(np.mean(found, axis=0)).tolist())
+        squares.append([float(vector @ vector) for vector in (gamma, delta, J @ gamma, J @ delta)])
+    return ModelErrors(*np.sqrt(np.mean(squares, axis=0)).tolist())
 
 
 def _jobs(quick: bool) -> tuple[Job, ...]:
@@ -134,7 +134,9 @@ def _panel(label: str, errors: dict[float, ModelErrors]) -> Panel:
     x = np.array(list(errors))
 
     def line(field: str, symbol: str, colour: str) -> PlotCurve:
-        return PlotCurve(x, np.array([getattr(each, field) for each in errors.values()]), symbol, colour)
+        return PlotCurve(
+            x, np.array([getattr(run_errors, field) for run_errors in errors.values()]), symbol, colour
+        )
 
     curves = (
         line("gamma", r"$\gamma$ (21), rad/s²", "1"),

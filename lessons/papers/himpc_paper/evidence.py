@@ -61,17 +61,20 @@ def _conflict(results: Results, quick: bool) -> Section:
             f"RT2: q₁'s error is large {word}",
             "s",
             text[f"conflict_{word}"],
-            float(large[place]),
+            float(large[index]),
             f"the paper does not print the size of this swing; here an error above {_LARGE:g}° is large",
             topic="conflict-reaches-level-1",
         )
-        for word, place in (("from", 0), ("until", -1))
+        for word, index in (("from", 0), ("until", -1))
     ]
     swing, turns = _swing(run, 2.0, 6.0)
     own = [
         ("RT2, 2 to 6 s: largest speed of joint 3", "deg/s", swing),
         ("RT2, 2 to 6 s: how often joint 3 swings", "Hz", turns),
-        *((f"{name(each)} on RT2: control is lost at", "s", _lost(results[rt2(each)])) for each in _LOST),
+        *(
+            (f"{name(controller)} on RT2: control is lost at", "s", _lost(results[rt2(controller)]))
+            for controller in _LOST
+        ),
     ]
     if not quick:
         half = level_1(results[rt2("himpc", _HALF_SWING)]) / level_1(results[rt1("himpc")])

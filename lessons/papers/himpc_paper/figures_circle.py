@@ -111,7 +111,7 @@ def _torques(results: Results, number: int, controllers: tuple[str, str]) -> Sec
         "in every 50 ms, which are nearly the same for both; right: an excerpt of 50 ms."
     )
     whole = joint_panels(runs, "tau", r"\tau", "N·m")
-    panels = tuple(each for panel in whole for each in (banded(panel), excerpt(panel, 2.5, 2.55)))
+    panels = tuple(part for panel in whole for part in (banded(panel), excerpt(panel, 2.5, 2.55)))
     row = stated(
         f"RMS of Δτ, {second}'s over {first}'s",
         roughness(runs[1]) / roughness(runs[0]),
@@ -134,7 +134,7 @@ def _fig_8(results: Results, quick: bool) -> Section:
         (label, key, tuple(100.0 * (c / h - 1.0) for c, h in zip(cost, costs[0], strict=True)))
         for label, key, cost in series[1:]
     )
-    beside = Bars("over HIMPC's (%)", groups, apart)
+    relative = Bars("over HIMPC's (%)", groups, apart)
     rows = tuple(
         (name(run.controller), *(number(value) for value in cost), trouble(run))
         for run, cost in zip(runs, costs, strict=True)
@@ -166,7 +166,7 @@ def _fig_8(results: Results, quick: bool) -> Section:
         ),
         rows=compared,
         tables=(Table("Average cost (41)", ("controller", "level 1", "level 2", ""), rows),),
-        pictures=(Picture("himpc-fig-8", "Average cost (41) on RT1, paper's encoder.", (bars, beside), 2),),
+        pictures=(Picture("himpc-fig-8", "Average cost (41) on RT1, paper's encoder.", (bars, relative), 2),),
     )
 
 

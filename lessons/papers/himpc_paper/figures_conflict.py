@@ -116,9 +116,9 @@ def _fig_14(results: Results, quick: bool) -> Section:
     panels = []
     if len(run.t):
         robot = load_robot("planar3")
-        places = np.linspace(0, len(run.t) - 1, POSES).round().astype(int)
-        for title, chosen in (("0 to 8 s", places[:10]), ("8 to 16 s", places[9:])):
-            chains = [(place, skeleton(robot, run["q"][place])) for place in chosen]
+        ticks = np.linspace(0, len(run.t) - 1, POSES).round().astype(int)
+        for title, chosen in (("0 to 8 s", ticks[:10]), ("8 to 16 s", ticks[9:])):
+            chains = [(tick, skeleton(robot, run["q"][tick])) for tick in chosen]
             arms = tuple(
                 PlotCurve(
                     points[:, 0],
@@ -133,7 +133,7 @@ def _fig_14(results: Results, quick: bool) -> Section:
             x_d = run["x_d/position"][span]
             path = PlotCurve(x_d[:, 0], x_d[:, 1], label="reference", colour="reference", style="dashed")
             # The last pose of a panel has no label; the second panel labels that of the first.
-            notes = tuple(_time_beside(points[-1], x_d, float(run.t[place])) for place, points in chains[:-1])
+            notes = tuple(_time_beside(points[-1], x_d, float(run.t[tick])) for tick, points in chains[:-1])
             panels.append(Panel("y (m)", (*arms, path), "x (m)", equal=True, title=title, notes=notes))
     caption = f"HIMPC on RT3 in {POSES} poses; straight and singular in the 1st, 10th and 19th (thick)."
     return drawn("himpc-fig-14", caption, panels or (Panel("y (m)", ()),), 2)

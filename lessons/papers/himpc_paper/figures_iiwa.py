@@ -104,7 +104,9 @@ def _fig_20(results: Results, quick: bool) -> Section:
 
 
 def _fig_21_jobs(quick: bool) -> tuple[Job, ...]:
-    return tuple(resolution_job(each, quick) for each in (printed("himpc_table_8")["benchmark"], 5))
+    return tuple(
+        resolution_job(resolution, quick) for resolution in (printed("himpc_table_8")["benchmark"], 5)
+    )
 
 
 def _fig_21(results: Results, quick: bool) -> Section:

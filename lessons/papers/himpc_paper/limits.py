@@ -113,8 +113,8 @@ _WHY = "the paper prints no number; its Fig. 13 shows slight violations of speed
 def _picture(results: Results, plants: list[str]) -> Picture:
     def bars(label: str, value: Callable[[JobResult], float]) -> Bars:
         series = tuple(
-            (mode, str(place), tuple(value(results[_job(mode, plant)]) for plant in plants))
-            for place, mode in enumerate(MODES)
+            (mode, str(index), tuple(value(results[_job(mode, plant)]) for plant in plants))
+            for index, mode in enumerate(MODES)
         )
         return Bars(label, tuple(plant.replace(" ", "\n", 1) for plant in plants), series)
 

@@ -84,13 +84,13 @@ def _jobs(quick: bool) -> tuple[Job, ...]:
 
 def _cell(results: Results, criterion: str, controller: str) -> Row:
     """Returns a row with the ✓ (1) or ✗ (0) of the paper's table beside ours."""
-    found = verdicts(results, controller)[criterion]
+    verdict = verdicts(results, controller)[criterion]
     return Row(
         f"{criterion}: {name(controller)}",
         "✓",
         float(printed("himpc_table_3")[criterion][controller]),
-        math.nan if found.holds is None else float(found.holds),
-        found.numbers,
+        math.nan if verdict.holds is None else float(verdict.holds),
+        verdict.numbers,
         turns_at=0.5,
         topic="rt3-without-inverse" if criterion == "Singularity-free" else "",
     )
@@ -116,8 +116,8 @@ def _approach_row(results: Results, rate: float) -> Row:
 
 
 def _section(results: Results, quick: bool) -> Section:
-    found = {controller: verdicts(results, controller) for controller in COMPARED}
-    own = found["himpc"]
+    by_controller = {controller: verdicts(results, controller) for controller in COMPARED}
+    own = by_controller["himpc"]
     return Section(
         notes=(
             "Each ✓ or ✗ of ours is decided by a criterion on these runs, with the numbers beside it:",
@@ -149,7 +149,7 @@ def _conflict_table(results: Results) -> Table:
         rows.append(
             (
                 name(controller),
-                *("–" if ended else number(each) for each in errors),
+                *("–" if ended else number(error) for error in errors),
                 number(conflict.figure("limits", "torque", "max_ratio")),
                 number(conflict.figure("limits", "velocity", "max_ratio")),
                 number(conflict.figure("bound_active_share")),

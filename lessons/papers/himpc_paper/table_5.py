@@ -167,7 +167,7 @@ def _changes(results: Results, quick: bool) -> Table:
     for scene in _SCENES[quick]:
         for reading, extra in list(_READINGS.items())[1:]:
             change = _change(results, scene, extra)
-            rows.append((scene, reading, *(f"{100 * (each - 1):+.1f} %" for each in change)))
+            rows.append((scene, reading, *(f"{100 * (ratio - 1):+.1f} %" for ratio in change)))
     return Table(
         "Level-1 RMSE after the first second against nominal", ("scene", "plant", "x", "y", "z"), tuple(rows)
     )

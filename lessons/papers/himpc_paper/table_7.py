@@ -36,7 +36,9 @@ def step_seconds(run: JobResult) -> dict[str, float]:
 
 def _table_7(results: Results, quick: bool) -> Section:
     paper = printed("himpc_table_7")
-    ours = {each: step_seconds(results[timed(each, 5, quick)]) for each in ("himpc", "nhimpc")}
+    ours = {
+        controller: step_seconds(results[timed(controller, 5, quick)]) for controller in ("himpc", "nhimpc")
+    }
     rows = [
         Row(
             f"{name(controller)}, {kind}",

@@ -25,7 +25,9 @@ def resolution_job(thousandths: float, quick: bool = False) -> Job:
 
 def _jobs(quick: bool) -> tuple[Job, ...]:
     paper = printed("himpc_table_8")
-    return tuple(resolution_job(each, quick) for each in (paper["benchmark"], *paper["resolution"]))
+    return tuple(
+        resolution_job(resolution, quick) for resolution in (paper["benchmark"], *paper["resolution"])
+    )
 
 
 def smoothness(run: JobResult, benchmark: JobResult) -> float:
@@ -40,7 +42,8 @@ def smoothness(run: JobResult, benchmark: JobResult) -> float:
 def _section(results: Results, quick: bool) -> Section:
     paper = printed("himpc_table_8")
     benchmark = results[resolution_job(paper["benchmark"], quick)]
-    found = [smoothness(results[resolution_job(each, quick)], benchmark) for each in paper["resolution"]]
+    runs = [results[resolution_job(resolution, quick)] for resolution in paper["resolution"]]
+    measured = [smoothness(run, benchmark) for run in runs]
     rows = tuple(
         Row(
             f"S at {resolution:g}e-3° (benchmark {paper['benchmark']:g}e-3°)",
@@ -51,9 +54,9 @@ def _section(results: Results, quick: bool) -> Section:
             or "scales with M̄ and the sensor model, and the paper does not say how it gets q̇ from q",
             topic="chatter",
         )
-        for resolution, value, ours in zip(paper["resolution"], paper["smoothness"], found, strict=True)
+        for resolution, value, ours in zip(paper["resolution"], paper["smoothness"], measured, strict=True)
     )
-    rising = float(np.min([b - a for a, b in pairwise(found)]))
+    rising = float(np.min([b - a for a, b in pairwise(measured)]))
     worst = max(abs(row.ratio - 1) if row.ratio else math.inf for row in rows)
     return Section(
         notes=(

@@ -81,8 +81,8 @@ def _section(results: Results, quick: bool) -> Section:
     )
 
 
-def _value(run: JobResult, level: str, place: int) -> PlotCurve:
-    return PlotCurve(run.t, run.column(f"cost/{level}"), f"level {place + 1}", str(place))
+def _value(run: JobResult, level: str, index: int) -> PlotCurve:
+    return PlotCurve(run.t, run.column(f"cost/{level}"), f"level {index + 1}", str(index))
 
 
 ITEMS = (

@@ -37,8 +37,8 @@ def _layouts(quick: bool) -> list[tuple[int, ...]]:
 
 def _job(seats: tuple[int, ...], architecture: str, rule: str) -> Job:
     listed = ",".join(map(str, seats))
-    asked = (f"architecture={ARCHITECTURES[architecture]}", f"seats=[{listed}]", *RULES[rule])
-    return Job(RunSpec("ridgeback-ur10-delivery", controller="htmpc", set=asked))
+    assignments = (f"architecture={ARCHITECTURES[architecture]}", f"seats=[{listed}]", *RULES[rule])
+    return Job(RunSpec("ridgeback-ur10-delivery", controller="htmpc", set=assignments))
 
 
 def _jobs(quick: bool) -> tuple[Job, ...]:
@@ -54,7 +54,7 @@ def _report(results: Results, quick: bool) -> Section:
     time = {case: all_of("completion_time_s", case) for case in CASES}
     way = {case: all_of("base_path_m", case) for case in CASES}
     done = {case: all_of("completed", case) == 1.0 for case in CASES}
-    together = np.concatenate([each for (a, _), each in done.items() if a != "decoupled"])
+    together = np.concatenate([completed for (a, _), completed in done.items() if a != "decoupled"])
     columns = (
         "seats",
         *(f"{a}, {rule} (s)" for a, rule in CASES),
@@ -81,11 +81,11 @@ def _report(results: Results, quick: bool) -> Section:
         at_most("acceleration over its limit", _largest(results, quick, "acceleration"), 1.001),
     ]
     curves = []
-    for place, architecture in enumerate(("HT", "ST")):
+    for index, architecture in enumerate(("HT", "ST")):
         run = results[_job(layouts[0], architecture, "80 cm")]
         if len(run.t):
             base = run["x/base"]
-            curves.append(PlotCurve(base[:, 0], base[:, 1], architecture, str(place)))
+            curves.append(PlotCurve(base[:, 0], base[:, 1], architecture, str(index)))
     panel = Panel("y (m)", tuple(curves), "x (m)", equal=True)
     return Section(
         rows=_ratios(time),
@@ -108,8 +108,8 @@ def _ratios(time: dict[tuple[str, str], Array]) -> tuple[Row, ...]:
     apart = "no comparison of architectures alone: each has its own rule"
 
     def row(over: tuple[str, str], under: tuple[str, str], words: str, same: bool) -> Row:
-        each = time[over] / time[under]
-        ratio = float(each[np.isfinite(each)].mean()) if np.isfinite(each).any() else math.nan
+        ratios = time[over] / time[under]
+        ratio = float(ratios[np.isfinite(ratios)].mean()) if np.isfinite(ratios).any() else math.nan
         why, theirs = (unprinted, paper) if same else (apart, None)
         quantity = f"{over[0]}/{under[0]} execution time, mean over the layouts completed, {words}"
         return Row(quantity, "1", theirs, ratio, why, turns_at=1.0 if same else None, topic="deliveries")

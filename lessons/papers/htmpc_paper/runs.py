@@ -39,9 +39,9 @@ def example(controller: str, *assignments: str) -> Job:
     return Job(RunSpec(SQUARE, controller=controller, set=assignments))
 
 
-def part(runs: Sequence[JobResult], place: int, key: str = "normalised_base_error") -> Array:
+def part(runs: Sequence[JobResult], index: int, key: str = "normalised_base_error") -> Array:
     """Returns the number `key` of one part of each run; NaN for a run without this part."""
-    return np.array([run.figure("parts", place, key) for run in runs])
+    return np.array([run.figure("parts", index, key) for run in runs])
 
 
 def hand_mm(run: JobResult) -> tuple[float, float, float]:

@@ -38,9 +38,9 @@ def _idkc(peak: tuple[float, float], gain: float) -> Job:
 
 
 def _jobs(quick: bool) -> tuple[Job, ...]:
-    found = [square(controller, peak) for controller in METHODS for peak in peaks(quick)]
+    jobs = [square(controller, peak) for controller in METHODS for peak in peaks(quick)]
     return (
-        *found,
+        *jobs,
         *(square("htmpc", peak, "formulation=paper") for peak in peaks(quick)),
         *(_idkc(peak, gain) for gain in BASE_GAINS for peak in peaks(quick)),
     )
@@ -48,17 +48,17 @@ def _jobs(quick: bool) -> tuple[Job, ...]:
 
 def _runs(results: Results, quick: bool) -> dict[str, list[JobResult]]:
     """Runs by method, among them the HTIDKC that matches HTMPC best on Part 1."""
-    found = {
+    by_method = {
         words: [results[square(controller, peak)] for peak in peaks(quick)]
         for controller, words in METHODS.items()
     }
-    found["HTMPC, A"] = [results[square("htmpc", peak, "formulation=paper")] for peak in peaks(quick)]
+    by_method["HTMPC, A"] = [results[square("htmpc", peak, "formulation=paper")] for peak in peaks(quick)]
     swept = {gain: [results[_idkc(peak, gain)] for peak in peaks(quick)] for gain in BASE_GAINS}
-    wanted = part(found["HTMPC"], 0).mean()
+    wanted = part(by_method["HTMPC"], 0).mean()
     gap = {gain: abs(part(runs, 0).mean() - wanted) for gain, runs in swept.items()}
     best = min(gap, key=lambda gain: gap[gain] if math.isfinite(gap[gain]) else math.inf)
-    found[f"HTIDKC, base gain {best:g}"] = swept[best]
-    return found
+    by_method[f"HTIDKC, base gain {best:g}"] = swept[best]
+    return by_method
 
 
 def _fig_3(results: Results, quick: bool) -> Section:
@@ -106,7 +106,7 @@ def _fig_4(results: Results, quick: bool) -> Section:
 
 def _fig_6(results: Results, quick: bool) -> Section:
     runs = _runs(results, quick)
-    errors = {words: (part(found, 0), part(found, 1)) for words, found in runs.items()}
+    errors = {words: (part(method_runs, 0), part(method_runs, 1)) for words, method_runs in runs.items()}
     ours, sooner = errors["HTMPC"], errors["HTMPC_WPT"]
     authors = errors["HTIDKC"][1].mean()
     matched = next(words for words in errors if words.startswith("HTIDKC, base gain"))
@@ -172,7 +172,7 @@ def _fig_6(results: Results, quick: bool) -> Section:
         "better",
     )
     panels = tuple(
-        _strip(f"Part {k + 1}", {words: each[k] for words, each in errors.items()}) for k in (0, 1)
+        _strip(f"Part {k + 1}", {words: parts[k] for words, parts in errors.items()}) for k in (0, 1)
     )
     notes = (
         "Base error divided by its value at the start of the part, mean over the part, per square wave. "
@@ -210,24 +210,24 @@ def collinear(job: Work) -> bool:
 
 def _strip(title: str, values: dict[str, Array]) -> Panel:
     curves = []
-    for place, each in enumerate(values.values()):
-        if np.isfinite(each).all() and np.ptp(each) > 0:
-            curves.append(_violin(place, each))
-        curves.append(PlotCurve(np.full(len(each), float(place)), each, "", str(place), "dots"))
-        across = np.linspace(place - 0.2, place + 0.2, 20)  # enough points that they are drawn as a line
-        curves.append(PlotCurve(across, np.full(20, each.mean()), "", str(place)))
+    for index, series in enumerate(values.values()):
+        if np.isfinite(series).all() and np.ptp(series) > 0:
+            curves.append(_violin(index, series))
+        curves.append(PlotCurve(np.full(len(series), float(index)), series, "", str(index), "dots"))
+        across = np.linspace(index - 0.2, index + 0.2, 20)  # enough points that they are drawn as a line
+        curves.append(PlotCurve(across, np.full(20, series.mean()), "", str(index)))
     return Panel("base error (1)", tuple(curves), "method", title=title, x_names=tuple(values))
 
 
-def _violin(place: int, values: Array) -> PlotCurve:
+def _violin(centre: int, values: Array) -> PlotCurve:
     """Returns the outline of the fitted density, from the smallest to the largest value."""
     from scipy.stats import gaussian_kde  # imported here, because its import takes long
 
     y = np.linspace(values.min(), values.max(), 60)
     density = gaussian_kde(values)(y)
     half = 0.4 * density / density.max()
-    x, y = np.append(place - half, (place + half)[::-1]), np.append(y, y[::-1])
-    return PlotCurve(np.append(x, x[0]), np.append(y, y[0]), "", str(place))
+    x, y = np.append(centre - half, (centre + half)[::-1]), np.append(y, y[::-1])
+    return PlotCurve(np.append(x, x[0]), np.append(y, y[0]), "", str(centre))
 
 
 def _fig_7(results: Results, quick: bool) -> Section:
@@ -237,10 +237,10 @@ def _fig_7(results: Results, quick: bool) -> Section:
         targets = np.array(peaks(quick)) - EE_HOME
         curves = []
         edges = (0.0, 0.1, 0.2, 0.4, math.inf)
-        for place, (low, high) in enumerate(pairwise(edges)):
+        for index, (low, high) in enumerate(pairwise(edges)):
             inside = (errors >= low) & (errors < high)
             label = f"{low:g} to {high:g}" if math.isfinite(high) else f"over {low:g}"
-            curves.append(PlotCurve(targets[inside, 0], targets[inside, 1], label, str(place), "dots"))
+            curves.append(PlotCurve(targets[inside, 0], targets[inside, 1], label, str(index), "dots"))
         panels.append(Panel("y from the EE (m)", tuple(curves), "x (m)", title=words, equal=True))
         on_line = np.array([collinear(run.job) for run in runs])
         apart = [errors[chosen].mean() if chosen.any() else math.nan for chosen in (on_line, ~on_line)]

@@ -24,9 +24,9 @@ _OWN = ("formulation=proximal", "lexicographic=per_coordinate", "delta_m=0.01")
 
 
 def _job(formulation: str, equation: str, tolerance: str) -> Job:
-    asked = (f"formulation={formulation}", f"lexicographic={equation}", f"delta_m={DELTAS[tolerance]}")
+    assignments = (f"formulation={formulation}", f"lexicographic={equation}", f"delta_m={DELTAS[tolerance]}")
     # The scene's own settings are not assigned, so that this is the same run as the example of Figs. 3 and 4.
-    return example("htmpc", *(() if asked == _OWN else asked))
+    return example("htmpc", *(() if assignments == _OWN else assignments))
 
 
 _CASES = [(f, e, d) for f in FORMULATIONS for e in EQUATIONS for d in DELTAS]
@@ -99,9 +99,9 @@ def _fig_5(results: Results, quick: bool) -> Section:
     panels = []
     for f, words in FORMULATIONS.items():
         curves = []
-        for place, (e, d) in enumerate((e, d) for e in EQUATIONS for d in DELTAS):
+        for index, (e, d) in enumerate((e, d) for e in EQUATIONS for d in DELTAS):
             run = results[_job(f, e, d)]
-            curves.append(PlotCurve(run.t, normalised(run), f"{EQUATIONS[e]}, {d} δ", str(place)))
+            curves.append(PlotCurve(run.t, normalised(run), f"{EQUATIONS[e]}, {d} δ", str(index)))
         panels.append(
             Panel(
                 "base error (1)",

@@ -15,11 +15,11 @@ _WHY = "another machine and another solver (the paper: CasADi and Gurobi)"
 
 
 def _cases() -> dict[str, Job]:
-    found: dict[str, Job] = {words: replace(example(c), timed=True) for c, words in METHODS.items()}
-    found["HTMPC with obstacles"] = Job(
+    cases: dict[str, Job] = {words: replace(example(c), timed=True) for c, words in METHODS.items()}
+    cases["HTMPC with obstacles"] = Job(
         RunSpec("ridgeback-ur10-cluttered", controller="htmpc", duration=8.0), timed=True
     )
-    return found
+    return cases
 
 
 def _report(results: Results, quick: bool) -> Section:

@@ -14,17 +14,17 @@ HEIGHTS = (0.5, 0.8, 1.2)
 
 def _cases() -> dict[str, Job]:
     scene = "ridgeback-ur10-waypoints"
-    found: dict[str, Job] = {
+    cases: dict[str, Job] = {
         f"HT, h = {height} m": Job(RunSpec(scene, controller="htmpc", set=(f"height={height}",)))
         for height in HEIGHTS
     }
-    found["ST, h = 0.8 m"] = Job(RunSpec(scene, controller="htmpc", set=("architecture=single_task",)))
-    return found
+    cases["ST, h = 0.8 m"] = Job(RunSpec(scene, controller="htmpc", set=("architecture=single_task",)))
+    return cases
 
 
 def _report(results: Results, quick: bool) -> Section:
     curves, lines = [], []
-    for place, (words, job) in enumerate(_cases().items()):
+    for index, (words, job) in enumerate(_cases().items()):
         run = results[job]
         lines.append(
             (
@@ -36,7 +36,7 @@ def _report(results: Results, quick: bool) -> Section:
         )
         if len(run.t):
             base = run["x/base"]
-            curves.append(PlotCurve(base[:, 0], base[:, 1], words, str(place)))
+            curves.append(PlotCurve(base[:, 0], base[:, 1], words, str(index)))
     caption = "Base paths. The paper's waypoints are not printed: these are ours."
     panel = Panel("y (m)", tuple(curves), "x (m)", equal=True)
     columns = ("architecture", "way of the base (m)", "time (s)", "mission")

@@ -13,7 +13,7 @@ from himpc.references import Preview
 Array = NDArray[np.float64]
 
 
-class Given(NamedTuple):
+class ControllerInput(NamedTuple):
     """The measured state, (n,) each, and the references' previews: all inputs of a controller at a tick."""
 
     q: Array
