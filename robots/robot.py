@@ -13,12 +13,14 @@ from robots.errors import InputError, unknown_name
 from robots.geometry.collision_model import CollisionModel
 from robots.geometry.cover import Cover
 from robots.geometry.shape import Shape
+from robots.joints import own_joints
 from robots.report import ImportReport
 
 
 @dataclass(frozen=True, eq=False)
 class Robot:
-    """A fixed-base robot whose joints all have one degree of freedom (nq = nv = n).
+    """A fixed-base robot whose joints all have one degree of freedom. It has n joints with a coordinate each
+    (nq = nv = n), and joints that follow (mimic) one of these.
 
     All vectors are in Pinocchio's joint order, and all frames are URDF links. Units are SI: rad for angles, m
     for prismatic joints. The arrays are read-only; `dataclasses.replace` creates a changed robot. A robot can
@@ -27,7 +29,7 @@ class Robot:
 
     name: str
     model: pin.Model
-    joint_names: tuple[str, ...]
+    joint_names: tuple[str, ...]  # (n,)
     tip: str  # default frame of tasks
     home: np.ndarray  # (n,) rad, inside the limits
     q_lower: np.ndarray  # (n,) rad, −inf where unbounded
@@ -52,8 +54,13 @@ class Robot:
 
     @property
     def n(self) -> int:
-        """Number of joints."""
+        """Number of joints that do not follow others."""
         return self.model.nv
+
+    @cached_property
+    def joints(self) -> tuple[int, ...]:
+        """Pinocchio indices of the joints that do not follow others, (n,)."""
+        return own_joints(self.model)
 
     @cached_property
     def _frame_ids(self) -> dict[str, int]:
@@ -82,7 +89,7 @@ class Robot:
         Raises InputError for an unknown name and for a frame that is fixed to the world.
         """
         if name in self.joint_names:
-            return self.joint_names.index(name) + 1
+            return self.joints[self.joint_names.index(name)]
         if name not in self._frame_ids:
             raise unknown_name(f"body of robot '{self.name}' called", name, (*self.frames, *self.joint_names))
         joint = self.model.frames[self._frame_ids[name]].parentJoint

@@ -80,7 +80,7 @@ class Pull:
             self._grip = Grip(joint, at, hand)
 
     def follow(self, poses: np.ndarray, plant: PlantSettings, running: bool, on: bool) -> None:
-        """poses (n + 1, 7): the present poses; plant: contains the link's mass; on: whether links can be
+        """poses (J, 7): the present poses; plant: contains the link's mass; on: whether links can be
         pulled. While paused no force is posted."""
         self._poses = poses
         if on != self._on:

@@ -13,6 +13,7 @@ import numpy as np
 from robots.collision import base_joint
 from robots.geometry.collision_model import CollisionModel, Excluded, Solid, Why
 from robots.inertia import sample_configurations
+from robots.joints import every_joint
 from robots.mechanics.model import compiled
 from robots.robot import Robot
 from robots.settings import PlantSettings
@@ -44,7 +45,7 @@ def collision_model(
     parents = robot.model.parents
     near = [
         pair(parents[joint], joint, "neighbours")
-        for joint in range(1, robot.n + 1)
+        for joint in range(1, robot.model.njoints)
         if joint in names and parents[joint] in names
     ]
     for links in hollow:
@@ -77,7 +78,7 @@ def _touches(robot: Robot, postures: np.ndarray, margin: float = 0.0) -> Iterato
     data = mujoco.MjData(model)
     joints = [solid.joint for solid in robot.collision.solids]
     for q in postures:
-        data.qpos[:] = q
+        data.qpos[:] = every_joint(robot.model, q)
         mujoco.mj_fwdPosition(model, data)
         pairs = (sorted(joints[geom] for geom in contact.geom) for contact in data.contact)
         yield {(a, b) for a, b in pairs}
@@ -88,7 +89,7 @@ def lowest(robot: Robot) -> tuple[float | None, float | None]:
     point of all other bodies. A height is None if there is no solid."""
     model = compiled(robot, PlantSettings(contacts=True))
     data = mujoco.MjData(model)
-    data.qpos[:] = robot.home
+    data.qpos[:] = every_joint(robot.model, robot.home)
     mujoco.mj_fwdPosition(model, data)
     standing = base_joint(robot)
     found: dict[bool, list[float]] = {True: [], False: []}
