@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -15,6 +16,9 @@ from robots.geometry.cover import Cover
 from robots.geometry.shape import Shape
 from robots.joints import own_joints
 from robots.report import ImportReport
+
+_MODEL = ("armature", "effortLimit", "velocityLimit", "lowerPositionLimit", "upperPositionLimit")
+"""What an import may change in the model of a canonical description."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +103,23 @@ class Robot:
                 f"'{name}' is fixed to the world: choose a moving body, such as '{next(moving)}'."
             )
         return joint
+
+    def __getstate__(self) -> dict[str, Any]:
+        state = dict(self.__dict__)
+        if self.model.njoints - 1 > self.n:
+            # Pinocchio cannot store joints that follow others: their model is read again.
+            state["model"] = {name: getattr(self.model, name).copy() for name in _MODEL}
+        return state
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        if isinstance(state["model"], dict):
+            from robots.urdf.canonical import canonical_model  # the files of this folder import this file
+
+            model = canonical_model(state["urdf_text"])
+            for name, values in state["model"].items():
+                setattr(model, name, values)
+            state = {**state, "model": model}
+        self.__dict__.update(state)
 
     def with_tip(self, tip: str) -> Robot:
         """Returns the same robot with another default end-effector frame. Raises InputError for an unknown

@@ -86,12 +86,12 @@ def canonicalise(
         return None, _report(source, findings)
     findings.extend(localise(root, folder, within))
     try:
-        findings.extend(fit_masses(root, _model(root)))
+        findings.extend(fit_masses(root, pinocchio_model(root)))
         for inertial in root.iterfind("link/inertial"):
             inertial.attrib.pop(ASSUMED, None)
         for joint in root.iterfind("joint"):
             joint.attrib.pop(HELD, None)
-        model = _model(root)
+        model = pinocchio_model(root)
         findings.extend(fill_efforts(root, model))
     except Refusal as refusal:
         return None, _report(source, [*findings, refusal.finding])
@@ -138,7 +138,12 @@ def _check_freedom(root: Element, source: str) -> Iterator[Finding]:
         yield Finding("refused", source, f"{text}: hold the others with --hold PATTERN")
 
 
-def _model(root: Element) -> pin.Model:
+def canonical_model(text: str) -> pin.Model:
+    """Returns the Pinocchio model of a canonical description."""
+    return pinocchio_model(etree.fromstring(text))
+
+
+def pinocchio_model(root: Element) -> pin.Model:
     """Returns the Pinocchio model of a repaired tree. Raises Refusal for a tree that Pinocchio cannot
     build."""
     try:

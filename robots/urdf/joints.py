@@ -214,6 +214,16 @@ def _leader(joint: Element) -> str:
     return _require(joint, "mimic").get("joint", "")
 
 
+def _first_leader(follower: Element, joints: dict[str, Element]) -> str:
+    """Returns the leader of a joint that follows another one; it is a joint that follows none."""
+    seen: dict[str, None] = {}
+    name = _leader(follower)
+    while name in joints and name not in seen and joints[name].find("mimic") is not None:
+        seen[name] = None
+        name = _leader(joints[name])
+    return name
+
+
 def _to_freeze(root: Element, held: dict[str, tuple[float, str]]) -> dict[str, tuple[float, str]]:
     """Returns the joints that an arm controller does not move, as name → (value, reason)."""
     frozen = dict(held)
@@ -230,7 +240,7 @@ def _to_freeze(root: Element, held: dict[str, tuple[float, str]]) -> dict[str, t
         for above in _ancestors(carriers, end_of(joint, "parent"))
     }
     for joint in followers(root):
-        name, leader = joint.get("name", ""), _leader(joint)
+        name, leader = joint.get("name", ""), _first_leader(joint, joints)
         pair = {name, leader}
         if leader in joints and not pair & loaded and not _same_chain(carriers, joint, joints[leader]):
             frozen.setdefault(
