@@ -92,8 +92,9 @@ class Robot:
 
         Raises InputError for an unknown name and for a frame that is fixed to the world.
         """
-        if name in self.joint_names:
-            return self.joints[self.joint_names.index(name)]
+        joints = list(self.model.names)
+        if name in joints[1:]:
+            return joints.index(name)
         if name not in self._frame_ids:
             raise unknown_name(f"body of robot '{self.name}' called", name, (*self.frames, *self.joint_names))
         joint = self.model.frames[self._frame_ids[name]].parentJoint

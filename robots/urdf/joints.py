@@ -136,11 +136,13 @@ _LEAST_RANGE = 1e-3  # rad or m
 
 
 def _places(root: Element) -> dict[str, int]:
-    """Returns the index of each joint in Pinocchio's model; nothing for a tree that it cannot read."""
-    try:
-        names = pin.buildModelFromXML(without_shapes(root)).names
-    except (ValueError, RuntimeError):
-        return {}
+    """Returns the index of each joint in Pinocchio's model, which does not depend on limits and inertias."""
+    bare = etree.fromstring(without_shapes(root))
+    for limit in bare.iterfind("joint/limit"):
+        limit.attrib.update({"velocity": "1", "effort": "1"})
+    for link in bare.iterfind("link"):
+        _drop(link, "inertial")
+    names = pin.buildModelFromXML(etree.tostring(bare, encoding="unicode")).names
     return {name: place for place, name in enumerate(names)}
 
 
@@ -361,10 +363,10 @@ def _require(joint: Element, tag: str) -> Element:
     return found
 
 
-def _drop(joint: Element, *tags: str) -> None:
+def _drop(parent: Element, *tags: str) -> None:
     for tag in tags:
-        for element in joint.findall(tag):
-            joint.remove(element)
+        for element in parent.findall(tag):
+            parent.remove(element)
 
 
 def _text(values: np.ndarray) -> str:

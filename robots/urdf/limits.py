@@ -52,17 +52,18 @@ def _slowed_by_followers(root: Element) -> Iterator[Finding]:
     leaders = {joint.get("name", ""): joint for joint in movable_joints(root)}
     for follower in followers(root):
         leader, factor, _ = coupling(follower)
-        limit, own = leaders[leader].find("limit"), follower.find("limit")
+        limit, own_limit = leaders[leader].find("limit"), follower.find("limit")
+        if limit is None or own_limit is None:
+            continue
         try:
-            speed = limit_value(own, "velocity") / abs(factor) if own is not None else 0.0
-            if limit is None or not _LEAST < speed < np.inf:
-                continue
-            given = limit_value(limit, "velocity")
-            if given < _LEAST:
-                given = float(_SPEED[leaders[leader].get("type", "")])
+            given, own = limit_value(limit, "velocity"), limit_value(own_limit, "velocity")
         except Refusal as refusal:
             yield refusal.finding
             continue
+        given = given if given >= _LEAST else float(_SPEED[leaders[leader].get("type", "")])
+        speed = own / abs(factor) if own >= _LEAST else np.inf
+        own_limit.set("velocity", repr(own) if _LEAST <= own < np.inf else "0")
+        own_limit.set("effort", "0")
         if speed < given:
             limit.set("velocity", repr(speed))
             text = f"its velocity limit is {speed:.3g}, as {label(follower)} follows it"
