@@ -17,6 +17,7 @@ from himpc.kinematics.geometry import geometry
 from lessons.experiments.drag import dragged
 from robots import Robot, load_urdf_text
 from robots.collision import Ball
+from robots.inertia import mass_matrix
 from robots.plant import Plant
 from robots.settings import PlantSettings
 
@@ -136,6 +137,16 @@ def test_the_plant_is_that_of_the_model(text: str) -> None:
     scaled = Plant(arm, PlantSettings(diagonal_scale=1.5))
     scaled.reset(q, v)
     np.testing.assert_allclose(scaled.mass_matrix(), M + 0.5 * np.diag(np.diag(M)), atol=1e-12)
+
+
+@ROBOTS
+def test_the_mass_matrix_does_not_depend_on_the_posture_before(text: str) -> None:
+    """Pinocchio adds to the matrix of the last call: M̄ and the rotors would be those of another robot."""
+    arm = load(text)
+    data, postures = arm.model.createData(), (posture(arm), 0.1 * posture(arm))
+    for q in (*postures, *postures):
+        found = mass_matrix(arm.model, data, q)
+        np.testing.assert_allclose(found, full_mass_matrix(arm.model, q), atol=1e-12)
 
 
 def test_a_telescope_follows_a_dragged_target() -> None:
