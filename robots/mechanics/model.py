@@ -80,7 +80,7 @@ def compiled(
             axis=axis,
             limited=mujoco.mjtLimited.mjLIMITED_FALSE,
         )
-        at = column[joint]
+        at = int(column[joint])
         if joint not in own:
             _follow(spec, made.name, f"joint{own[at]}", factor[joint])
             continue
