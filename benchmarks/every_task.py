@@ -27,7 +27,7 @@ from lessons.scenes.torque_scene import TorqueScene
 from lessons.session.torque import TorqueSession
 from lessons.settings.assignments import assignment
 from robots import CATALOG, Robot
-from robots.truth import joint_axis
+from robots.joints import joint_axis
 
 CONTROLLERS = ("himpc", "hqp")
 HELD_FOR = 0.1  # s
@@ -125,7 +125,10 @@ def settled_within(task: Task, robot: Robot) -> NDArray[np.float64]:
     """Returns the value of `SETTLED` for each coordinate, (m,)."""
     names, joints = task.coordinates(robot), {}
     if isinstance(task, (Joints, Posture, Damping)):
-        joints = {name: joint_axis(robot.model, at)[0] for at, name in enumerate(robot.joint_names, start=1)}
+        joints = {
+            name: joint_axis(robot.model, at)[0]
+            for at, name in zip(robot.joints, robot.joint_names, strict=True)
+        }
     return np.array([SETTLED["m" if joints.get(name, task.unit == "m") else "rad"] for name in names])
 
 

@@ -3,8 +3,8 @@
     python -m benchmarks.field DIR_OR_FILE… [--out FILE.md] [--seconds 120]
 
 Each file is checked by `himpc-lab robots --check` in a process of its own. The table has a row per file: how
-many joints move, the tip, and how the robot follows a dragged target, or the first reason of a refusal. A
-summary is at its end.
+many joints move, the tip, the size of its largest link, as meshes draw it, as a share of the arm's length,
+and how the robot follows a dragged target, or the first reason of a refusal. A summary is at its end.
 """
 
 from __future__ import annotations
@@ -16,18 +16,26 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+from robots.errors import listed
 from robots.loading.archive import is_description
+from robots.loading.imported import WRONG_SIZE
 
 
 @dataclass(frozen=True)
 class Tried:
-    """A file: whether a robot was loaded from it, whether it follows (None: it was not dragged), and the
-    cells of its row."""
+    """A file: whether a robot was loaded from it, whether it follows (None: it was not dragged), the size of
+    its largest link (None: it has no meshes), and the cells of its row."""
 
     name: str
     loads: bool
     follows: bool | None
-    cells: tuple[str, str, str]
+    drawn: float | None
+    cells: tuple[str, str, str, str]
+
+    @property
+    def wrong_size(self) -> bool:
+        """Whether the meshes have another size than the kinematics, as with a wrong unit."""
+        return self.drawn is not None and not WRONG_SIZE[0] <= self.drawn <= WRONG_SIZE[1]
 
 
 def tried(path: Path, name: str, seconds: float) -> Tried:
@@ -36,18 +44,24 @@ def tried(path: Path, name: str, seconds: float) -> Tried:
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=seconds, check=False)
     except subprocess.TimeoutExpired:
-        return Tried(name, False, None, ("", "", f"takes longer than {seconds:g} s"))
+        return _not_loaded(name, f"takes longer than {seconds:g} s")
     try:
         told = json.loads(done.stdout)
     except ValueError:
         last = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
-        return Tried(name, False, None, ("", "", f"no answer: {last}"))
+        return _not_loaded(name, f"no answer: {last}")
     refused = [each for each in told["findings"] if each["kind"] == "refused"]
     if refused:
-        return Tried(name, False, None, ("", "", f"refused: {refused[0]['where']}: {refused[0]['text']}"))
+        return _not_loaded(name, f"refused: {refused[0]['where']}: {refused[0]['text']}")
     motion = told["motion"]
     follows = motion["follows"] if motion["drag"] else None
-    return Tried(name, True, follows, (str(len(told["joints"])), told["tip"], motion["text"]))
+    size = "" if told["drawn"] is None else f"{told['drawn']:.2g}"
+    cells = str(len(told["joints"])), told["tip"], size, motion["text"]
+    return Tried(name, True, follows, told["drawn"], cells)
+
+
+def _not_loaded(name: str, why: str) -> Tried:
+    return Tried(name, False, None, None, ("", "", "", why))
 
 
 def files_in(places: list[str]) -> list[tuple[Path, str]]:
@@ -65,13 +79,16 @@ def files_in(places: list[str]) -> list[tuple[Path, str]]:
 
 
 def summary(rows: list[Tried]) -> str:
-    """Returns one sentence with the numbers of files that load and that follow."""
+    """Returns the numbers of files that load, that follow, and that are drawn at a wrong size."""
     loaded = [row for row in rows if row.loads]
     dragged = [row for row in loaded if row.follows is not None]
+    drawn = [row for row in loaded if row.drawn is not None]
+    wrong = [row.name for row in drawn if row.wrong_size]
     follow = sum(row.follows is True for row in dragged)
     return (
         f"{len(loaded)} of {len(rows)} files load; {follow} of {len(dragged)} dragged robots follow "
-        "within 1 % of the drag after 2 s."
+        f"within 1 % of the drag after 2 s; {len(wrong)} of {len(drawn)} robots with meshes are drawn at a "
+        f"wrong size{f' ({listed(wrong, 20)})' if wrong else ''}."
     )
 
 
@@ -81,7 +98,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path)
     parser.add_argument("--seconds", type=float, default=120.0, help="wall time for a file")
     options = parser.parse_args()
-    rows, lines = [], ["| file | joints | tip | motion, or why not |", "|---|--:|---|---|"]
+    rows, lines = [], ["| file | joints | tip | size | motion, or why not |", "|---|--:|---|--:|---|"]
     for path, name in files_in(options.places):
         rows.append(tried(path, name, options.seconds))
         cells = (cell.replace("|", "/").replace("\n", " ") for cell in (name, *rows[-1].cells))

@@ -142,7 +142,7 @@ def base_joint(robot: Robot) -> int:
     """Returns the index of the last joint of a mobile base, which unbounded joints move over the floor; 0 for
     a robot without one. Bodies up to that joint stand on the floor."""
     free = np.isinf(robot.q_lower) & np.isinf(robot.q_upper)
-    return max((j for j in range(robot.n + 1) if j > 2 and free[:j].all()), default=0)
+    return max((robot.joints[j - 1] for j in range(3, robot.n + 1) if free[:j].all()), default=0)
 
 
 def _shape(obstacle: Obstacle, joint: Indices, base: int) -> _Shape:

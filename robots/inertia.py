@@ -40,6 +40,10 @@ def sample_configurations(
 
 def mass_matrix(model: pin.Model, data: pin.Data, q: np.ndarray) -> np.ndarray:
     """Returns M(q), kg·m², symmetric (Pinocchio's `crba` fills the upper triangle only)."""
+    if model.njoints - 1 > model.nv:
+        data = (
+            model.createData()
+        )  # for joints that follow others, Pinocchio adds to the result of the last call
     return _symmetric(pin.crba(model, data, q))
 
 
@@ -92,7 +96,7 @@ def suggest_M_bar(
     """
     data = model.createData()
     configurations = sample_configurations(q_lower, q_upper, samples, seed)
-    stack = np.linalg.inv(_symmetric(np.array([pin.crba(model, data, q).copy() for q in configurations])))
+    stack = np.linalg.inv(np.array([mass_matrix(model, data, q) for q in configurations]))
     shape = 1.0 / np.diagonal(stack, axis1=1, axis2=2).max(axis=0)
     root = np.sqrt(shape)
     largest = np.linalg.eigvalsh(root[:, None] * stack * root[None, :])[:, -1].max()

@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 
 from robots.errors import InputError
+from robots.joints import motions
 from robots.mechanics.contacts import Contact, Touch, contacts, touch_of
 from robots.mechanics.model import compiled
 from robots.robot import Robot
@@ -46,6 +47,10 @@ class Plant:
         if not (math.isfinite(timestep) and 0.0 < timestep <= 0.01):
             raise InputError(f"plant timestep is {timestep} s; give a value above 0 and at most 0.01.")
         self.robot = robot
+        # MuJoCo's joints of the robot come first; some of them may follow others: G (joints, n), or None.
+        self._joints = robot.model.njoints - 1
+        self._own = np.array(robot.joints) - 1 if self._joints > robot.n else slice(0, robot.n)
+        self._G = _coupling(robot) if self._joints > robot.n else None
         check_world(world)
         self.timestep = timestep
         self.world = world
@@ -57,9 +62,8 @@ class Plant:
         self._model = compiled(robot, settings, self.world) if model is None else model
         self.settings = settings
         self._data, self._probe = mujoco.MjData(self._model), mujoco.MjData(self._model)
-        self._q, self._v = self._data.qpos[: robot.n], self._data.qvel[: robot.n]
         self._fresh = False
-        self._armature = self._model.dof_armature[: robot.n].copy()
+        self._armature = self._model.dof_armature[self._own].copy()
         self._diagonal = settings.per_joint("diagonal_scale", robot.n)
         self._resolution = encoder_resolution(robot, settings)
         self._altered, self._rounds = bool((self._diagonal != 1.0).any()), bool(self._resolution.any())
@@ -80,12 +84,12 @@ class Plant:
     @property
     def q(self) -> np.ndarray:
         """(n,) rad, the true position."""
-        return self._q.copy()
+        return self._data.qpos[self._own].copy()
 
     @property
     def v(self) -> np.ndarray:
         """(n,) rad/s, the true velocity."""
-        return self._v.copy()
+        return self._data.qvel[self._own].copy()
 
     @property
     def tau(self) -> np.ndarray:
@@ -116,7 +120,8 @@ class Plant:
         velocity = np.zeros(self.n) if v is None else as_vector("v", v, self.n)
         torque = None if tau is None else as_vector("tau", tau, self.n)
         mujoco.mj_resetData(self._model, self._data)
-        self._q[:], self._v[:] = position, velocity
+        for values, given in ((self._data.qpos, position), (self._data.qvel, velocity)):
+            values[: self._joints] = given if self._G is None else self._G @ given
         self._push: tuple[str | None, np.ndarray] = (None, np.zeros(6))
         self._fresh = self.broken = False
         self._touch = Touch()
@@ -185,7 +190,7 @@ class Plant:
         for name in ("qpos", "qvel", "qacc_warmstart"):
             # The robot's part comes first. Objects exist only with contacts.
             now, before = getattr(self._data, name), getattr(old, name)
-            k = self.n if len(now) != len(before) else len(now)
+            k = self._joints if len(now) != len(before) else len(now)
             now[:k] = before[:k]
         self._touch = Touch()
         if body is not None:
@@ -193,11 +198,11 @@ class Plant:
 
     def mass_matrix(self) -> np.ndarray:
         """Returns M(q) with payload and armature, (n, n) kg·m²."""
-        return self._inertia(self._look())[: self.n, : self.n].copy()
+        return self._inertia(self._look())
 
     def bias(self) -> np.ndarray:
         """Returns C(q, v)·v + g(q), (n,) N·m: M q̈ + bias = τ − friction + push."""
-        return self._look().qfrc_bias[: self.n].copy()
+        return self._reduced(self._look().qfrc_bias)
 
     def holding_torque(self) -> np.ndarray:
         """Returns the torque, (n,) N·m, that holds the plant at q without a push or friction (v = q̈ = 0)."""
@@ -206,13 +211,13 @@ class Plant:
         mujoco.mj_fwdPosition(self._model, probe)
         mujoco.mj_fwdVelocity(self._model, probe)
         self._fresh = False
-        return probe.qfrc_bias[: self.n].copy()
+        return self._reduced(probe.qfrc_bias)
 
     def jacobian(self, frame: str) -> np.ndarray:
         """Returns the Jacobian of a frame's origin, (6, n), world axes: linear (m/rad), then angular rows."""
         J = np.zeros((6, self._model.nv))
         mujoco.mj_jacSite(self._model, self._look(), J[:3], J[3:], self._site(frame))
-        return J[:, : self.n].copy()
+        return J[:, : self.n].copy() if self._G is None else J[:, : self._joints] @ self._G
 
     def frame_pose(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
         """Returns the orientation R, (3, 3), and the position p, (3,) m, of a frame in the world."""
@@ -224,22 +229,22 @@ class Plant:
         friction, damping and push, without saturation, delay and lag."""
         found = self._accelerate(self._data.qpos, self._data.qvel, as_vector("tau", tau, self.n))
         self._fresh = True
-        return found[: self.n].copy()
+        return found[self._own].copy()
 
     def objects(self) -> np.ndarray:
         """Returns the poses of the free objects in order, (k, 7): position, m; quaternion (w, x, y, z)."""
         if self.settings.contacts:
-            return self._data.qpos[self.n :].reshape(-1, 7).copy()
+            return self._data.qpos[self._joints :].reshape(-1, 7).copy()
         return np.array([thing.pose for thing in self.world if thing.free]).reshape(-1, 7)
 
     def object_velocities(self) -> np.ndarray:
         """Returns the velocities of the middles of the free objects in order, (k, 3) m/s, world axes."""
-        return self._data.qvel[self.n :].reshape(-1, 6)[:, :3].copy()
+        return self._data.qvel[self._joints :].reshape(-1, 6)[:, :3].copy()
 
     def carry(self, place: int, position: np.ndarray, velocity: np.ndarray) -> None:
         """Sets position, (3,) m, and velocity, (3,) m/s, of the free object with this index in `objects`, as
         if somebody carried it; requires `contacts`."""
-        q, v = self._data.qpos[self.n :].reshape(-1, 7), self._data.qvel[self.n :].reshape(-1, 6)
+        q, v = self._data.qpos[self._joints :].reshape(-1, 7), self._data.qvel[self._joints :].reshape(-1, 6)
         q[place, :3], v[place, :3], self._fresh = position, velocity, False
 
     def _advance(self, h: float) -> None:
@@ -268,14 +273,21 @@ class Plant:
         mujoco.mj_fwdPosition(self._model, data)
         if self._altered:
             M = self._inertia(data)
-            self._model.dof_armature[:] = self._armature + (self._diagonal - 1.0) * M.diagonal()
+            self._model.dof_armature[self._own] = self._armature + (self._diagonal - 1.0) * M.diagonal()
             mujoco.mj_fwdPosition(self._model, data)
-            self._model.dof_armature[:] = self._armature
+            self._model.dof_armature[self._own] = self._armature
+
+    def _reduced(self, values: np.ndarray) -> np.ndarray:
+        """Returns Gᵀ x of values x (m, …) with a row for each of MuJoCo's coordinates, (n, …)."""
+        return values[: self.n].copy() if self._G is None else self._G.T @ values[: self._joints]
 
     def _inertia(self, data: mujoco.MjData) -> np.ndarray:
+        """Returns M(q) of the coordinates, (n, n)."""
         M = np.zeros((self._model.nv, self._model.nv))
         mujoco.mj_fullM(self._model, data, M)
-        return M
+        if self._G is None:
+            return M[: self.n, : self.n].copy()
+        return self._G.T @ M[: self._joints, : self._joints] @ self._G
 
     @property
     def _seen(self) -> mujoco.MjData:
@@ -298,3 +310,11 @@ class Plant:
 
     def _site(self, frame: str) -> int:
         return self._model.site(f"frame{self.robot.frame_id(frame)}").id
+
+
+def _coupling(robot: Robot) -> np.ndarray:
+    """Returns G, (joints, n): q of every joint is G times the coordinates q (n,)."""
+    column, factor = motions(robot.model)
+    G = np.zeros((len(column) - 1, robot.n))
+    G[np.arange(len(G)), column[1:]] = factor[1:]
+    return G

@@ -32,6 +32,8 @@ class ImportReport:
 
     Attributes:
         tips: frames that are as likely as the tip.
+        drawn: size of the largest link that meshes draw, divided by the length of the arm; None without
+            meshes.
     """
 
     source: str
@@ -40,6 +42,7 @@ class ImportReport:
     joints: tuple[str, ...] = ()
     tip: str = ""
     tips: tuple[str, ...] = ()
+    drawn: float | None = None
 
     @property
     def usable(self) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -13,12 +14,17 @@ from robots.errors import InputError, unknown_name
 from robots.geometry.collision_model import CollisionModel
 from robots.geometry.cover import Cover
 from robots.geometry.shape import Shape
+from robots.joints import own_joints
 from robots.report import ImportReport
+
+_MODEL = ("armature", "effortLimit", "velocityLimit", "lowerPositionLimit", "upperPositionLimit")
+"""What an import may change in the model of a canonical description."""
 
 
 @dataclass(frozen=True, eq=False)
 class Robot:
-    """A fixed-base robot whose joints all have one degree of freedom (nq = nv = n).
+    """A fixed-base robot whose joints all have one degree of freedom. It has n joints with a coordinate each
+    (nq = nv = n), and joints that follow (mimic) one of these.
 
     All vectors are in Pinocchio's joint order, and all frames are URDF links. Units are SI: rad for angles, m
     for prismatic joints. The arrays are read-only; `dataclasses.replace` creates a changed robot. A robot can
@@ -27,7 +33,7 @@ class Robot:
 
     name: str
     model: pin.Model
-    joint_names: tuple[str, ...]
+    joint_names: tuple[str, ...]  # (n,)
     tip: str  # default frame of tasks
     home: np.ndarray  # (n,) rad, inside the limits
     q_lower: np.ndarray  # (n,) rad, −inf where unbounded
@@ -52,8 +58,13 @@ class Robot:
 
     @property
     def n(self) -> int:
-        """Number of joints."""
+        """Number of joints that do not follow others."""
         return self.model.nv
+
+    @cached_property
+    def joints(self) -> tuple[int, ...]:
+        """Pinocchio indices of the joints that do not follow others, (n,)."""
+        return own_joints(self.model)
 
     @cached_property
     def _frame_ids(self) -> dict[str, int]:
@@ -81,8 +92,9 @@ class Robot:
 
         Raises InputError for an unknown name and for a frame that is fixed to the world.
         """
-        if name in self.joint_names:
-            return self.joint_names.index(name) + 1
+        joints = list(self.model.names)
+        if name in joints[1:]:
+            return joints.index(name)
         if name not in self._frame_ids:
             raise unknown_name(f"body of robot '{self.name}' called", name, (*self.frames, *self.joint_names))
         joint = self.model.frames[self._frame_ids[name]].parentJoint
@@ -92,6 +104,23 @@ class Robot:
                 f"'{name}' is fixed to the world: choose a moving body, such as '{next(moving)}'."
             )
         return joint
+
+    def __getstate__(self) -> dict[str, Any]:
+        state = dict(self.__dict__)
+        if self.model.njoints - 1 > self.n:
+            # Pinocchio cannot store joints that follow others: their model is read again.
+            state["model"] = {name: getattr(self.model, name).copy() for name in _MODEL}
+        return state
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        if isinstance(state["model"], dict):
+            from robots.urdf.canonical import canonical_model  # the files of this folder import this file
+
+            model = canonical_model(state["urdf_text"])
+            for name, values in state["model"].items():
+                setattr(model, name, values)
+            state = {**state, "model": model}
+        self.__dict__.update(state)
 
     def with_tip(self, tip: str) -> Robot:
         """Returns the same robot with another default end-effector frame. Raises InputError for an unknown

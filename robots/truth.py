@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
+from robots.joints import joint_axis, motions
 from robots.robot import Robot
 from robots.settings import PlantSettings
 
@@ -12,14 +13,15 @@ from robots.settings import PlantSettings
 def true_model(robot: Robot, settings: PlantSettings) -> pin.Model:
     """Returns a copy of the robot's model with the plant's masses, inertias, payload, armature and gravity.
 
-    First, the body of each joint is scaled. Then the payload, a point mass at the tip, is added to the body
-    that carries the tip. Raises InputError for a per-joint list of the wrong length.
+    First, the body of each joint is scaled, that of a follower as its leader's. Then the payload, a point
+    mass at the tip, is added to the body that carries the tip. Raises InputError for a per-joint list of the
+    wrong length.
     """
     model: pin.Model = robot.model.copy()
-    scales = zip(
-        settings.per_joint("mass_scale", robot.n), settings.per_joint("inertia_scale", robot.n), strict=True
-    )
-    for joint, (mass, inertia) in enumerate(scales, start=1):
+    masses, inertias = settings.per_joint("mass_scale", robot.n), settings.per_joint("inertia_scale", robot.n)
+    column, _ = motions(model)
+    for joint in range(1, model.njoints):
+        mass, inertia = masses[column[joint]], inertias[column[joint]]
         nominal = robot.model.inertias[joint]
         model.inertias[joint] = pin.Inertia(nominal.mass * mass, nominal.lever, nominal.inertia * inertia)
     if settings.payload_kg > 0.0:
@@ -34,18 +36,10 @@ def true_model(robot: Robot, settings: PlantSettings) -> pin.Model:
     return model
 
 
-def joint_axis(model: pin.Model, joint: int) -> tuple[bool, np.ndarray]:
-    """Returns whether a one-axis joint is prismatic, and its unit axis. The axis is given in the joint's
-    frame, in which it is constant."""
-    motion = np.asarray(model.joints[joint].createData().S, dtype=float).reshape(6)
-    prismatic = bool(np.abs(motion[:3]).max() > 0.5)
-    return prismatic, motion[:3] if prismatic else motion[3:]
-
-
 def encoder_resolution(robot: Robot, settings: PlantSettings) -> np.ndarray:
     """Returns the resolution of each joint's sensor, (n,) rad; 0 is ideal. Sensors of prismatic joints are
     always ideal."""
-    revolute = [not joint_axis(robot.model, joint)[0] for joint in range(1, robot.n + 1)]
+    revolute = [not joint_axis(robot.model, joint)[0] for joint in robot.joints]
     return np.where(revolute, np.radians(settings.encoder_resolution_deg), 0.0)
 
 

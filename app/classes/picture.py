@@ -25,7 +25,7 @@ def shape_of(robot: Robot) -> Shape:
 
 
 def pose_of(t: float, poses: np.ndarray) -> Shape:
-    """Returns the simulated time, s, and the poses (n + 1, 7) of joints and tip: position, mm, and quaternion
+    """Returns the simulated time, s, and the poses (J, 7) of joints and tip: position, mm, and quaternion
     wxyz."""
     return {
         "t": round(t, 2),

@@ -32,11 +32,11 @@ class Moment:
     Attributes:
         t: s.
         live: whether this is the present instant.
-        poses: (n + 1, 7) poses of joints and tip, position (m) and quaternion wxyz.
+        poses: (J, 7) poses of joints and tip, position (m) and quaternion wxyz.
         status: the newest report at that instant.
         latest: the newest row of telemetry at that instant.
         window: the curves of the plots.
-        way: (k, n + 1, 7) poses of the last TRACE_SECONDS, oldest first.
+        way: (k, J, 7) poses of the last TRACE_SECONDS, oldest first.
         ghost: the ghost at that instant; None if there is no ghost.
     """
 

@@ -17,7 +17,7 @@ RATE = 30.0
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """t: s; poses: (n + 1, 7), as in `Block`; status: the newest report at that time."""
+    """t: s; poses: (J, 7), as in `Block`; status: the newest report at that time."""
 
     t: float
     poses: np.ndarray

@@ -11,13 +11,13 @@ _WXYZ = [0, 1, 2, 6, 3, 4, 5]
 
 
 class LinkPoses:
-    """Computes the poses of joints 1 … n and the tip: (n + 1, 7), position in m and quaternion wxyz."""
+    """Computes the poses of all joints and the tip: (J, 7), position in m and quaternion wxyz."""
 
     def __init__(self, robot: Robot) -> None:
         self._model = robot.model
         self._data = robot.model.createData()
         self._tip = robot.frame_id(robot.tip)
-        self._poses = np.zeros((robot.n + 1, 7))
+        self._poses = np.zeros((robot.model.njoints, 7))
 
     def at(self, q: np.ndarray) -> np.ndarray | None:
         """Returns the poses at joint positions q, in a buffer that the next call overwrites; None if q is not

@@ -30,7 +30,7 @@ _HEAD = 64  # bytes
 
 
 class Block:
-    """A ring of telemetry rows (width float64) and the poses of joints 1 … n and the tip, (n + 1, 7):
+    """A ring of telemetry rows (width float64) and the poses of all joints and the tip, (J, 7):
     position, m, and quaternion wxyz. The memory has no name, so it is freed when the last process that
     uses it ends for any reason."""
 
@@ -50,7 +50,7 @@ class Block:
 
     @classmethod
     def for_robot(cls, robot: Robot, width: int, file: int | None = None) -> Block:
-        return cls(width, robot.n + 1, file)
+        return cls(width, robot.model.njoints, file)
 
     @property
     def file(self) -> int:

@@ -47,7 +47,7 @@ class Context:
         return self.learner.settings_of(self.ready)
 
     def poses(self) -> np.ndarray | None:
-        """Poses of joints 1 … n and the tip, (n + 1, 7); None if another scene was loaded meanwhile, since
+        """Poses of all joints and the tip, (J, 7); None if another scene was loaded meanwhile, since
         its robot may have another number of joints."""
         learner = self.learner
         return learner.read(lambda block, _: block.poses() if learner.ready is self.ready else None)
@@ -57,7 +57,7 @@ class Context:
         updated later."""
         poses = self.poses()
         still = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-        return np.tile(still, (self.ready.robot.n + 1, 1)) if poses is None else poses
+        return np.tile(still, (self.ready.robot.model.njoints, 1)) if poses is None else poses
 
 
 class Face(Protocol):

@@ -140,7 +140,7 @@ class TorqueFace:
         asked = exercise is not None and any(
             each.name == "joints moved" for each in signals_of(exercise.part)
         )
-        self._turns = JointTurns(scene, ready.robot.n) if asked else None
+        self._turns = JointTurns(scene, ready.robot.joints) if asked else None
         self._world, self._contacts = WorldView(scene, ready.world), ContactView(scene)
         self._pull = Pull(scene, robot, ready.robot, context.post)
         curves = [(task.path, context.colours[task.level]) for task in ready.tasks if task.path is not None]

@@ -117,7 +117,7 @@ class Goals:
         status: Callable[[], Status | None],
         dragged: Callable[[], None],
     ) -> None:
-        """poses: (n + 1, 7), present poses of joints and tip; size: of the arrows of a hand, m; status:
+        """poses: (J, 7), present poses of joints and tip; size: of the arrows of a hand, m; status:
         returns the newest report; dragged: called at every move."""
         self._post, self._status, self._dragged = post, status, dragged
         self._roles = {task.name: task for task in ready.tasks if task.kind == "position"}

@@ -23,7 +23,7 @@ _HELD = 0.15  # s: duration of a push if the page does not renew it
 
 @dataclass(frozen=True, eq=False)
 class Grip:
-    """joint: 1 … n, of the grabbed link; at (3,): the grabbed point in the joint's axes, m; hand (3,):
+    """joint: 1 … J − 1, of the grabbed link; at (3,): the grabbed point in the joint's axes, m; hand (3,):
     position of the pointer in the world, m."""
 
     joint: int
@@ -80,7 +80,7 @@ class Pull:
             self._grip = Grip(joint, at, hand)
 
     def follow(self, poses: np.ndarray, plant: PlantSettings, running: bool, on: bool) -> None:
-        """poses (n + 1, 7): the present poses; plant: contains the link's mass; on: whether links can be
+        """poses (J, 7): the present poses; plant: contains the link's mass; on: whether links can be
         pulled. While paused no force is posted."""
         self._poses = poses
         if on != self._on:
@@ -88,7 +88,7 @@ class Pull:
         grip = self._grip if on else None
         if grip is None or not running:
             if self._pulling is not None:
-                self._post(Push(self._robot.joint_names[self._pulling - 1], seconds=1e-3))
+                self._post(Push(self._robot.model.names[self._pulling], seconds=1e-3))
                 self._pulling = None
             if self._arrow.visible:
                 self._arrow.visible = self._label.visible = False
@@ -120,7 +120,7 @@ def push_at(
     Args:
         robot: the robot.
         plant: contains the robot's true masses.
-        joint: the number, 1 … n, of the joint that moves the link.
+        joint: the number, 1 … J − 1, of the joint that moves the link.
         pose: the pose (7,) of the joint's frame.
         point: the point (3,) in the world, m.
         force: the force (3,) in world axes, N.
@@ -129,7 +129,7 @@ def push_at(
     centre = pose[:3] + vtf.SO3(pose[3:]).as_matrix() @ lever
     torque = np.cross(point - centre, force)
     return Push(
-        robot.joint_names[joint - 1],
+        robot.model.names[joint],
         tuple(float(x) for x in force),
         tuple(float(x) for x in torque),
         _HELD,

@@ -44,7 +44,7 @@ class RobotView:
         has its own colours."""
         shapes = link_shapes(robot)
         self._frames = [
-            scene.add_frame(f"{root}/{joint}", show_axes=False) for joint in range(1, robot.n + 1)
+            scene.add_frame(f"{root}/{joint}", show_axes=False) for joint in range(1, robot.model.njoints)
         ]
         self.links = [
             (
@@ -61,11 +61,11 @@ class RobotView:
             for index, shape in enumerate(shapes)
             if shape.joint or colour is None  # two bases at the same place would flicker
         ]
-        self._shown = np.full((robot.n, 7), np.nan)
+        self._shown = np.full((len(self._frames), 7), np.nan)
 
     def move(self, poses: np.ndarray) -> None:
-        """poses: (n, 7), position, m, and quaternion wxyz per joint. For a robot at rest no message is sent,
-        so that the browser need not draw."""
+        """poses: (J − 1, 7), position, m, and quaternion wxyz of all joints. For a robot at rest no message
+        is sent, so that the browser need not draw."""
         moved = ~(np.abs(poses - self._shown) <= _STILL)  # NaN: never shown
         shifted, turned = moved[:, :3].any(axis=1), moved[:, 3:].any(axis=1)
         for k in np.flatnonzero(shifted):

@@ -36,7 +36,7 @@ class Targets:
         size: float,
         post: Send,
     ) -> None:
-        """poses: (n + 1, 7), present poses of joints and tip; size: of the arrows, m."""
+        """poses: (J, 7), present poses of joints and tip; size: of the arrows, m."""
         of_hand = {task.name for task in draggable(ready.tasks) if task is not None}
         self._targets = [
             _Target(scene, task, ready.robot, colours.get(task.level, BOUND), poses, size, post)
@@ -45,7 +45,7 @@ class Targets:
         ]
 
     def follow(self, poses: np.ndarray, raw: dict[str, np.ndarray], live: bool) -> None:
-        """poses (n + 1, 7) of the instant that is shown; raw: the session's raw targets; live: whether this
+        """poses (J, 7) of the instant that is shown; raw: the session's raw targets; live: whether this
         instant is now, so that targets can be dragged."""
         for target in self._targets:
             target.follow(poses, of_task(target.task, raw), live)
@@ -158,7 +158,7 @@ class _Target:
 
 
 def frame_pose(robot: Robot, poses: np.ndarray, frame: str) -> pin.SE3:
-    """Returns the pose of a link in the world, from the poses (n + 1, 7) of the joints."""
+    """Returns the pose of a link in the world, from the poses (J, 7) of the joints."""
     found = robot.model.frames[robot.frame_id(frame)]
     joint = found.parentJoint
     if joint == 0:

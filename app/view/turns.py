@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import viser
 
@@ -14,12 +16,14 @@ _BEGIN = 0.05
 class JointTurns:
     """A label at each joint, such as "3: 12°"; no labels if the recording does not contain the start."""
 
-    def __init__(self, scene: viser.SceneApi, joints: int) -> None:
-        self._labels = [scene.add_label(f"/turn/{k}", "", visible=False) for k in range(1, joints + 1)]
+    def __init__(self, scene: viser.SceneApi, joints: Sequence[int]) -> None:
+        """joints: indices of the joints that get a label, in the order of the poses, from 1 on."""
+        self._joints = joints
+        self._labels = [scene.add_label(f"/turn/{k}", "", visible=False) for k in joints]
         self._start: np.ndarray | None = None
 
     def draw(self, t: float, q: np.ndarray, poses: np.ndarray, window: PlotWindow) -> None:
-        """t: simulated time, s; q: (n,) rad; poses: (n + 1, 7), of the joints and the tip; window: the
+        """t: simulated time, s; q: (n,) rad; poses: (J, 7), of the joints and the tip; window: the
         recording up to this time."""
         if t < _BEGIN:
             self._start = None
@@ -35,7 +39,7 @@ class JointTurns:
             text = f"{k + 1}: {turn:.{0 if turn >= 10 else 1}f}°"
             if label.text != text:
                 label.text = text
-            label.position = tuple(poses[k, :3])
+            label.position = tuple(poses[self._joints[k] - 1, :3])
 
 
 def _start_of(window: PlotWindow) -> np.ndarray | None:

@@ -8,9 +8,10 @@ import numpy as np
 
 from docs.figures.pack import Pack, plain
 from robots import PlantSettings, Robot
+from robots.joints import joint_axis
 from robots.meshes.simplify import simplify
 from robots.shapes.link_shapes import Shape, link_shapes
-from robots.truth import inertial, joint_axis, true_model
+from robots.truth import inertial, true_model
 
 FACES = 16_000
 """Largest number of triangles of a robot."""

@@ -38,7 +38,7 @@ def base_joints(robot: Robot) -> tuple[int, ...]:
     """Returns the columns of the joints of a mobile base: the unbounded joints at the root of the tree."""
     count = 0
     for joint in range(1, robot.n + 1):
-        chained = robot.model.parents[joint] == joint - 1
+        chained = robot.model.parents[joint] == joint - 1 and robot.joints[joint - 1] == joint
         if not chained or np.isfinite(robot.q_lower[joint - 1]) or np.isfinite(robot.q_upper[joint - 1]):
             break
         count = joint

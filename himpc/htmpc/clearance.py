@@ -85,7 +85,7 @@ class CollisionModel:
         distance, normal = np.empty(most + 1), np.empty((most + 1, 3))
         gradient = np.empty((most if gradients else 0, tree.moves.shape[1]))
         count = near(
-            *(*where, tree.is_revolute, tree.moves, around.joint, around.centre, around.span),
+            *(*where, *tree.of_joints[1:], tree.carries, around.joint, around.centre, around.span),
             *(around.radius, around.kind, around.carrier, around.turn, around.middle, around.half),
             *(around.thickness, around.meets, within, np.empty((K, S, 3)), np.empty((K, S, 3))),
             *(knot, sphere, shape, np.empty(most + 1), distance, normal, gradient),

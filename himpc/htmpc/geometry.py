@@ -27,8 +27,8 @@ class Placed(NamedTuple):
     """Placements and axes of all joints at K configurations.
 
     Attributes:
-        at: (K, n+1, 12), orientation in the world, row by row, then position in m.
-        z: (K, n+1, 3), axis of the joint.
+        at: (K, J, 12), orientation in the world, row by row, then position in m.
+        z: (K, J, 3), axis of the joint.
     """
 
     at: Array
@@ -40,7 +40,7 @@ def placed(tree: Geometry, q: Array) -> Placed:
     q = np.array(q, float)
     joints = len(tree.parent)
     placements = Placed(np.empty((len(q), joints, 12)), np.empty((len(q), joints, 3)))
-    place_all(tree.parent, tree.is_revolute, tree.rotation, tree.translation, tree.axis, q, *placements)
+    place_all(*tree.of_joints, tree.rotation, tree.translation, tree.axis, q, *placements)
     return placements
 
 
@@ -57,7 +57,7 @@ def frame_at(robot: Robot, where: Placed, name: str) -> Frames:
     """Returns a frame of the robot for given placements of the joints; an empty name means the tip."""
     tree, K = geometry(robot), len(where.at)
     frames = Frames(np.empty((K, 3, 3)), np.empty((K, 3)), np.empty((K, 6, robot.n)))
-    frame_along(_TASK, _PART, tree.parent, tree.is_revolute, *where, *_mounted(robot, name), *frames)
+    frame_along(_TASK, _PART, *tree.of_joints, *where, *_mounted(robot, name), *frames)
     return frames
 
 

@@ -62,6 +62,11 @@ class Placo(DifferentialController):
             raise InputError(
                 f"solver={settings.solver} changes nothing here: placo has its own QP solver; set solver=daqp"
             )
+        if self.robot.model.njoints - 1 > self.robot.n:
+            raise InputError(
+                f"placo moves every joint by itself, and joints of '{self.robot.name}' follow others: "
+                "choose another controller"
+            )
         import placo
 
         solver = placo.KinematicsSolver(_wrapper(self.robot.urdf_text))

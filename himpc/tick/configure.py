@@ -107,6 +107,7 @@ def write_tasks(
         max(len(frames), 1),
         max(python_rows, 1),
         directed,
+        robot.model.njoints,
     )
     _write_geometry(arena, robot, frames)
     spans, start, python_rows = [], 0, 0
@@ -177,6 +178,7 @@ def write_curve(arena: Arena, index: int, span: slice, reference: Reference) -> 
 def _write_geometry(arena: Arena, robot: Robot, frames: Sequence[str]) -> None:
     f, i, tree = arena.f, arena.i, geometry(robot)
     i["parent"][:], i["is_revolute"][:] = tree.parent, tree.is_revolute
+    i["column"][:], f["factor"][:] = tree.column, tree.factor
     f["rotation"][:], f["translation"][:], f["axis"][:] = tree.rotation, tree.translation, tree.axis
     for index, name in enumerate(frames):
         frame = robot.model.frames[robot.frame_id(name)]

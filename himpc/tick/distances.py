@@ -59,7 +59,7 @@ class _Pairs:
     def __init__(self, tree: Geometry, around: Surroundings) -> None:
         self._tree, self.around = tree, around
         S, most = len(around.radius), int(around.meets.sum()) + 1
-        self._joints = tree.parent, tree.is_revolute, tree.rotation, tree.translation, tree.axis
+        self._joints = *tree.of_joints, tree.rotation, tree.translation, tree.axis
         self._q = np.empty((1, tree.moves.shape[1]))
         self._placed = np.empty((1, len(tree.parent), 12)), np.empty((1, len(tree.parent), 3))
         self._scratch = np.empty((1, S, 3)), np.empty((1, S, 3))
@@ -74,7 +74,7 @@ class _Pairs:
         self._q[0] = q
         place_all(*self._joints, self._q, *self._placed)
         self.count = near(
-            *(*self._placed, tree.is_revolute, tree.moves, around.joint, around.centre, around.span),
+            *(*self._placed, *tree.of_joints[1:], tree.carries, around.joint, around.centre, around.span),
             *(around.radius, around.kind, around.carrier, around.turn, around.middle, around.half),
             *(around.thickness, around.meets, within, *self._scratch),
             *(self._knot, self.sphere, self.shape, self._share, self.distance, self.normal, self.slopes),
@@ -96,7 +96,8 @@ def _links(robot: Robot) -> _Links:
     tree, around = geometry(robot), cover_surroundings(robot, cover_of(robot), ())
     between: dict[tuple[int, ...], list[tuple[int, int]]] = {}
     for o, s in np.argwhere(around.meets).tolist():
-        joints = np.flatnonzero(tree.moves[around.joint[o]] != tree.moves[around.joint[s]])
+        between_them = tree.carries[around.joint[o]] != tree.carries[around.joint[s]]
+        joints = np.unique(tree.column[between_them])
         if len(joints) <= 2:
             between.setdefault(tuple(joints.tolist()), []).append((o, s))
     low = np.where(np.isfinite(robot.q_lower), robot.q_lower, -np.pi)
@@ -120,7 +121,7 @@ def _links(robot: Robot) -> _Links:
 
 def carried(robot: Robot) -> NDArray[np.bool_]:
     """Returns whether the motor of joint j carries joint k, (n, n), entry [k, j]; true for k = j."""
-    return np.ascontiguousarray(geometry(robot).moves[1:] > 0)
+    return np.ascontiguousarray(geometry(robot).moves[list(robot.joints)] > 0)
 
 
 class Distances:

@@ -114,6 +114,7 @@ def sizes(
     frames: int = 1,
     python_rows: int = 1,
     directed: int = 0,
+    placements: int = 1,
 ) -> Arena:
     """Returns an arena for n joints and N knots.
 
@@ -123,8 +124,9 @@ def sizes(
         levels, bounds, tasks, frames: number of each.
         python_rows: number of rows of tasks that are not built into the kernel, at least 1.
         directed: number of constraints that are not built into the kernel.
+        placements: number of joints, with those that follow others, and the world.
     """
-    numbers = [n, N, rows, solved, levels, tasks, frames, bounds, N * n, 0, python_rows, directed]
+    numbers = [n, N, rows, solved, levels, tasks, frames, bounds, N * n, 0, python_rows, directed, placements]
     arena = Arena(sizes_of(numbers))
     arena.i["sizes"][:] = numbers
     return arena

@@ -28,13 +28,13 @@ def find_home(
     """
     lower, upper = finite_range(q_lower, q_upper)
     middle, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
-    moving = np.array([joint - 1 for joint in model.supports[model.frames[frame].parentJoint] if joint > 0])
+    chain = [int(joint) for joint in model.supports[model.frames[frame].parentJoint] if joint > 0]
+    moving = np.unique([model.idx_vs[joint] for joint in chain]).astype(int)
     if len(moving) == 0:
         return middle
     data = model.createData()
     reach = max(chain_length(model, frame), 1e-3)
 
-    chain = [int(joint) + 1 for joint in moving]
     pin.forwardKinematics(model, data, middle)
     floor = min(0.0, float(data.oMi[chain[0]].translation[2]))
 

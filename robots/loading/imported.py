@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import PurePath
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,9 +19,14 @@ from robots.report import Finding
 from robots.robot import Robot
 from robots.shapes.collision_shapes import collision_solids
 from robots.shapes.limbs import chain_length
-from robots.shapes.read import described_shapes, mesh_surfaces
+from robots.shapes.read import DescribedShape, described_shapes, mesh_surfaces
 
-_FAR_LARGER = 5.0  # size of a link's mesh, divided by the length of the arm
+if TYPE_CHECKING:
+    from robots.meshes.surfaces import Piece
+
+WRONG_SIZE = 0.02, 5.0
+"""Size of the meshes of a link, divided by the length of the arm: the largest link of a robot is not smaller
+than the first number, and no link is larger than the second."""
 
 
 def with_collision(robot: Robot, meshes: bool = True) -> Robot:
@@ -56,38 +62,51 @@ def with_cover(robot: Robot, meshes: bool = True) -> Robot:
 
 def with_geometry(robot: Robot, meshes: bool = True) -> Robot:
     """Returns the robot with its collision geometry and its capsules, and notes about its meshes."""
-    for finding in _about_meshes(robot) if meshes else ():
-        robot = _noted(robot, finding.where, finding.text)
+    if meshes:
+        drawn, findings = _about_meshes(robot)
+        report = replace(robot.report, drawn=drawn, findings=(*robot.report.findings, *findings))
+        robot = replace(robot, report=report)
     return with_cover(with_collision(robot, meshes), meshes)
 
 
-def _about_meshes(robot: Robot) -> Iterator[Finding]:
-    """Yields a note for the meshes that could not be read, and for each link whose meshes are far larger than
-    the arm."""
-    shapes = [
-        shape
+def _about_meshes(robot: Robot) -> tuple[float | None, list[Finding]]:
+    """Returns the report's `drawn`, a note for the meshes that could not be read, and one for each link whose
+    meshes are far larger than the arm, or for all meshes if they are far smaller."""
+    visuals, collisions = (
+        [shape for found in described_shapes(robot, what).values() for shape in found if shape.kind == "mesh"]
         for what in ("visuals", "collisions")
-        for found in described_shapes(robot, what).values()
-        for shape in found
-        if shape.kind == "mesh"
-    ]
+    )
+    shapes, findings = [*visuals, *collisions], []
     surfaces = mesh_surfaces(shapes)
     missing = dict.fromkeys(PurePath(shape.mesh).name for shape in shapes if shape.mesh not in surfaces)
     if missing:
-        yield Finding("note", "meshes", f"{len(missing)} mesh file(s) could not be read ({listed(missing)})")
+        text = f"{len(missing)} mesh file(s) could not be read ({listed(missing)})"
+        findings.append(Finding("note", "meshes", text))
+    reach = chain_length(robot.model, robot.frame_id(robot.tip))
+    for link, size in _sizes(shapes, surfaces).items():
+        if size > WRONG_SIZE[1] * reach:
+            text = (
+                f"its meshes are {size:.3g} m large, the whole arm is {reach:.2g} m long: STL and OBJ files"
+            )
+            text += ' have no unit; scale="0.001 0.001 0.001" in <mesh> turns millimetres into metres'
+            findings.append(Finding("note", f"link '{link}'", text))
+    size = max(_sizes(visuals, surfaces).values(), default=0.0)
+    if 0.0 < size < WRONG_SIZE[0] * reach:
+        text = (
+            f"the largest link is drawn {1e3 * size:.2g} mm large, the whole arm is {reach:.2g} m long: check"
+        )
+        findings.append(Finding("note", "meshes", f"{text} the scale in <mesh>"))
+    return size / reach if size > 0.0 and reach > 0.0 else None, findings
+
+
+def _sizes(shapes: list[DescribedShape], surfaces: Mapping[str, tuple[Piece, ...]]) -> dict[str, float]:
+    """Returns the size of the largest mesh of each link, the longest edge of its bounding box, m."""
     sizes: dict[str, float] = {}
     for shape in shapes:
         for _, vertices, _ in surfaces.get(shape.mesh, ()):
             extent = float((np.ptp(vertices, axis=0) * np.abs(shape.size)).max())
             sizes[shape.link] = max(extent, sizes.get(shape.link, 0.0))
-    reach = chain_length(robot.model, robot.frame_id(robot.tip))
-    for link, size in sizes.items():
-        if size > _FAR_LARGER * reach:
-            text = (
-                f"its meshes are {size:.3g} m large, the whole arm is {reach:.2g} m long: STL and OBJ files"
-            )
-            text += ' have no unit; scale="0.001 0.001 0.001" in <mesh> turns millimetres into metres'
-            yield Finding("note", f"link '{link}'", text)
+    return sizes
 
 
 def _noted(robot: Robot, where: str, text: str) -> Robot:

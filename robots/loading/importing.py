@@ -15,6 +15,7 @@ from lxml.etree import _Element as Element
 
 from robots.errors import InputError
 from robots.inertia import mass_matrix, rotor_inertia, suggest_M_bar, tracking_bandwidth
+from robots.joints import joint_names
 from robots.loading.home import chain_length, find_home, sensible_a_max
 from robots.loading.imported import with_collision
 from robots.meshes.files import has_meshes
@@ -118,7 +119,7 @@ def _robot(canonical: Canonical) -> Robot | None:
     return Robot(
         name=canonical.name,
         model=model,
-        joint_names=tuple(model.names)[1:],
+        joint_names=joint_names(model),
         tip=canonical.report.tip,
         home=home,
         q_lower=lower,
@@ -164,9 +165,9 @@ def _home_of(
 
 
 def _joints_of(canonical: Canonical) -> list[Element]:
-    """Returns the joints that move, in the order of the model."""
+    """Returns the joints with a coordinate of their own, in the order of the model."""
     joints = {each.get("name"): each for each in etree.fromstring(canonical.text).iterfind("{*}joint")}
-    return [joints[name] for name in canonical.model.names[1:]]
+    return [joints[name] for name in joint_names(canonical.model)]
 
 
 def _rotors_of(canonical: Canonical) -> np.ndarray:

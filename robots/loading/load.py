@@ -17,6 +17,7 @@ from robots.errors import InputError, shortened, unknown_name
 from robots.geometry.collision_model import CollisionModel
 from robots.geometry.cover import Cover
 from robots.geometry.files import stored
+from robots.joints import joint_names
 from robots.loading.archive import MAX_PACKED, description, unpack
 from robots.loading.imported import with_cover, with_geometry
 from robots.loading.importing import Import, bounds, import_robot
@@ -200,7 +201,7 @@ def _catalog_robot(entry: CatalogEntry) -> Robot:
     return Robot(
         name=entry.name,
         model=model,
-        joint_names=tuple(model.names)[1:],
+        joint_names=joint_names(model),
         tip=entry.tip,
         home=entry.home,
         q_lower=lower,

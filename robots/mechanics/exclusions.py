@@ -13,6 +13,7 @@ import numpy as np
 from robots.collision import base_joint
 from robots.geometry.collision_model import CollisionModel, Excluded, Solid, Why
 from robots.inertia import sample_configurations
+from robots.joints import every_joint, joint_axis, motions
 from robots.mechanics.model import compiled
 from robots.robot import Robot
 from robots.settings import PlantSettings
@@ -31,9 +32,9 @@ def collision_model(
     hollow: tuple[tuple[str, str], ...] = (),
     near_home: float = NEAR,
 ) -> CollisionModel:
-    """Returns the solids with the pairs of bodies to leave out: neighbours, pairs of links that are
-    `hollow`, pairs that are nearer than a distance (m) at home, and pairs that touch in nearly every posture
-    within the joints' limits."""
+    """Returns the solids with the pairs of bodies to leave out: neighbours, segments of a telescope, pairs of
+    links that are `hollow`, pairs that are nearer than a distance (m) at home, and pairs that touch in nearly
+    every posture within the joints' limits."""
     names: dict[int, str] = {}
     for solid in solids:
         names.setdefault(solid.joint, solid.link)
@@ -41,11 +42,11 @@ def collision_model(
     def pair(first: int, second: int, why: Why) -> Excluded:
         return Excluded(first, second, (names[first], names[second]), why)
 
-    parents = robot.model.parents
     near = [
-        pair(parents[joint], joint, "neighbours")
-        for joint in range(1, robot.n + 1)
-        if joint in names and parents[joint] in names
+        pair(other, joint, "neighbours")
+        for joint in range(1, robot.model.njoints)
+        for other in _neighbours(robot, joint)
+        if joint in names and other in names
     ]
     for links in hollow:
         first, second = sorted(robot.model.frames[robot.frame_id(link)].parentJoint for link in links)
@@ -56,6 +57,18 @@ def collision_model(
     counts = Counter(each for found in touching_often(replace(robot, collision=model)) for each in found)
     always = sorted(each for each, count in counts.items() if count > OFTEN * SAMPLES)
     return replace(model, excluded=(*model.excluded, *(pair(a, b, "always") for a, b in always)))
+
+
+def _neighbours(robot: Robot, joint: int) -> Iterator[int]:
+    """Yields the body that carries a joint, and for a segment of a telescope, whose segments slide together
+    in one another, the bodies of all segments below it and the one that carries them."""
+    model, (column, _) = robot.model, motions(robot.model)
+    below = model.parents[joint]
+    yield below
+    slides = joint_axis(model, joint)[0]
+    while slides and below > 0 and column[below] == column[joint] and joint_axis(model, below)[0]:
+        below = model.parents[below]
+        yield below
 
 
 def touching(robot: Robot, q: np.ndarray, margin: float = 0.0) -> set[Bodies]:
@@ -77,7 +90,7 @@ def _touches(robot: Robot, postures: np.ndarray, margin: float = 0.0) -> Iterato
     data = mujoco.MjData(model)
     joints = [solid.joint for solid in robot.collision.solids]
     for q in postures:
-        data.qpos[:] = q
+        data.qpos[:] = every_joint(robot.model, q)
         mujoco.mj_fwdPosition(model, data)
         pairs = (sorted(joints[geom] for geom in contact.geom) for contact in data.contact)
         yield {(a, b) for a, b in pairs}
@@ -88,7 +101,7 @@ def lowest(robot: Robot) -> tuple[float | None, float | None]:
     point of all other bodies. A height is None if there is no solid."""
     model = compiled(robot, PlantSettings(contacts=True))
     data = mujoco.MjData(model)
-    data.qpos[:] = robot.home
+    data.qpos[:] = every_joint(robot.model, robot.home)
     mujoco.mj_fwdPosition(model, data)
     standing = base_joint(robot)
     found: dict[bool, list[float]] = {True: [], False: []}

@@ -9,9 +9,10 @@ import pinocchio as pin
 from robots.collision import base_joint
 from robots.errors import InputError
 from robots.geometry.collision_model import Excluded, Solid
+from robots.joints import joint_axis, joints_at_zero, motions, own_joints
 from robots.robot import Robot
 from robots.settings import PlantSettings
-from robots.truth import inertial, joint_axis, pose, true_model
+from robots.truth import inertial, pose, true_model
 from robots.world import Ball, Box, Floor, Post, Thing, World
 
 # MuJoCo models friction as a spring-damper. With the default parameters, a light joint that should stick
@@ -37,6 +38,7 @@ def compiled(
     margin: float = 0.0,
 ) -> mujoco.MjModel:
     """Returns MuJoCo's model. Body i carries joint i of Pinocchio's tree, and site k is frame k of this tree.
+    A joint that follows another one is held to it by an equality constraint; its position counts from q = 0.
 
     With contacts, geometry k is solid k of the robot. The robot's bodies are followed by one body for all
     solids that are fixed to the world, and by one body for each object of the world. The joints of free
@@ -64,11 +66,10 @@ def compiled(
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     if not settings.contacts:
         spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
-    bodies = [spec.worldbody]
+    bodies, placements = [spec.worldbody], joints_at_zero(truth)
+    own, (column, factor) = own_joints(truth), motions(truth)
     for joint in range(1, truth.njoints):
-        body = bodies[truth.parents[joint]].add_body(
-            name=f"body{joint}", **pose(truth.jointPlacements[joint])
-        )
+        body = bodies[truth.parents[joint]].add_body(name=f"body{joint}", **pose(placements[joint]))
         bodies.append(body)
         body.mass, body.ipos, body.fullinertia = inertial(truth.inertias[joint])
         body.explicitinertial = True
@@ -78,14 +79,16 @@ def compiled(
             type=mujoco.mjtJoint.mjJNT_SLIDE if prismatic else mujoco.mjtJoint.mjJNT_HINGE,
             axis=axis,
             limited=mujoco.mjtLimited.mjLIMITED_FALSE,
-            armature=truth.armature[joint - 1],
-            damping=[damping[joint - 1], 0.0, 0.0],
-            frictionloss=friction[joint - 1],
-            solref_friction=_STICTION_SOLREF,
-            solimp_friction=_STICTION_SOLIMP,
         )
+        at = int(column[joint])
+        if joint not in own:
+            _follow(spec, made.name, f"joint{own[at]}", factor[joint])
+            continue
+        made.armature, made.frictionloss = truth.armature[at], friction[at]
+        made.damping = [damping[at], 0.0, 0.0]
+        made.solref_friction, made.solimp_friction = _STICTION_SOLREF, _STICTION_SOLIMP
         if settings.joint_stops:
-            _stop(made, robot.q_lower[joint - 1], robot.q_upper[joint - 1])
+            _stop(made, robot.q_lower[at], robot.q_upper[at])
         spec.add_actuator(
             name=f"motor{joint}", target=f"joint{joint}", trntype=mujoco.mjtTrn.mjTRN_JOINT
         ).set_to_motor()
@@ -98,7 +101,7 @@ def compiled(
         for pair in (*robot.collision.excluded, *also):
             spec.add_exclude(bodyname1=_body(pair.first), bodyname2=_body(pair.second))
     model = spec.compile()
-    order = [model.joint(i).name for i in range(robot.n)]
+    order = [model.joint(i).name for i in range(truth.njoints - 1)]
     if order != [f"joint{i}" for i in range(1, truth.njoints)]:
         raise RuntimeError(f"MuJoCo reordered the joints of '{robot.name}': {order}")
     geoms = [model.geom(i).name for i in range(model.ngeom)]
@@ -112,6 +115,13 @@ def compiled(
 
 def _body(joint: int) -> str:
     return f"body{joint}" if joint else BASE
+
+
+def _follow(spec: mujoco.MjSpec, follower: str, leader: str, factor: float) -> None:
+    """Holds a joint at factor · q of its leader."""
+    made = spec.add_equality(type=mujoco.mjtEq.mjEQ_JOINT, name1=follower, name2=leader)
+    made.data[:2] = 0.0, factor
+    made.solref, made.solimp = _STICTION_SOLREF, _STICTION_SOLIMP
 
 
 def _stop(joint: mujoco.MjsJoint, lower: float, upper: float) -> None:

@@ -282,6 +282,9 @@ def _left_out(
             ),
         }
     )
+    if not model.opt.gravity.any():
+        text = "the file has none; here it acts unless plant.gravity=false, and motors may be too weak"
+        yield Finding("note", "gravity", text)
     listed = ", ".join(f"{count} {what}" for what, count in counts.items() if count > 0)
     if listed:
         yield Finding("note", source, f"of this MuJoCo model, these were left out: {listed}")

@@ -12,8 +12,8 @@ import pinocchio as pin
 import trimesh
 
 from robots.geometry.cover import Cover
+from robots.joints import joint_axis
 from robots.shapes.limbs import BODY, DRUM, TIP, Colour, Limb, joint_radius, limbs
-from robots.truth import joint_axis
 
 COVER: Colour = (86, 140, 200)
 

@@ -52,7 +52,7 @@ def collision_solids(robot: Robot, meshes: bool = True) -> tuple[Solid, ...]:
         if pieces
     }
     solids = [solid for shapes, source in chosen for solid in _of_link(shapes, source, points)]
-    bare = set(range(robot.n + 1)) - {solid.joint for solid in solids}
+    bare = set(range(robot.model.njoints)) - {solid.joint for solid in solids}
     solids = [*solids[:_PER_ROBOT], *_capsules(robot, bare)]
     return tuple(sorted(solids[:_PER_ROBOT], key=lambda solid: (solid.joint == 0, solid.joint)))
 

@@ -13,15 +13,16 @@ from lxml import etree
 from lxml.etree import _Element as Element
 
 from robots.errors import shortened, unknown_name
+from robots.joints import followed, joint_names
 from robots.meshes.files import localise
 from robots.report import Finding, ImportReport
 from robots.urdf.hold import MAX_JOINTS, held_by_name, hold_what_does_not_move
 from robots.urdf.inertials import ASSUMED, repair_inertials
-from robots.urdf.joints import HELD, hold_followers, normalise_joints
+from robots.urdf.joints import HELD, coupling, normalise_joints, settle_followers
 from robots.urdf.limits import fill_efforts, fill_speeds, fit_masses
 from robots.urdf.read import Refusal, named, parse, without_shapes
 from robots.urdf.shapes import remove_unusable_shapes
-from robots.urdf.structure import check_structure, movable_joints
+from robots.urdf.structure import check_structure, followers, movable_joints
 from robots.urdf.tip import choose_tip
 
 MAX_FINDINGS = 200
@@ -76,7 +77,7 @@ def canonicalise(
     if refused_by(
         lambda _: told,
         lambda tree: hold_what_does_not_move(tree, chosen),
-        hold_followers,
+        settle_followers,
         lambda tree: _check_freedom(tree, source),
         repair_inertials,
         fill_speeds,
@@ -85,19 +86,17 @@ def canonicalise(
         return None, _report(source, findings)
     findings.extend(localise(root, folder, within))
     try:
-        findings.extend(fit_masses(root, _model(root)))
+        findings.extend(fit_masses(root, pinocchio_model(root)))
         for inertial in root.iterfind("link/inertial"):
             inertial.attrib.pop(ASSUMED, None)
         for joint in root.iterfind("joint"):
             joint.attrib.pop(HELD, None)
-        model = _model(root)
+        model = pinocchio_model(root)
         findings.extend(fill_efforts(root, model))
     except Refusal as refusal:
         return None, _report(source, [*findings, refusal.finding])
     name = shortened(root.get("name", "").strip())
-    report = replace(
-        _report(source, findings), name=name, joints=tuple(model.names)[1:], tip=chosen, tips=alike
-    )
+    report = replace(_report(source, findings), name=name, joints=joint_names(model), tip=chosen, tips=alike)
     text = etree.tostring(root, encoding="unicode", pretty_print=True)
     return Canonical(name, text, model, report), report
 
@@ -139,7 +138,12 @@ def _check_freedom(root: Element, source: str) -> Iterator[Finding]:
         yield Finding("refused", source, f"{text}: hold the others with --hold PATTERN")
 
 
-def _model(root: Element) -> pin.Model:
+def canonical_model(text: str) -> pin.Model:
+    """Returns the Pinocchio model of a canonical description."""
+    return pinocchio_model(etree.fromstring(text))
+
+
+def pinocchio_model(root: Element) -> pin.Model:
     """Returns the Pinocchio model of a repaired tree. Raises Refusal for a tree that Pinocchio cannot
     build."""
     try:
@@ -156,4 +160,6 @@ def _model(root: Element) -> pin.Model:
         if not (moments[0] > max(1e-14, 1e-12 * moments[2]) and moments[0] + moments[1] > moments[2]):
             text = "no simulator can use the inertia of the body that it moves; check its masses and origins"
             raise Refusal(f"joint '{model.names[joint]}'", text)
+    for joint in followers(root):
+        model = followed(model, joint.get("name", ""), *coupling(joint))
     return model

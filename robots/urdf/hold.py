@@ -13,7 +13,7 @@ from robots.errors import InputError, shortened, unknown_name
 from robots.report import Finding
 from robots.urdf.joints import freeze
 from robots.urdf.read import end_of, label, named
-from robots.urdf.structure import chains, followers, movable_joints, resting
+from robots.urdf.structure import chains, followers, movable_joints, parent_joints, resting
 from robots.urdf.tip import not_legs
 
 MAX_JOINTS = 20
@@ -61,6 +61,16 @@ def _parts(text: str) -> tuple[str, float | None]:
     return pattern, number
 
 
+def _leaders(root: Element, link: str) -> set[str]:
+    """Returns the names of the joints that those joints follow (mimic) that carry a link."""
+    carriers, found = parent_joints(root), set[str]()
+    while link in carriers:
+        mimic = carriers[link].find("mimic")
+        found |= set() if mimic is None else {mimic.get("joint", "")}
+        link = end_of(carriers[link], "parent")
+    return found
+
+
 def hold_what_does_not_move(root: Element, tip: str) -> Iterator[Finding]:
     """Holds the joints that do not move the tip if more than `MAX_JOINTS` move. The other arm of a two-armed
     robot, which has as many joints as that of the tip, keeps moving. Yields one finding per body from which
@@ -70,9 +80,10 @@ def hold_what_does_not_move(root: Element, tip: str) -> Iterator[Finding]:
         return
     carried, links = chains(root), named(root, "link")
     chain = carried[tip]
+    leaders = _leaders(root, tip)
     others = {carried[name] for name in not_legs(root) if len(carried[name]) == len(chain)} - {chain}
     both = {*chain, *(name for other in others for name in other)}
-    kept = both if len(others) == 1 and len(both) <= MAX_JOINTS else set(chain)
+    kept = both if len(others) == 1 and len(both) <= MAX_JOINTS else {*chain, *leaders}
     groups: dict[str, list[str]] = {}
     for name, joint in moving.items():
         if name not in kept:

@@ -13,7 +13,7 @@ from lxml.etree import _Element as Element
 
 from robots.report import Finding
 from robots.urdf.read import Refusal, end_of, label, named, numbers, placement
-from robots.urdf.structure import body_of, movable_joints
+from robots.urdf.structure import body_of, followers, movable_joints
 
 _DENSITY = 1000.0  # kg/m³: density of the solids that replace missing masses and inertias
 _LEAST_MASS = 1e-6  # kg
@@ -42,7 +42,7 @@ def repair_inertials(root: Element) -> Iterator[Finding]:
     total: dict[str, float] = {}
     for name, first in body_of(root).items():
         total[first] = total.get(first, 0.0) + masses[name]
-    for joint in movable_joints(root):
+    for joint in (*movable_joints(root), *followers(root)):
         carried = end_of(joint, "child")
         if total[carried] <= 0.0:
             try:

@@ -1,5 +1,5 @@
 """Normalises the joints of a URDF: axes get unit length, `continuous` joints become revolute, joints of
-grippers become fixed, and so do joints that follow (mimic) another one, where their leader puts them."""
+grippers become fixed, and so do joints that follow (mimic) a held one, where their leader puts them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,17 @@ from lxml.etree import _Element as Element
 
 from robots.errors import shortened
 from robots.report import Finding
-from robots.urdf.read import UNLIMITED, Refusal, end_of, label, limit_value, named, numbers, placement
+from robots.urdf.read import (
+    UNLIMITED,
+    Refusal,
+    end_of,
+    label,
+    limit_value,
+    named,
+    numbers,
+    placement,
+    without_shapes,
+)
 from robots.urdf.structure import followers, movable_joints, parent_joints, resting
 
 UNBOUNDED = UNLIMITED  # limit of a joint without limits, so that nq = nv; it is read as ±inf
@@ -79,12 +89,17 @@ def freeze(joint: Element, value: float, reason: str) -> Finding:
     return Finding("fixed", label(joint), f"held at {value:.4g} {unit}: {reason}")
 
 
-def hold_followers(root: Element) -> Iterator[Finding]:
-    """Fixes each joint that follows another one at multiplier · q + offset, where q is the value at which its
-    leader is held. If the leader moves, q is that of the file's home, or 0, within the leader's limits, and
-    the finding says that the motion is not simulated."""
+def settle_followers(root: Element) -> Iterator[Finding]:
+    """Decides for each joint that follows (mimics) another one whether it moves.
+
+    A follower of a moving joint moves: its element `mimic` then names a joint with a coordinate of its own,
+    and the range of this joint is cut so that the follower stays in its own range. It is fixed if its leader
+    is held, at multiplier · q + offset, where q is the value at which the leader is held; or if the motion
+    cannot be simulated. The leader is then thought to be at the file's home, or at 0, within its limits.
+    """
     joints, following = named(root, "joint"), {joint.get("name", ""): joint for joint in followers(root)}
     moving = {joint.get("name", "") for joint in movable_joints(root)}
+    places, settled = _places(root) if following else {}, set[str]()
     for first in list(following):
         chain: dict[str, None] = {}
         name = first
@@ -95,18 +110,91 @@ def hold_followers(root: Element) -> Iterator[Finding]:
             joint = following.pop(each)
             leader = _leader(joint)
             try:
-                yield freeze(joint, *_led(joint, leader, joints.get(leader), leader in moving))
+                why_not = _cannot_follow(joint, joints.get(leader), places, len(settled))
+                if leader in moving and not why_not:
+                    settled.add(each)
+                    yield from _keep_range(joint, joints[coupling(joint)[0]])
+                else:
+                    yield freeze(joint, *_led(joint, leader, joints.get(leader), leader in moving, why_not))
             except Refusal as refusal:
                 yield refusal.finding
             if leader in moving:
                 moving.add(each)
 
 
-def _led(joint: Element, leader: str, leads: Element | None, moves: bool) -> tuple[float, str]:
-    """Returns the value of a joint that follows another one, rad or m, and the reason for the report."""
+def coupling(follower: Element) -> tuple[str, float, float]:
+    """Returns the leader, the multiplier and the offset, rad or m, of a joint that follows another one."""
+    mimic = _require(follower, "mimic")
+    factor, offset = (float(numbers(mimic, key, 1, (usual,))[0]) for key, usual in _COUPLING)
+    return mimic.get("joint", ""), factor, offset
+
+
+_COUPLING = (("multiplier", 1.0), ("offset", 0.0))
+_FACTORS = 1e-3, 1e3  # a follower that moves less or more is held
+_MOST_FOLLOWERS = 20
+_LEAST_RANGE = 1e-3  # rad or m
+
+
+def _places(root: Element) -> dict[str, int]:
+    """Returns the index of each joint in Pinocchio's model, which does not depend on limits and inertias."""
+    bare = etree.fromstring(without_shapes(root))
+    for limit in bare.iterfind("joint/limit"):
+        limit.attrib.update({"velocity": "1", "effort": "1"})
+    for link in bare.iterfind("link"):
+        _drop(link, "inertial")
+    names = pin.buildModelFromXML(etree.tostring(bare, encoding="unicode")).names
+    return {name: place for place, name in enumerate(names)}
+
+
+def _cannot_follow(joint: Element, leads: Element | None, places: dict[str, int], count: int) -> str:
+    """Returns why the motion of a joint that follows another one, which may follow a third one, cannot be
+    simulated, or "". The element `mimic` of the joint then names a joint with a coordinate of its own."""
+    leader, factor, offset = coupling(joint)
+    if leads is None or leads.get("type") == "fixed":
+        return "its leader does not move"
+    if leads.find("mimic") is not None:
+        leader, first, start = coupling(leads)
+        factor, offset = factor * first, factor * start + offset
+    if places.get(joint.get("name", ""), 0) <= places.get(leader, len(places)):
+        return "its leader comes after it in the tree"
+    if not _FACTORS[0] <= abs(factor) <= _FACTORS[1] or abs(offset) >= UNBOUNDED:
+        return "its factor or its offset is out of range"
+    if count >= _MOST_FOLLOWERS:
+        return f"only {_MOST_FOLLOWERS} joints can follow others"
     mimic = _require(joint, "mimic")
-    factor = float(numbers(mimic, "multiplier", 1, (1.0,))[0])
-    offset = float(numbers(mimic, "offset", 1, (0.0,))[0])
+    mimic.set("joint", leader)
+    mimic.set("multiplier", repr(factor))
+    mimic.set("offset", repr(offset))
+    return ""
+
+
+def _keep_range(joint: Element, leader: Element) -> Iterator[Finding]:
+    """Cuts the range of a leader so that a joint that follows it stays in its own range, and reports both;
+    fixes the joint if no range is left."""
+    name, factor, offset = coupling(joint)
+    limit = _require(leader, "limit")
+    given = _ends(limit)
+    ends = (
+        end if abs(end) < UNBOUNDED else math.copysign(math.inf, end)
+        for end in _ends(_require(joint, "limit"))
+    )
+    first, last = sorted((end - offset) / factor for end in ends)
+    low, high = max(given[0], first), min(given[1], last)
+    if high - low < _LEAST_RANGE:
+        yield freeze(joint, *_led(joint, name, leader, True, "its own range leaves its leader none"))
+        return
+    yield Finding("note", label(joint), f"it follows '{shortened(name)}': {factor:g} · q + {offset:g}")
+    if max(low - given[0], given[1] - high) > 1e-9:
+        limit.set("lower", repr(low))
+        limit.set("upper", repr(high))
+        text = f"its range is cut to [{low:.4g}, {high:.4g}], so that {label(joint)}, which follows it, stays"
+        yield Finding("repaired", label(leader), f"{text} in its own")
+
+
+def _led(joint: Element, leader: str, leads: Element | None, moves: bool, why_not: str) -> tuple[float, str]:
+    """Returns the value of a joint that is held although it follows another one, rad or m, and the reason for
+    the report."""
+    _, factor, offset = coupling(joint)
     if leads is None or (leads.get("type") != "fixed" and leads.find("limit") is None):
         q = 0.0
     elif leads.get("type") == "fixed":
@@ -116,8 +204,8 @@ def _led(joint: Element, leader: str, leads: Element | None, moves: bool) -> tup
     reason = f"it mimics '{shortened(leader)}'"
     if moves:
         reason = (
-            f"it should follow '{shortened(leader)}' with factor {factor:g}, which is not simulated: "
-            "what it carries moves differently on the real robot"
+            f"it should follow '{shortened(leader)}' with factor {factor:g}, which is not simulated "
+            f"({why_not}): what it carries moves differently on the real robot"
         )
     elif q != 0.0:
         reason += f", which is held at {q:.4g}"
@@ -126,6 +214,16 @@ def _led(joint: Element, leader: str, leads: Element | None, moves: bool) -> tup
 
 def _leader(joint: Element) -> str:
     return _require(joint, "mimic").get("joint", "")
+
+
+def _first_leader(follower: Element, joints: dict[str, Element]) -> str:
+    """Returns the leader of a joint that follows another one; it is a joint that follows none."""
+    seen: dict[str, None] = {}
+    name = _leader(follower)
+    while name in joints and name not in seen and joints[name].find("mimic") is not None:
+        seen[name] = None
+        name = _leader(joints[name])
+    return name
 
 
 def _to_freeze(root: Element, held: dict[str, tuple[float, str]]) -> dict[str, tuple[float, str]]:
@@ -144,7 +242,7 @@ def _to_freeze(root: Element, held: dict[str, tuple[float, str]]) -> dict[str, t
         for above in _ancestors(carriers, end_of(joint, "parent"))
     }
     for joint in followers(root):
-        name, leader = joint.get("name", ""), _leader(joint)
+        name, leader = joint.get("name", ""), _first_leader(joint, joints)
         pair = {name, leader}
         if leader in joints and not pair & loaded and not _same_chain(carriers, joint, joints[leader]):
             frozen.setdefault(
@@ -265,10 +363,10 @@ def _require(joint: Element, tag: str) -> Element:
     return found
 
 
-def _drop(joint: Element, *tags: str) -> None:
+def _drop(parent: Element, *tags: str) -> None:
     for tag in tags:
-        for element in joint.findall(tag):
-            joint.remove(element)
+        for element in parent.findall(tag):
+            parent.remove(element)
 
 
 def _text(values: np.ndarray) -> str:

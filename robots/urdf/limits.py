@@ -12,9 +12,9 @@ from lxml.etree import _Element as Element
 from robots.inertia import largest_loads
 from robots.report import Finding
 from robots.urdf.inertials import ASSUMED, lighten
-from robots.urdf.joints import finite_bounds
+from robots.urdf.joints import coupling, finite_bounds
 from robots.urdf.read import Refusal, label, limit_value
-from robots.urdf.structure import movable_joints
+from robots.urdf.structure import followers, movable_joints
 
 _SPEED = {"revolute": np.pi, "prismatic": 0.5}  # rad/s, m/s: fast, but safe for an unknown arm
 _LEAST = 1e-6  # rad/s, N·m: a smaller limit counts as missing, because it would allow no motion
@@ -25,7 +25,8 @@ _ACCELERATION = 10.0  # rad/s², m/s²: acceleration that the effort limit allow
 
 def fill_speeds(root: Element) -> Iterator[Finding]:
     """Fills missing, zero and negative velocity limits. Effort limits that are missing, zero or negative are
-    set to 0."""
+    set to 0. A joint that another one follows is so slow that its follower keeps its limit."""
+    yield from _slowed_by_followers(root)
     for joint in movable_joints(root):
         limit = joint.find("limit")
         if limit is None:
@@ -47,13 +48,35 @@ def fill_speeds(root: Element) -> Iterator[Finding]:
             yield refusal.finding
 
 
+def _slowed_by_followers(root: Element) -> Iterator[Finding]:
+    leaders = {joint.get("name", ""): joint for joint in movable_joints(root)}
+    for follower in followers(root):
+        leader, factor, _ = coupling(follower)
+        limit, own_limit = leaders[leader].find("limit"), follower.find("limit")
+        if limit is None or own_limit is None:
+            continue
+        try:
+            given, own = limit_value(limit, "velocity"), limit_value(own_limit, "velocity")
+        except Refusal as refusal:
+            yield refusal.finding
+            continue
+        given = given if given >= _LEAST else float(_SPEED[leaders[leader].get("type", "")])
+        speed = own / abs(factor) if own >= _LEAST else np.inf
+        own_limit.set("velocity", repr(own) if _LEAST <= own < np.inf else "0")
+        own_limit.set("effort", "0")
+        if speed < given:
+            limit.set("velocity", repr(speed))
+            text = f"its velocity limit is {speed:.3g}, as {label(follower)} follows it"
+            yield Finding("repaired", label(leaders[leader]), text)
+
+
 def fit_masses(root: Element, model: pin.Model) -> Iterator[Finding]:
     """Makes the masses that the file does not give lighter if its effort limits could not move them: shapes
     are often drawn thicker than the robot, and a motor carries its arm."""
     if root.find(f"link/inertial[@{ASSUMED}]") is None:
         return
     gravity, _ = _loads(model)
-    places = {joint: model.getJointId(joint.get("name", "")) - 1 for joint in movable_joints(root)}
+    places = {joint: _coordinate(model, joint) for joint in movable_joints(root)}
     loads = [gravity[place] / effort for joint, place in places.items() if (effort := _effort(joint)) > 0.0]
     share = 1.0 / (_LEVER * float(max(loads, default=0.0)) + 1e-12)
     if share < 1.0:
@@ -71,7 +94,7 @@ def fill_efforts(root: Element, model: pin.Model) -> Iterator[Finding]:
     gravity, inertia = _loads(model)
     limits = model.effortLimit.copy()
     for joint in movable_joints(root):
-        place = model.getJointId(joint.get("name", "")) - 1
+        place = _coordinate(model, joint)
         unit = "N" if joint.get("type") == "prismatic" else "N·m"
         given = _effort(joint)
         if given > 0.0:
@@ -87,6 +110,10 @@ def fill_efforts(root: Element, model: pin.Model) -> Iterator[Finding]:
         text = f"no effort limit; {effort:g} {unit} was estimated from the weight it carries"
         yield Finding("filled", label(joint), text)
     model.effortLimit = limits
+
+
+def _coordinate(model: pin.Model, joint: Element) -> int:
+    return int(model.idx_vs[model.getJointId(joint.get("name", ""))])
 
 
 def _effort(joint: Element) -> float:

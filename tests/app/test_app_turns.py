@@ -22,7 +22,7 @@ def test_the_turn_since_the_start_is_at_each_joint() -> None:
     """Also if the page saw no picture of the start, as in a run that is as fast as possible."""
     scene = MagicMock()
     labels = scene.add_label.side_effect = [MagicMock(visible=False, text="") for _ in range(2)]
-    turns, q, poses = JointTurns(scene, 2), np.array([0.5, -1.0]), np.arange(21.0).reshape(3, 7)
+    turns, q, poses = JointTurns(scene, (1, 2)), np.array([0.5, -1.0]), np.arange(21.0).reshape(3, 7)
     unknown, nothing = np.full(2, np.nan), recording((np.nan, np.nan, np.nan))
     turns.draw(0.0, unknown, poses, nothing)
     turns.draw(3.0, q, poses, recording((2.0, *q), (3.0, *q)))

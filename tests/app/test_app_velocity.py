@@ -289,7 +289,7 @@ def test_a_level_has_its_name_on_the_page_as_it_is(
     tasks = [replace(level.tasks[0], name=f"<{level.name}>") for level in settings.levels]
     named = MagicMock(levels=[Level((task,)) for task in tasks])
     monkeypatch.setattr("app.panels.velocity.tasks.Controls", MagicMock())
-    RolesPanel(gui, MagicMock(), named, dict.fromkeys(("<ee>", "<base>"), (0, 0, 0)), lambda: settings)
+    RolesPanel(gui, MagicMock(), named, dict.fromkeys(("<ee>", "<base>"), (0, 0, 0)), lambda: settings, None)
     labels = [call.args[0] for call in gui.add_folder.call_args_list if call.args[0]]
     assert labels == ["Settings of <ee>", "Settings of <base>"]
 

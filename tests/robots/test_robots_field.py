@@ -143,11 +143,19 @@ def test_position_limits_that_nobody_filled_in() -> None:
     assert load(one).n == 1
 
 
-def test_a_joint_that_should_follow_another_is_held_and_the_report_says_what_is_wrong() -> None:
-    arm = load_robot(FIELD / "mimic_in_chain.urdf")
-    assert arm.joint_names == ("j1", "j2")
-    assert "it should follow 'j2' with factor -1, which is not simulated: what it carries moves" in str(
-        arm.report.of_kind("fixed")
+def test_a_joint_that_cannot_follow_another_is_held_and_the_report_says_what_is_wrong() -> None:
+    """A follower in front of its leader, or with a range that leaves its leader none, is held."""
+    text = (FIELD / "mimic_in_chain.urdf").read_text()
+    assert "'j3': it follows 'j2': -1 · q + 0" in str([*map(str, load_urdf_text(text).report.findings)])
+    narrow = text.replace('multiplier="-1" offset="0"', 'multiplier="-1" offset="100"')
+    arm = load_urdf_text(narrow)
+    assert arm.joint_names == ("j1", "j2") and arm.model.njoints == 3
+    told = str(arm.report.of_kind("fixed"))
+    assert "it should follow 'j2' with factor -1, which is not simulated (its own range leaves its" in told
+    assert "leader none): what it carries moves differently on the real robot" in told
+    first = joint("j1", "base", "l1", inside=MIMIC.format("j2", 1, 0))
+    assert "(its leader comes after it in the tree)" in findings_of(
+        ARM.replace(joint("j1", "base", "l1"), first)
     )
     both = load_robot(FIELD / "mimic_in_chain.urdf", hold=("j2=0.5",))
     assert "not simulated" not in str(both.report.findings)
@@ -215,14 +223,17 @@ def test_followers_are_placed_after_the_joints_that_do_not_move_the_tip_are_held
 def test_a_joint_that_carries_an_arm_moves_although_a_rod_follows_it() -> None:
     """A palletising robot: a rod beside the upper arm keeps the hand level. It carries nothing, and the
     joint that it follows is no gripper."""
-    rod = joint("rod", "l1", "bar", inside=MIMIC.format("j2", 1, 0))
-    arm = load_urdf_text(
-        two_joint_arm(link("l3") + joint("j3", "l2", "l3", axis="1 0 0") + link("bar") + rod)
-    )
-    assert arm.joint_names == ("j1", "j2", "j3")
-    assert "joint 'rod': held at 0 rad: it should follow 'j2' with factor 1" in str(
-        [*map(str, arm.report.findings)]
-    )
+    for name, told in (
+        ("rod", "joint 'rod': it follows 'j2': 1 · q + 0"),
+        # Pinocchio sorts joints beside one another by their names, and a follower must come after its leader.
+        ("bar", "joint 'bar': held at 0 rad: it should follow 'j2' with factor 1, which is not simulated"),
+    ):
+        rod = joint(name, "l1", "bar", inside=MIMIC.format("j2", 1, 0))
+        arm = load_urdf_text(
+            two_joint_arm(link("l3") + joint("j3", "l2", "l3", axis="1 0 0") + link("bar") + rod)
+        )
+        assert arm.joint_names == ("j1", "j2", "j3")
+        assert told in " | ".join(map(str, arm.report.findings))
 
 
 # ------------------------------------------------------------------ joints that are held

@@ -159,6 +159,13 @@ def test_a_finger_that_follows_another_is_a_mimic_joint() -> None:
     assert "equality" not in str(robot.report.findings)
 
 
+def test_a_file_without_gravity_is_reported() -> None:
+    """Its motors need not carry the arm (pusher of gymnasium); here they must."""
+    assert "note: gravity" not in " | ".join(map(str, loaded(ARM).report.findings))
+    text = ARM.replace("<default>", '<option gravity="0 0 0"/><default>', 1)
+    assert "here it acts unless plant.gravity=false" in str(loaded(text).report.findings)
+
+
 def with_keys(*keys: str, text: str = ARM) -> str:
     every = "".join(f"<key {key}/>" for key in keys)
     return text.replace("</mujoco>", f"<keyframe>{every}</keyframe></mujoco>")

@@ -11,7 +11,7 @@ from arms import full_mass_matrix, joint, link
 from arms import robot as urdf
 
 from robots import CATALOG, Plant, PlantSettings, Robot, load_robot, load_urdf_text
-from robots.truth import joint_axis
+from robots.joints import joint_axis
 
 
 def independently_changed(

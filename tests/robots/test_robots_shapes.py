@@ -206,6 +206,27 @@ def test_a_mesh_that_is_far_larger_than_the_robot_is_reported(tmp_path) -> None:
         assert ("no unit" in told) is reported
 
 
+def test_the_table_of_other_peoples_robots_shows_meshes_of_a_wrong_size(tmp_path) -> None:
+    """The largest link of a robot is neither 50 times smaller nor five times larger than the arm."""
+    import trimesh
+
+    from benchmarks.field import Tried, summary
+
+    trimesh.creation.box((0.06, 0.08, 0.3)).export(tmp_path / "part.stl")
+    rows = []
+    for scale in (1.0, 1000.0, 0.001):
+        mesh = mesh_visual("part.stl").replace('.stl"', f'.stl" scale="{scale} {scale} {scale}"')
+        (tmp_path / "arm.urdf").write_text(two_joint_arm(l2=mesh))
+        report = load_robot(tmp_path / "arm.urdf").report
+        assert report.drawn == pytest.approx(scale * 0.3 / (2 * np.hypot(0.3, 0.1)), rel=1e-3)
+        assert ("the largest link is drawn 0.3 mm large" in str(report.findings)) is (scale < 1.0)
+        rows.append(Tried(f"{scale:g}.urdf", True, True, report.drawn, ("", "", "", "")))
+    assert load(two_joint_arm()).report.drawn is None
+    assert summary(rows).endswith(
+        "2 of 3 robots with meshes are drawn at a wrong size ('1000.urdf', '0.001.urdf')."
+    )
+
+
 def test_the_wall_clock_drops_no_mesh(tmp_path, monkeypatch) -> None:
     """On a slow or busy machine reading takes long; only processor time counts."""
     a_ball(tmp_path / "ball.stl")

@@ -15,7 +15,7 @@ from app.html.text import block, joints_named
 from app.panels.widgets.chart import Chart, ChartLine, of_ghost
 from app.panels.widgets.in_view import InView
 from robots import Robot
-from robots.truth import joint_axis
+from robots.joints import joint_axis
 
 _ALL = "All joints, % of bound"
 _SHARE = 120.0  # %: the axis reaches slightly beyond the bounds
@@ -63,7 +63,7 @@ class JointPlots:
         self._gui, self._in_view = gui, in_view
         self._robot, self._input = robot, driven
         self._sheet = data_sheet(robot, driven)
-        self._prismatic = [joint_axis(robot.model, joint)[0] for joint in range(1, robot.n + 1)]
+        self._prismatic = [joint_axis(robot.model, joint)[0] for joint in robot.joints]
         self._joint: int | None = None
         self._built: tuple[int | None, bool] | None = None
         self._charts: list[Chart] = []

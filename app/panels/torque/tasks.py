@@ -24,7 +24,7 @@ from himpc.telemetry import FALLBACKS
 from lessons.events import Event, MoveLevel, MoveTarget, Set
 from lessons.settings.torque import TorqueSettings
 from robots import Robot
-from robots.truth import joint_axis
+from robots.joints import joint_axis
 
 Targets = Mapping[str, NDArray[np.float64]]
 """The raw targets that can be moved, by task."""
@@ -153,7 +153,9 @@ def _add_slider(
 ) -> None:
     at = robot.joint_names.index(joint)
     unit, factor, step, far = (
-        ("m", 1.0, 0.001, _WAY) if joint_axis(robot.model, at + 1)[0] else ("°", np.degrees(1.0), 0.1, _TURN)
+        ("m", 1.0, 0.001, _WAY)
+        if joint_axis(robot.model, robot.joints[at])[0]
+        else ("°", np.degrees(1.0), 0.1, _TURN)
     )
     digits = round(-np.log10(step))
 

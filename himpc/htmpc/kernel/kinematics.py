@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.compilation.compiled import INDICES, MATRICES, MATRIX, TABLE, kernel
+from himpc.compilation.compiled import INDICES, MATRICES, MATRIX, TABLE, VECTOR, kernel
 from himpc.compilation.views import borrowed
 from himpc.tick.kernel.kinematics import jacobian, points, rotation_of_frame
 
@@ -14,13 +14,16 @@ Indices = NDArray[np.intp]
 
 
 @kernel(
-    TABLE, INDICES, INDICES, INDICES, MATRICES, MATRICES, INDICES, MATRIX, MATRIX, MATRICES, MATRIX, MATRICES
+    *(TABLE, INDICES, INDICES, INDICES, INDICES, VECTOR, MATRICES, MATRICES),
+    *(INDICES, MATRIX, MATRIX, MATRICES, MATRIX, MATRICES),
 )
 def frame_along(
     task: Indices,
     part: Indices,
     parent: Indices,
     is_revolute: Indices,
+    column: Indices,
+    factor: Array,
     placed: Array,
     z: Array,
     joint: Indices,
@@ -34,7 +37,7 @@ def frame_along(
 
     Args:
         task, part: the tasks whose rows are computed, see `jacobian`.
-        parent, is_revolute: properties of all joints. placed, z: the results of `place_all`.
+        parent, is_revolute, column, factor: properties of all joints. placed, z: the results of `place_all`.
         joint: (1,), the joint that carries the frame. rotation, translation: the frame's axes (3, 3) and
             origin (1, 3) in that joint's frame.
         R, p, J: the result, (K, 3, 3), (K, 3) and (K, m, n).
@@ -50,4 +53,7 @@ def frame_along(
         here = p[k : k + 1]
         points(placed[k], joint, translation, here)
         rotation_of_frame(placed[k, joint[0]], rotation, R[k])
-        jacobian(task, part, parent, is_revolute, placed[k], z[k], joint, here, translation, J[k])
+        jacobian(
+            *(task, part, parent, is_revolute, column, factor, placed[k], z[k]),
+            *(joint, here, translation, J[k]),
+        )

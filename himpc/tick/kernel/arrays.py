@@ -26,9 +26,10 @@ class TickArrays(NamedTuple):
     N·m; for tasks that are angles, read rad for m.
 
     Sizes: n joints, N knots, N1 = N + 1; M rows of all tasks, m of those that are solved; r levels; T tasks;
-    F frames; G rows of tasks that Python computes; J = n + 1 placements, the world first; b rows of bounds, N
-    per constraint; g constraints with directions of their own, whose rows are the last ones; w = N · n
-    coordinates of a level; k = w + 1 active rows at most: w, and a new row that replaces one of them.
+    F frames; G rows of tasks that Python computes; J placements, of the world and of all joints, with those
+    that follow others; b rows of bounds, N per constraint; g constraints with directions of their own, whose
+    rows are the last ones; w = N · n coordinates of a level; k = w + 1 active rows at most: w, and a new row
+    that replaces one of them.
     """
 
     # The input of a tick.
@@ -98,6 +99,7 @@ class TickArrays(NamedTuple):
     rotation: Annotated[Array, "J 3 3", "1", "configure → linearize"]
     translation: Annotated[Array, "J 3", "m", "configure → linearize"]
     axis: Annotated[Array, "J 3", "1", "configure → linearize"]
+    factor: Annotated[Array, "J", "1", "configure → linearize"]
     frame_rotation: Annotated[Array, "F 3 3", "1", "configure → linearize"]
     frame_translation: Annotated[Array, "F 3", "m", "configure → linearize"]
     # The results of a tick. They are adjacent: a plan copies them in one operation.
@@ -175,7 +177,7 @@ class TickArrays(NamedTuple):
     budget: Annotated[Array, "1", "1", "solve_level problems tick → itself"]
     sizes: Annotated[
         IntArray,
-        "12",
+        "13",
         "1",
         "configure tables → control_period distance_rows fallbacks finish_tick linearize solve_level",
     ]
@@ -197,6 +199,7 @@ class TickArrays(NamedTuple):
     # The robot.
     parent: Annotated[IntArray, "J", "1", "configure → linearize"]
     is_revolute: Annotated[IntArray, "J", "1", "configure → linearize"]
+    column: Annotated[IntArray, "J", "1", "configure → linearize"]
     frame_joint: Annotated[IntArray, "F", "1", "configure → linearize"]
     # Further results of a tick.
     active_row: Annotated[IntArray, "r k", "1", "solve_level → finish_tick problems"]
@@ -231,7 +234,7 @@ Sizes = namedtuple("Sizes", "n N N1 M r T F G J b g w k")
 def sizes_of(s: IntArray) -> Sizes:
     """Returns the values of the letters for the numbers in the array `sizes`."""
     n, N, M, r, T, F, b, w, G = s[0], s[1], s[2], max(s[4], 1), s[5], s[6], s[7], s[8], s[10]
-    return Sizes(n, N, N + 1, M, r, T, F, G, n + 1, b, max(s[11], 1), w, w + 1)
+    return Sizes(n, N, N + 1, M, r, T, F, G, s[12], b, max(s[11], 1), w, w + 1)
 
 
 _VIEWS = (

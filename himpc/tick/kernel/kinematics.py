@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from himpc.compilation.compiled import inline_kernel
 from himpc.tick.kernel.arrays import Array, IntArray
@@ -17,28 +18,31 @@ def forward_kinematics(
     q: Array,
     parent: IntArray,
     is_revolute: IntArray,
+    column: IntArray,
+    factor: Array,
     rotation: Array,
     translation: Array,
     axis: Array,
     placed: Array,
     z: Array,
 ) -> None:
-    """Computes the placements of all joints at q in world axes: `placed` (n+1, 12) contains the rotation row
-    by row, then the origin; index 0 is the world. z (n+1, 3) contains the joints' axes in the world.
+    """Computes the placements of all J − 1 joints at q in world axes: `placed` (J, 12) contains the rotation
+    row by row, then the origin; index 0 is the world. z (J, 3) contains the joints' axes in the world.
 
     Args:
         q: (n,) rad or m.
         parent: index of each joint's parent, which is always smaller.
         is_revolute: whether the joint is revolute, not prismatic.
+        column, factor: the joint moves by factor · q[column], see `Geometry`.
         rotation, translation: from the parent to the joint at q = 0.
         axis: axis of the joint, in the joint's own axes.
         placed, z: the result.
     """
     for a in range(12):
         placed[0, a] = 1.0 if a % 4 == 0 and a < 9 else 0.0
-    for j in range(1, q.size + 1):
+    for j in range(1, parent.size):
         before, here = placed[parent[j]], placed[j]
-        x, y, w, angle = axis[j, 0], axis[j, 1], axis[j, 2], q[j - 1]
+        x, y, w, angle = axis[j, 0], axis[j, 1], axis[j, 2], factor[j] * q[column[j]]
         cos, sin = (math.cos(angle), math.sin(angle)) if is_revolute[j] else (1.0, 0.0)
         gone = 0.0 if is_revolute[j] else angle
         for a in range(3):
@@ -65,11 +69,19 @@ def points(placed: Array, frame_joint: IntArray, frame_translation: Array, point
 
 
 @inline_kernel
+def add(row: Array, column: int, x: Any) -> None:
+    """Adds x to an element, which keeps the sign of a zero x."""
+    row[column] = x if row[column] == 0.0 else row[column] + x
+
+
+@inline_kernel
 def jacobian(
     task: IntArray,
     part: IntArray,
     parent: IntArray,
     is_revolute: IntArray,
+    column: IntArray,
+    factor: Array,
     placed: Array,
     z: Array,
     frame_joint: IntArray,
@@ -77,12 +89,13 @@ def jacobian(
     python_jacobian: Array,
     J: Array,
 ) -> None:
-    """Computes J_i of (3) of all tasks, one below another, (M, n), in world axes at the frames' origins.
+    """Computes J_i of (3) of all tasks, one below another, (M, n), in world axes at the frames' origins. A
+    joint that follows another one adds to the column of its leader.
 
     Args:
         task: (T, 4) kind, frame, first row and number of rows of each task.
         part: (M,) for each row, the index of its axis, of its joint, or of its row in `python_jacobian`.
-        parent, is_revolute, placed, z: as in `forward_kinematics`.
+        parent, is_revolute, column, factor, placed, z: as in `forward_kinematics`.
         frame_joint, point: the joint that carries each frame, and its origin.
         python_jacobian: rows of the tasks that Python computes, (G, n).
         J: the result.
@@ -102,12 +115,13 @@ def jacobian(
             j = frame_joint[frame]
             while j > 0:
                 if kind == ORIENTATION:
-                    J[i, j - 1] = z[j, c] if is_revolute[j] else 0.0
+                    rate = z[j, c] if is_revolute[j] else 0.0
                 elif is_revolute[j]:
                     x, y = point[frame, a] - placed[j, 9 + a], point[frame, b] - placed[j, 9 + b]
-                    J[i, j - 1] = z[j, a] * y - z[j, b] * x
+                    rate = z[j, a] * y - z[j, b] * x
                 else:
-                    J[i, j - 1] = z[j, c]
+                    rate = z[j, c]
+                add(J[i], column[j], factor[j] * rate)
                 j = parent[j]
 
 
@@ -128,6 +142,8 @@ def about_one_axis(
     part: IntArray,
     parent: IntArray,
     is_revolute: IntArray,
+    column: IntArray,
+    factor: Array,
     placed: Array,
     z: Array,
     frame_joint: IntArray,
@@ -142,7 +158,7 @@ def about_one_axis(
     `jacobian`.
 
     Args:
-        task, part, parent, is_revolute, placed, z, frame_joint, J: as in `jacobian`.
+        task, part, parent, is_revolute, column, factor, placed, z, frame_joint, J: as in `jacobian`.
         frame_rotation: rotation of each frame. R_d: reference of each task.
         R_now, w: scratch for a rotation per task, and for three numbers.
     """
@@ -164,8 +180,12 @@ def about_one_axis(
             bent * w[a] * w[c] - 0.5 * w[b],
         )
         while j > 0:
+            J[i, column[j]] = 0.0
+            j = parent[j]
+        j = frame_joint[task[t, 1]]
+        while j > 0:
             if is_revolute[j]:
-                J[i, j - 1] = on_a * z[j, a] + on_b * z[j, b] + on_c * z[j, c]
+                add(J[i], column[j], factor[j] * (on_a * z[j, a] + on_b * z[j, b] + on_c * z[j, c]))
             j = parent[j]
 
 

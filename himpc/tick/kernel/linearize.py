@@ -34,15 +34,18 @@ _MODE = 9
 def jacobian_at(t: TickArrays, q: Array, python_jacobian: Array, J: Array) -> None:
     """Writes J_i of (3) of all tasks at q to J (M, n); `python_jacobian` (G, n) contains the rows that Python
     computes."""
-    forward_kinematics(q, t.parent, t.is_revolute, t.rotation, t.translation, t.axis, t.placed, t.axis_now)
+    forward_kinematics(
+        *(q, t.parent, t.is_revolute, t.column, t.factor, t.rotation, t.translation, t.axis),
+        *(t.placed, t.axis_now),
+    )
     points(t.placed, t.frame_joint, t.frame_translation, t.point)
     jacobian(
-        *(t.task, t.part, t.parent, t.is_revolute, t.placed, t.axis_now, t.frame_joint, t.point),
-        *(python_jacobian, J),
+        *(t.task, t.part, t.parent, t.is_revolute, t.column, t.factor, t.placed, t.axis_now),
+        *(t.frame_joint, t.point, python_jacobian, J),
     )
     about_one_axis(
-        *(t.task, t.part, t.parent, t.is_revolute, t.placed, t.axis_now, t.frame_joint),
-        *(t.frame_rotation, t.R_d, t.R_now, t.slope, J),
+        *(t.task, t.part, t.parent, t.is_revolute, t.column, t.factor, t.placed, t.axis_now),
+        *(t.frame_joint, t.frame_rotation, t.R_d, t.R_now, t.slope, J),
     )
 
 

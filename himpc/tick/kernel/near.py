@@ -19,7 +19,7 @@ from himpc.compilation.compiled import (
     kernel,
 )
 from himpc.compilation.views import borrowed
-from himpc.tick.kernel.kinematics import points
+from himpc.tick.kernel.kinematics import add, points
 from robots.collision import BALL, BOX, CAPSULE, FLOOR
 
 Array = NDArray[np.float64]
@@ -150,7 +150,7 @@ def share_of(kind: int, p: Vector3, d: Vector3, rotation: Array, half: Array) ->
 
 
 @kernel(
-    *(MATRICES, MATRICES, INDICES, MATRIX, INDICES, MATRIX, MATRIX, VECTOR),
+    *(MATRICES, MATRICES, INDICES, INDICES, VECTOR, MATRIX, INDICES, MATRIX, MATRIX, VECTOR),
     *(INDICES, INDICES, MATRICES, MATRIX, MATRIX, VECTOR, FLAGS, NUMBER),
     *(MATRICES, MATRICES, INDICES, INDICES, INDICES, VECTOR, VECTOR, MATRIX, MATRIX),
 )
@@ -158,7 +158,9 @@ def near(
     placed: Array,
     z: Array,
     is_revolute: Indices,
-    moves: Array,
+    column: Indices,
+    factor: Array,
+    carries: Array,
     joint: Indices,
     centre: Array,
     span: Array,
@@ -187,7 +189,8 @@ def near(
     unit vector from the shape to that point, multiplied by the Jacobian of the relative motion.
 
     Args:
-        placed, z: (K, n+1, …) joints, see `forward_kinematics`. is_revolute, moves: see `Geometry`.
+        placed, z: (K, J, …) joints, see `forward_kinematics`.
+        is_revolute, column, factor, carries: see `Geometry`.
         joint, centre, span, radius, kind, carrier, rotation, middle, half, thickness, meets: see
             `Surroundings`.
         centres, spans: scratch, (K, S, 3).
@@ -196,7 +199,7 @@ def near(
             result.
         slopes: the gradients, with space for all pairs or for none; the result.
     """
-    K, n, S, B = len(placed), moves.shape[1], len(radius), len(kind)
+    K, S, B = len(placed), len(radius), len(kind)
     placed, z, centres, normal = borrowed(placed), borrowed(z), borrowed(centres), borrowed(normal)
     rotation, middle, half, slopes = borrowed(rotation), borrowed(middle), borrowed(half), borrowed(slopes)
     span, spans = borrowed(span), borrowed(spans)
@@ -254,10 +257,11 @@ def near(
     for r in range(min(count, len(slopes))):
         k, s, c = knot[r], sphere[r], carrier[shape[r]]
         u, C, along, t = normal[r], centres[k, s], spans[k, s], share[r]
-        for j in range(1, n + 1):
-            slopes[r, j - 1] = 0.0
+        for j in range(slopes.shape[1]):
+            slopes[r, j] = 0.0
+        for j in range(1, column.size):
             # A joint that moves both the capsule and the shape does not change their distance.
-            sign = moves[joint[s], j - 1] - moves[c, j - 1]
+            sign = carries[joint[s], j] - carries[c, j]
             if sign == 0.0:
                 continue
             w, on = z[k, j], placed[k, j]
@@ -272,5 +276,5 @@ def near(
                 )
             else:
                 rate = u[0] * w[0] + u[1] * w[1] + u[2] * w[2]
-            slopes[r, j - 1] = sign * rate
+            add(slopes[r], column[j], factor[j] * sign * rate)
     return count
