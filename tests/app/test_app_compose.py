@@ -76,7 +76,7 @@ def test_a_task_is_added_moved_reduced_merged_split_and_removed(server: PageServ
         press(wire, "Add")
         assert are("position", "elbow", "orientation", "posture")
         shown(wire, "Remove elbow")
-        assert wait_until(lambda: wire.shows("2 of 3 free"), LONG)
+        assert wait_until(lambda: wire.shows("2/3 free"), LONG)
 
         wire.press_key("4")  # before, this key belonged to no level
         assert wait_until(lambda: not settings(learner).levels[3].enabled, LONG)
@@ -86,7 +86,7 @@ def test_a_task_is_added_moved_reduced_merged_split_and_removed(server: PageServ
 
         choose(wire, "Axes", "y", at=1)
         assert wait_until(lambda: axes(learner, "elbow") == "y", LONG)
-        assert wait_until(lambda: wire.shows("1 of 1 free"), LONG)
+        assert wait_until(lambda: wire.shows("1/1 free"), LONG)
         choose(wire, "Level elbow", "▲")
         assert are("elbow", "position", "orientation", "posture")
         before = settings(learner)

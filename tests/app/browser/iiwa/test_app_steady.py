@@ -32,7 +32,7 @@ def test_a_description_of_a_scene_moves_no_button(page: Page) -> None:
 def test_a_level_that_is_off_moves_no_button(page: Page) -> None:
     """Each level is one row of about 40 px, with its buttons at the right of its text."""
     tab(page, "Tasks")
-    expect(page.get_by_text("1 of 7 free")).to_be_visible()
+    expect(page.get_by_text("1/7 free")).to_be_visible()
     first = "Each level gets the freedom"
     for place in range(2):  # an earlier test may have opened the weights of a level
         if below(page, "▼", first, place + 1) - below(page, "▼", first, place) > 100:
