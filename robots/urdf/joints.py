@@ -136,8 +136,11 @@ _LEAST_RANGE = 1e-3  # rad or m
 
 
 def _places(root: Element) -> dict[str, int]:
-    """Returns the index of each joint in Pinocchio's model, which does not depend on limits and inertias."""
+    """Returns the index of each joint in Pinocchio's model. It depends on the tree of the joints only, so
+    nothing else is read, which may not be valid yet."""
     bare = etree.fromstring(without_shapes(root))
+    for joint in bare.iterfind("joint"):
+        _drop(joint, "mimic", "dynamics", "calibration", "safety_controller")
     for limit in bare.iterfind("joint/limit"):
         limit.attrib.update({"velocity": "1", "effort": "1"})
     for link in bare.iterfind("link"):

@@ -23,7 +23,17 @@ from lessons.teaching.note import Note
 from lessons.teaching.reader import read_lesson, read_note
 
 ROOT = Path(__file__).parents[2]
-_IN_DOCS = ("authoring", "disagreements", "export", "house", "instructors", "results", "serving", "settings")
+_IN_DOCS = (
+    "authoring",
+    "disagreements",
+    "export",
+    "house",
+    "instructors",
+    "results",
+    "serving",
+    "settings",
+    "starting",
+)
 DOCUMENTS = {
     "README": "README.md",
     "contributing": "CONTRIBUTING.md",
