@@ -6,16 +6,8 @@ import re
 from pathlib import Path
 
 IN_DOCS = (
-    *(
-        "serving",
-        "export",
-        "authoring",
-        "instructors",
-        "disagreements",
-        "settings",
-        "results",
-        "house",
-    ),
+    *("starting", "serving", "export", "authoring", "instructors"),
+    *("disagreements", "settings", "results", "house"),
 )
 LINKS = {
     **{f"{where}{name}.md": f"{name}.md" for name in IN_DOCS for where in ("docs/", "")},
