@@ -150,12 +150,15 @@ class StartPanel:
                 robot.model, robot.model.getFrameId(robot.tip), robot.home, robot.tau_limit, _LARGEST_LOAD
             )
             self._pick_up = f"Pick up {f'{self._kg:g} kg' if self._kg >= 1.0 else f'{1e3 * self._kg:g} g'}"
-            usual = _PUSH_PER_KG * self._kg
-            step = float(f"{usual / 6.0:.1g}")
+            step = float(f"{_PUSH_PER_KG * self._kg / 6.0:.1g}")
             bodies = dict(zip(joint_labels(names), names, strict=True))
             body = gui.add_dropdown("Joint", tuple(bodies), initial_value=tuple(bodies)[-1])
             force = gui.add_slider(
-                "Force [N]", min=step, max=20.0 * step, step=step, initial_value=6.0 * step
+                "Force [N]",
+                min=step,
+                max=round(20.0 * step, 6),
+                step=step,
+                initial_value=round(6.0 * step, 6),
             )
             buttons = gui.add_button_group(
                 "Push",
