@@ -23,8 +23,13 @@ def no_floor(robot: Robot) -> str:
     base, rest = lowest(robot)
     if base is None:
         return "its scene has no floor: the base has no shape that could stand on one"
-    if not -_SUNK < base < _SUNK:
+    if not stands(base):
         return f"its scene has no floor: the lowest point of the base is at {base:.2f} m, and not at 0"
     if rest is not None and rest <= 0.0:
         return f"its scene has no floor: at home the arm reaches down to {rest:.2f} m"
     return ""
+
+
+def stands(base: float) -> bool:
+    """Returns whether a base whose lowest point has this height, m, stands on a floor at the height 0."""
+    return -_SUNK < base < _SUNK

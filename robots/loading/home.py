@@ -15,7 +15,12 @@ _PLAIN = 0.05  # accepted loss of score if a joint is put at the middle of its r
 
 
 def find_home(
-    model: pin.Model, frame: int, q_lower: np.ndarray, q_upper: np.ndarray, seed: int = 0
+    model: pin.Model,
+    frame: int,
+    q_lower: np.ndarray,
+    q_upper: np.ndarray,
+    seed: int = 0,
+    least_height: float = -np.inf,
 ) -> np.ndarray:
     """Returns a configuration (n,), rad, inside the limits and away from singularities and from the limits.
 
@@ -23,8 +28,8 @@ def find_home(
     then by random steps; the linear part of J is divided by the reach. The result is deterministic. Joints
     that do not move the frame are at the middle of their range (unbounded joints at 0). A chain that reaches
     below the floor (z = 0, or the height of the first joint if lower) gets a lower score, and so does a frame
-    that is less than an eighth of the reach above it: one could not drag it down. An elbow above the tip gets
-    a higher score.
+    that is less than an eighth of the reach above it, or lower than `least_height`, m: one could not drag it
+    down. An elbow above the tip gets a higher score.
     """
     lower, upper = finite_range(q_lower, q_upper)
     middle, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
@@ -37,6 +42,7 @@ def find_home(
 
     pin.forwardKinematics(model, data, middle)
     floor = min(0.0, float(data.oMi[chain[0]].translation[2]))
+    least_height = max(least_height, floor + _ROOM * reach)
 
     def score(q: np.ndarray) -> float:
         # For a single joint Pinocchio returns the Jacobian as a one-dimensional array.
@@ -52,7 +58,7 @@ def find_home(
         singular = np.linalg.svd(jacobian, compute_uv=False)
         margin = float(((half - np.abs(q - middle)) / half)[moving].min())
         bend = float(np.square((q - middle)[moving] / np.pi).mean())
-        below = 8.0 * max(0.0, floor - lowest, floor + _ROOM * reach - height) / reach
+        below = 8.0 * max(0.0, floor - lowest, least_height - height) / reach
         return float(np.log(singular.min() + 1e-9) + 0.5 * np.log(max(margin, 1e-9)) - bend - below + elbow)
 
     samples = sample_configurations(

@@ -8,14 +8,16 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pinocchio as pin
 
 from robots.collision import base_joint
 from robots.covering.covers import made_cover
 from robots.errors import listed
-from robots.floor import no_floor
+from robots.floor import no_floor, stands
 from robots.geometry.collision_model import CollisionModel
 from robots.geometry.cover import Cover
-from robots.mechanics.exclusions import collision_model
+from robots.loading.home import find_home
+from robots.mechanics.exclusions import collision_model, lowest
 from robots.report import Finding
 from robots.robot import Robot
 from robots.shapes.collision_shapes import collision_solids
@@ -25,26 +27,48 @@ from robots.shapes.read import DescribedShape, described_shapes, mesh_surfaces
 if TYPE_CHECKING:
     from robots.meshes.surfaces import Piece
 
+CLEAR = 0.04
+"""The smallest height of a moving shape above the floor at an estimated home, m: twice the distance that is
+kept from the floor."""
 WRONG_SIZE = 0.02, 5.0
 """Size of the meshes of a link, divided by the length of the arm: the largest link of a robot is not smaller
 than the first number, and no link is larger than the second."""
 
 
 def with_collision(robot: Robot, meshes: bool = True) -> Robot:
-    """Returns the robot with its collision geometry.
+    """Returns the robot with its collision geometry, and with a home at which its hand is not at the floor.
 
     meshes: whether mesh files are read; otherwise capsules replace bodies with meshes. If MuJoCo cannot use
     the shapes, all shapes are left out. The report notes this. It also notes why a robot has no floor.
     """
     try:
-        found = collision_model(robot, collision_solids(robot, meshes))
-        text = str(found)
+        robot = _raised(replace(robot, collision=collision_model(robot, collision_solids(robot, meshes))))
+        text = str(robot.collision)
     except (ValueError, RuntimeError):
-        found, text = CollisionModel(), "MuJoCo cannot use the robot's shapes: the robot touches nothing"
+        robot = replace(robot, collision=CollisionModel())
+        text = "MuJoCo cannot use the robot's shapes: the robot touches nothing"
     if not meshes:
         text += "; reading its meshes takes too long or fails"
-    with_solids = replace(_noted(robot, "contacts", text), collision=found)
-    return _noted(with_solids, "floor", missing) if (missing := no_floor(with_solids)) else with_solids
+    robot = _noted(robot, "contacts", text)
+    return _noted(robot, "floor", missing) if (missing := no_floor(robot)) else robot
+
+
+def _raised(robot: Robot) -> Robot:
+    """Returns the robot with a higher home if its shapes are nearer than CLEAR to the floor at home, and if
+    its home was estimated: a hand may reach lower than the frame by which it is dragged."""
+    base, rest = lowest(robot)
+    if base is None or not stands(base) or rest is None or rest >= CLEAR:
+        return robot
+    model, frame, limits = robot.model, robot.frame_id(robot.tip), (robot.q_lower, robot.q_upper)
+    if not np.array_equal(robot.home, find_home(model, frame, *limits)):
+        return robot
+    data = model.createData()
+    pin.forwardKinematics(model, data, robot.home)
+    height = float(pin.updateFramePlacement(model, data, frame).translation[2])
+    home = find_home(model, frame, *limits, least_height=height + CLEAR - rest)
+    higher = replace(robot, home=home)
+    higher = replace(higher, collision=collision_model(higher, robot.collision.solids))
+    return higher if (lowest(higher)[1] or 0.0) > rest else robot
 
 
 def with_cover(robot: Robot, meshes: bool = True) -> Robot:

@@ -21,6 +21,10 @@ _LEAST = 1e-6  # rad/s, N·m: a smaller limit counts as missing, because it woul
 _LEVER = 3.0  # effort limit divided by the largest gravity load
 _FASTEST = 50.0  # rad/s: no arm's joint is faster, but a limit in degrees says so
 _ACCELERATION = 10.0  # rad/s², m/s²: acceleration that the effort limit allows in addition to gravity
+_OF_CARRIER = 0.2
+"""An estimated effort limit is at least this share of that of the joint that carries this one: a wrist that
+only turns the hand carries no weight, but its motor is hardly smaller. The smallest shares in data sheets are
+0.14 (Panda, joint 5), 0.19 (UR5, wrist) and 0.36 (LBR iiwa 14)."""
 
 
 def fill_speeds(root: Element) -> Iterator[Finding]:
@@ -89,12 +93,16 @@ def fill_efforts(root: Element, model: pin.Model) -> Iterator[Finding]:
     """Fills the effort limits that are 0, in the tree and in its model: three times the largest gravity load
     plus an effort for acceleration. Yields a note for each given limit that cannot hold the robot everywhere.
 
-    τ_i = 3 max|g_i(q)| + 10 rad/s² · max M_ii(q) over sampled configurations, to two digits.
+    τ_i = 3 max|g_i(q)| + 10 rad/s² · max M_ii(q) over sampled configurations, and at least a fifth of the
+    limit of the joint of the same kind that carries joint i, to two digits.
     """
     gravity, inertia = _loads(model)
     limits = model.effortLimit.copy()
-    for joint in movable_joints(root):
+    kind: dict[int, str | None] = {}
+    for joint in sorted(movable_joints(root), key=lambda each: _coordinate(model, each)):
         place = _coordinate(model, joint)
+        index = model.getJointId(joint.get("name", ""))
+        kind[index], carrier = joint.get("type"), int(model.parents[index])
         unit = "N" if joint.get("type") == "prismatic" else "N·m"
         given = _effort(joint)
         if given > 0.0:
@@ -102,12 +110,16 @@ def fill_efforts(root: Element, model: pin.Model) -> Iterator[Finding]:
                 text = f"its effort limit is {given:.3g} {unit}; holding the robot takes up to"
                 yield Finding("note", label(joint), f"{text} {gravity[place]:.2g} {unit}")
             continue
-        effort = float(f"{max(_LEVER * gravity[place] + _ACCELERATION * inertia[place], 1e-3):.1e}")
+        own = max(_LEVER * gravity[place] + _ACCELERATION * inertia[place], 1e-3)
+        alike = kind.get(carrier) == joint.get("type")
+        least = _OF_CARRIER * limits[model.idx_vs[carrier]] if alike else 0.0
+        effort = float(f"{max(own, least):.1e}")
         limits[place] = effort
         limit = joint.find("limit")
         if limit is not None:
             limit.set("effort", repr(effort))
-        text = f"no effort limit; {effort:g} {unit} was estimated from the weight it carries"
+        source = "the weight it carries" if own >= least else "the joint that carries it"
+        text = f"no effort limit; {effort:g} {unit} was estimated from {source}"
         yield Finding("filled", label(joint), text)
     model.effortLimit = limits
 

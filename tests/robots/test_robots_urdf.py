@@ -13,6 +13,7 @@ from arms import INERTIAL, LIMIT, joint, link, load, robot, two_joint_arm
 from robots import InputError, Robot, check_urdf, load_robot
 from robots.loading.home import chain_length
 from robots.loading.importing import import_robot
+from robots.mechanics.exclusions import lowest
 from robots.meshes.files import installed_shares
 from robots.report import Kind
 from robots.shapes.read import described_shapes
@@ -274,6 +275,44 @@ EXAMPLES = {
     "so_arm_description/urdf/so101.urdf": (5, "gripper_frame_link"),
     "g1_description/urdf/g1_29dof_rev_1_0.urdf": (17, "left_rubber_hand"),
 }
+
+
+def test_a_hand_does_not_hang_in_the_floor_at_home() -> None:
+    """The tip of this arm is high enough, but its hand reaches 0.15 m lower, as that of an SO-100 does."""
+    stand = '<collision><origin xyz="0 0 0.05"/><geometry><box size="0.2 0.2 0.1"/></geometry></collision>'
+    hand = '<collision><origin xyz="0 0 -0.15"/><geometry><sphere radius="0.03"/></geometry></collision>'
+    heights = []
+    for shape in ("", hand):
+        loaded = load(
+            two_joint_arm(extra="", l2=link("l2", INERTIAL + shape)).replace(
+                link("base"), link("base", stand)
+            )
+        )
+        assert "its scene has no floor" not in texts(loaded, "note")
+        data = loaded.model.createData()
+        pin.framesForwardKinematics(loaded.model, data, loaded.home)
+        heights.append(data.oMf[loaded.frame_id(loaded.tip)].translation[2])
+    lowest_of_all = lowest(loaded)[1]
+    assert lowest_of_all is not None and lowest_of_all > 0.03
+    assert heights[1] > heights[0]
+
+
+def test_a_wrist_that_carries_no_weight_gets_a_motor_like_its_carrier() -> None:
+    """A joint that only turns the hand about the hand's own axis carries no weight, but its motor is not
+    hundred times weaker than that of the joint before it."""
+    free = '<limit lower="-2" upper="2" velocity="3"/>'
+    hand = inertial("0.01", "1e-6 1e-6 1e-6")
+    loaded = load(
+        two_joint_arm(
+            j2=joint("j2", "l1", "l2", inside=free),
+            extra=link("hand", hand) + joint("turn", "l2", "hand", inside=free, axis="1 0 0"),
+        )
+    )
+    limits = dict(zip(loaded.joint_names, loaded.tau_limit, strict=True))
+    assert limits["j1"] == 50.0  # its own
+    assert limits["turn"] == pytest.approx(0.2 * limits["j2"], rel=0.05)
+    assert limits["j2"] >= 0.2 * limits["j1"]
+    assert "2 N·m was estimated from the joint that carries it" in texts(loaded, "filled")
 
 
 @pytest.mark.parametrize("file", EXAMPLES)
