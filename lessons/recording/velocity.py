@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from himpc.catalog import OWN_METHOD
 from lessons.recording.figures import position_share, qp_figures, task_figures
 from lessons.recording.recording import Recording
-from lessons.session.velocity_rows import FALLBACKS
 from lessons.settings.values import peak
 from lessons.settings.velocity import VelocitySettings
 
@@ -39,7 +38,7 @@ def block(recording: Recording) -> dict[str, Any]:
         "solver": {
             "backend": _qp_method(session.settings),
             "route": "condensed",
-            **qp_figures(recording, FALLBACKS),
+            **qp_figures(recording),
         },
         "dynamic_leak_max": None,
         "bound_active_share": float((active > 0).any(axis=1).mean()),

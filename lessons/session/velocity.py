@@ -15,13 +15,14 @@ from himpc.missions import Progress, advanced, insert, move, release, remove, re
 from himpc.plan import Binding
 from himpc.references import Reference, previews
 from himpc.stack import Level, Stack
+from himpc.telemetry import velocity_layout_of
 from lessons.events import Event, InsertTask, MoveLevel, MoveTarget, Release, RemoveTask
 from lessons.scenes.velocity_scene import VelocityScene
 from lessons.session.obstacle_distances import ObstacleDistances
 from lessons.session.servo_commands import Commands, command_step
 from lessons.session.session import LOST_SPEED, Session
 from lessons.session.velocity_controllers import VelocityController, make_velocity_controller
-from lessons.session.velocity_rows import layout_of, write_bounds, write_plan, write_truth
+from lessons.session.velocity_rows import write_bounds, write_plan, write_truth
 from lessons.settings.missions import OrderOptions
 from lessons.settings.settings import SceneSettings
 from lessons.settings.velocity import VelocitySettings
@@ -54,7 +55,7 @@ class VelocitySession(Session):
         self._distances = ObstacleDistances(scene.robot, scene.settings.htmpc)
         self._data = scene.robot.model.createData()
         self.roles = {task.name: task for level in scene.settings.htmpc.stack for task in level.tasks}
-        self.layout = layout_of(scene.robot, scene.settings.htmpc.stack)
+        self.layout = velocity_layout_of(scene.robot, scene.settings.htmpc.stack)
         self._row = np.full(self.layout.size, np.nan)
         # Settings that do not fit the robot are refused here, not at the first tick.
         make_velocity_controller(scene.settings.controller, scene.robot, scene.settings.htmpc)
