@@ -44,6 +44,7 @@ def write_plan(row: Array, layout: Layout, plan: VelocityPlan, delta: float | No
 def write_truth(
     row: Array,
     layout: Layout,
+    t: float,
     at: Configuration,
     roles: Mapping[str, Task],
     level_index: Mapping[str, int],
@@ -51,11 +52,12 @@ def write_truth(
 ) -> None:
     """Writes the true positions of the points, their present references, and the errors.
 
+    t: the time, s.
+    at: the plant's true state.
     level_index: by role, the place of its task in the window, counted from 1.
     references: by role, the reference of its task, as far as the task is in the window.
     """
     fields = layout.fields
-    t = float(row[fields["t"]][0])
     for info in layout.tasks:
         name, task = info.name, roles[info.name]
         value = task.value(at)
