@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.catalog import OWN_METHOD
+from himpc.catalog import qp_method
 from lessons.recording.figures import position_share, qp_figures, task_figures
 from lessons.recording.recording import Recording
 from lessons.settings.values import peak
-from lessons.settings.velocity import VelocitySettings
 
 Array = NDArray[np.float64]
 
@@ -36,7 +35,7 @@ def block(recording: Recording) -> dict[str, Any]:
         "average_cost": [_mean(recording[f"cost/{name}"]) for name in layout.levels],
         "limits": _limits(recording),
         "solver": {
-            "backend": _qp_method(session.settings),
+            "backend": qp_method(session.settings.controller, session.settings.htmpc.solver),
             "route": "condensed",
             **qp_figures(recording),
         },
@@ -109,11 +108,3 @@ def _limits(recording: Recording) -> dict[str, dict[str, float | None]]:
             "acceleration": {"max_ratio": peak(np.abs(recording["acceleration"]) / bounds.a)},
             "jerk": {"max_ratio": peak(np.abs(recording["jerk"]) / bounds.j)},
         }
-
-
-def _qp_method(settings: VelocitySettings) -> str:
-    """Returns the method that solves the QPs. If the compiled method finds no solution, DAQP is tried."""
-    solver = settings.htmpc.solver
-    if settings.controller == "placo":
-        return "placo"
-    return OWN_METHOD if solver == "daqp" and settings.controller != "htidkc" else solver
