@@ -68,11 +68,10 @@ def as_numbers(value: Array) -> Array:
 def write_levels(row: Array, layout: Layout, levels: Iterable[SolvedLevel]) -> None:
     """Writes the fields that levels have at torque level and at velocity level."""
     for level in levels:
-        # These fields are adjacent.
-        start = layout.fields[f"cost/{level.name}"].start
-        code = layout.fallbacks.index(level.fallback)
-        row[start : start + 4] = level.cost, level.kkt_residual, code, level.time_us
-        row[layout.fields[f"active/{level.name}"]] = len(level.active)
+        first = layout.fields[f"cost/{level.name}"].start  # the next three fields follow
+        row[first], row[first + 1] = level.cost, level.kkt_residual
+        row[first + 2], row[first + 3] = layout.fallbacks.index(level.fallback), level.time_us
+        row[layout.fields[f"active/{level.name}"].start] = len(level.active)
 
 
 def _write_by_field(row: Array, layout: Layout, plan: Plan) -> None:
@@ -93,8 +92,9 @@ def _write_by_field(row: Array, layout: Layout, plan: Plan) -> None:
     write_levels(row, layout, plan.levels)
     marks = [0] * len(layout.joints)
     for level in plan.levels:
-        row[fields[f"leak/{level.name}"]] = level.leak
-        _mark_bounds(marks, level.active, plan.rows)
+        row[fields[f"leak/{level.name}"].start] = level.leak
+        if len(level.active):
+            _mark_bounds(marks, level.active, plan.rows)
     if plan.behind is not None:
         _mark_bounds(marks, plan.behind.solution.active, plan.behind.rows)
     row[fields["at_bound"]] = marks

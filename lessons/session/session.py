@@ -202,3 +202,7 @@ class Session(ABC):
         if self.plan is None:
             return np.empty((0, 3))
         return np.array([point(Configuration(self.robot, self._data, q, q)) for q in self.plan.q])
+
+    def reference_path(self, task: str, points: int = 200) -> Array | None:
+        """Returns one period of a periodic position reference, (points, 3) m; None for other references."""
+        return None

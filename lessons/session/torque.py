@@ -224,7 +224,6 @@ class TorqueSession(Session):
         return self._along_plan(lambda at: at.placement(frame).translation)
 
     def reference_path(self, task: str, points: int = 200) -> Array | None:
-        """Returns one period of a periodic position reference, (points, 3) m; None for other references."""
         reference = self.references.get(task)
         phase = getattr(reference, "phase", None)
         tasks = {candidate.name: candidate for candidate in _tasks(self.settings.levels)}
