@@ -116,7 +116,7 @@ class Layout:
     obstacle is near. `acceleration` and `jerk` are those of the command. `manipulability` is w = √det(J Jᵀ)
     of the hand's position under the arm's joints alone, m³. Per task: `level/<task>`, its place in the
     mission's window (NaN: it is not in the window). Per level: `step`, the accepted step of the line search,
-    and `bound`, see `lessons.session.velocity_rows.write_plan`.
+    and `bound`, the bound ‖|e*| + δ‖ of (12) on its error at the next knot (NaN if there is none).
     """
 
     size: int

@@ -46,7 +46,7 @@ class Session(ABC):
     # Each kind of session has its own kind of plan.
     plan: Any
 
-    def __init__(self, scene: Scene, seed: int, plant: Plant | VelocityPlant, layout: Layout) -> None:
+    def __init__(self, scene: Scene, seed: int, plant: Plant | VelocityPlant) -> None:
         self.settings = scene.settings
         self.plant = plant
         self.scene = scene
@@ -56,9 +56,9 @@ class Session(ABC):
         self.log: list[tuple[float, Event]] = []
         self._data = scene.robot.model.createData()
         self._mailbox: deque[Event] = deque()
-        self._arrange(layout)
 
     def _arrange(self, layout: Layout) -> None:
+        """Sets the layout of the rows; a subclass calls it before the first tick."""
         self.layout, self._row = layout, np.full(layout.size, np.nan)
 
     # ---------------------------------------------------------------- time

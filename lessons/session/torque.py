@@ -61,10 +61,10 @@ class TorqueSession(Session):
     ) -> None:
         """controllers: makes the controller that settings name. Raises InputError if the scene's settings do
         not fit its robot."""
-        plant = Plant(scene.robot, scene.settings.plant, world=scene.world)
-        super().__init__(scene, seed, plant, layout_of(scene.robot, scene.settings.levels))
+        super().__init__(scene, seed, Plant(scene.robot, scene.settings.plant, world=scene.world))
         self._controller_of = controllers
         self.controller = self._controller_of(scene.settings, scene.robot)
+        self._arrange(layout_of(scene.robot, scene.settings.levels))
         self.clearance = Clearance(self.plant)
         self.reset()
 
@@ -120,7 +120,7 @@ class TorqueSession(Session):
 
     def drain(self) -> None:
         super().drain()
-        if self.t >= self._push_until - 1e-9:
+        if self._push_until < math.inf and self.t >= self._push_until - 1e-9:
             self.plant.push(None)
             self._push_until = math.inf
 

@@ -48,11 +48,11 @@ class VelocitySession(Session):
 
     def __init__(self, scene: VelocityScene, seed: int = 0) -> None:
         """Raises InputError if the scene's settings do not fit its robot."""
-        plant = VelocityPlant(scene.robot, scene.settings.plant, seed)
-        super().__init__(scene, seed, plant, velocity_layout_of(scene.robot, scene.settings.levels))
+        super().__init__(scene, seed, VelocityPlant(scene.robot, scene.settings.plant, seed))
         self.bounds = bounds(scene.robot, scene.settings.htmpc.limits)
         self._distances = ObstacleDistances(scene.robot, scene.settings.htmpc)
         self.roles = {task.name: task for level in scene.settings.htmpc.stack for task in level.tasks}
+        self._arrange(velocity_layout_of(scene.robot, scene.settings.htmpc.stack))
         # Settings that do not fit the robot are refused here, not at the first tick.
         make_velocity_controller(scene.settings.controller, scene.robot, scene.settings.htmpc)
         self.reset()
