@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from himpc.htmpc import VelocityPlan, base_joints
 from himpc.kinematics.configuration import Configuration
-from himpc.plan import as_numbers, write_levels, write_reference
+from himpc.plan.row import as_numbers, write_levels, write_reference
 from himpc.references import Reference
 from himpc.tasks import Task
 from himpc.telemetry import AT_ACCELERATION, AT_POSITION, AT_VELOCITY, Layout
