@@ -87,7 +87,7 @@ class Session(ABC):
         """Computes one step: events, plan and row if a control period begins, then the plant. Returns the row
         of `tick` if a control period ended with it, else None."""
         begins = not self.between
-        if begins:
+        if begins and (self._mailbox or self._script):
             self.drain()
         row, at, plant = self._row, self.layout.fields, self.plant
         if begins:

@@ -118,12 +118,6 @@ class TorqueSession(Session):
         reference = self.references.get(task)
         return reference if isinstance(reference, Target) else None
 
-    def drain(self) -> None:
-        super().drain()
-        if self._push_until < math.inf and self.t >= self._push_until - 1e-9:
-            self.plant.push(None)
-            self._push_until = math.inf
-
     def _happen(self, event: Event) -> None:
         match event:
             case MoveTarget(task, value):
@@ -175,6 +169,9 @@ class TorqueSession(Session):
     def _decide(self, t: float, q: Array, v: Array) -> PlantState:
         settings, plant, row, at = self.settings, self.plant, self._row, self.layout.fields
         tau, T_s = plant.tau, settings.T_s
+        if t >= self._push_until - 1e-9:
+            plant.push(None)
+            self._push_until = math.inf
         state = plant.measure(T_s)
         around = observed(plant, settings.limits.avoidance)
         ahead = Outlook(self.references, t, T_s, settings.horizon, around)
