@@ -46,9 +46,8 @@ def child(scene: str, down: float, variants: list[str]) -> None:
     from himpc.references import Outlook
     from lessons.events import MoveTarget
     from lessons.scenes.run_spec import RunSpec
-    from lessons.scenes.torque_scene import TorqueScene
+    from lessons.session.start import begin
     from lessons.session.torque import TorqueSession
-    from lessons.session.velocity import VelocitySession
 
     sessions: list[Any] = []
     in_plant: list[int] = []
@@ -57,8 +56,7 @@ def child(scene: str, down: float, variants: list[str]) -> None:
         named = next((word for word in words if "=" not in word), None)
         given = tuple(word for word in words if "=" in word)
         prepared: Any = RunSpec(scene, controller=named, set=given).prepared()
-        kind: Any = TorqueSession if isinstance(prepared, TorqueScene) else VelocitySession
-        sessions.append(session := kind(prepared))
+        sessions.append(session := begin(prepared))
         for _ in range(UNTIMED):
             session.tick()
         session.reset()

@@ -32,10 +32,13 @@ OWN_METHOD = "goldfarb-idnani"
 
 
 def qp_method(controller: str, solver: str) -> str | None:
-    """Returns the method that solves the QPs of a torque-level controller: `OWN_METHOD`, the solver, or None
-    if the controller solves no QP. If the method finds no optimum of a level, DAQP may be used in
-    addition."""
-    if controller in ("hqp", "himpc_printed"):
+    """Returns the method that solves the QPs of a controller: `OWN_METHOD`, the solver, or None if the
+    controller solves no QP. If `OWN_METHOD` finds no optimum of a level, DAQP may be used in addition."""
+    if controller == "placo":
+        return "placo"
+    if controller in ("hqp", "himpc_printed", "htidkc"):
         return solver
+    if controller in VELOCITY_CONTROLLERS:
+        return OWN_METHOD if solver == "daqp" else solver
     own = controller in ("himpc", "hiqp", "nhimpc", "weighted", "himpc_filtered")
     return OWN_METHOD if own else None

@@ -136,8 +136,8 @@ class TaskView:
 
     kind: a key of himpc.tasks.KINDS; frame: name of a link (tasks on frames only); axes: the controlled axes;
     raw: the raw value of a target that can be dragged, None for other references; path: (k, 3) closed curve
-    of a position reference, m; speed_cap: speed limit of the filtered target, m/s or rad/s; root: the
-    reference link of a relative task; normal, offset: the plane of a distance task.
+    of a position reference, m; root: the reference link of a relative task; normal, offset: the plane of a
+    distance task.
     """
 
     name: str
@@ -148,7 +148,6 @@ class TaskView:
     axes: str
     raw: np.ndarray | None
     path: np.ndarray | None
-    speed_cap: float
     root: str = ""
     normal: tuple[float, ...] = (0.0, 0.0, 1.0)
     offset: float = 0.0

@@ -28,6 +28,15 @@ class ActiveMotionRows(NamedTuple):
     multiplier: Array
     name: tuple[str, ...]
 
+    def __len__(self) -> int:
+        return self.kind.size
+
+    def labelled(self, joints: Sequence[str]) -> list[tuple[str, int, str, float, float]]:
+        """Returns (label, knot, name, multiplier, slack) of each active row."""
+        kinds, knots, parts, multipliers, names = self
+        rows = zip(kinds.tolist(), knots.tolist(), parts.tolist(), multipliers.tolist(), names, strict=True)
+        return [(KINDS[kind], knot, name or joints[int(part)], m, 0.0) for kind, knot, part, m, name in rows]
+
 
 class LevelEvidence(NamedTuple):
     """The solution of one level and its verification.
@@ -62,16 +71,10 @@ class LevelEvidence(NamedTuple):
     time_us: float
     active: ActiveMotionRows
 
-    def binding(self, joint_names: Sequence[str]) -> list[Binding]:
-        """Returns the active constraints with the names of joints and kinds."""
-        bindings: list[Binding] = []
-        kinds, knots, parts, values, names = self.active
-        rows = zip(kinds.tolist(), knots.tolist(), parts.tolist(), values.tolist(), names, strict=True)
-        for kind, knot, part, multiplier, name in rows:
-            joint = name or joint_names[int(part)]
-            side = "upper" if multiplier > 0 else "lower"
-            bindings.append(Binding(self.name, joint, KINDS[kind], side, knot, abs(multiplier), 0.0))
-        return bindings
+    @property
+    def step(self) -> float:
+        """The mean accepted step size; NaN if no QP was solved."""
+        return float(np.mean(self.steps)) if self.steps else float("nan")
 
 
 class VelocityPlan(NamedTuple):
@@ -107,7 +110,11 @@ class VelocityPlan(NamedTuple):
 
     def binding(self, joint_names: Sequence[str]) -> list[Binding]:
         """Returns all active constraints, level by level."""
-        return [bound for level in self.levels for bound in level.binding(joint_names)]
+        return [
+            binding
+            for level in self.levels
+            for binding in Binding.of(level.name, level.active.labelled(joint_names))
+        ]
 
     @property
     def unsolved(self) -> int:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sized
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,33 @@ class Binding(NamedTuple):
     knot: int
     multiplier: float
     slack: float
+
+    @classmethod
+    def of(cls, level: str, rows: Iterable[tuple[str, int, str, float, float]]) -> list[Binding]:
+        """Returns the active constraints of a level from (label, knot, name of the joint or direction,
+        multiplier, slack) of each."""
+        return [
+            cls(level, name, label, "upper" if multiplier > 0 else "lower", knot, abs(multiplier), slack)
+            for label, knot, name, multiplier, slack in rows
+        ]
+
+
+class SolvedLevel(Protocol):
+    """The data that a solved level has at torque level (`LevelSolution`) and at velocity level
+    (`himpc.htmpc.plan.LevelEvidence`)."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def cost(self) -> float: ...
+    @property
+    def kkt_residual(self) -> float: ...
+    @property
+    def fallback(self) -> str: ...
+    @property
+    def time_us(self) -> float: ...
+    @property
+    def active(self) -> Sized: ...
 
 
 class Evidence(NamedTuple):
@@ -158,15 +185,7 @@ class Plan:
         filter that follows the levels."""
         pairs = [(level, self.rows) for level in self.levels]
         return [
-            Binding(
-                level.name,
-                direction,
-                label,
-                "upper" if multiplier > 0 else "lower",
-                knot,
-                abs(multiplier),
-                slack,
-            )
+            binding
             for level, rows in (pairs if self.behind is None else [*pairs, self.behind])
-            for label, knot, direction, multiplier, slack in level.active.labelled(rows, joint_names)
+            for binding in Binding.of(level.name, level.active.labelled(rows, joint_names))
         ]

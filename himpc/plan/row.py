@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from himpc.cascade.level import ActiveRows
 from himpc.limits import Rows
 from himpc.limits.constraints import bit_of
-from himpc.plan.plan import Plan
+from himpc.plan.plan import Plan, SolvedLevel
 from himpc.references import Preview
 from himpc.rotation import quaternion
 from himpc.tasks.axes import AXES
-from himpc.telemetry import FALLBACKS, PER_LEVEL, Layout
+from himpc.telemetry import Layout, TaskInfo
 
 Array = NDArray[np.float64]
 
@@ -27,7 +27,8 @@ def write_plan(row: Array, layout: Layout, plan: Plan, ahead: Mapping[str, Previ
     if plan.fill is None or not plan.fill(row, layout):
         row.fill(math.nan)
         _write_by_field(row, layout, plan)
-        _write_references(row, layout, ahead)
+        for task in layout.tasks:
+            write_reference(row, layout, task, ahead[task.name])
     elif plan.behind is not None:
         _write_behind(row, layout, plan)
     row[fields["step_us"].start] = plan.step_us
@@ -48,23 +49,29 @@ def _write_behind(row: Array, layout: Layout, plan: Plan) -> None:
     row[fields["at_bound"]] = marks
 
 
-def _write_references(row: Array, layout: Layout, ahead: Mapping[str, Preview]) -> None:
+def write_reference(row: Array, layout: Layout, task: TaskInfo, preview: Preview) -> None:
+    """Writes the present reference of a task: x_d, ẋ_d and ẍ_d. Of the motion of a rotation, which has
+    components along all axes, it writes the components along the task's axes."""
     fields = layout.fields
-    for task in layout.tasks:
-        preview = ahead[task.name]
-        value = preview.value
-        row[fields[f"x_d/{task.name}"]] = quaternion(value) if value.ndim == 2 else value
-        row[fields[f"v_d/{task.name}"]] = on_axes(task.coordinates, preview, preview.velocity)
-        row[fields[f"a_d/{task.name}"]] = on_axes(task.coordinates, preview, preview.acceleration)
+    row[fields[f"x_d/{task.name}"]] = as_numbers(preview.value)
+    for name, motion in (("v_d", preview.velocity[0]), ("a_d", preview.acceleration[0])):
+        if preview.value.ndim == 2 and motion.size != len(task.coordinates):
+            motion = motion[[AXES.index(axis) for axis in task.coordinates]]
+        row[fields[f"{name}/{task.name}"]] = motion
 
 
-def on_axes(coordinates: Sequence[str], preview: Preview, motion: Array) -> Array:
-    """Returns the present ẋ_d or ẍ_d. For a rotation, whose motion has components along all axes, it returns
-    the components along the task's axes."""
-    now = motion[0]
-    if preview.value.ndim == 1 or now.size == len(coordinates):
-        return now
-    return now[[AXES.index(axis) for axis in coordinates]]
+def as_numbers(value: Array) -> Array:
+    """Returns a value of a task as a row contains it: a rotation matrix as a quaternion x y z w."""
+    return quaternion(value) if value.ndim == 2 else value
+
+
+def write_levels(row: Array, layout: Layout, levels: Iterable[SolvedLevel]) -> None:
+    """Writes the fields that levels have at torque level and at velocity level."""
+    for level in levels:
+        first = layout.fields[f"cost/{level.name}"].start  # the next three fields follow
+        row[first], row[first + 1] = level.cost, level.kkt_residual
+        row[first + 2], row[first + 3] = layout.fallbacks.index(level.fallback), level.time_us
+        row[layout.fields[f"active/{level.name}"].start] = len(level.active)
 
 
 def _write_by_field(row: Array, layout: Layout, plan: Plan) -> None:
@@ -78,28 +85,16 @@ def _write_by_field(row: Array, layout: Layout, plan: Plan) -> None:
     block = row[fields["tau_demand"].start : fields["q_upper"].stop].reshape(6, -1)
     block[0], block[1], block[2] = plan.tau, limits.tau_lower, limits.tau_upper
     block[3], block[4], block[5] = limits.v_limit, limits.q_lower, limits.q_upper
-    for name, value in plan.values.items():
-        where = fields.get(f"x/{name}")
-        if where is not None:
-            row[where] = quaternion(value) if value.ndim == 2 else value
-            row[fields[f"error/{name}"]] = plan.errors[name]
-    # The per-level fields are adjacent, level by level, in the order of PER_LEVEL.
-    base = fields[f"cost/{layout.levels[0]}"].start
-    evidence = [math.nan] * (len(PER_LEVEL) * len(layout.levels))
+    for task in layout.tasks:
+        if task.name in plan.values:
+            row[fields[f"x/{task.name}"]] = as_numbers(plan.values[task.name])
+            row[fields[f"error/{task.name}"]] = plan.errors[task.name]
+    write_levels(row, layout, plan.levels)
     marks = [0] * len(layout.joints)
     for level in plan.levels:
-        start = fields[f"cost/{level.name}"].start - base
-        evidence[start : start + len(PER_LEVEL)] = (
-            level.cost,
-            level.kkt_residual,
-            FALLBACKS.index(level.fallback),
-            level.time_us,
-            level.leak,
-            level.active.row.size,
-        )
-        if level.active.row.size:
+        row[fields[f"leak/{level.name}"].start] = level.leak
+        if len(level.active):
             _mark_bounds(marks, level.active, plan.rows)
-    row[base : base + len(evidence)] = evidence
     if plan.behind is not None:
         _mark_bounds(marks, plan.behind.solution.active, plan.behind.rows)
     row[fields["at_bound"]] = marks

@@ -16,20 +16,16 @@ from lessons.recording.recording import Recording
 from lessons.recording.run import run
 from lessons.recording.summary import summary
 from lessons.scenes.run_spec import RunSpec
-from lessons.session.session import Session
-from lessons.session.torque import TorqueSession
-from lessons.session.velocity import VelocitySession
 
 Array = NDArray[np.float64]
 
 TIMING_KEYS = ("step_ms", "real_time_factor")
 """Keys of a summary whose values differ from run to run; all other values are equal to the last bit."""
 
-_KEPT = ("t", "q", "v", "tau", "v_limit", "at_bound", "tau_demand", "step_us", "x", "x_d", "error", "cost")
-_KEPT_BY: Mapping[type[Session], tuple[str, ...]] = {
-    TorqueSession: (*_KEPT, "tau_lower", "tau_upper", "delta_tau"),
-    VelocitySession: (*_KEPT, "step"),
-}
+_KEPT = (
+    *("t", "q", "v", "tau", "v_limit", "at_bound", "tau_demand", "step_us", "x", "x_d", "error", "cost"),
+    *("tau_lower", "tau_upper", "delta_tau", "step"),
+)
 """The data of a run that plots need: fields, and prefixes of the fields per task and level."""
 
 
@@ -130,8 +126,7 @@ def _do(job: Work) -> JobResult:
 
 
 def _arrays(recording: Recording) -> dict[str, Array]:
-    kept = _KEPT_BY[type(recording.session)]
-    names = (name for name in recording.layout.fields if name.partition("/")[0] in kept)
+    names = (name for name in recording.layout.fields if name.partition("/")[0] in _KEPT)
     return {name: np.ascontiguousarray(recording[name]) for name in names}
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -46,13 +45,13 @@ def _rms(error: Array) -> list[float]:
     return [float(x) for x in np.sqrt((error**2).mean(axis=0))] if len(error) else []
 
 
-def qp_figures(recording: Recording, fallbacks: Sequence[str]) -> dict[str, Any]:
-    """Figures about the QPs of a run. fallbacks: the names of the fallbacks, by their code."""
+def qp_figures(recording: Recording) -> dict[str, Any]:
+    """Returns figures about the QPs of a run."""
     layout = recording.layout
     counts: Counter[str] = Counter()
     for name in layout.levels:
         codes = recording[f"fallback/{name}"][:, 0]
-        counts.update(fallbacks[int(code)] for code in codes[np.isfinite(codes)] if code > 0)
+        counts.update(layout.fallbacks[int(code)] for code in codes[np.isfinite(codes)] if code > 0)
     return {
         "solves": int(sum(np.isfinite(recording[f"kkt/{name}"]).sum() for name in layout.levels)),
         "unsolved": int(np.nansum(recording["unsolved"])),

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.catalog import qp_method
-from himpc.telemetry import FALLBACKS
 from lessons.recording.figures import position_share, qp_figures, task_figures
 from lessons.recording.recording import Recording
 from lessons.session.period import period_too_long
@@ -31,7 +30,7 @@ def block(recording: Recording) -> dict[str, Any]:
         "solver": {
             "backend": qp_method(settings.controller, settings.solver),
             "route": "printed" if settings.controller == "himpc_printed" else "compiled",
-            **qp_figures(recording, FALLBACKS),
+            **qp_figures(recording),
             "iterations": {"mean": float(iterations.mean()), "max": float(iterations.max())},
         },
         "dynamic_leak_max": peak(recording["dynamic_leak"]),

@@ -7,12 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.catalog import OWN_METHOD
+from himpc.catalog import qp_method
 from lessons.recording.figures import position_share, qp_figures, task_figures
 from lessons.recording.recording import Recording
-from lessons.session.velocity_rows import FALLBACKS
 from lessons.settings.values import peak
-from lessons.settings.velocity import VelocitySettings
 
 Array = NDArray[np.float64]
 
@@ -37,9 +35,9 @@ def block(recording: Recording) -> dict[str, Any]:
         "average_cost": [_mean(recording[f"cost/{name}"]) for name in layout.levels],
         "limits": _limits(recording),
         "solver": {
-            "backend": _qp_method(session.settings),
+            "backend": qp_method(session.settings.controller, session.settings.htmpc.solver),
             "route": "condensed",
-            **qp_figures(recording, FALLBACKS),
+            **qp_figures(recording),
         },
         "dynamic_leak_max": None,
         "bound_active_share": float((active > 0).any(axis=1).mean()),
@@ -110,11 +108,3 @@ def _limits(recording: Recording) -> dict[str, dict[str, float | None]]:
             "acceleration": {"max_ratio": peak(np.abs(recording["acceleration"]) / bounds.a)},
             "jerk": {"max_ratio": peak(np.abs(recording["jerk"]) / bounds.j)},
         }
-
-
-def _qp_method(settings: VelocitySettings) -> str:
-    """Returns the method that solves the QPs. If the compiled method finds no solution, DAQP is tried."""
-    solver = settings.htmpc.solver
-    if settings.controller == "placo":
-        return "placo"
-    return OWN_METHOD if solver == "daqp" and settings.controller != "htidkc" else solver

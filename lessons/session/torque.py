@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from himpc.controllers import Controller
 from himpc.kinematics.configuration import Configuration
-from himpc.plan import Binding, Plan, write_plan
+from himpc.plan import Plan, write_plan
 from himpc.references import Outlook, Preview, Reference, Target
 from himpc.stack import Stack, about, ranks
 from himpc.tasks import FramePosition, Task
@@ -25,13 +25,12 @@ from lessons.session.controllers import controller_of
 from lessons.session.deadline import DelayedTorque
 from lessons.session.leak import at_once, dynamic_leak
 from lessons.session.observed import observed
-from lessons.session.places import Places
-from lessons.session.session import LOST_SPEED, Session
+from lessons.session.session import Session
 from lessons.session.targets import carried, kept, move_target, target_at
 from lessons.settings.settings import SceneSettings
 from lessons.settings.stack import same_tasks
 from lessons.settings.torque import TorqueSettings
-from robots import InputError, Plant, Robot, convergence_gauge
+from robots import InputError, Plant, PlantState, Robot, convergence_gauge
 from robots.mechanics.model import compiled
 
 Array = NDArray[np.float64]
@@ -45,14 +44,14 @@ class TorqueSession(Session):
     """A run whose controller gives torques: every step is a control tick.
 
     Attributes:
-        plan: the last plan, None before the first tick.
-        controller_input: the inputs from which the controller computed it.
+        controller_input: the inputs from which the controller computed the last plan.
         clearance: measures the nearest pair.
     """
 
     scene: TorqueScene
     settings: TorqueSettings
     plant: Plant
+    plan: Plan | None
 
     def __init__(
         self,
@@ -65,27 +64,9 @@ class TorqueSession(Session):
         super().__init__(scene, seed, Plant(scene.robot, scene.settings.plant, world=scene.world))
         self._controller_of = controllers
         self.controller = self._controller_of(scene.settings, scene.robot)
-        self.layout = layout_of(scene.robot, scene.settings.levels)
-        self._data = scene.robot.model.createData()
+        self._arrange(layout_of(scene.robot, scene.settings.levels))
         self.clearance = Clearance(self.plant)
-        self._row, self._at = np.full(self.layout.size, np.nan), Places.of(self.layout)
         self.reset()
-
-    @property
-    def t(self) -> float:
-        return self.plant.t
-
-    @property
-    def step_s(self) -> float:
-        return self.settings.T_s
-
-    @property
-    def between(self) -> bool:
-        return False
-
-    @property
-    def over(self) -> bool:
-        return False
 
     def reset(self) -> None:
         super().reset()
@@ -94,7 +75,6 @@ class TorqueSession(Session):
         self.controller.reset(self.plant.tau)
         self.clearance.reset()
         self.references = self._fresh_references()
-        self.plan: Plan | None = None
         self.controller_input: ControllerInput | None = None
         self._push_until, self._ticks = math.inf, 0
         self._outbox = DelayedTorque()
@@ -138,12 +118,6 @@ class TorqueSession(Session):
         reference = self.references.get(task)
         return reference if isinstance(reference, Target) else None
 
-    def drain(self) -> None:
-        super().drain()
-        if self.t >= self._push_until - 1e-9:
-            self.plant.push(None)
-            self._push_until = math.inf
-
     def _happen(self, event: Event) -> None:
         match event:
             case MoveTarget(task, value):
@@ -178,8 +152,8 @@ class TorqueSession(Session):
         if model is not None:
             self.plant.configure(settings.plant, model)
         if recomposed:
-            self.layout, self.references, self.plan, self.controller_input = layout, references, None, None
-            self._row, self._at = np.full(layout.size, np.nan), Places.of(layout)
+            self.references, self.plan, self.controller_input = references, None, None
+            self._arrange(layout)
         self.settings = settings
 
     def _hand_over(self, taking: Controller) -> None:
@@ -192,36 +166,38 @@ class TorqueSession(Session):
         self._hand_over(self._controller_of(self.settings, self.robot))
         self.failure = None
 
-    def advance(self) -> Array:
-        """Runs one control tick and returns its row: true joint state, references, results of the controller,
-        and the torque that is applied from this tick on. The row is a buffer: copy it to keep it."""
-        if self._mailbox or self._script or self._push_until < math.inf:
-            self.drain()
-        settings, plant = self.settings, self.plant
-        T_s, t = settings.T_s, plant.t
-        q, v, tau = plant.q, plant.v, plant.tau
+    def _decide(self, t: float, q: Array, v: Array) -> PlantState:
+        settings, plant, row, at = self.settings, self.plant, self._row, self.layout.fields
+        tau, T_s = plant.tau, settings.T_s
+        if t >= self._push_until - 1e-9:
+            plant.push(None)
+            self._push_until = math.inf
         state = plant.measure(T_s)
         around = observed(plant, settings.limits.avoidance)
         ahead = Outlook(self.references, t, T_s, settings.horizon, around)
         self.controller = settled(self.controller)
         plan = self.controller.step(state.q, state.v, ahead, tau)
-        row, at = self._row, self._at
         write_plan(row, self.layout, plan, ahead)
-        row[at.t], row[at.q], row[at.v] = t, q, v
-        row[at.q_measured], row[at.v_measured] = state.q, state.v
-        row[at.v_limit], row[at.v_limit_lowered] = plan.limits.user_v_limit, plan.limits.v_limit
+        row[at["v_limit"]], row[at["v_limit_lowered"]] = plan.limits.user_v_limit, plan.limits.v_limit
         self.plan, self.controller_input = plan, ControllerInput(state.q, state.v, ahead)
-        row[at.truth], row[at.truth + 1], row[at.truth + 2] = self._true(plan, q, ahead)
+        # Adjacent fields: dynamic_leak, gauge_norm, gauge_radius.
+        truth = at["dynamic_leak"].start
+        row[truth], row[truth + 1], row[truth + 2] = self._true(plan, q, ahead)
         if plan.notice is not None:
             self.failure = plan.notice
-        late = row[at.late] = settings.is_late(1e-3 * plan.step_us)
-        row[at.tau] = plant.step(self._outbox.applied(plan.tau, late, tau), T_s)
-        row[at.touch], row[at.touch + 1] = plant.touch
-        row[at.near], row[at.near + 1] = self.clearance.measure(q, settings.limits.avoidance)
+        late = row[at["late"].start] = settings.is_late(1e-3 * plan.step_us)
+        self._applied = self._outbox.applied(plan.tau, late, tau)
+        return state
+
+    def _act(self) -> bool:
+        row, at, plant = self._row, self.layout.fields, self.plant
+        row[at["tau"]] = plant.step(self._applied, self.settings.T_s)
+        touch = at["contact_depth"].start
+        row[touch], row[touch + 1] = plant.touch
+        near, avoidance = at["distance"].start, self.settings.limits.avoidance
+        row[near], row[near + 1] = self.clearance.measure(row[at["q"]], avoidance)
         self._ticks += 1
-        if self.diverged_at is None and self._is_wild(q, v):
-            self._lost(t)
-        return row
+        return True
 
     def _true(self, plan: Plan, q: Array, ahead: Mapping[str, Preview]) -> tuple[float, float, float]:
         """Returns the true leak and the gauge of M̄, which need the plant's M, as of the last update."""
@@ -238,23 +214,13 @@ class TorqueSession(Session):
         return self._truth
 
     def _is_wild(self, q: Array, v: Array) -> bool:
-        """Returns whether control is lost. A large error alone is not a loss: a target may be out of reach,
-        or limits or distances may hold the robot."""
-        share = v / self.robot.v_limit
-        # A comparison with NaN is false, so "not within" is also true for values that are not finite.
-        slow = share.dot(share) <= LOST_SPEED**2 or float(np.abs(share).max()) <= LOST_SPEED
-        return self.plant.broken or not slow or not math.isfinite(q.dot(q))
+        return self.plant.broken or super()._is_wild(q, v)
 
     def predicted_path(self, frame: str = "") -> Array:
         """Predicted positions of a frame at knots 0 … N of the last plan, (N+1, 3) m."""
-        if self.plan is None:
-            return np.empty((0, 3))
-        return np.array(
-            [Configuration(self.robot, self._data, q, q).placement(frame).translation for q in self.plan.q]
-        )
+        return self._along_plan(lambda at: at.placement(frame).translation)
 
     def reference_path(self, task: str, points: int = 200) -> Array | None:
-        """Returns one period of a periodic position reference, (points, 3) m; None for other references."""
         reference = self.references.get(task)
         phase = getattr(reference, "phase", None)
         tasks = {candidate.name: candidate for candidate in _tasks(self.settings.levels)}
@@ -271,9 +237,6 @@ class TorqueSession(Session):
         """Returns the ranks of the enabled levels at the present posture, see `himpc.stack.ranks`."""
         q = np.asarray(self.plant.q)
         return ranks(self.settings.levels, Configuration(self.robot, self._data, q, q))
-
-    def binding(self) -> list[Binding]:
-        return [] if self.plan is None else self.plan.binding(self.robot.joint_names)
 
 
 def _tasks(stack: Stack) -> list[Task]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from typing import final
 
@@ -12,20 +11,20 @@ from numpy.typing import NDArray
 from himpc.htmpc import HTMPCSettings, VelocityPlan, base_joints, bounds
 from himpc.kinematics.configuration import Configuration
 from himpc.missions import Progress, advanced, insert, move, release, remove, reorder, where
-from himpc.plan import Binding
 from himpc.references import Reference, previews
 from himpc.stack import Level, Stack
+from himpc.telemetry import velocity_layout_of
 from lessons.events import Event, InsertTask, MoveLevel, MoveTarget, Release, RemoveTask
 from lessons.scenes.velocity_scene import VelocityScene
 from lessons.session.obstacle_distances import ObstacleDistances
 from lessons.session.servo_commands import Commands, command_step
-from lessons.session.session import LOST_SPEED, Session
+from lessons.session.session import Session
 from lessons.session.velocity_controllers import VelocityController, make_velocity_controller
-from lessons.session.velocity_rows import layout_of, write_bounds, write_plan, write_truth
+from lessons.session.velocity_rows import write_bounds, write_plan, write_truth
 from lessons.settings.missions import OrderOptions
 from lessons.settings.settings import SceneSettings
 from lessons.settings.velocity import VelocitySettings
-from robots import InputError, VelocityPlant
+from robots import InputError, PlantState, VelocityPlant
 from robots.errors import unknown_name
 
 Array = NDArray[np.float64]
@@ -40,22 +39,20 @@ class VelocitySession(Session):
         bounds: the bounds in force.
         roles: the tasks of the scene's levels by name; a mission moves their points.
         progress: the progress of the mission.
-        plan: the last plan, None before the first tick.
     """
 
     scene: VelocityScene
     settings: VelocitySettings
     plant: VelocityPlant
+    plan: VelocityPlan | None
 
     def __init__(self, scene: VelocityScene, seed: int = 0) -> None:
         """Raises InputError if the scene's settings do not fit its robot."""
         super().__init__(scene, seed, VelocityPlant(scene.robot, scene.settings.plant, seed))
         self.bounds = bounds(scene.robot, scene.settings.htmpc.limits)
         self._distances = ObstacleDistances(scene.robot, scene.settings.htmpc)
-        self._data = scene.robot.model.createData()
         self.roles = {task.name: task for level in scene.settings.htmpc.stack for task in level.tasks}
-        self.layout = layout_of(scene.robot, scene.settings.htmpc.stack)
-        self._row = np.full(self.layout.size, np.nan)
+        self._arrange(velocity_layout_of(scene.robot, scene.settings.htmpc.stack))
         # Settings that do not fit the robot are refused here, not at the first tick.
         make_velocity_controller(scene.settings.controller, scene.robot, scene.settings.htmpc)
         self.reset()
@@ -71,7 +68,6 @@ class VelocitySession(Session):
         home, _ = self._points(self.scene.q_0, np.zeros(self.robot.n))
         self.progress = Progress(self.settings.options.mission(home))
         self._stack: Stack = ()
-        self.plan: VelocityPlan | None = None
         self.controller: VelocityController | None = None
         self._solve_ms = 0.0
         self._commands: Commands | None = None
@@ -142,13 +138,7 @@ class VelocitySession(Session):
     def predicted_path(self, role: str) -> Array:
         """Returns the positions of a role's point in the last plan, knots 0 … N, (N+1, m) m; empty before the
         first tick."""
-        if self.plan is None:
-            return np.empty((0, 3))
-        task = self.roles[role]
-        return np.array([task.value(Configuration(self.robot, self._data, q, q)) for q in self.plan.q])
-
-    def binding(self) -> list[Binding]:
-        return [] if self.plan is None else self.plan.binding(self.robot.joint_names)
+        return self._along_plan(self.roles[role].value)
 
     # ---------------------------------------------------------------- one tick
 
@@ -160,31 +150,13 @@ class VelocitySession(Session):
     def step_s(self) -> float:
         return command_step(self.settings.T_s)[1] if self._commands is None else self._commands.h
 
-    def advance(self) -> Array | None:
-        """Sends one command to the servos, after planning if a control period begins. Returns the row of
-        `tick` when the period is over, else None."""
-        if self._commands is None:
-            self._commands = self._decide()
-            self._nearest = self._distances.at(self.plant.q)
-        commands = self._commands
-        self.plant.step(commands.next(), commands.h)
-        self._nearest = np.minimum(self._nearest, self._distances.at(self.plant.q))
-        if not commands.done:
-            return None
-        self._commands = None
-        self._finish(self._row, commands)
-        return self._row
-
-    def _decide(self) -> Commands:
-        """Computes a plan from events and state; writes the fields that are known at the period's start."""
-        self.drain()
-        settings = self.settings
-        t, q, v = self.t, self.plant.q, self.plant.v
+    def _decide(self, t: float, q: Array, v: Array) -> PlantState:
+        settings, htmpc = self.settings, self.settings.htmpc
         state = self.plant.measure()
         points, speeds = self._points(state.q, state.v)
         self.progress = advanced(self.progress, settings.options.L, t, points, speeds)
         controller, references = self._direct()
-        ahead, htmpc = t + controller.settings.delay_s, settings.htmpc
+        ahead = t + controller.settings.delay_s
         plan = controller.step(state.q, state.v, previews(references, ahead, htmpc.dt, htmpc.horizon))
         self.plan, self._solve_ms = plan, 1e-3 * plan.step_us
         if plan.notice not in (None, self._noticed):
@@ -192,31 +164,36 @@ class VelocitySession(Session):
             self._noticed = plan.notice
         if (delayed := settings.with_delay(self._solve_ms)) != self.plant.settings:
             self.plant.configure(delayed)
-        row = self._row
+        row, fields = self._row, self.layout.fields
         row.fill(np.nan)
-        fields = self.layout.fields
-        row[fields["t"]], row[fields["q"]], row[fields["v"]] = t, q, v
-        row[fields["q_measured"]], row[fields["v_measured"]] = state.q, state.v
         row[fields["tau_0"]] = self._commanded
         l_0 = row[fields["place"]] = self.progress.l_0
         row[fields["left"]] = len(self.progress.mission) - l_0
         write_plan(row, self.layout, plan, settings.lexicographic_delta)
         at = Configuration(self.robot, self._data, q, v)
         level_index = {level.name: index for index, level in enumerate(self._stack, start=1)}
-        write_truth(row, self.layout, at, self.roles, level_index, references)
-        return Commands(plan, htmpc.period, self._commanded)
+        write_truth(row, self.layout, t, at, self.roles, level_index, references)
+        self._commands = Commands(plan, htmpc.period, self._commanded)
+        self._nearest = self._distances.at(q)
+        return state
 
-    def _finish(self, row: Array, commands: Commands) -> None:
-        """Writes the fields that are known at the end of the period."""
-        fields, U = self.layout.fields, commands.plan.motion.U
+    def _act(self) -> bool:
+        """Sends one command to the servos."""
+        commands = self._commands
+        assert commands is not None
+        self.plant.step(commands.next(), commands.h)
+        self._nearest = np.minimum(self._nearest, self._distances.at(self.plant.q))
+        if not commands.done:
+            return False
+        self._commands = None
+        row, fields, U = self._row, self.layout.fields, commands.plan.motion.U
         row[fields["tau"]] = row[fields["tau_demand"]] = commands.last
         row[fields["acceleration"]] = commands.sharpest
         row[fields["clearance"]], row[fields["clearance_reported"]] = self._nearest
         row[fields["jerk"]] = (U[0] - self._input) / min(commands.period, self.settings.htmpc.dt)
         write_bounds(row, self.layout)
         self._commanded, self._input = commands.last, U[0]
-        if self.diverged_at is None and self._is_wild(row):
-            self._lost(float(row[fields["t"]][0]))
+        return True
 
     def _direct(self) -> tuple[VelocityController, dict[str, Reference]]:
         """Returns the controller, with the window as its stack, and the references of its tasks by name."""
@@ -245,12 +222,3 @@ class VelocitySession(Session):
     def _points(self, q: Array, v: Array) -> tuple[dict[str, Array], dict[str, float]]:
         """Returns the position of each role's point, and its speed (m/s or rad/s)."""
         return where(Configuration(self.robot, self._data, q, v), self.roles)
-
-    def _is_wild(self, row: Array) -> bool:
-        """Returns whether the state is not finite or far too fast. A large error does not count: missions
-        have goals metres away.
-        """
-        fields = self.layout.fields
-        fastest = float((np.abs(row[fields["v"]]) / self.robot.v_limit).max())
-        # A comparison with NaN is false, so "not within" is also true for values that are not finite.
-        return not fastest <= LOST_SPEED or not math.isfinite(float(row[fields["q"]].sum()))

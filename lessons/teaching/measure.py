@@ -56,8 +56,7 @@ class Signal:
     """One number per tick.
 
     Attributes:
-        name: a key of DERIVED, or a field of telemetry (`himpc.telemetry.layout_of`, and for velocity-level
-            scenes `lessons.session.velocity_rows.layout_of`).
+        name: a key of DERIVED, or a field of telemetry (`himpc.telemetry.Layout`).
         unit: a key of UNITS.
         column: index of a component of the field; None: the field's Euclidean norm.
     """

@@ -13,14 +13,13 @@ import pytest
 from course_runs import CourseRuns
 from latex2mathml.converter import convert
 
-from himpc.telemetry import layout_of
+from himpc.telemetry import layout_of, velocity_layout_of
 from lessons.course import COURSE, load_lesson
 from lessons.events import MoveTarget, Push, Set
 from lessons.parallel import one_by_one
 from lessons.scenes.run_spec import RunSpec
 from lessons.scenes.scene import Scene
 from lessons.scenes.torque_scene import TorqueScene
-from lessons.session.velocity_rows import layout_of as mobile_layout_of
 from lessons.settings.assignments import parse_assignment
 from lessons.teaching.challenge import Challenge, Score
 from lessons.teaching.check import Verdict, check, measured
@@ -75,7 +74,7 @@ def fields_of(scene: Scene) -> dict[str, slice]:
     """Returns the telemetry fields of a scene."""
     if isinstance(scene, TorqueScene):
         return layout_of(scene.robot, scene.settings.levels).fields
-    return mobile_layout_of(scene.robot, scene.settings.levels).fields
+    return velocity_layout_of(scene.robot, scene.settings.levels).fields
 
 
 @pytest.mark.parametrize("name", COURSE)

@@ -12,7 +12,9 @@ from session_rows import value
 from lessons.events import MoveTarget, Push, Set
 from lessons.recording.run import run
 from lessons.recording.summary import summary
+from lessons.scenes.catalog import load_scene, prepared
 from lessons.scenes.torque_scene import TorqueScene
+from lessons.session.start import begin
 from lessons.session.torque import TorqueSession
 from lessons.settings.assignments import with_assignments
 
@@ -52,6 +54,25 @@ def test_a_row_tells_the_truth(session: TorqueSession) -> None:
     assert value(session, row, "dynamic_leak")[0] >= 0
     assert value(session, row, "unsolved")[0] == 0
     assert value(session, row, "gauge_radius")[0] > 0
+
+
+@pytest.mark.parametrize(
+    ("name", "controller"), [("planar3-hold", "himpc"), ("planar3-hold", "hqp"), ("iiwa14-htmpc", "htmpc")]
+)
+def test_a_row_contains_the_figures_of_every_level(name: str, controller: str) -> None:
+    """At torque level and at velocity level, a row contains the figures of every level of the plan, and the
+    code of its fallback is the place of its name in the layout."""
+    session = begin(prepared(load_scene(name), controller, ()))
+    for _ in range(3):
+        row = session.tick()
+        assert session.plan.levels
+        for level in session.plan.levels:
+            fields = "cost", "kkt", "fallback", "time_us", "active"
+            code = session.layout.fallbacks.index(level.fallback)
+            figures = level.cost, level.kkt_residual, code, level.time_us, len(level.active)
+            assert (
+                tuple(row[session.layout.fields[f"{field}/{level.name}"]][0] for field in fields) == figures
+            )
 
 
 def test_the_gauge_follows_M_bar(session: TorqueSession) -> None:

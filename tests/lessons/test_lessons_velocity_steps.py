@@ -9,12 +9,12 @@ import pinocchio as pin
 import pytest
 
 from himpc.htmpc import HTMPC, VelocityPlan
+from himpc.telemetry import AT_ACCELERATION, AT_VELOCITY
 from lessons.events import Event, MoveLevel, MoveTarget, Reset, Set
 from lessons.scenes.catalog import as_torque_scene, load_scene, prepared
 from lessons.scenes.run_spec import RunSpec
 from lessons.scenes.velocity_scene import VelocityScene
 from lessons.session.velocity import VelocitySession
-from lessons.session.velocity_rows import AT_ACCELERATION, AT_VELOCITY, FALLBACKS
 from robots import InputError
 from robots.stretch import horizontal_reach
 
@@ -201,7 +201,8 @@ def test_the_learner_reads_once_what_placo_says() -> None:
     (notice,) = made.notices
     assert "placo found no velocity, and the robot brakes: Problem: Infeasible QP" in notice
     at = made.layout.fields
-    assert {float(row[at["fallback/position"]][0]) for row in rows} == {float(FALLBACKS.index("keep"))}
+    keep = made.layout.fallbacks.index("keep")
+    assert {float(row[at["fallback/position"]][0]) for row in rows} == {float(keep)}
     np.testing.assert_allclose(rows[-1][at["q"]], made.robot.home, atol=1e-9)
     made.post(Set("first_level", "scaled"))
     rows = [made.tick().copy() for _ in range(150)]

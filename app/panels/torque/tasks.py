@@ -20,7 +20,6 @@ from app.panels.widgets.mirror import Bindings
 from app.panels.widgets.snapshot import SessionSnapshot
 from himpc.stack import Level
 from himpc.tasks import Joints, Posture
-from himpc.telemetry import FALLBACKS
 from lessons.events import Event, MoveLevel, MoveTarget, Set
 from lessons.settings.torque import TorqueSettings
 from robots import Robot
@@ -87,8 +86,6 @@ class LevelCard:
 
     def update(self, now: SessionSnapshot[TorqueSettings], level: Level, place: int) -> None:
         errors = [(task.name, now.error(task.name), task.unit) for task in level.tasks]
-        fallback = now.number(f"fallback/{level.name}")
-        failed = level.enabled and fallback == fallback and fallback > 0
         found = now.status.ranks.get(level.name)
         for row in self._rows:
             row.update(
@@ -99,7 +96,7 @@ class LevelCard:
                 error_in_words(errors),
                 "" if found is None or not level.enabled else f"{found[0]}/{found[1]} free",
                 _rank(found),
-                FALLBACKS[int(fallback)] if failed else "",
+                now.fallback(level.name) if level.enabled else "",
             )
 
 

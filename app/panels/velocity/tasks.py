@@ -15,7 +15,6 @@ from app.panels.widgets.mirror import Bindings
 from app.panels.widgets.snapshot import SessionSnapshot
 from himpc.stack import Level
 from lessons.events import Set
-from lessons.session.velocity_rows import FALLBACKS
 from lessons.settings.velocity import VelocitySettings
 
 
@@ -98,7 +97,6 @@ class _Card:
     def update(self, now: SessionSnapshot[VelocitySettings], level: Level, place: int, inside: bool) -> None:
         task = level.tasks[0]
         error, bound = now.error(task.name), now.number(f"bound/{level.name}")
-        fallback = now.number(f"fallback/{level.name}")
         for row in self._rows:
             row.update(
                 place + 1,
@@ -108,5 +106,5 @@ class _Card:
                 f"<b>{quantity(error, task.unit)}</b>" if inside else "no task now",
                 f"≤ {quantity(bound, task.unit)}" if inside and bound == bound else "",
                 "Levels below may increase the error of this level to this bound",
-                FALLBACKS[int(fallback)] if inside and fallback == fallback and fallback > 0 else "",
+                now.fallback(level.name) if inside else "",
             )

@@ -33,6 +33,12 @@ class SessionSnapshot(Generic[S_co]):
         where = self.ready.layout.fields.get(name)
         return float("nan") if where is None else float(self.latest[where][0])
 
+    def fallback(self, level: str) -> str:
+        """Returns the name of the fallback with which a level was solved at the last row; "" if none was
+        needed or the level was not solved."""
+        code = self.number(f"fallback/{level}")
+        return self.ready.layout.fallbacks[int(code)] if code > 0 else ""
+
     def error(self, task: str) -> float:
         """Returns the error norm ‖x̃‖ of a task, m or rad."""
         return float(np.linalg.norm(self.field(f"error/{task}")))

@@ -12,6 +12,8 @@ from app.link.messages import ContactPoint, TaskView
 from app.link.mission_view import MissionView
 from app.link.own_code import OwnCode
 from himpc.plan import Binding
+from himpc.tasks import PlaneDistance, Task
+from himpc.tasks.kinds import kind_name
 from robots.world import World
 
 LISTED = 24
@@ -37,9 +39,30 @@ class SessionReport(ABC):
         saved since the last call takes effect."""
         return None
 
-    @abstractmethod
     def tasks(self) -> tuple[TaskView, ...]:
         """Returns the data of the tasks that the page needs."""
+        targets = self.targets()
+        return tuple(
+            self._view(task, level.name, targets.get(task.name))
+            for level in self.session.settings.levels
+            for task in level.tasks
+        )
+
+    def _view(self, task: Task, level: str, raw: np.ndarray | None) -> TaskView:
+        robot = self.session.robot
+        return TaskView(
+            name=task.name,
+            level=level,
+            kind=kind_name(task),
+            unit=task.unit,
+            frame=str(getattr(task, "frame", "")) or robot.tip,
+            axes=str(getattr(task, "axes", "")),
+            root=str(getattr(task, "root", "")) or robot.frames[0],
+            normal=tuple(task.n.tolist()) if isinstance(task, PlaneDistance) else (0.0, 0.0, 1.0),
+            offset=task.offset if isinstance(task, PlaneDistance) else 0.0,
+            raw=raw,
+            path=self.session.reference_path(task.name),
+        )
 
     @abstractmethod
     def targets(self) -> dict[str, np.ndarray]:

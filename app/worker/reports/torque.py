@@ -7,12 +7,10 @@ from typing import final
 import numpy as np
 
 from app.link.inside import Inside, InsideRequest
-from app.link.messages import ContactPoint, TaskView
+from app.link.messages import ContactPoint
 from app.link.own_code import OwnCode
 from app.worker.reports.own_code import File
 from app.worker.reports.report import TOUCHING, SessionReport
-from himpc.tasks import PlaneDistance, Task
-from himpc.tasks.kinds import kind_name
 from lessons.geometry.look import matrix_of, plane_of
 from lessons.session.torque import TorqueSession
 from robots import InputError, convergence_eigenvalues, convergence_gauge
@@ -31,28 +29,6 @@ class TorqueRun(SessionReport):
 
     def own(self) -> OwnCode | None:
         return self._file.look(self.session)
-
-    def tasks(self) -> tuple[TaskView, ...]:
-        levels = self.session.settings.levels
-        return tuple(self._view(task, level.name) for level in levels for task in level.tasks)
-
-    def _view(self, task: Task, level: str) -> TaskView:
-        target = self.session.target(task.name)
-        robot = self.session.robot
-        return TaskView(
-            name=task.name,
-            level=level,
-            kind=kind_name(task),
-            unit=task.unit,
-            frame=str(getattr(task, "frame", "")) or robot.tip,
-            axes=str(getattr(task, "axes", "")),
-            root=str(getattr(task, "root", "")) or robot.frames[0],
-            normal=tuple(task.n.tolist()) if isinstance(task, PlaneDistance) else (0.0, 0.0, 1.0),
-            offset=task.offset if isinstance(task, PlaneDistance) else 0.0,
-            raw=None if target is None else np.array(target.raw),
-            path=self.session.reference_path(task.name),
-            speed_cap=float("nan") if target is None else target.caps.speed,
-        )
 
     def targets(self) -> dict[str, np.ndarray]:
         found = {task.name: self.session.target(task.name) for task in self.session.layout.tasks}

@@ -6,14 +6,13 @@ from typing import final
 
 import numpy as np
 
-from app.link.messages import TaskView
 from app.link.mission_view import MissionRow, MissionView, Person
 from app.worker.reports.report import SessionReport
 from himpc.htmpc import base_joints
 from himpc.missions import Follow, Go, MissionTask
 from himpc.references import Path
 from himpc.rotation import quaternion
-from himpc.tasks import FramePosition, Task
+from himpc.tasks import FramePosition
 from lessons.session.velocity import VelocitySession
 
 _ABOVE = np.array([0.0, 0.0, 0.015])
@@ -32,27 +31,6 @@ class VelocityRun(SessionReport):
     """
 
     session: VelocitySession
-
-    def tasks(self) -> tuple[TaskView, ...]:
-        targets = self.targets()
-        return tuple(
-            self._view(task, level.name, targets.get(task.name))
-            for level in self.session.settings.levels
-            for task in level.tasks
-        )
-
-    def _view(self, task: Task, level: str, raw: np.ndarray | None) -> TaskView:
-        return TaskView(
-            name=task.name,
-            level=level,
-            kind="position" if isinstance(task, FramePosition) else "orientation",
-            unit=task.unit,
-            frame=str(getattr(task, "frame", "")) or self.session.robot.tip,
-            axes=str(getattr(task, "axes", "")),
-            raw=raw,
-            path=None,
-            speed_cap=float("nan"),
-        )
 
     def targets(self) -> dict[str, np.ndarray]:
         progress = self.session.progress
