@@ -263,7 +263,7 @@ ROBOTS = {
     "spheres": ("robot",),
     "collision": ("spheres", "robot", "errors"),
     "world": ("collision", "ranges", "errors"),
-    "cover_shapes": ("world", "collision", "robot", "geometry"),
+    "cover_shapes": ("world", "collision", "per_robot", "robot", "geometry"),
     "shapes": ("joints", "truth", "per_robot", "robot", "geometry", "meshes"),
     "mechanics": (
         *("joints", "world", "collision", "truth", "robot", "geometry", "inertia", "settings", "errors"),
@@ -275,7 +275,19 @@ ROBOTS = {
     ),
     "servo": ("plant", "robot", "settings", "ranges", "signals"),
     "loading": (
-        *("joints", "plant", "covering", "floor", "mechanics", "shapes", "robot", "geometry", "mjcf", "urdf"),
+        *(
+            "joints",
+            "collision",
+            "plant",
+            "covering",
+            "floor",
+            "mechanics",
+            "shapes",
+            "robot",
+            "geometry",
+            "mjcf",
+            "urdf",
+        ),
         *("meshes", "processes", "catalog", "inertia", "report", "errors"),
     ),
 }
