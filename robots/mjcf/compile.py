@@ -17,6 +17,8 @@ from robots.report import Finding
 from robots.urdf.read import MAX_BYTES, Refusal, load_bytes, parser
 
 _INCLUDES = 100
+_LARGE = 50.0
+"""MB of mesh files. MuJoCo needs about fifteen times as much memory to compile them."""
 _TURNS = 4.0 * math.pi  # rad
 _RADIANS = (
     'its ranges look like radians, and no <compiler> says so: MuJoCo would read degrees; add angle="radian"'
@@ -74,8 +76,13 @@ def compiled_mjcf(
         spec = mujoco.MjSpec.from_string(etree.tostring(root, encoding="unicode"), assets=files)
         model = spec.compile()
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
-        reason = shortened(" ".join(str(error).split()), 150)
-        raise Refusal(source, f"MuJoCo cannot compile it ({reason}); correct it or give another") from None
+        reason, size = shortened(" ".join(str(error).split()), 150), 1e-6 * sum(map(len, files.values()))
+        advice = "correct it or give another"
+        if size > _LARGE:
+            advice = (
+                f"its meshes have {size:.0f} MB, perhaps more than the import's memory is for: simplify them"
+            )
+        raise Refusal(source, f"MuJoCo cannot compile it ({reason}); {advice}") from None
     found = (Finding("repaired", source, _RADIANS),) if turns else ()
     text = f"{len(missing)} mesh file(s) not found ({listed(missing.values())})"
     text += "" if folder else "; a zip of the robot's folder brings them along"
