@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import pickle
 import struct
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -23,6 +24,7 @@ from robots.covering.covering import covering
 from robots.geometry.cover import Capsule
 from robots.loading.importing import import_robot
 from robots.meshes.surfaces import read_meshes
+from robots.processes.isolation import DEADLINE
 from robots.shapes.link_shapes import MAX_TOTAL, link_shapes
 
 DOCUMENTS = hostile.documents()
@@ -48,7 +50,9 @@ def equal_shapes_are_covered_once() -> Iterator[None]:
 @pytest.mark.parametrize("group", range(GROUPS))
 def test_every_kind_runs_or_is_refused_in_one_sentence(group: int) -> None:
     for kind in list(DOCUMENTS)[group::GROUPS]:
+        began = time.process_time()
         result = import_robot(DOCUMENTS[kind], "my.urdf")
+        assert time.process_time() - began < DEADLINE, kind
         assert len(result.report.findings) < 300, kind
         for finding in result.report.findings:
             assert len(str(finding)) < 400, kind
