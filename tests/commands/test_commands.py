@@ -197,13 +197,13 @@ def test_lists_as_table_and_json(command: str, capfd: pytest.CaptureFixture[str]
     assert json.loads((tmp_path / "list.json").read_text()) == entries
 
 
-def test_the_catalog_can_be_checked(capfd: pytest.CaptureFixture[str]) -> None:
-    """All URDFs of the catalog are usable."""
-    for entry in CATALOG.values():
-        assert main(["robots", "--check", str(entry.path), "--json", "-"]) == 0
-        report = json.loads(capfd.readouterr().out)
-        assert report["usable"] is True
-        assert len(report["joints"]) == len(entry.M_bar)
+def test_a_urdf_of_the_catalog_can_be_checked(capfd: pytest.CaptureFixture[str]) -> None:
+    """`test_robots_catalog.py` imports the URDFs of all robots."""
+    entry = CATALOG["planar3"]
+    assert main(["robots", "--check", str(entry.path), "--json", "-"]) == 0
+    report = json.loads(capfd.readouterr().out)
+    assert report["usable"] is True
+    assert len(report["joints"]) == len(entry.M_bar)
 
 
 def test_a_urdf_that_cannot_be_used_is_reported_with_exit_1(
