@@ -233,13 +233,21 @@ def browser() -> Iterator[Browser]:
 
 
 @pytest.fixture(scope="session")
-def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The site, built by the function that the command calls; every warning counts as an error."""
+def site(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The site, built by the function that the command calls; every warning counts as an error. It has live
+    figures, whose kernel takes minutes to compile, if a selected test needs them."""
     from docs.build import build
 
     out = tmp_path_factory.mktemp("docs") / "site"
-    assert build(out) == 0
+    needed = any("live_site" in getattr(item, "fixturenames", ()) for item in request.session.items)
+    assert build(out, live=needed) == 0
     return out
+
+
+@pytest.fixture(scope="session")
+def live_site(site: Path) -> Path:
+    """The site with live figures."""
+    return site
 
 
 @pytest.fixture(scope="session")

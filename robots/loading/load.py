@@ -112,8 +112,8 @@ def import_file(
 
 
 def _zip_of(path: Path) -> Path | None:
-    """Returns the zip that the path names or lies in, the innermost one, in a time that is proportional to the
-    length of the path."""
+    """Returns the innermost zip that the path names or lies in. The time is proportional to the path's
+    length, unlike that of `path.parents`."""
     parts = path.parts
     ends = (k for k in range(len(parts), 0, -1) if parts[k - 1].lower().endswith(".zip"))
     end = next(ends, None)
