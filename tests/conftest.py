@@ -4,6 +4,7 @@ examples."""
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -100,6 +101,60 @@ _QUICK = (
 """The files of the mark `quick`."""
 
 
+_MOTION = tuple(
+    f"tests/lessons/test_lessons_{name}.py"
+    for name in (
+        "adaptation",
+        "architectures",
+        "calm",
+        "distances",
+        "drag",
+        "drags",
+        "every_task",
+        "live_changes",
+        "paper_scene",
+        "planar",
+        "scenes",
+        "tasks",
+        "tick",
+        "two_arms",
+        "velocity",
+    )
+)
+"""Files whose tests assert how a controlled robot moves."""
+_TESTED = {
+    _MOTION: (
+        "robots/",
+        "himpc/",
+        *(f"lessons/{part}" for part in ("events", "experiments/", "recording/", "runs/")),
+        *(f"lessons/{part}/" for part in ("scenes", "session", "settings")),
+        "benchmarks/",
+    ),
+    "tests/robots/": ("robots/",),
+    "tests/himpc/": ("robots/", "himpc/"),
+    "tests/lessons/": ("robots/", "himpc/", "lessons/", "benchmarks/"),
+}
+"""What the tests of a package can find wrong: the package and those that it imports. Imports go in one
+direction (`tests/test_structure.py`), so that no change of another package can break it. If none of these has
+changed, a push leaves the tests out, like those that are marked nightly."""
+_ALWAYS = (
+    *_QUICK,
+    "tests/robots/test_robots_hostile.py",
+    "tests/robots/test_robots_isolation.py",
+    "tests/robots/test_robots_plant.py",
+    "tests/himpc/test_himpc_closed_loop.py",
+    "tests/himpc/test_himpc_compiling.py",
+    "tests/himpc/test_himpc_oracle.py",
+    "tests/lessons/test_lessons_course.py",
+    "tests/lessons/test_lessons_every_controller.py",
+    "tests/lessons/test_lessons_grade_attacks.py",
+    "tests/lessons/test_lessons_session.py",
+)
+"""Files of these folders that run at every push, with a representative of each kind of test."""
+_EVERYTHING = ("tests/conftest.py", "constraints.txt", "pyproject.toml", ".ci/")
+"""Files whose change may break any test."""
+
+
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
     """With `-m quick` pytest collects only the files in `_QUICK`."""
     if config.getoption("markexpr") != "quick" or collection_path.suffix != ".py":
@@ -119,6 +174,9 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     for item in items:
         if item.nodeid.startswith(_QUICK):
             item.add_marker(pytest.mark.quick)
+        tested = next((of for folder, of in _TESTED.items() if item.nodeid.startswith(folder)), None)
+        if tested and item.get_closest_marker("nightly") is None and not item.nodeid.startswith(_ALWAYS):
+            item.add_marker(pytest.mark.nightly(*tested, *_EVERYTHING))
     left_out = [item for item in items if not _runs(item, config)]
     if left_out:
         items[:] = [item for item in items if item not in set(left_out)]
@@ -127,22 +185,24 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 def _runs(item: pytest.Item, config: pytest.Config) -> bool:
     """Whether the test runs. A test that is marked `nightly` runs with `--nightly`, when the command line
-    names its file, and when one of the last commits has changed its file or a path that the mark names."""
+    names its file, and when one of the last commits has changed its file, a module of its folder that it may
+    import, or a path that the mark names."""
     mark = item.get_closest_marker("nightly")
     if mark is None or config.getoption("nightly") or _few_files(config):
         return True
     file = item.path.relative_to(_ROOT).as_posix()
-    return any(path.startswith((file, *mark.args)) for path in config.stash[_CHANGED])
+    beside = re.compile(rf"{re.escape(file.rpartition('/')[0])}/(?!test_)\w+\.py")
+    return any(path.startswith((file, *mark.args)) or beside.match(path) for path in config.stash[_CHANGED])
 
 
 def _changed() -> list[str]:
     """Returns the files that the last commits have changed, about as many as a push has. Without a repository
-    the list is empty."""
+    these are not known: the tests of all packages run, but none that is marked nightly in its file."""
     command = ["git", "-C", str(_ROOT), "log", "-n", "10", "--no-merges", "--name-only", "--format="]
     try:
         found = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     except (OSError, subprocess.CalledProcessError):
-        return []
+        return [_EVERYTHING[0]]
     return sorted(set(found.split("\n")) - {""})
 
 
