@@ -143,7 +143,6 @@ _ALWAYS = (
     "tests/robots/test_robots_isolation.py",
     "tests/robots/test_robots_plant.py",
     "tests/himpc/test_himpc_closed_loop.py",
-    "tests/himpc/test_himpc_compiling.py",
     "tests/himpc/test_himpc_oracle.py",
     "tests/lessons/test_lessons_course.py",
     "tests/lessons/test_lessons_every_controller.py",

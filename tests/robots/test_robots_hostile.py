@@ -27,6 +27,7 @@ from robots.meshes.surfaces import read_meshes
 from robots.processes.isolation import DEADLINE
 from robots.shapes.link_shapes import MAX_TOTAL, link_shapes
 
+READING = pytest.mark.nightly("robots/", "tests/robots/hostile.py")
 DOCUMENTS = hostile.documents()
 GROUPS = 8  # number of tests; with one test per kind there would be 400, most of them of one millisecond
 
@@ -47,7 +48,7 @@ def equal_shapes_are_covered_once() -> Iterator[None]:
         yield
 
 
-@pytest.mark.parametrize("group", range(GROUPS))
+@pytest.mark.parametrize("group", [pytest.param(k, marks=READING) if k > 1 else k for k in range(GROUPS)])
 def test_every_kind_runs_or_is_refused_in_one_sentence(group: int) -> None:
     for kind in list(DOCUMENTS)[group::GROUPS]:
         began = time.process_time()
