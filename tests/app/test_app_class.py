@@ -12,6 +12,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
+from served import served
 from test_app_load import get
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
@@ -20,13 +21,11 @@ from app.__main__ import main
 from app.classes.newcomers import PER_MINUTE, Newcomers
 from app.classes.words import LONGEST, ONLY_HERE
 from app.client.simulation_client import STAYING, SimulationClient
-from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
 from app.web.passes import QUERY
 from app.web.server import PageServer
 from app.web.serving import greeting
 from browsing.wire import Wire, eventually
-from lessons.scenes.run_spec import RunSpec
 
 pytestmark = pytest.mark.usefixtures("one_fork_server")
 STEP = LessonPlace("a-redundant-arm", 0)
@@ -35,9 +34,8 @@ LONG = 120.0
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[PageServer]:
-    running = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=2, class_names=True)
-    yield running
-    running.close()
+    with served(max_sessions=2, class_names=True) as running:
+        yield running
 
 
 class Line:
@@ -364,11 +362,8 @@ def test_an_address_that_phones_cannot_reach_is_said(server: PageServer) -> None
 
 
 def test_a_server_without_a_class_has_none_of_its_pages(one_fork_server: None) -> None:
-    server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
-    try:
+    with served() as server:
         assert get(f"{server.url}/class")[0] == get(f"{server.url}/v/abcdef")[0] == 403
-    finally:
-        server.close()
 
 
 def test_the_command_starts_a_class(monkeypatch: pytest.MonkeyPatch) -> None:

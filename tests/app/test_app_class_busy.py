@@ -11,6 +11,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from served import served
 from test_app_class import LONG
 
 from app.classes.hall import Hall
@@ -33,9 +34,8 @@ pytestmark = pytest.mark.usefixtures("one_fork_server")
 
 @pytest.fixture
 def server() -> Iterator[PageServer]:
-    running = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1, class_names=True)
-    yield running
-    running.close()
+    with served(class_names=True) as running:
+        yield running
 
 
 def test_pages_do_not_wait_for_robots(server: PageServer, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -70,8 +70,7 @@ def test_a_page_shows_the_next_step_before_its_robot_is_there() -> None:
     the prediction, which the robot gets when it loads the step."""
     here, there = (LessonPlace("a-redundant-arm", place) for place in (0, 1))
     first, second = (f"Next: {each.title}" for each in here.whole.steps[1:3])
-    server = PageServer(SceneChoice.opening(here.lesson), port=0, max_sessions=1, class_names=False)
-    try:
+    with served(SceneChoice.opening(here.lesson), class_names=False) as server:
         assert server.hall is not None
         with Wire(server.guest_link) as page:
             assert eventually(lambda: page.find(first) is not None, LONG)
@@ -100,8 +99,6 @@ def test_a_page_shows_the_next_step_before_its_robot_is_there() -> None:
             assert eventually(lambda: answer_of(learner.lecture) == 1, LONG)
             assert page.find(second) is not None and page.find(first) is None
             assert learner.pid == pid, "a new process would make a busy computer busier"
-    finally:
-        server.close()
 
 
 def test_a_robot_rests_after_its_run_until_its_learner_does_something(

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from served import served
 
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
@@ -27,15 +28,8 @@ LONG = 120.0
 
 @pytest.fixture
 def server(tmp_path: Path) -> Iterator[PageServer]:
-    running = PageServer(
-        SceneChoice(RunSpec("planar3-hold")),
-        port=0,
-        max_sessions=1,
-        own_files=Folder.at(str(tmp_path)),
-        key=KEY,
-    )
-    yield running
-    running.close()
+    with served(own_files=Folder.at(str(tmp_path)), key=KEY) as running:
+        yield running
 
 
 def settings(learner: SimulationClient) -> TorqueSettings:

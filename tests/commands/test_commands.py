@@ -63,6 +63,17 @@ WRONG: dict[str, tuple[list[str], str]] = {
     "a bad code for the page": (["--state", "hl1-x"], "copy all of it"),
     "a scene and a state for the page": (["--scene", "planar3-hold", "--state", "hl1-x"], "leave out"),
     "a negative deadline": (["run", "planar3-hold", "--set", "deadline_ms=-1"], "deadline_ms"),
+    **{
+        words: (["run", "ridgeback-ur10-square", "--duration", "0.1", *words.split()], says)
+        for words, says in (
+            ("--controller himpc", "choose one of htmpc"),
+            ("--controller htmcp", "'htmpc'"),
+            ("--set peak=[1]", "give x and y"),
+            ("--set delta=0.1", "'delta_m'"),
+            ("--set input_effort=[1,2]", "9 joints"),
+            ("--urdf panda", "brings its own robot"),
+        )
+    },
     "json nowhere": (["run", "planar3-hold", "--duration", "0.01", "--json", "/nowhere/x.json"], "--json"),
     "npz nowhere": (["run", "planar3-hold", "--duration", "0.01", "--npz", "/nowhere/x.npz"], "--npz"),
     "check a missing file": (["robots", "--check", "/nowhere/arm.urdf"], "/nowhere/arm.urdf"),
