@@ -136,7 +136,7 @@ _TESTED = {
 }
 """What the tests of a package can find wrong: the package and those that it imports. Imports go in one
 direction (`tests/test_structure.py`), so that no change of another package can break it. If none of these has
-changed, a push leaves the tests out, like those that are marked nightly."""
+changed, a run of all tests leaves these out, like those that are marked nightly."""
 _ALWAYS = (
     *_QUICK,
     "tests/robots/test_robots_hostile.py",
@@ -170,11 +170,13 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         return next((k for k, long in enumerate(_LONG) if item.nodeid.startswith(long)), len(_LONG))
 
     items.sort(key=rank)
+    whole = [Path(config.rootpath, each) for each in config.args] == [_ROOT / "tests"]
     for item in items:
         if item.nodeid.startswith(_QUICK):
             item.add_marker(pytest.mark.quick)
         tested = next((of for folder, of in _TESTED.items() if item.nodeid.startswith(folder)), None)
-        if tested and item.get_closest_marker("nightly") is None and not item.nodeid.startswith(_ALWAYS):
+        always = item.nodeid.startswith(_ALWAYS) or item.get_closest_marker("nightly") is not None
+        if whole and tested and not always:
             item.add_marker(pytest.mark.nightly(*tested, *_EVERYTHING))
     left_out = [item for item in items if not _runs(item, config)]
     if left_out:
@@ -195,11 +197,14 @@ def _runs(item: pytest.Item, config: pytest.Config) -> bool:
 
 
 def _changed() -> list[str]:
-    """Returns the files that the last commits have changed, about as many as a push has. Without a repository
-    these are not known: the tests of all packages run, but none that is marked nightly in its file."""
-    command = ["git", "-C", str(_ROOT), "log", "-n", "10", "--no-merges", "--name-only", "--format="]
+    """Returns the files that the last commits have changed, about as many as a push has, and those that are
+    changed and not committed. Without a repository these are not known: the tests of all packages run, but
+    none that is marked nightly in its file."""
+    found = ""
     try:
-        found = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+        for command in ("log -n 10 --no-merges --name-only --format=", "diff --name-only HEAD"):
+            words = ["git", "-C", str(_ROOT), *command.split()]
+            found += subprocess.run(words, capture_output=True, text=True, check=True).stdout
     except (OSError, subprocess.CalledProcessError):
         return [_EVERYTHING[0]]
     return sorted(set(found.split("\n")) - {""})

@@ -149,12 +149,9 @@ def test_a_lecture_from_the_step_to_who_was_right(
         lead.send(do="here", address="http://lab.example:8080/prefix/")
         shown = lead.hear("address")["address"]
         assert shown["text"] == f"http://lab.example:8080/prefix/v/{hall.code}" and "<svg" in shown["qr"]
-        assert eventually(lambda: len(server.sessions.learners) == 1, LONG)
-        (learner,) = server.sessions.learners
-        assert eventually(lambda: page.find("Your name") is not None, LONG)
-        name = page.find("Your name")
-        assert name is not None
-        page.write(name, value="Zoë")
+        assert eventually(lambda: bool(server.sessions.learners), 60.0)
+        learner = server.sessions.learners[0]
+        page.use("Your name", "Zoë")
         assert eventually(lambda: hall.name_of(learner.token) == "Zoë", LONG), page.notices
         monkeypatch.undo()
         lead.send(do="go", lesson=STEP.lesson, place=STEP.place)

@@ -111,10 +111,7 @@ def test_pages_are_counted_also_if_a_watcher_enters_the_token_or_the_teacher_lea
         assert isinstance(room, Classroom)
         assert server.guard.load.attached == 0
         with Wire(server.guest_link) as page:
-            assert eventually(lambda: page.find("Instructor's token") is not None, LONG)
-            token = page.find("Instructor's token")
-            assert token is not None
-            page.write(token, value=room.token)
+            page.use("Instructor's token", room.token)
             assert eventually(lambda: page.find("Instructor's token") is None, LONG)
             assert server.guard.load.attached == 1
             with Wire(server.link):

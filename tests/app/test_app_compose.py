@@ -29,29 +29,17 @@ def server() -> Iterator[PageServer]:
         yield running
 
 
-def shown(wire: Wire, label: str, at: int = 0) -> str:
-    """Returns the id of one of the controls with this label, counted from the top, as soon as it exists."""
-
-    def found() -> list[str]:
-        return [uuid for uuid, each in list(wire.controls.items()) if each["props"].get("label") == label]
-
-    assert wait_until(lambda: len(found()) > at, LONG), label
-    return found()[at]
-
-
-def choose(wire: Wire, label: str, value: str, at: int = 0) -> None:
-    wire.write(shown(wire, label, at), value=value)
-
-
-def press(wire: Wire, label: str) -> None:
-    wire.write(shown(wire, label), value=True)
+def shown(wire: Wire, label: str) -> str:
+    """Returns the id of the control with this label, as soon as it exists."""
+    assert wait_until(lambda: wire.find(label) is not None, LONG), label
+    return str(wire.find(label))
 
 
 def test_where_a_posture_wants_the_joints_is_set_by_sliders(server: PageServer) -> None:
     """Each joint has a slider in degrees within its limits. Sliders that are moved at the same time do not
     overwrite each other, and a reset restores them."""
     with Wire(server.link) as wire:
-        assert wait_until(lambda: bool(server.sessions.learners), LONG)
+        assert wait_until(lambda: bool(server.sessions.learners), 60.0)
         learner = server.sessions.learners[0]
 
         def target() -> np.ndarray:
@@ -113,13 +101,13 @@ def test_a_control_may_be_written_after_its_panel_was_rebuilt(
 
     monkeypatch.setattr(AddTask, "_show", slowly)
     with Wire(server.link) as wire:
-        choose(wire, "Kind", "com")
+        wire.use("Kind", "com")
         assert begun.wait(LONG)
-        press(wire, "Add")
+        wire.use("Add")
         shown(wire, "Remove com")
         rebuilt.set()
         assert ended.wait(LONG)
-        choose(wire, "Kind", "damping")  # its callback runs after the other one has ended
+        wire.use("Kind", "damping")  # its callback runs after the other one has ended
         assert wait_until(lambda: wire.shows("all joints come to rest"), LONG)
     said = capfd.readouterr()
     assert "removed" not in said.err + said.out

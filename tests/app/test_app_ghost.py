@@ -226,8 +226,8 @@ def test_a_button_that_starts_a_process_does_not_hold_up_other_pages(monkeypatch
     monkeypatch.setattr(SimulationClient, "start_ghost", start_ghost)
     with served() as server, Wire(server.link) as page:
         assert eventually(lambda: page.find("Start the ghost") is not None, LONG)
-        page.write(str(page.find("Ghost's controller")), value="osf")
-        page.write(str(page.find("Start the ghost")), value=True)
+        page.use("Ghost's controller", "osf")
+        page.use("Start the ghost")
         assert eventually(lambda: bool(waits))
     assert waits == [False]
 

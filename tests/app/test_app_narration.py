@@ -108,7 +108,7 @@ def test_a_page_without_a_mouse(one_fork_server: None) -> None:
     centimetre, and a button turns it by 5°. A sentence says that the simulation runs: to
     screen readers, and on the screen if these sentences are switched on."""
     with served("iiwa14-hold") as server, Reader(server.link) as page:
-        assert eventually(lambda: bool(server.sessions.learners))
+        assert eventually(lambda: bool(server.sessions.learners), 60.0)
         learner = server.sessions.learners[0]
 
         def targets() -> dict[str, np.ndarray]:

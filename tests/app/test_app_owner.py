@@ -73,8 +73,8 @@ def code_that_runs(path: Path, mark: Path) -> Path:
 
 
 def ask(page: Wire, field: str, path: object, button: str) -> None:
-    page.write(str(page.find(field)), value=str(path))
-    page.write(str(page.find(button)), value=True)
+    page.use(field, str(path))
+    page.use(button)
 
 
 def answer(page: Wire) -> Callable[[], str]:
@@ -127,8 +127,7 @@ def test_who_watches_a_classroom_opens_no_files(own: Path) -> None:
         assert isinstance(server.sessions, Classroom)
         for link, offered in ((server.guest_link, False), (server.link, True)):
             with Wire(link) as page:
-                assert eventually(lambda page=page: page.find("Instructor's token") is not None, LONG)
-                page.write(str(page.find("Instructor's token")), value=server.sessions.token)
+                page.use("Instructor's token", server.sessions.token)
                 assert eventually(lambda page=page: not page.shows("you are watching"), LONG)
                 assert built(page, times=2)
                 assert (page.find("Your file") is not None) is offered
@@ -198,8 +197,8 @@ def test_a_code_opens_no_file_and_does_not_say_where_files_lie(own: Path, mark: 
             ('controller="mine.py@0123456789ab"', "its fingerprint is"),
             ("controller=himcp", "Choose one of"),
         ):
-            page.write(str(page.find("Somebody's code")), value=encoded(setting))
-            page.write(str(page.find("Open it")), value=True)
+            page.use("Somebody's code", encoded(setting))
+            page.use("Open it")
             assert eventually(lambda word=word: any(word in body for _, body in page.notices), 20.0), (
                 setting,
                 page.notices,

@@ -71,15 +71,11 @@ def assert_is_alive(page: Wire, learner: Any, runs: bool) -> None:
     """Checks that the session responds, the page shows its state, and presses take effect."""
     assert learner.failure is None
     before = learner.status.ticks
-    playback = page.find("Playback")
-    assert playback is not None
-    page.write(playback, value="Step")
+    page.use("Playback", "Step")
     assert eventually(lambda: page.shows("Paused"))
     if runs:
         assert eventually(lambda: learner.status.ticks != before)
-    speed = page.find("Speed")
-    assert speed is not None
-    page.write(speed, value=0.5)
+    page.use("Speed", 0.5)
     assert eventually(lambda: learner.status.speed == 0.5)
 
 
@@ -98,8 +94,7 @@ def test_a_press_whose_panel_goes_meanwhile_is_told_of(capfd: pytest.CaptureFixt
             folder.remove()
             words.content = "too late"
 
-        assert eventually(lambda: page.find("Rebuild me") is not None)
-        page.write(str(page.find("Rebuild me")), value=True)
+        page.use("Rebuild me")
         assert eventually(lambda: "Not taken" in [title for title, _ in page.notices])
     assert "Traceback" not in capfd.readouterr().err
 

@@ -134,8 +134,8 @@ def test_a_task_is_added_dragged_moved_reduced_merged_passed_on_and_removed(
     code = row(page, "Code").locator("textarea").input_value()
     with Wire(server.link) as elsewhere:
         assert eventually(page, lambda: elsewhere.find("Somebody's code") is not None)
-        elsewhere.write(str(elsewhere.find("Somebody's code")), value=code)
-        elsewhere.write(str(elsewhere.find("Open it")), value=True)
+        elsewhere.use("Somebody's code", code)
+        elsewhere.use("Open it")
         other = server.sessions.learners[1]
         assert eventually(page, lambda: other.settings == settings(learner)), elsewhere.notices
 
