@@ -36,7 +36,8 @@ def write_sources(folder: Path, live: bool) -> None:
         path = folder / f"{name}.md"
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")
-    shutil.copy(ROOT / "docs" / "page.webp", folder / "page.webp")
+    for name in ("page.webp", "robots.webp"):
+        shutil.copy(ROOT / "docs" / name, folder / name)
     for picture in sorted((ROOT / "docs" / "lessons").glob("*.webp")):
         shutil.copy(picture, folder / "lessons" / picture.name)
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from robots.collision import BALL, BOX, CAPSULE, FLOOR, Ball, Box, Floor, Surroundings, base_joint
 from robots.geometry.cover import Capsule, Cover
+from robots.per_robot import per_robot
 from robots.robot import Robot
 from robots.world import Post
 
@@ -90,7 +91,8 @@ def _table(shape: WorldShape) -> tuple[int, float, Array, Array, float]:
             return CAPSULE, 0.0, np.array(foot, float), np.array([0.0, 0.0, height]), radius
 
 
-def _reaches(robot: Robot, capsules: Sequence[Capsule], height: float) -> NDArray[np.bool_]:
+@per_robot
+def _reaches(robot: Robot, capsules: tuple[Capsule, ...], height: float) -> NDArray[np.bool_]:
     """Returns whether the height of each capsule above a floor depends on the posture and is positive at
     home, (S,)."""
     rng = np.random.default_rng(0)

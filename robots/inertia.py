@@ -1,5 +1,5 @@
-"""Suggests M̄ of time-delay estimation for any robot, and computes a measure of convergence for a given
-M̄."""
+"""Suggests M̄ of time-delay estimation and a payload for any robot, and computes a measure of convergence
+for a given M̄."""
 
 from __future__ import annotations
 
@@ -75,6 +75,29 @@ def rotor_inertia(model: pin.Model, q_lower: np.ndarray, q_upper: np.ndarray) ->
     _, load = largest_loads(model, q_lower, q_upper)
     least = np.maximum(0.1 * load, 5e-3 * model.effortLimit / model.velocityLimit)
     return np.array([float(f"{value:.1e}") for value in least])
+
+
+def sensible_payload(
+    model: pin.Model, frame: int, q: np.ndarray, tau_limit: np.ndarray, largest: float
+) -> float:
+    """Returns a mass, kg, that the robot can hold at a frame: a third of what its torque limits leave beside
+    gravity at q, at most `largest`, rounded down to 1, 2 or 3 times a power of ten.
+
+    m = ⅓ min_i (τ_i − |g_i|) / |Jᵀ a|_i, with the linear Jacobian J of the frame and the gravity a, m/s².
+    Robots that cannot hold themselves get 1 g.
+    """
+    data = model.createData()
+    gravity = np.abs(pin.computeGeneralizedGravity(model, data, q))
+    pin.computeJointJacobians(model, data, q)
+    pin.updateFramePlacements(model, data)
+    J = pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)[:3]
+    per_kg = np.abs(J.T @ model.gravity.linear)
+    loaded = per_kg > 1e-6
+    held = float(np.min((tau_limit - gravity)[loaded] / per_kg[loaded], initial=math.inf)) / 3.0
+    if held >= largest:
+        return largest
+    power = 10.0 ** math.floor(math.log10(max(held, 1e-3)))
+    return float(f"{power * max(share for share in (1, 2, 3) if share == 1 or share * power <= held):.1g}")
 
 
 def suggest_M_bar(

@@ -14,7 +14,7 @@ from himpc.kinematics.geometry import Geometry, geometry
 from himpc.limits.avoidance import Avoidance
 from himpc.limits.distance import row_count
 from himpc.limits.near import Near
-from himpc.references.observed import NOTHING, Observed
+from himpc.references.observed import Observed
 from himpc.tick.kernel.arena import Arena
 from himpc.tick.kernel.distance_rows import (
     CHANGED,
@@ -147,8 +147,7 @@ class Distances:
         self._fastest = np.where(limited, robot.v_limit, robot.v_limit[limited].max(initial=1.0))
         self.carried = carried(robot)
         self.velocity_margin = avoidance.velocity_margin
-        self._observed = NOTHING
-        self._know(NOTHING)
+        self._observed: Observed | None = None
 
     @property
     def room(self) -> float:
@@ -164,13 +163,12 @@ class Distances:
     def observe(self, observed: Observed) -> None:
         """Stores the present placements of the objects."""
         before, self._observed = self._observed, observed
-        if observed.shapes == before.shapes:
-            return
-        if list(map(_kind, observed.shapes)) == list(map(_kind, before.shapes)):
-            around, B = self._pairs.around, len(observed.shapes)
-            around.turn[:B], around.middle[:B] = placements(observed.shapes)
-        else:
-            self._know(observed)
+        if before is None or before.shapes != observed.shapes:
+            if before and list(map(_kind, observed.shapes)) == list(map(_kind, before.shapes)):
+                around, B = self._pairs.around, len(observed.shapes)
+                around.turn[:B], around.middle[:B] = placements(observed.shapes)
+            else:
+                self._know(observed)
 
     def _know(self, observed: Observed) -> None:
         """Prepares the arrays for a new set of objects."""
@@ -188,6 +186,7 @@ class Distances:
 
     def _find(self, q: Array) -> int:
         """Chooses the nearest pairs at the positions q; returns their number."""
+        assert self._observed is not None
         pairs, velocity = self._pairs, self._observed.velocity
         pairs.find(q, WITHIN)
         count = nearest(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from robots.collision import base_joint
 from robots.covering.covers import made_cover
 from robots.errors import listed
 from robots.floor import no_floor
@@ -49,6 +50,10 @@ def with_collision(robot: Robot, meshes: bool = True) -> Robot:
 def with_cover(robot: Robot, meshes: bool = True) -> Robot:
     """Returns a robot with the capsules that distances use. The robot must have its collision geometry.
 
+    Two moving bodies with a single body between them whose capsules are too near to keep a distance do not
+    touch in the plant either: the controller would press one against the other. The shapes of such links, as
+    link 5 and link 7 of many arms, are thicker than the real ones.
+
     meshes: whether mesh files are read. If capsules cannot contain the robot, it gets none, and the report
     notes this.
     """
@@ -57,7 +62,20 @@ def with_cover(robot: Robot, meshes: bool = True) -> Robot:
         text = str(found)
     except (ValueError, RuntimeError, ArithmeticError):
         found, text = Cover(), "no capsules contain the robot's shapes: no distance is kept"
-    return replace(_noted(robot, "distances", text), cover=found)
+    robot = replace(_noted(robot, "distances", text), cover=found)
+    known = {(pair.first, pair.second) for pair in robot.collision.excluded}
+    parents, base = robot.model.parents, base_joint(robot)
+    nested = tuple(
+        pair
+        for pair in found.excluded
+        if (pair.first, pair.second) not in known and parents[parents[pair.second]] == pair.first > base
+    )
+    if not nested:
+        return robot
+    pairs = ", ".join(" – ".join(pair.names) for pair in nested)
+    text = f"{pairs}: these links pass through each other, as no distance between them can be kept"
+    collision = replace(robot.collision, excluded=(*robot.collision.excluded, *nested))
+    return replace(_noted(robot, "contacts", text), collision=collision)
 
 
 def with_geometry(robot: Robot, meshes: bool = True) -> Robot:

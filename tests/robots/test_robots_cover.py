@@ -217,20 +217,38 @@ def test_the_import_report_tells_of_the_cover() -> None:
     assert f"{len(near)} pair(s) of neighbours" in finding.text
 
 
+PLATE = '<collision><geometry><box size="2 2 0.01"/></geometry></collision>'
+BELOW = '<collision><origin xyz="0 0 -0.15"/><geometry><sphere radius="0.005"/></geometry></collision>'
+STILL = '<limit lower="-0.001" upper="0.001" velocity="3" effort="50"/>'
+
+
 def test_bodies_that_only_their_capsules_join_are_left_out() -> None:
     """A small ball is near a large plate. The bodies do not touch, but the capsules of the plate contain the
     ball in all postures; therefore the pair is excluded."""
-    plate = '<collision><geometry><box size="2 2 0.01"/></geometry></collision>'
-    ball = '<collision><origin xyz="0 0 -0.15"/><geometry><sphere radius="0.005"/></geometry></collision>'
-    still = '<limit lower="-0.001" upper="0.001" velocity="3" effort="50"/>'
     text = urdf(
-        link("base", plate),
+        link("base", PLATE),
         link("l1"),
-        link("l2", INERTIAL + ball),
-        joint("j1", "base", "l1", inside=still),
-        joint("j2", "l1", "l2", inside=still),
+        link("l2", INERTIAL + BELOW),
+        joint("j1", "base", "l1", inside=STILL),
+        joint("j2", "l1", "l2", inside=STILL),
     )
     robot = load(text)
     pairs = {pair.names: pair.why for pair in cover_of(robot).excluded}
     assert ("base", "l2") not in {pair.names for pair in robot.collision.excluded}
     assert pairs["base", "l2"] == "home"
+
+
+def test_links_that_no_distance_keeps_apart_pass_through_each_other() -> None:
+    """The hull of a link's shape is often thicker than the link, so that a body two joints further touches
+    it. Nothing keeps these two apart, and the controller would press one against the other. A base is no such
+    link: it may be a table."""
+    names = ["base", "l1", "l2", "l3"]
+    inside = [PLATE, INERTIAL + PLATE, INERTIAL + BELOW, INERTIAL + BELOW]
+    joints = [joint(f"j{a}", a, b, inside=STILL) for a, b in pairwise(names)]
+    robot = load_urdf_text(urdf(*map(link, names, inside), *joints))
+    left_out = {pair.names for pair in robot.collision.excluded if pair.why != "neighbours"}
+    apart = {pair.names for pair in cover_of(robot).excluded if pair.why != "neighbours"}
+    assert apart == {("base", "l2"), ("l1", "l3")}
+    assert left_out == {("l1", "l3")}
+    texts = [each.text for each in robot.report.findings if each.where == "contacts"]
+    assert texts[-1].startswith("l1 – l3: these links pass through each other")

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+import pinocchio as pin
 import pytest
 from arms import full_mass_matrix
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robots import CATALOG, convergence_gauge, load_robot, suggest_M_bar
-from robots.inertia import finite_range
+from robots.inertia import finite_range, sensible_payload
 
 
 @pytest.mark.parametrize("name", CATALOG)
@@ -59,3 +62,25 @@ def test_suggestion_is_deterministic_and_copes_with_unbounded_joints() -> None:
     first, second = (suggest_M_bar(robot.model, -free, free, 50) for _ in range(2))
     np.testing.assert_array_equal(first, second)
     assert np.all(first > 0.0)
+
+
+@pytest.mark.parametrize("name", CATALOG)
+def test_a_robot_holds_three_times_its_payload(name: str) -> None:
+    """The robots of the catalog get 3 kg. One whose motors are weaker gets what three times of it can be
+    held, by gravity computed with the mass at the hand."""
+    robot = load_robot(name)
+    frame = robot.model.frames[robot.frame_id(robot.tip)]
+    gravity = pin.computeGeneralizedGravity(robot.model, robot.model.createData(), robot.home)
+    weak = replace(robot, tau_limit=np.abs(gravity) + 1e-3 * robot.tau_limit)
+    found = [
+        sensible_payload(each.model, each.frame_id(each.tip), each.home, each.tau_limit, 3.0)
+        for each in (robot, weak)
+    ]
+    assert found[0] == 3.0
+    loaded = robot.model.copy()
+    loaded.appendBodyToJoint(
+        frame.parentJoint, pin.Inertia(3.0 * found[1], np.zeros(3), np.zeros((3, 3))), frame.placement
+    )
+    with_mass = pin.computeGeneralizedGravity(loaded, loaded.createData(), robot.home)
+    assert (np.abs(with_mass) <= weak.tau_limit + 1e-9).all()
+    assert name == "planar3" or 1e-3 <= found[1] < 3.0  # gravity does not act on its joints

@@ -19,6 +19,7 @@ from app.view.reachability import Reachability
 from himpc.stack import Level
 from lessons.events import Push, Set
 from lessons.settings.torque import TorqueSettings
+from robots.inertia import sensible_payload
 
 _DIRECTIONS = {
     "+x": (1, 0, 0),
@@ -29,8 +30,9 @@ _DIRECTIONS = {
     "−z": (0, 0, -1),
 }
 PUSH_SECONDS = 0.1
-_LOAD = 3.0  # kg
-_PICK_UP, _DROP = f"Pick up {_LOAD:g} kg", "Drop the payload"
+_LARGEST_LOAD = 3.0  # kg
+_PUSH_PER_KG = 10.0  # N/kg
+_DROP = "Drop the payload"
 
 
 def guide(
@@ -83,9 +85,7 @@ def _following(tasks: tuple[TaskView, ...], places: Mapping[str, int]) -> tuple[
 
 
 def _next(places: Mapping[str, int]) -> tuple[str, str]:
-    rest = (
-        "drag the target out of reach, push the robot below, or put 5 kg on its hand in <b>Robot</b>, Plant."
-    )
+    rest = "drag the target out of reach, push the robot below, or let it pick up a mass."
     if len(places) < 2:
         return "Now add a task.", f"Add a level in the tab <b>Tasks</b>, {rest}"
     (top, first), (lower, place), *_ = places.items()
@@ -145,10 +145,21 @@ class StartPanel:
             )
             recall = gui.add_button("Bring the target to the hand")
         with gui.add_folder("Push the robot"):
-            names = ready.robot.joint_names
+            robot, names = ready.robot, ready.robot.joint_names
+            self._kg = sensible_payload(
+                robot.model, robot.model.getFrameId(robot.tip), robot.home, robot.tau_limit, _LARGEST_LOAD
+            )
+            self._pick_up = f"Pick up {f'{self._kg:g} kg' if self._kg >= 1.0 else f'{1e3 * self._kg:g} g'}"
+            step = float(f"{_PUSH_PER_KG * self._kg / 6.0:.1g}")
             bodies = dict(zip(joint_labels(names), names, strict=True))
             body = gui.add_dropdown("Joint", tuple(bodies), initial_value=tuple(bodies)[-1])
-            force = gui.add_slider("Force [N]", min=5.0, max=100.0, step=5.0, initial_value=30.0)
+            force = gui.add_slider(
+                "Force [N]",
+                min=step,
+                max=round(20.0 * step, 6),
+                step=step,
+                initial_value=round(6.0 * step, 6),
+            )
             buttons = gui.add_button_group(
                 "Push",
                 tuple(_DIRECTIONS),
@@ -161,7 +172,7 @@ class StartPanel:
                 hint="Drag any link with the mouse: the force grows with the distance, as with a rubber "
                 "band. Key G. While this is on, you cannot drag the target through a link in front of it.",
             )
-            self._load = gui.add_button(_PICK_UP, hint="The controller does not know about the payload")
+            self._load = gui.add_button(self._pick_up, hint="The controller does not know about the payload")
         with gui.add_folder("Show", expand_by_default=False):
             self.trace = gui.add_checkbox("Trace of the hand", True)
             self.prediction = gui.add_checkbox("Predicted path", True)
@@ -191,7 +202,7 @@ class StartPanel:
 
         @self._load.on_click
         async def _(_: object) -> None:
-            post(Set("plant.payload_kg", _LOAD if self._load.label == _PICK_UP else 0.0))
+            post(Set("plant.payload_kg", 0.0 if self._load.label == _DROP else self._kg))
 
         on_click(recall, lambda: self.on_recall())
 
@@ -237,6 +248,6 @@ class StartPanel:
         told = guide(tasks, levels, colours, self._dragged)
         if self._guide.content != told:
             self._guide.content = told
-        label = _DROP if now.settings.plant.payload_kg > 0 else _PICK_UP
+        label = _DROP if now.settings.plant.payload_kg > 0 else self._pick_up
         if self._load.label != label:
             self._load.label = label
