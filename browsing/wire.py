@@ -109,6 +109,13 @@ class Wire:
         """Changes attributes of a control, as its input changes `value`."""
         self.say(_messages.GuiUpdateMessage(uuid, updates))
 
+    def use(self, label: str, value: object = True) -> None:
+        """Writes the value of the control with a label, as a user does, as soon as there is such a control.
+        True presses a button."""
+        if not eventually(lambda: self.find(label) is not None, 60.0):
+            raise LookupError(f"the page has no control {label!r}")
+        self.write(str(self.find(label)), value=value)
+
     def turn(self, node: str, xyzw: Sequence[float]) -> None:
         """Turns the rings of a node in the 3D view to an orientation."""
         x, y, z, w = (float(part) for part in xyzw)

@@ -57,19 +57,20 @@ def write_films(folder: Path) -> None:
         (folder / f"{name}.js").write_text(films.film(load_lesson(name), motion), encoding="utf-8")
 
 
-def build(out: Path) -> int:
-    """Builds the site and returns Sphinx's exit code."""
+def build(out: Path, live: bool = True) -> int:
+    """Builds the site, with live figures if they are wanted and possible, and returns Sphinx's exit code."""
     from sphinx.cmd.build import build_main
 
     source = out.parent / f"{out.name}-source"
-    missing = front.missing()
+    missing = front.missing() if live else None
     if missing:
         print(missing, file=sys.stderr)
-    write_sources(source, missing is None)
+    live = live and missing is None
+    write_sources(source, live)
     shutil.rmtree(out, ignore_errors=True)
     sys.path.insert(0, str(ROOT))
     write_films(out / "films")
-    if missing is None:
+    if live:
         front.write(out)
     return build_main(
         ["-q", "-W", "--keep-going", "-b", "html", "-d", str(source / "_build"), str(source), str(out)]

@@ -4,6 +4,7 @@ examples."""
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -100,6 +101,59 @@ _QUICK = (
 """The files of the mark `quick`."""
 
 
+_MOTION = tuple(
+    f"tests/lessons/test_lessons_{name}.py"
+    for name in (
+        "adaptation",
+        "architectures",
+        "calm",
+        "distances",
+        "drag",
+        "drags",
+        "every_task",
+        "live_changes",
+        "paper_scene",
+        "planar",
+        "scenes",
+        "tasks",
+        "tick",
+        "two_arms",
+        "velocity",
+    )
+)
+"""Files whose tests assert how a controlled robot moves."""
+_TESTED = {
+    _MOTION: (
+        "robots/",
+        "himpc/",
+        *(f"lessons/{part}" for part in ("events", "experiments/", "recording/", "runs/")),
+        *(f"lessons/{part}/" for part in ("scenes", "session", "settings")),
+        "benchmarks/",
+    ),
+    "tests/robots/": ("robots/",),
+    "tests/himpc/": ("robots/", "himpc/"),
+    "tests/lessons/": ("robots/", "himpc/", "lessons/", "benchmarks/"),
+}
+"""What the tests of a package can find wrong: the package and those that it imports. Imports go in one
+direction (`tests/test_structure.py`), so that no change of another package can break it. If none of these has
+changed, a run of all tests leaves these out, like those that are marked nightly."""
+_ALWAYS = (
+    *_QUICK,
+    "tests/robots/test_robots_hostile.py",
+    "tests/robots/test_robots_isolation.py",
+    "tests/robots/test_robots_plant.py",
+    "tests/himpc/test_himpc_closed_loop.py",
+    "tests/himpc/test_himpc_oracle.py",
+    "tests/lessons/test_lessons_course.py",
+    "tests/lessons/test_lessons_every_controller.py",
+    "tests/lessons/test_lessons_grade_attacks.py",
+    "tests/lessons/test_lessons_session.py",
+)
+"""Files of these folders that run at every push, with a representative of each kind of test."""
+_EVERYTHING = ("tests/conftest.py", "constraints.txt", "pyproject.toml", ".ci/")
+"""Files whose change may break any test."""
+
+
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
     """With `-m quick` pytest collects only the files in `_QUICK`."""
     if config.getoption("markexpr") != "quick" or collection_path.suffix != ".py":
@@ -116,9 +170,14 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         return next((k for k, long in enumerate(_LONG) if item.nodeid.startswith(long)), len(_LONG))
 
     items.sort(key=rank)
+    whole = [Path(config.rootpath, each) for each in config.args] == [_ROOT / "tests"]
     for item in items:
         if item.nodeid.startswith(_QUICK):
             item.add_marker(pytest.mark.quick)
+        tested = next((of for folder, of in _TESTED.items() if item.nodeid.startswith(folder)), None)
+        always = item.nodeid.startswith(_ALWAYS) or item.get_closest_marker("nightly") is not None
+        if whole and tested and not always:
+            item.add_marker(pytest.mark.nightly(*tested, *_EVERYTHING, since="half a day"))
     left_out = [item for item in items if not _runs(item, config)]
     if left_out:
         items[:] = [item for item in items if item not in set(left_out)]
@@ -127,27 +186,39 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 def _runs(item: pytest.Item, config: pytest.Config) -> bool:
     """Whether the test runs. A test that is marked `nightly` runs with `--nightly`, when the command line
-    names its file, and when one of the last commits has changed its file or a path that the mark names."""
+    names its file, and when one of the last commits has changed its file, a module of its folder that it may
+    import, or a path that the mark names."""
     mark = item.get_closest_marker("nightly")
     if mark is None or config.getoption("nightly") or _few_files(config):
         return True
     file = item.path.relative_to(_ROOT).as_posix()
-    return any(path.startswith((file, *mark.args)) for path in config.stash[_CHANGED])
+    beside = re.compile(rf"{re.escape(file.rpartition('/')[0])}/(?!test_)\w+\.py")
+    recent, half_a_day = config.stash[_CHANGED]
+    changed = half_a_day if "since" in mark.kwargs else recent
+    return any(path.startswith((file, *mark.args)) or beside.match(path) for path in changed)
 
 
-def _changed() -> list[str]:
-    """Returns the files that the last commits have changed, about as many as a push has. Without a repository
-    the list is empty."""
-    command = ["git", "-C", str(_ROOT), "log", "-n", "10", "--no-merges", "--name-only", "--format="]
+def _changed() -> tuple[list[str], list[str]]:
+    """Returns the files that the last ten commits have changed, and those that have changed in the half day
+    before the last commit; both with those that are changed and not committed. Without a repository these are
+    not known: the tests of all packages run, but none that is marked nightly in its file."""
+
+    def git(*words: str) -> list[str]:
+        command = ["git", "-C", str(_ROOT), *words]
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()
+
     try:
-        found = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    except (OSError, subprocess.CalledProcessError):
-        return []
-    return sorted(set(found.split("\n")) - {""})
+        last = int(git("log", "-1", "--format=%ct")[0])
+        now = git("diff", "--name-only", "HEAD")
+        log = ("log", "--no-merges", "--name-only", "--format=")
+        recent, half_a_day = git(*log, "-n", "10"), git(*log, f"--since={last - 43200}")
+    except (OSError, subprocess.CalledProcessError, IndexError):
+        return [_EVERYTHING[0]], [_EVERYTHING[0]]
+    return tuple(sorted({*found, *now} - {""}) for found in (recent, [*recent, *half_a_day]))  # pyright: ignore[reportReturnType]
 
 
 _ROOT = Path(__file__).parents[1]
-_CHANGED = pytest.StashKey[list[str]]()
+_CHANGED = pytest.StashKey[tuple[list[str], list[str]]]()
 _COMPILE = "from himpc.compilation.compiling import compile_all; compile_all(lambda *_: None)"
 _COLD = pytest.StashKey[tuple[str, str]]()
 
@@ -233,13 +304,21 @@ def browser() -> Iterator[Browser]:
 
 
 @pytest.fixture(scope="session")
-def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The site, built by the function that the command calls; every warning counts as an error."""
+def site(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The site, built by the function that the command calls; every warning counts as an error. It has live
+    figures, whose kernel takes minutes to compile, if a selected test needs them."""
     from docs.build import build
 
     out = tmp_path_factory.mktemp("docs") / "site"
-    assert build(out) == 0
+    needed = any("live_site" in getattr(item, "fixturenames", ()) for item in request.session.items)
+    assert build(out, live=needed) == 0
     return out
+
+
+@pytest.fixture(scope="session")
+def live_site(site: Path) -> Path:
+    """The site with live figures."""
+    return site
 
 
 @pytest.fixture(scope="session")

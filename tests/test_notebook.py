@@ -56,7 +56,7 @@ def test_the_page_and_python_have_one_robot(lab: Lab) -> None:
         lab.set("horizon", 7)
         for each in (page, other):
             assert eventually(lambda wire=each: _value(wire, "N") == 7, LONG)
-        page.write(str(page.find("N")), value=4)
+        page.use("N", 4)
         assert eventually(lambda: lab.settings.as_data()["horizon"] == 4, LONG)
     rows = lab.rows()
     assert rows["q"].shape == (len(rows["t"]), 3) and np.isfinite(rows["q"]).all()

@@ -22,6 +22,10 @@ from lessons.course import COURSE, load_lesson
 
 ROOT = Path(__file__).parents[1]
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::PendingDeprecationWarning")
+SITE = pytest.mark.nightly(
+    "README", "CONTRIBUTING", "CHANGELOG", "pyproject", "docs/", "examples/", "himpc/", "lessons/", "robots/"
+)
+"""The mark of all tests of the built site, which is made of these files."""
 QUICK = "one-task"
 """The lesson whose numbers are measured again by these tests."""
 
@@ -47,6 +51,7 @@ class Parts(HTMLParser):
             self.loads.append(given["src"])
 
 
+@SITE
 def test_every_link_leads_somewhere(site: Path) -> None:
     """Links to pages, anchors and pictures are relative and valid, from a file and from a server."""
     pages = {path: Parts(path.read_text(encoding="utf-8")) for path in site.rglob("*.html")}
@@ -65,6 +70,7 @@ def test_every_link_leads_somewhere(site: Path) -> None:
                 assert unquote(goal.fragment) in pages[target].anchors, f"{path.name} leads to {link}"
 
 
+@SITE
 def test_styles_load_nothing_from_elsewhere(site: Path) -> None:
     for path in site.rglob("*.css"):
         assert not re.search(r"(?:url\(|@import)\s*['\"]?(?:https?:)?//", path.read_text(encoding="utf-8")), (
@@ -72,6 +78,7 @@ def test_styles_load_nothing_from_elsewhere(site: Path) -> None:
         )
 
 
+@SITE
 def test_every_lesson_is_a_page(site: Path) -> None:
     """The page of a lesson contains its steps, its claims, and equations that a browser displays without a
     script."""
@@ -84,6 +91,7 @@ def test_every_lesson_is_a_page(site: Path) -> None:
     assert "<math" in text
 
 
+@SITE
 @pytest.mark.parametrize("name", COURSE)
 def test_a_lesson_has_curves_a_derivation_and_answers(site: Path, name: str) -> None:
     """The page contains curves of every recorded step, a film, equations, and three answers that can be
@@ -99,6 +107,7 @@ def test_a_lesson_has_curves_a_derivation_and_answers(site: Path, name: str) -> 
     assert player + (site / "films" / f"{name}.js").stat().st_size < 5e6
 
 
+@SITE
 def test_every_claim_on_a_page_has_been_measured(site: Path) -> None:
     told = measured(ROOT / MEASURED)
     for name in COURSE:
@@ -127,6 +136,7 @@ def test_what_is_recorded_is_of_the_lessons_as_they_are() -> None:
     assert now["curves"][0] == pytest.approx(kept["plots"][0]["curves"][0], rel=5e-3, abs=1e-6)
 
 
+@SITE
 @pytest.mark.parametrize(("width", "height"), [(1440, 900), (390, 844)])
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_the_site_in_a_browser(
@@ -158,6 +168,7 @@ def test_the_site_in_a_browser(
     assert asked and all(url.startswith(("file:", "data:", "blob:")) for url in asked)
 
 
+@SITE
 def test_what_one_would_search_for_is_in_the_index(site: Path) -> None:
     index = (site / "searchindex.js").read_text(encoding="utf-8")
     for word in ("hierarchi", "himpc.controllers.himpc", "previews", "convergence_gauge"):

@@ -48,12 +48,6 @@ SECONDS = 2.0
 UNSTABLE = "no-model-needed/4"
 """Errors grow from period to period in this step, as its claim says; so does a difference in the last
 digit."""
-STEPS = [
-    f"{name}/{place + 1}"
-    for name in COURSE
-    for place in range(len(load_lesson(name).steps))
-    if why_not(name, place) is None
-]
 _LOAD = "(async () => { await (window.engine = new HIMPC.Engine()).load(); })()"
 _MOVED = """new Promise((done) => {
   const look = () => (HIMPC.shown?.frame?.t > 0.1 ? drawn() : setTimeout(look, 50));
@@ -73,12 +67,12 @@ _REPLAY = """async ([pack, robot, step, ticks]) => {
 
 
 @pytest.fixture(scope="module")
-def everything(site: Path) -> Iterator[str]:
+def everything(live_site: Path) -> Iterator[str]:
     """The address of a page on the disk that contains all scripts of the live figures."""
     scripts = "".join(
-        f'<script src="live/{path.name}"></script>' for path in sorted((site / "live").glob("*.js"))
+        f'<script src="live/{path.name}"></script>' for path in sorted((live_site / "live").glob("*.js"))
     )
-    page = site / "everything.html"
+    page = live_site / "everything.html"
     page.write_text(f"<!doctype html><meta charset=utf-8><body>{scripts}</body>", encoding="utf-8")
     yield page.as_uri()
     page.unlink()
@@ -132,6 +126,13 @@ def parts_of(name: str) -> tuple[Lesson, Step]:
 
 
 @cache
+def live_steps(lesson: str) -> list[str]:
+    """Returns the steps of a lesson that have a live figure, as `LESSON/STEP`."""
+    places = range(len(load_lesson(lesson).steps))
+    return [f"{lesson}/{place + 1}" for place in places if why_not(lesson, place) is None]
+
+
+@cache
 def wanted(name: str) -> np.ndarray:
     """The torques of two seconds of a live figure, `SCENE` or `LESSON/STEP`, computed once for both
     browsers."""
@@ -157,6 +158,25 @@ def figure(page: Page | Tab, name: str, ticks: int) -> dict[str, Any]:
     return replayed(page, f"lesson/{lesson.name}", robot_of(lesson, step), name.split("/")[1], ticks)
 
 
+FIGURES = pytest.mark.nightly(
+    "docs/browser",
+    "docs/build.py",
+    "docs/figures",
+    "docs/pages/lessons.py",
+    "himpc/compilation",
+    "himpc/export",
+    "himpc/tick/kernel",
+    "lessons/course",
+    "lessons/scenes",
+    "lessons/session",
+    "robots/plant.py",
+)
+"""The mark of all tests of the built figures; compiling their kernel for a browser takes minutes. At every
+push `test_commands_export.py` replays a controller in WebAssembly, and the tests below without this mark
+compare the model and check the program."""
+
+
+@FIGURES
 @pytest.mark.parametrize("name", front.TRIED)
 def test_the_page_computes_what_the_lab_computes(simulated: Page, name: str) -> None:
     """The torques of the scenes of Try it equal Python's in closed loop, also while the robot is pushed."""
@@ -164,39 +184,44 @@ def test_the_page_computes_what_the_lab_computes(simulated: Page, name: str) -> 
     assert np.abs(found["tau"] - wanted(name)).max() < 1e-8
 
 
-@pytest.mark.parametrize("name", STEPS)
-def test_a_live_step_is_the_step_of_the_lesson(simulated: Page, name: str) -> None:
+@FIGURES
+@pytest.mark.parametrize("lesson_name", COURSE)
+def test_a_live_step_is_the_step_of_the_lesson(simulated: Page, lesson_name: str) -> None:
     """The torques of two seconds equal Python's, and the claims that a browser judges hold in the step."""
-    lesson, step = parts_of(name)
-    scene = scene_of_step(lesson, step)
-    found = figure(simulated, name, round(step.duration / scene.settings.T_s))
-    assert np.abs(found["tau"][: len(wanted(name))] - wanted(name)).max() < 1e-8
-    with_ghost = step.ghost is not None and not re.search("controller=(hqp|osf)", " ".join(step.ghost.set))
-    seen = 0
-    for claim, value in zip(step.claims, found["claims"], strict=True):
-        if judged(claim.measure, with_ghost):
-            assert claim.holds(value), claim.text
-            seen += 1
-        else:
-            assert np.isnan(value), claim.text
-    assert seen
+    for name in live_steps(lesson_name):
+        lesson, step = parts_of(name)
+        scene = scene_of_step(lesson, step)
+        found = figure(simulated, name, round(step.duration / scene.settings.T_s))
+        assert np.abs(found["tau"][: len(wanted(name))] - wanted(name)).max() < 1e-8, name
+        with_ghost = step.ghost is not None and not re.search(
+            "controller=(hqp|osf)", " ".join(step.ghost.set)
+        )
+        seen = 0
+        for claim, value in zip(step.claims, found["claims"], strict=True):
+            if judged(claim.measure, with_ghost):
+                assert claim.holds(value), (name, claim.text)
+                seen += 1
+            else:
+                assert np.isnan(value), (name, claim.text)
+        assert seen, name
 
 
 FIREFOX = pytest.mark.nightly("docs/browser", "himpc/compilation", "himpc/export")
 
 
 @FIREFOX
-@pytest.mark.parametrize("name", [*front.TRIED, *STEPS])
-def test_firefox_computes_what_the_lab_computes(simulated_in_firefox: Tab, name: str) -> None:
+@pytest.mark.parametrize("of", [*front.TRIED, *COURSE])
+def test_firefox_computes_what_the_lab_computes(simulated_in_firefox: Tab, of: str) -> None:
     """The torques of two seconds of every live figure equal Python's."""
-    found = figure(simulated_in_firefox, name, len(wanted(name)))
-    assert np.abs(found["tau"] - wanted(name)).max() < 1e-8
+    for name in [of] if of in front.TRIED else live_steps(of):
+        found = figure(simulated_in_firefox, name, len(wanted(name)))
+        assert np.abs(found["tau"] - wanted(name)).max() < 1e-8, name
 
 
 @FIREFOX
-def test_firefox_draws_the_robot(site: Path, in_firefox: Tab) -> None:
+def test_firefox_draws_the_robot(live_site: Path, in_firefox: Tab) -> None:
     """The page simulates in Firefox and draws the ball of the first level, in orange, at its position."""
-    in_firefox.goto((site / "try.html").as_uri() + "#planar3-hold")
+    in_firefox.goto((live_site / "try.html").as_uri() + "#planar3-hold")
     in_firefox.evaluate(_MOVED)
     picture = np.asarray(Image.open(BytesIO(in_firefox.screenshot())).convert("RGB"), float)
     x, y = in_firefox.evaluate("HIMPC.shown.pixel('position')")
@@ -232,21 +257,23 @@ def test_the_model_in_the_browser_is_that_of_the_lab(name: str) -> None:
 
 def test_few_claims_are_left_to_the_lab() -> None:
     """One claim of the live steps needs the plant's M at every level, which the page does not compute."""
+    steps = [name for lesson in COURSE for name in live_steps(lesson)]
     names = [
         claim.measure.signal.name
-        for name in STEPS
+        for name in steps
         for claim in load_lesson(name.split("/")[0]).steps[int(name.split("/")[1]) - 1].claims
         if not judged(claim.measure, True)
     ]
-    assert names == ["dynamic_leak"] and len(STEPS) >= 42
+    assert names == ["dynamic_leak"] and len(steps) >= 42
 
 
-def test_plots_and_their_legends_are_in_the_window(site: Path, browser: Browser) -> None:
+@FIGURES
+def test_plots_and_their_legends_are_in_the_window(live_site: Path, browser: Browser) -> None:
     """In a small window the cards scroll, and a line shows this. The labels of the axis of the errors differ
     while all errors are zero. Joints have other colours than levels."""
     page = browser.new_page(viewport={"width": 1100, "height": 750})
     page.set_default_timeout(SLOW)
-    page.goto((site / "try.html").as_uri() + "#iiwa14-hold")
+    page.goto((live_site / "try.html").as_uri() + "#iiwa14-hold")
     page.wait_for_function("() => HIMPC.shown?.frame?.t > 0.1")
     bottoms = "[...document.querySelectorAll('.u-legend')].map((each) => each.getBoundingClientRect().bottom)"
     assert max(page.evaluate(bottoms)) <= 750
@@ -260,15 +287,16 @@ def test_plots_and_their_legends_are_in_the_window(site: Path, browser: Browser)
     page.close()
 
 
+@FIGURES
 @pytest.mark.parametrize(("width", "height"), [(1440, 900), (390, 844)])
-def test_try_it(site: Path, browser: Browser, width: int, height: int) -> None:
+def test_try_it(live_site: Path, browser: Browser, width: int, height: int) -> None:
     """The page is opened from a file. The robot is pushed, its target is dragged with mouse and keys, levels
     change places, and the page sends no request to a server."""
     asked: list[str] = []
     page = browser.new_page(viewport={"width": width, "height": height}, has_touch=width < 500)
     page.set_default_timeout(SLOW)
     page.on("request", lambda request: asked.append(request.url))
-    page.goto((site / "try.html").as_uri() + "#planar3-hold")
+    page.goto((live_site / "try.html").as_uri() + "#planar3-hold")
     page.wait_for_function("() => HIMPC.shown?.frame?.t > 0.1")
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     page.get_by_role("button", name="Push").click()
@@ -299,7 +327,8 @@ def test_try_it(site: Path, browser: Browser, width: int, height: int) -> None:
     assert asked and all(url.startswith(("file:", "data:", "blob:")) for url in asked)
 
 
-def test_a_code_goes_both_ways(site: Path, browser: Browser) -> None:
+@FIGURES
+def test_a_code_goes_both_ways(live_site: Path, browser: Browser) -> None:
     """The page opens a code of the lab with its settings, and the lab reads a code of the page."""
     told = (
         "M_bar_scale=2",
@@ -309,7 +338,7 @@ def test_a_code_goes_both_ways(site: Path, browser: Browser) -> None:
     )
     page = browser.new_page(reduced_motion="reduce")
     page.set_default_timeout(SLOW)
-    page.goto((site / "try.html").as_uri() + "#" + encode(State(RunSpec("panda-hold", set=told))))
+    page.goto((live_site / "try.html").as_uri() + "#" + encode(State(RunSpec("panda-hold", set=told))))
     page.wait_for_function("() => HIMPC.shown?.frame")
     assert page.evaluate("HIMPC.shown.frame.order.join()") == "orientation,position,posture"
     assert page.evaluate("[HIMPC.shown.frame.horizon, HIMPC.shown.frame.running]") == [10, False]
@@ -325,11 +354,12 @@ def test_a_code_goes_both_ways(site: Path, browser: Browser) -> None:
     page.close()
 
 
-def test_a_step_in_a_page(site: Path, browser: Browser) -> None:
+@FIGURES
+def test_a_step_in_a_page(live_site: Path, browser: Browser) -> None:
     """A step is predicted, run and judged in its page. The lab opens its code, and a link opens the step."""
     page = browser.new_page(reduced_motion="reduce")
     page.set_default_timeout(SLOW)
-    page.goto((site / "lessons" / "inside-the-qp.html").as_uri())
+    page.goto((live_site / "lessons" / "inside-the-qp.html").as_uri())
     page.locator("button[data-live]").first.click()
     figure = page.locator("figure.live.open")
     figure.get_by_role("radio").first.check()
@@ -350,10 +380,11 @@ def test_a_step_in_a_page(site: Path, browser: Browser) -> None:
     page.close()
 
 
-def test_what_is_loaded_first_is_small(site: Path) -> None:
+@FIGURES
+def test_what_is_loaded_first_is_small(live_site: Path) -> None:
     """Page, program, MuJoCo, kernel, robot and scene have less than 5 MB; scripts hold compressed data."""
     names = ("live", "mujoco", "kernel", "iiwa14-hold", "robot-iiwa14")
-    files = [site / "try.html", *(site / "live" / f"{name}.js" for name in names)]
+    files = [live_site / "try.html", *(live_site / "live" / f"{name}.js" for name in names)]
     assert sum(path.stat().st_size for path in files) < 5e6
     import gzip
 
@@ -413,6 +444,7 @@ CHANGES = (
 )
 
 
+@FIGURES
 def test_what_is_changed_while_the_robot_moves_acts_as_in_the_lab(simulated: Page) -> None:
     """Targets, order, levels, N, M̄, gains, weights, limits, payload, friction and pushes are changed."""
     scene = RunSpec("iiwa14-hold").for_export().prepared()

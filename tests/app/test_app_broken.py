@@ -7,6 +7,7 @@ import threading
 from typing import Any
 
 import pytest
+from served import served
 
 from app.client.moment import Moment
 from app.client.simulation_client import SimulationClient
@@ -17,7 +18,6 @@ from app.page.layout import Stage
 from app.page.page import Page
 from app.panels.run.help import HelpPanel
 from app.panels.widgets.in_view import AWAKE, LABEL
-from app.web.server import PageServer
 from browsing.wire import Wire, eventually
 from lessons.course import load_lesson
 from lessons.scenes.run_spec import RunSpec
@@ -47,24 +47,20 @@ def test_the_next_lesson_is_built_once_so_that_no_answer_is_lost(monkeypatch: py
             eventually(lambda: any(answers(page) for page in pages), 3.0)
 
     monkeypatch.setattr(Stage, "_write", slow)
-    server = PageServer(SceneChoice.of_lesson(LessonPlace("one-task")), port=0, max_sessions=1)
-    try:
-        with Wire(server.link) as page:
-            pages.append(page)
-            assert eventually(lambda: page.shows(load_lesson("one-task").steps[0].title))
-            learner = server.sessions.learners[0]
-            leaving.set()
-            assert writing.wait(40.0)
-            learner.send(Load(SceneChoice.of_lesson(NEXT)))
-            assert eventually(lambda: page.shows(load_lesson("deadlines").steps[0].title))
-            assert eventually(lambda: answers(page) != [] and page.shows("t = "))
-            asked = answers(page)[0]
-            page.write(asked, value=True)
-            assert eventually(lambda: learner.lecture is not None and learner.lecture.answer == 1)
-            assert eventually(lambda: "your answer" in page.controls[asked]["props"]["label"])
-            assert answers(page) == [asked]
-    finally:
-        server.close()
+    with served(SceneChoice.of_lesson(LessonPlace("one-task"))) as server, Wire(server.link) as page:
+        pages.append(page)
+        assert eventually(lambda: page.shows(load_lesson("one-task").steps[0].title))
+        learner = server.sessions.learners[0]
+        leaving.set()
+        assert writing.wait(40.0)
+        learner.send(Load(SceneChoice.of_lesson(NEXT)))
+        assert eventually(lambda: page.shows(load_lesson("deadlines").steps[0].title))
+        assert eventually(lambda: answers(page) != [] and page.shows("t = "))
+        asked = answers(page)[0]
+        page.write(asked, value=True)
+        assert eventually(lambda: learner.lecture is not None and learner.lecture.answer == 1)
+        assert eventually(lambda: "your answer" in page.controls[asked]["props"]["label"])
+        assert answers(page) == [asked]
 
 
 def answers(page: Wire) -> list[str]:
@@ -76,23 +72,19 @@ def answers(page: Wire) -> list[str]:
 
 
 def test_what_is_pressed_on_a_page_that_is_gone_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
-    try:
-        with Wire(server.link) as page:
-            assert eventually(lambda: page.find("Playback") is not None)
-            before = page.find("Playback")
-            assert before is not None
-            server.sessions.learners[0].send(Load(SceneChoice(RunSpec("ridgeback-ur10-drag"))))
-            assert eventually(lambda: page.find("Playback") not in (None, before))
-            said = len(page.notices)
-            told = next(each["uuid"] for each in page.made if each["props"].get("label") == LABEL)
-            # the page itself sends this message, without a press
-            page.write(told, value=f"{AWAKE}\nErrors")
-            page.write(before, value="Pause")
-            assert eventually(lambda: any("was rebuilt" in body for _, body in page.notices))
-            assert len(page.notices) == said + 1
-    finally:
-        server.close()
+    with served() as server, Wire(server.link) as page:
+        assert eventually(lambda: page.find("Playback") is not None)
+        before = page.find("Playback")
+        assert before is not None
+        server.sessions.learners[0].send(Load(SceneChoice(RunSpec("ridgeback-ur10-drag"))))
+        assert eventually(lambda: page.find("Playback") not in (None, before))
+        said = len(page.notices)
+        told = next(each["uuid"] for each in page.made if each["props"].get("label") == LABEL)
+        # the page itself sends this message, without a press
+        page.write(told, value=f"{AWAKE}\nErrors")
+        page.write(before, value="Pause")
+        assert eventually(lambda: any("was rebuilt" in body for _, body in page.notices))
+        assert len(page.notices) == said + 1
 
 
 @pytest.mark.parametrize("place", [(HelpPanel, "_fill"), (Stage, "_write"), (Page, "_pass_on")])
@@ -108,17 +100,13 @@ def test_a_page_that_fails_says_so_and_can_be_started_again(
         return works(self, *given)
 
     monkeypatch.setattr(owner, name, fails)
-    server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
-    try:
-        with Wire(server.link) as page:
-            assert eventually(lambda: page.shows("no &lt;place&gt; for it"))
-            again = page.find("Start again")
-            assert again is not None and page.find("Playback") is None
-            broken.set()
-            page.write(again, value=True)
-            assert eventually(lambda: page.shows("Running"))
-            learner = server.sessions.learners[0]
-            assert isinstance(learner, SimulationClient) and learner.failure is None
-    finally:
-        server.close()
+    with served() as server, Wire(server.link) as page:
+        assert eventually(lambda: page.shows("no &lt;place&gt; for it"))
+        again = page.find("Start again")
+        assert again is not None and page.find("Playback") is None
+        broken.set()
+        page.write(again, value=True)
+        assert eventually(lambda: page.shows("Running"))
+        learner = server.sessions.learners[0]
+        assert isinstance(learner, SimulationClient) and learner.failure is None
     assert "no <place> for it" in capfd.readouterr().err  # the log shows the place of the error

@@ -12,6 +12,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
+from served import served
 from test_app_load import get
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
@@ -20,13 +21,11 @@ from app.__main__ import main
 from app.classes.newcomers import PER_MINUTE, Newcomers
 from app.classes.words import LONGEST, ONLY_HERE
 from app.client.simulation_client import STAYING, SimulationClient
-from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
 from app.web.passes import QUERY
 from app.web.server import PageServer
 from app.web.serving import greeting
 from browsing.wire import Wire, eventually
-from lessons.scenes.run_spec import RunSpec
 
 pytestmark = pytest.mark.usefixtures("one_fork_server")
 STEP = LessonPlace("a-redundant-arm", 0)
@@ -35,9 +34,8 @@ LONG = 120.0
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[PageServer]:
-    running = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=2, class_names=True)
-    yield running
-    running.close()
+    with served(max_sessions=2, class_names=True) as running:
+        yield running
 
 
 class Line:
@@ -151,12 +149,9 @@ def test_a_lecture_from_the_step_to_who_was_right(
         lead.send(do="here", address="http://lab.example:8080/prefix/")
         shown = lead.hear("address")["address"]
         assert shown["text"] == f"http://lab.example:8080/prefix/v/{hall.code}" and "<svg" in shown["qr"]
-        assert eventually(lambda: len(server.sessions.learners) == 1, LONG)
-        (learner,) = server.sessions.learners
-        assert eventually(lambda: page.find("Your name") is not None, LONG)
-        name = page.find("Your name")
-        assert name is not None
-        page.write(name, value="Zoë")
+        assert eventually(lambda: bool(server.sessions.learners), 60.0)
+        learner = server.sessions.learners[0]
+        page.use("Your name", "Zoë")
         assert eventually(lambda: hall.name_of(learner.token) == "Zoë", LONG), page.notices
         monkeypatch.undo()
         lead.send(do="go", lesson=STEP.lesson, place=STEP.place)
@@ -364,11 +359,8 @@ def test_an_address_that_phones_cannot_reach_is_said(server: PageServer) -> None
 
 
 def test_a_server_without_a_class_has_none_of_its_pages(one_fork_server: None) -> None:
-    server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
-    try:
+    with served() as server:
         assert get(f"{server.url}/class")[0] == get(f"{server.url}/v/abcdef")[0] == 403
-    finally:
-        server.close()
 
 
 def test_the_command_starts_a_class(monkeypatch: pytest.MonkeyPatch) -> None:

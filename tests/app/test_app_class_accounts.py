@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from urllib.parse import quote, urlsplit
 
 import pytest
+from served import served
 from test_app_class import LONG, Line, cookie_of
 from test_app_load import get
 from viser import __version__
@@ -30,16 +31,9 @@ TOKEN, ORIGIN = "the-token-of-the-proxy", "https://lab.example.org"
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[PageServer]:
-    running = PageServer(
-        *(START, "127.0.0.1", 0),
-        max_sessions=2,
-        token=TOKEN,
-        class_names=True,
-        proxy_only=True,
-        trusted_origins=[ORIGIN],
-    )
-    yield running
-    running.close()
+    named = {"token": TOKEN, "class_names": True, "proxy_only": True, "trusted_origins": [ORIGIN]}
+    with served(START, max_sessions=2, **named) as running:
+        yield running
 
 
 def by_proxy(account: str = "") -> dict[str, str]:
@@ -92,16 +86,13 @@ def test_where_the_proxy_asks_for_no_password_nobody_gets_a_robot(server: PageSe
     """The proxy treats these addresses as addresses below /v/, and passes on an account that it did not
     check. The last addresses go to a server without a class."""
     assert server.hall is not None
-    alone = PageServer(START, port=0, max_sessions=1, token=TOKEN, proxy_only=True, trusted_origins=[ORIGIN])
-    try:
+    with served(START, token=TOKEN, proxy_only=True, trusted_origins=[ORIGIN]) as alone:
         for url, path in (
             *((server.url, path) for path in ("//v/x", "/%76/x", "/x/../v/x", "/v/x")),
             *((alone.url, path) for path in ("//v/x", "/%76/x", "/x/../v/x", "/v/x", "/class")),
         ):
             assert upgraded(url, path, **by_proxy("prof")) == 403, path
         assert upgraded(alone.url, "/", **by_proxy("prof")) == 101
-    finally:
-        alone.close()
 
 
 def upgraded(url: str, path: str, **headers: str) -> int:

@@ -11,6 +11,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from served import served
 from test_app_class import LONG
 
 from app.classes.hall import Hall
@@ -33,9 +34,8 @@ pytestmark = pytest.mark.usefixtures("one_fork_server")
 
 @pytest.fixture
 def server() -> Iterator[PageServer]:
-    running = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1, class_names=True)
-    yield running
-    running.close()
+    with served(class_names=True) as running:
+        yield running
 
 
 def test_pages_do_not_wait_for_robots(server: PageServer, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -47,8 +47,8 @@ def test_pages_do_not_wait_for_robots(server: PageServer, monkeypatch: pytest.Mo
     monkeypatch.setattr(os, "getpriority", lambda *_: 3)
     monkeypatch.setattr(os, "setpriority", lambda _, pid, priority: given.append((pid, priority)))
     with Wire(server.guest_link) as page:
-        assert eventually(lambda: len(server.sessions.learners) == 1, LONG)
-        (learner,) = server.sessions.learners
+        assert eventually(lambda: bool(server.sessions.learners), 60.0)
+        learner = server.sessions.learners[0]
         assert eventually(lambda: learner.pid is not None, LONG)
         pid = learner.pid
         assert pid is not None and eventually(lambda: page.find("Write the text") is not None, LONG)
@@ -56,9 +56,7 @@ def test_pages_do_not_wait_for_robots(server: PageServer, monkeypatch: pytest.Mo
         os.kill(pid, signal.SIGSTOP)
         try:
             assert hall.code_of(learner.token).startswith("hl1-")
-            button = page.find("Write the text")
-            assert button is not None
-            page.write(button, value=True)
+            page.use("Write the text")
             assert eventually(lambda: text_of(page).startswith("hp1"), LONG)
             assert read_handed_in(text_of(page), None)[0].code.startswith("hl1-")
         finally:
@@ -70,8 +68,7 @@ def test_a_page_shows_the_next_step_before_its_robot_is_there() -> None:
     the prediction, which the robot gets when it loads the step."""
     here, there = (LessonPlace("a-redundant-arm", place) for place in (0, 1))
     first, second = (f"Next: {each.title}" for each in here.whole.steps[1:3])
-    server = PageServer(SceneChoice.opening(here.lesson), port=0, max_sessions=1, class_names=False)
-    try:
+    with served(SceneChoice.opening(here.lesson), class_names=False) as server:
         assert server.hall is not None
         with Wire(server.guest_link) as page:
             assert eventually(lambda: page.find(first) is not None, LONG)
@@ -100,8 +97,6 @@ def test_a_page_shows_the_next_step_before_its_robot_is_there() -> None:
             assert eventually(lambda: answer_of(learner.lecture) == 1, LONG)
             assert page.find(second) is not None and page.find(first) is None
             assert learner.pid == pid, "a new process would make a busy computer busier"
-    finally:
-        server.close()
 
 
 def test_a_robot_rests_after_its_run_until_its_learner_does_something(

@@ -22,7 +22,7 @@ from app.classes.saved import restored, saved
 from app.link.exercise import Lecture, LessonPlace
 from app.link.process import wait_until
 from app.web.class_file import KEPT, ClassFile
-from browsing.wire import Wire, eventually
+from browsing.wire import Wire
 from lessons.course import COURSE
 
 ROOT = Path(__file__).parents[2]
@@ -87,10 +87,7 @@ def test_a_class_whose_server_is_killed_goes_on_with_its_addresses_and_votes(
             first.lines["for others"],
         )
         with Line(first.lines["teacher"]) as lead, Wire(others) as page, phone_at(phones) as one:
-            assert eventually(lambda: page.find("Your name") is not None, LONG)
-            name = page.find("Your name")
-            assert name is not None
-            page.write(name, value="Zoë")
+            page.use("Your name", "Zoë")
             lead.send(do="set", stays=True, everywhere=False)
             lead.send(do="go", lesson=STEP.lesson, place=STEP.place)
             lead.until("all", "stage", "waiting")

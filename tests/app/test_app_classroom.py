@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, cast
 
 import pytest
+from served import served
 
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
@@ -17,7 +18,6 @@ from app.link.messages import Play
 from app.panels.run.classroom import Guesses
 from app.web.classroom import STEERING, Classroom, Watcher
 from app.web.passes import new_token
-from app.web.server import PageServer
 from browsing.wire import Wire, eventually
 from lessons.scenes.run_spec import RunSpec
 
@@ -106,21 +106,15 @@ def test_pages_are_counted_also_if_a_watcher_enters_the_token_or_the_teacher_lea
     one_fork_server: None,
 ) -> None:
     """Otherwise an arm is not stopped after the last page, and /metrics is wrong."""
-    server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, classroom=True, class_names=False)
-    room = server.sessions
-    assert isinstance(room, Classroom)
-    try:
+    with served(classroom=True, class_names=False) as server:
+        room = server.sessions
+        assert isinstance(room, Classroom)
         assert server.guard.load.attached == 0
         with Wire(server.guest_link) as page:
-            assert eventually(lambda: page.find("Instructor's token") is not None, LONG)
-            token = page.find("Instructor's token")
-            assert token is not None
-            page.write(token, value=room.token)
+            page.use("Instructor's token", room.token)
             assert eventually(lambda: page.find("Instructor's token") is None, LONG)
             assert server.guard.load.attached == 1
             with Wire(server.link):
                 assert eventually(lambda: room.pages == 2, LONG)
             assert eventually(lambda: room.pages == 1, LONG)
         assert eventually(lambda: room.pages == 0, LONG) and server.guard.load.attached == 0
-    finally:
-        server.close()

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from served import served
 from viser import ClientHandle
 
 from app.adapter import private
@@ -28,9 +29,8 @@ TORQUE, NEAREST = "Torque, % of bound", "Joint nearest its bound, %"
 
 @pytest.fixture(scope="module")
 def circling() -> Iterator[PageServer]:
-    running = PageServer(SceneChoice(RunSpec("planar3-circle")), port=0, max_sessions=1, grace=0.0)
-    yield running
-    running.close()
+    with served("planar3-circle", grace=0.0) as running:
+        yield running
 
 
 @pytest.fixture

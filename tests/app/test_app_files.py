@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from served import served
 
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
@@ -27,15 +28,8 @@ LONG = 120.0
 
 @pytest.fixture
 def server(tmp_path: Path) -> Iterator[PageServer]:
-    running = PageServer(
-        SceneChoice(RunSpec("planar3-hold")),
-        port=0,
-        max_sessions=1,
-        own_files=Folder.at(str(tmp_path)),
-        key=KEY,
-    )
-    yield running
-    running.close()
+    with served(own_files=Folder.at(str(tmp_path)), key=KEY) as running:
+        yield running
 
 
 def settings(learner: SimulationClient) -> TorqueSettings:
@@ -43,15 +37,9 @@ def settings(learner: SimulationClient) -> TorqueSettings:
     return learner.settings
 
 
-def press(wire: Wire, label: str) -> None:
-    assert eventually(lambda: wire.find(label) is not None, LONG), label
-    wire.write(str(wire.find(label)), value=True)
-
-
 def open_file(wire: Wire, path: Path) -> None:
-    assert eventually(lambda: wire.find("Your file") is not None, LONG)
-    wire.write(str(wire.find("Your file")), value=str(path))
-    press(wire, "Open file")
+    wire.use("Your file", str(path))
+    wire.use("Open file")
 
 
 def test_files_of_ones_own_are_opened_by_path(server: PageServer, tmp_path: Path) -> None:
@@ -81,8 +69,8 @@ def test_files_of_ones_own_are_opened_by_path(server: PageServer, tmp_path: Path
             return uuid is not None and str(task) in wire.controls[uuid]["props"]["options"]
 
         assert eventually(offered, LONG)
-        wire.write(str(wire.find("Kind")), value=str(task))
-        press(wire, "Add")
+        wire.use("Kind", str(task))
+        wire.use("Add")
         assert eventually(lambda: "reach" in [level.name for level in settings(learner).levels], LONG), (
             wire.notices
         )
@@ -90,8 +78,8 @@ def test_files_of_ones_own_are_opened_by_path(server: PageServer, tmp_path: Path
         assert learner.failure is None
 
         task.write_text(task.read_text().replace('name="reach"', 'name="reach", frame="ee"'))
-        wire.write(str(wire.find("Robot")), value="panda")
-        press(wire, "Load robot")
+        wire.use("Robot", "panda")
+        wire.use("Load robot")
         assert eventually(lambda: wire.shows("LEFT OUT"), LONG)
         assert learner.ready is not None and learner.ready.robot.name == "panda"
         assert eventually(lambda: "Opened without one of your tasks" in dict(wire.notices), LONG)
@@ -110,9 +98,8 @@ def test_a_scene_and_a_lesson_are_opened_instead(tmp_path: Path) -> None:
 
 def test_what_was_done_is_handed_in_with_the_labs_signature(server: PageServer) -> None:
     with Wire(server.link) as wire:
-        assert eventually(lambda: wire.find("Your name") is not None, LONG)
-        wire.write(str(wire.find("Your name")), value="Zoë")
-        press(wire, "Write the text")
+        wire.use("Your name", "Zoë")
+        wire.use("Write the text")
 
         def text() -> str:
             return str(wire.controls[str(wire.find("To hand in"))].get("value", ""))
@@ -128,9 +115,8 @@ def test_a_code_that_does_not_fit_is_answered_though_nobody_looks_at_the_robot_t
 ) -> None:
     code = encode(State(RunSpec("planar3-hold", set=("horizn=3",))))
     with Wire(server.link) as wire:
-        assert eventually(lambda: wire.find("Somebody's code") is not None, LONG)
-        wire.write(str(wire.find("Somebody's code")), value=code)
-        press(wire, "Open it")
+        wire.use("Somebody's code", code)
+        wire.use("Open it")
         assert eventually(
             lambda: any(title == "Not loaded" and "horizon" in body for title, body in wire.notices), LONG
         )

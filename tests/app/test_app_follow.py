@@ -7,14 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from served import served
 
-from app.link.choice import SceneChoice
 from app.link.messages import Post
 from app.view.camera import FollowBase
-from app.web.server import PageServer
 from browsing.wire import Wire, eventually
 from lessons.events import MoveTarget
-from lessons.scenes.run_spec import RunSpec
 
 pytestmark = pytest.mark.usefixtures("one_fork_server")
 
@@ -68,21 +66,17 @@ def test_what_is_looked_at_can_be_moved_between_two_drives() -> None:
 
 
 def test_the_page_of_a_mobile_robot_goes_along_once_it_is_asked() -> None:
-    server = PageServer(SceneChoice(RunSpec("ridgeback-ur10-drag")), port=0, max_sessions=1)
-    try:
-        with Wire(server.link) as page:
-            assert eventually(lambda: page.find("Camera follows the base") is not None and page.eye != ())
-            learner = server.sessions.learners[0]
+    with served("ridgeback-ur10-drag") as server, Wire(server.link) as page:
+        assert eventually(lambda: page.find("Camera follows the base") is not None and page.eye != ())
+        learner = server.sessions.learners[0]
 
-            def base() -> np.ndarray:
-                found = learner.read(lambda _, history: history.latest[history.layout.fields["x/base"]])
-                return np.full(2, np.nan) if found is None else found.copy()
+        def base() -> np.ndarray:
+            found = learner.read(lambda _, history: history.latest[history.layout.fields["x/base"]])
+            return np.full(2, np.nan) if found is None else found.copy()
 
-            assert eventually(lambda: bool(np.isfinite(base()).all()))
-            start, eye = base(), np.array(page.eye)
-            page.write(page.find("Camera follows the base") or "", value=True)
-            learner.send(Post(MoveTarget("base", (float(start[0]), float(start[1]) - 1.0))))
-            assert eventually(lambda: bool(np.linalg.norm(base() - start) > 0.8))
-            assert eventually(lambda: np.allclose((np.array(page.eye) - eye)[:2], base() - start, atol=0.03))
-    finally:
-        server.close()
+        assert eventually(lambda: bool(np.isfinite(base()).all()))
+        start, eye = base(), np.array(page.eye)
+        page.write(page.find("Camera follows the base") or "", value=True)
+        learner.send(Post(MoveTarget("base", (float(start[0]), float(start[1]) - 1.0))))
+        assert eventually(lambda: bool(np.linalg.norm(base() - start) > 0.8))
+        assert eventually(lambda: np.allclose((np.array(page.eye) - eye)[:2], base() - start, atol=0.03))

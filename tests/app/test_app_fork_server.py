@@ -20,6 +20,7 @@ from app.link.process import Spares, wait_until
 from app.web.sessions import WORKER
 
 HERE = Path(__file__).parent
+LINK = pytest.mark.nightly("app/link", "app/client", "app/worker")
 
 
 def parent(learner: SimulationClient) -> int:
@@ -42,7 +43,7 @@ def test_children_are_forked_where_one_thread_lives(start: Start) -> None:
     assert psutil.Process(born(learner)).memory_full_info().uss < 25e6  # its own memory, bytes
 
 
-@pytest.mark.parametrize("worker", ["broken", "threaded"])
+@pytest.mark.parametrize("worker", ["broken", pytest.param("threaded", marks=LINK)])
 def test_without_a_fork_server_children_are_spawned(start: Start, worker: str) -> None:
     learner = start("planar3-hold", worker, own_server=True)
     assert wait_until(lambda: running(learner), LONG)
@@ -73,11 +74,12 @@ def test_a_dead_fork_server_takes_nobody_along(start: Start) -> None:
     assert wait_until(lambda: running(another), LONG)
     assert parent(another) == server() != before and running(learner)
     os.kill(born(learner), signal.SIGKILL)
-    assert wait_until(lambda: learner.failure is not None, LONG)
+    assert wait_until(lambda: "signal 9" in str(learner.failure), LONG)
     learner.reset_all()
     assert wait_until(lambda: running(learner), LONG)
 
 
+@LINK
 def test_a_robot_without_its_fork_server_can_be_ended(start: Start) -> None:
     """A child whose fork server has died is ended as others are, also if it is stopped."""
     learner = start("planar3-hold", own_server=True)
@@ -106,6 +108,7 @@ def test_a_fork_server_that_is_stopped_is_replaced(start: Start) -> None:
     assert parent(waiting) == server() != before
 
 
+@LINK
 def test_a_fork_server_that_is_stopped_while_it_gets_ready_is_replaced(start: Start) -> None:
     learner = start("idle", "slow", own_server=True)
     assert wait_until(lambda: bool(SERVER.doing), LONG)
@@ -115,6 +118,7 @@ def test_a_fork_server_that_is_stopped_while_it_gets_ready_is_replaced(start: St
     assert parent(learner) == server() != before
 
 
+@LINK
 def test_a_fork_server_that_says_what_it_does_is_not_stuck(
     start: Start, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import psutil
 import pytest
+from served import served
 
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
@@ -19,7 +20,6 @@ from app.link.connection import receive, send
 from app.link.exercise import LessonPlace
 from app.link.messages import Lead, Load, Play, Post, ResetAll, Script, WaitAt
 from app.link.process import Spares, wait_until
-from app.web.server import PageServer
 from app.web.sessions import WORKER
 from app.worker.ghost import GhostBody
 from app.worker.simulation import SimulationRunner
@@ -224,15 +224,11 @@ def test_a_button_that_starts_a_process_does_not_hold_up_other_pages(monkeypatch
             waits.append(True)
 
     monkeypatch.setattr(SimulationClient, "start_ghost", start_ghost)
-    server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
-    try:
-        with Wire(server.link) as page:
-            assert eventually(lambda: page.find("Start the ghost") is not None, LONG)
-            page.write(str(page.find("Ghost's controller")), value="osf")
-            page.write(str(page.find("Start the ghost")), value=True)
-            assert eventually(lambda: bool(waits))
-    finally:
-        server.close()
+    with served() as server, Wire(server.link) as page:
+        assert eventually(lambda: page.find("Start the ghost") is not None, LONG)
+        page.use("Ghost's controller", "osf")
+        page.use("Start the ghost")
+        assert eventually(lambda: bool(waits))
     assert waits == [False]
 
 
@@ -242,21 +238,17 @@ def test_a_step_shows_its_ghost_until_it_is_hidden(in_class: bool) -> None:
     """In a class, whose robots share one computer, a learner starts the ghost with the same checkbox."""
     place = LessonPlace("a-redundant-arm", 2)
     names = False if in_class else None
-    server = PageServer(SceneChoice.of_lesson(place), port=0, max_sessions=1, class_names=names)
-    try:
-        with Wire(server.guest_link) as page:
-            assert eventually(lambda: page.find("Ghost") is not None, LONG)
-            (learner,) = server.sessions.learners
-            switch = str(page.find("Ghost"))
-            assert eventually(lambda: learner.lecture is not None, LONG)
-            assert page.controls[switch]["value"] is not in_class
-            if in_class:
-                assert learner.ghost is None
-                page.write(switch, value=True)
-            assert eventually(lambda: "/ghost/label" in page.nodes, LONG)
-            ghost = learner.ghost
-            assert ghost is not None and ghost.words == "orientation kept"
-            page.write(switch, value=False)
-            assert eventually(lambda: learner.ghost is None and "/ghost" not in page.nodes, LONG)
-    finally:
-        server.close()
+    with served(SceneChoice.of_lesson(place), class_names=names) as server, Wire(server.guest_link) as page:
+        assert eventually(lambda: page.find("Ghost") is not None, LONG)
+        (learner,) = server.sessions.learners
+        switch = str(page.find("Ghost"))
+        assert eventually(lambda: learner.lecture is not None, LONG)
+        assert page.controls[switch]["value"] is not in_class
+        if in_class:
+            assert learner.ghost is None
+            page.write(switch, value=True)
+        assert eventually(lambda: "/ghost/label" in page.nodes, LONG)
+        ghost = learner.ghost
+        assert ghost is not None and ghost.words == "orientation kept"
+        page.write(switch, value=False)
+        assert eventually(lambda: learner.ghost is None and "/ghost" not in page.nodes, LONG)

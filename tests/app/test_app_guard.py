@@ -18,6 +18,7 @@ from urllib.parse import urlsplit
 
 import msgspec
 import pytest
+from served import served
 from viser import ViserServer, __version__, _messages
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
@@ -44,21 +45,14 @@ LONG = 60.0
 
 @pytest.fixture(scope="module")
 def plain() -> Iterator[PageServer]:
-    running = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=2, grace=60.0)
-    yield running
-    running.close()
+    with served(max_sessions=2, grace=60.0) as running:
+        yield running
 
 
 @pytest.fixture(scope="module")
 def tokened() -> Iterator[PageServer]:
-    running = PageServer(
-        SceneChoice(RunSpec("planar3-hold")),
-        port=0,
-        max_sessions=1,
-        trusted_origins=["https://lab.example.org"],
-    )
-    yield running
-    running.close()
+    with served(trusted_origins=["https://lab.example.org"]) as running:
+        yield running
 
 
 def dial(server: PageServer, **more: Any) -> ClientConnection:
@@ -186,10 +180,7 @@ def test_without_the_token_nothing_opens(kind: str, request: pytest.FixtureReque
 
 def test_no_token_lets_everybody_in() -> None:
     """If no token is needed, no visitor counts as the owner."""
-    server = PageServer(
-        SceneChoice(RunSpec("planar3-hold")), port=0, ask_token=False, own_files=Folder.at(".")
-    )
-    try:
+    with served(ask_token=False, own_files=Folder.at(".")) as server:
         assert server.guest_link == server.url != server.link
         assert get(server).status == 200
         with connect(server.url.replace("http", "ws"), subprotocols=PROTOCOL) as page:
@@ -198,8 +189,6 @@ def test_no_token_lets_everybody_in() -> None:
             (client,) = server._viser.get_clients().values()
             line = private.connection_of(server._viser, client)
             assert isinstance(line, GuardedConnection) and not line.is_owners
-    finally:
-        server.close()
 
 
 def test_cookies_of_two_servers_live_in_one_jar() -> None:

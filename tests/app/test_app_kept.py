@@ -10,14 +10,11 @@ import re
 import tempfile
 
 import pytest
+from served import served
 
-from app.adapter import private
-from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
-from app.web.server import PageServer
 from app.worker.simulation import SimulationRunner
-from benchmarks.client import Viewers
 from browsing.wire import Wire
 from lessons.scenes.run_spec import RunSpec
 
@@ -49,8 +46,16 @@ def allocated() -> int:
 PLACO = RunSpec("iiwa14-htmpc", controller="placo")
 
 
+SLOW = pytest.mark.nightly("app/client", "app/worker", "himpc/htmpc", "lessons/session")
+
+
 @pytest.mark.parametrize(
-    "run_spec", [*map(RunSpec, ("iiwa14-hold", "planar3-circle", "ridgeback-ur10-drag")), PLACO], ids=str
+    "run_spec",
+    [
+        *map(RunSpec, ("iiwa14-hold", "planar3-circle")),
+        *(pytest.param(each, marks=SLOW) for each in (RunSpec("ridgeback-ur10-drag"), PLACO)),
+    ],
+    ids=str,
 )
 def test_ticks_keep_nothing(run_spec: RunSpec) -> None:
     """A leak of 80 bytes per tick would be 5 MB per minute."""
@@ -87,58 +92,16 @@ def test_ten_changes_of_the_scene_make_one_robot_of_placo() -> None:
     assert visit(10) - before < 500_000
 
 
-def test_scenes_that_were_left_keep_nothing() -> None:
-    """Four visits of a scene keep less than 100 kB each. Memory for something that is loaded only once may be
-    counted in one round; a leak grows in every round."""
-    server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
-    try:
-        with Viewers(server.link, 1):
-            assert wait_until(lambda: bool(server.sessions.learners), LONG)
-
-            def visit(times: int) -> int:
-                for scene in times * ("baxter-hold", "planar3-hold"):
-                    show(server, scene)
-                return allocated()
-
-            visit(3)
-            sizes = [visit(1)]
-            while len(sizes) < 4 and (len(sizes) < 2 or sizes[-1] - sizes[-2] >= 400_000):
-                sizes.append(visit(4))
-            assert sizes[-1] - sizes[-2] < 400_000, sizes
-    finally:
-        server.close()
-
-
-def show(server: PageServer, scene: str) -> None:
-    """Opens a scene, and waits until the page has sent it."""
-    (learner,) = server.sessions.learners
-    before = learner.ready
-    learner.load(SceneChoice(RunSpec(scene)))
-    assert wait_until(lambda: learner.ready is not before and simulates(learner), LONG)
-    (client,) = server._viser.get_clients().values()
-    (page,) = (each._page for each in server._visits.values() if each._page is not None)
-    assert wait_until(lambda: page._built is learner.ready and private.waiting(client) == 0, LONG)
-
-
-def simulates(learner: SimulationClient) -> bool:
-    """Returns whether the simulation has run for a moment."""
-    status = learner.status
-    return status is not None and status.t > 0.1
-
-
 def test_memory_is_given_back_after_the_last_page(monkeypatch: pytest.MonkeyPatch) -> None:
     """Not while another page is open, as this takes some milliseconds."""
     given: list[int] = []
-    server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=2, grace=0.1)
-    sessions = server.sessions
     monkeypatch.setattr("app.web.sessions.give_back", lambda: given.append(len(sessions.learners)))
     monkeypatch.setattr("app.web.sessions._TIDY", LONG)
-    try:
+    with served(max_sessions=2, grace=0.1) as server:
+        sessions = server.sessions
         with Wire(server.guest_link):
             with Wire(server.guest_link):
                 assert wait_until(lambda: len(sessions.learners) == 2, LONG)
             assert wait_until(lambda: len(sessions.learners) == 1, LONG)
             assert given == []
         assert wait_until(lambda: given == [0], LONG)
-    finally:
-        server.close()

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 import viser
+from served import served
 
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
 from app.panels.widgets.command import CAMERA_KEYS
-from app.web.server import PageServer
 from browsing.wire import Wire, eventually
 from lessons.scenes.run_spec import RunSpec
 
@@ -35,18 +35,14 @@ def test_the_cameras_keys_are_those_of_viser() -> None:
     ids=["torque", "velocity", "lesson"],
 )
 def test_every_command_has_a_key_of_its_own(choice: SceneChoice) -> None:
-    server = PageServer(choice, port=0, max_sessions=1)
-    try:
-        with Wire(server.link) as page:
-            assert eventually(lambda: page.shows("every command, searchable") and len(page.commands) >= 10)
-            commands = [each for each in page.commands.values() if each["hotkey"] is not None]
-            keys = [(each["hotkey"], each["modifier"]) for each in commands]
-            assert len(set(keys)) == len(keys), sorted(keys)
-            assert {key for key, _ in keys} & CAMERA_KEYS == set()
-            shown = " ".join(str(each["props"].get("content")) for each in page.controls.values())
-            table = shown[shown.index("run or pause") - 200 : shown.index("every command, searchable")]
-            for key, _ in keys:
-                names = {"space": "Space"} if not str(key).isdigit() else {str(key): "1 … 9"}
-                assert re.search(rf"<b>[^<]*{re.escape(names.get(str(key), str(key)))}[^<]*</b>", table), key
-    finally:
-        server.close()
+    with served(choice) as server, Wire(server.link) as page:
+        assert eventually(lambda: page.shows("every command, searchable") and len(page.commands) >= 10)
+        commands = [each for each in page.commands.values() if each["hotkey"] is not None]
+        keys = [(each["hotkey"], each["modifier"]) for each in commands]
+        assert len(set(keys)) == len(keys), sorted(keys)
+        assert {key for key, _ in keys} & CAMERA_KEYS == set()
+        shown = " ".join(str(each["props"].get("content")) for each in page.controls.values())
+        table = shown[shown.index("run or pause") - 200 : shown.index("every command, searchable")]
+        for key, _ in keys:
+            names = {"space": "Space"} if not str(key).isdigit() else {str(key): "1 … 9"}
+            assert re.search(rf"<b>[^<]*{re.escape(names.get(str(key), str(key)))}[^<]*</b>", table), key

@@ -11,6 +11,7 @@ from dataclasses import replace
 from http import HTTPStatus
 
 import pytest
+from served import served
 from viser import __version__
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
@@ -72,11 +73,8 @@ def get(address: str, **headers: str) -> tuple[int, dict[str, str], str]:
 
 
 def test_a_full_server_sends_newcomers_away_and_takes_them_again(one_fork_server: None) -> None:
-    server = PageServer(
-        SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1, token=TOKEN, refers=True
-    )
     token = {HEADER: TOKEN}
-    try:
+    with served(token=TOKEN, refers=True) as server:
         assert get(f"{server.url}/health")[0] == 200
         assert get(f"{server.url}/health", Host="evil.example")[0] == 403
         assert get(server.url)[0] == 403
@@ -98,53 +96,34 @@ def test_a_full_server_sends_newcomers_away_and_takes_them_again(one_fork_server
         assert eventually(lambda: get(f"{server.url}/health")[0] == 200)
         server.guard.close()
         assert json.loads(get(f"{server.url}/health")[2])["state"] == "stopping"
-    finally:
-        server.close()
-
-
-def test_a_server_of_its_own_shows_a_full_house_on_the_page(one_fork_server: None) -> None:
-    """Without a proxy that could try another server, a newcomer's page opens and explains why it must
-    wait."""
-    server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
-    try:
-        with Wire(server.link) as first:
-            assert eventually(lambda: bool(server.sessions.learners) and bool(first.made))
-            with Wire(server.link) as second:
-                assert eventually(lambda: second.shows("runs a robot for each of 1 pages"))
-    finally:
-        server.close()
 
 
 def test_a_change_of_a_setting_loads_no_robot_in_the_server(
     one_fork_server: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The simulation makes the code that the tab stores, which another server could open."""
-    server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
-    try:
-        with Wire(server.guest_link):
-            assert eventually(lambda: len(server.sessions.learners) == 1, 60.0)
-            (learner,) = server.sessions.learners
-            assert eventually(lambda: learner.code != "", 60.0)
-            loaded: list[str] = []
+    with served() as server, Wire(server.guest_link):
+        assert eventually(lambda: bool(server.sessions.learners), 60.0)
+        learner = server.sessions.learners[0]
+        assert eventually(lambda: learner.code != "", 60.0)
+        loaded: list[str] = []
 
-            def load(name: str, *_: object, **__: object) -> None:
-                loaded.append(name)
-                raise AssertionError("the server loads a scene")
+        def load(name: str, *_: object, **__: object) -> None:
+            loaded.append(name)
+            raise AssertionError("the server loads a scene")
 
-            monkeypatch.setattr("lessons.runs.named.scene_named", load)
-            monkeypatch.setattr("lessons.scenes.catalog.load_scene", load)
-            for horizon in (6, 7, 8):
-                learner.send(Post(Set("horizon", horizon)))
+        monkeypatch.setattr("lessons.runs.named.scene_named", load)
+        monkeypatch.setattr("lessons.scenes.catalog.load_scene", load)
+        for horizon in (6, 7, 8):
+            learner.send(Post(Set("horizon", horizon)))
 
-                def stored(horizon: int = horizon) -> bool:
-                    code = learner.code
-                    kept = [str(visit._stored) for visit in server._visits.values()]
-                    return f"horizon={horizon}" in decode(code).run.set and all(code in each for each in kept)
+            def stored(horizon: int = horizon) -> bool:
+                code = learner.code
+                kept = [str(visit._stored) for visit in server._visits.values()]
+                return f"horizon={horizon}" in decode(code).run.set and all(code in each for each in kept)
 
-                assert eventually(stored, 60.0)
-            assert loaded == []
-    finally:
-        server.close()
+            assert eventually(stored, 60.0)
+        assert loaded == []
 
 
 def test_a_code_is_opened_on_a_thread_of_the_page(

@@ -8,14 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from served import served
 from viser import _messages
 
-from app.link.choice import SceneChoice
 from app.page.comfort import MOTION, REDUCED
 from app.panels.run.narration import AT_MOST_EVERY, Facts, Narration
-from app.web.server import PageServer
 from browsing.wire import Wire, eventually
-from lessons.scenes.run_spec import RunSpec
 
 STILL = Facts(True, 0, (("position", True), ("posture", True)), {"position": (0.0, "m")}, frozenset())
 
@@ -109,35 +107,27 @@ def test_a_page_without_a_mouse(one_fork_server: None) -> None:
     """The page begins paused, because its browser asks for less motion. A field moves the target by a
     centimetre, and a button turns it by 5°. A sentence says that the simulation runs: to
     screen readers, and on the screen if these sentences are switched on."""
-    server = PageServer(SceneChoice(RunSpec("iiwa14-hold")), port=0, max_sessions=1)
-    try:
-        with Reader(server.link) as page:
-            assert eventually(lambda: bool(server.sessions.learners))
-            learner = server.sessions.learners[0]
+    with served("iiwa14-hold") as server, Reader(server.link) as page:
+        assert eventually(lambda: bool(server.sessions.learners), 60.0)
+        learner = server.sessions.learners[0]
 
-            def targets() -> dict[str, np.ndarray]:
-                return {} if learner.status is None else learner.status.targets
+        def targets() -> dict[str, np.ndarray]:
+            return {} if learner.status is None else learner.status.targets
 
-            assert eventually(lambda: learner.status is not None and not learner.status.running)
-            assert any("prefers-reduced-motion" in each for each in page.scripts)
-            x, y, start = page.label("Target x [m]"), page.label("Target y [m]"), dict(targets())
-            assert eventually(
-                lambda: page.controls[x]["value"] == pytest.approx(start["position"][0], abs=1e-3)
-            )
-            assert page.controls[y]["props"]["step"] == 0.01
-            assert eventually(lambda: says(page, "paused"))
-            page.press_key("space")
-            assert eventually(lambda: says(page, "running"))
-            page.write(y, value=round(float(start["position"][1]) + 0.01, 3))
-            assert eventually(lambda: targets()["position"][1] - start["position"][1] > 0.008)
-            assert np.abs(targets()["position"] - start["position"]).max() < 0.012
-            page.write(page.label("Turn"), value="+z")
-            assert eventually(
-                lambda: not np.allclose(targets()["orientation"], start["orientation"], atol=0.05)
-            )
-            looks = [each for each in page.scripts if "cssText" in each and "aria-live" in each]
-            assert all("width:1px" in each for each in looks), "only for screen readers"
-            page.write(page.label("Say what happens"), value=True)
-            assert eventually(lambda: "left:50%" in page.scripts[-1])
-    finally:
-        server.close()
+        assert eventually(lambda: learner.status is not None and not learner.status.running)
+        assert any("prefers-reduced-motion" in each for each in page.scripts)
+        x, y, start = page.label("Target x [m]"), page.label("Target y [m]"), dict(targets())
+        assert eventually(lambda: page.controls[x]["value"] == pytest.approx(start["position"][0], abs=1e-3))
+        assert page.controls[y]["props"]["step"] == 0.01
+        assert eventually(lambda: says(page, "paused"))
+        page.press_key("space")
+        assert eventually(lambda: says(page, "running"))
+        page.write(y, value=round(float(start["position"][1]) + 0.01, 3))
+        assert eventually(lambda: targets()["position"][1] - start["position"][1] > 0.008)
+        assert np.abs(targets()["position"] - start["position"]).max() < 0.012
+        page.write(page.label("Turn"), value="+z")
+        assert eventually(lambda: not np.allclose(targets()["orientation"], start["orientation"], atol=0.05))
+        looks = [each for each in page.scripts if "cssText" in each and "aria-live" in each]
+        assert all("width:1px" in each for each in looks), "only for screen readers"
+        page.write(page.label("Say what happens"), value=True)
+        assert eventually(lambda: "left:50%" in page.scripts[-1])

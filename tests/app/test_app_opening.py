@@ -8,20 +8,16 @@ import signal
 import stat
 import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import psutil
 import pytest
+from served import served
 
-from app.link.choice import SceneChoice
 from app.link.process import wait_until
 from app.web.address import seen_from_outside
-from app.web.server import PageServer
 from app.web.serving import greeting, opened_in_a_browser
 from lessons.own.folder import Folder
-from lessons.scenes.run_spec import RunSpec
 
 pytestmark = pytest.mark.usefixtures("one_fork_server")
 
@@ -95,17 +91,8 @@ def test_the_file_leads_to_the_page_and_nothing_else(monkeypatch: pytest.MonkeyP
         assert "<script>" not in text and "&amp;b=&quot;" in text
 
 
-@contextmanager
-def made(**more: object) -> Iterator[PageServer]:
-    server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1, **more)  # pyright: ignore
-    try:
-        yield server
-    finally:
-        server.close()
-
-
 def test_who_works_alone_reads_one_line() -> None:
-    with made(own_files=Folder.at(".")) as server:
+    with served(own_files=Folder.at(".")) as server:
         assert [*greeting(server)] == [f"himpc-lab ready at {server.link}"]
         assert str(server.passes.owner) in server.link
 
@@ -113,7 +100,7 @@ def test_who_works_alone_reads_one_line() -> None:
 def test_who_serves_others_reads_which_address_is_for_whom() -> None:
     """The first address is the owner's, and no other line contains the owner's secret."""
     origin = "https://lab.example.org"
-    with made(own_files=Folder.at("."), trusted_origins=[origin], classroom=True) as server:
+    with served(own_files=Folder.at("."), trusted_origins=[origin], classroom=True) as server:
         first, *others = greeting(server)
         owner, token = server.passes.owner, server.passes.token
         assert owner and token and owner != token
@@ -127,13 +114,13 @@ def test_who_serves_others_reads_which_address_is_for_whom() -> None:
 
 
 def test_a_server_of_a_network_is_shown_with_its_number() -> None:
-    with made(own_files=Folder.at("."), host="0.0.0.0") as server:
+    with served(own_files=Folder.at("."), host="0.0.0.0") as server:
         numbers = seen_from_outside("0.0.0.0", server.url)
         assert f"  for others:           {numbers}/?himpc-token={server.passes.token}" in [*greeting(server)]
 
 
 def test_no_token_says_what_it_gives_up() -> None:
-    with made(ask_token=False) as server:
+    with served(ask_token=False) as server:
         first, told = greeting(server)
         assert first == f"himpc-lab ready at {server.url}"
         assert "--no-token: every user of this machine" in told

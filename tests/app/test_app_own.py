@@ -4,23 +4,23 @@ the previous controller continues."""
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from served import served
 
 from app.link.choice import SceneChoice
 from app.link.messages import Lead, Load, LoadRefused, Post, Ready
 from app.link.process import wait_until
-from app.web.server import PageServer
 from app.worker.ghost import GhostBody
 from app.worker.reports import own_code
 from app.worker.simulation import SimulationRunner
 from browsing.wire import Wire, eventually
 from lessons.authoring.new import text_of
-from lessons.events import Reset, Set
+from lessons.events import Set
 from lessons.own.judge import judged
 from lessons.replay.script import script
 from lessons.replay.state import decode, encode, state_of
@@ -46,46 +46,6 @@ def body(file: Path) -> Iterator[SimulationRunner]:
     made = SimulationRunner(SceneChoice.starting("planar3-hold", controller=str(file)))
     yield made
     made.close()
-
-
-def after(body: SimulationRunner, condition: Callable[[], bool]) -> bool:
-    """Returns whether a condition becomes true while the simulation runs."""
-
-    def looked() -> bool:
-        body.tick(5)
-        return condition()
-
-    return wait_until(looked, LONG, period=0.05)
-
-
-def test_own_code_that_is_saved_runs(body: SimulationRunner, file: Path) -> None:
-    body.tick(20)
-    own = body.status().own
-    assert own is not None
-    assert (own.file, own.fault, own.saves) == (str(file), None, 0)
-    assert body.session.plant.tau is not None
-    before = body.session.plant.tau.copy()
-    file.write_text(HOLDS.replace("now.bias", "now.bias + 0.1"))
-    assert after(body, lambda: (now := body.status().own) is not None and now.saves == 1)
-    assert np.abs(body.session.plant.tau - before).max() < 0.11
-    body.tick(400)
-    assert not body.session.failure
-
-
-def test_own_code_that_is_wrong_leaves_what_ran_before(body: SimulationRunner, file: Path) -> None:
-    body.tick(20)
-    body.status()
-    file.write_text("def torque(now)\n    return 1\n")
-    assert after(body, lambda: (now := body.status().own) is not None and now.fault is not None)
-    own = body.status().own
-    assert own is not None
-    assert own.fault is not None
-    assert "line 1: expected ':'. The previous code continues to run." in own.fault
-    assert body.session.failure is None
-    file.write_text(HOLDS + "\n")
-    assert after(body, lambda: (now := body.status().own) is not None and now.saves == 1)
-    assert (found := body.status().own) is not None
-    assert found.fault is None
 
 
 def test_what_a_test_of_another_file_finds_says_nothing_about_this_file(
@@ -119,23 +79,6 @@ def test_what_a_test_of_another_file_finds_says_nothing_about_this_file(
         assert own is not None
         assert (own.file, own.fault, own.saves) == (str(other), None, 0)
         file.write_text(HOLDS)
-
-
-def test_own_code_that_fails_can_be_reset(body: SimulationRunner, file: Path) -> None:
-    body.tick(20)
-    body.status()
-    file.write_text("def torque(now):\n    return now.q[7]\n")
-    assert after(body, lambda: body.status().own is not None and body.session.failure is not None)
-    own = body.status().own
-    assert own is not None
-    assert own.fault is not None
-    assert "line 2: IndexError" in own.fault
-    file.write_text(HOLDS)
-    assert after(body, lambda: (now := body.status().own) is not None and now.saves == 2)
-    body.handle(Post(Reset()))
-    body.tick(50)
-    assert (found := body.status().own) is not None
-    assert found.fault is None
 
 
 def test_own_code_has_a_ghost_beside_it(body: SimulationRunner, file: Path) -> None:
@@ -189,31 +132,29 @@ def test_own_code_is_known_by_its_content(body: SimulationRunner, file: Path) ->
 
 def test_own_code_is_told_of_at_the_top_of_the_page(file: Path) -> None:
     choice = SceneChoice.starting("planar3-hold", controller=str(file))
-    server = PageServer(choice, port=0, max_sessions=1)
-    try:
-        with Wire(server.link) as page:
-            assert eventually(lambda: page.shows("a controller of your own"))
-            learner = server.sessions.learners[0]
-            assert eventually(lambda: learner.status is not None and learner.status.own is not None)
-            file.write_text("def torque(now):\n    return oops\n")
-            assert eventually(lambda: page.shows("line 2: NameError"))
-            assert page.shows("YOUR CODE")
+    with served(choice) as server, Wire(server.link) as page:
+        assert eventually(lambda: page.shows("a controller of your own"))
+        learner = server.sessions.learners[0]
+        assert eventually(lambda: learner.status is not None and learner.status.own is not None)
+        file.write_text("def torque(now)\n    return 1\n")
+        assert eventually(lambda: page.shows("The previous code continues to run."))
+        file.write_text("def torque(now):\n    return oops\n")
+        assert eventually(lambda: page.shows("line 2: NameError"))
+        assert page.shows("YOUR CODE")
 
-            def faults() -> list[str]:  # visible at every position of the panel
-                return [body for title, body in list(page.standing.values()) if title == "Your file"]
+        def faults() -> list[str]:  # visible at every position of the panel
+            return [body for title, body in list(page.standing.values()) if title == "Your file"]
 
-            assert ["line 2: NameError" in each for each in faults()] == [True]
-            file.write_text("def torque(now):\n    return now.q[7]\n")
-            assert eventually(lambda: ["line 2: IndexError" in each for each in faults()] == [True])
-            file.write_text(HOLDS + "\n")
-            assert eventually(lambda: any("took over at t" in body for _, body in page.notices))
-            assert eventually(lambda: faults() == [])
-            learner.load(SceneChoice(RunSpec("planar3-circle")))
-            assert eventually(lambda: learner.choice.run.scene == "planar3-circle")
-            assert learner.settings is not None
-            assert str(file) in learner.settings.controllers
-    finally:
-        server.close()
+        assert ["line 2: NameError" in each for each in faults()] == [True]
+        file.write_text("def torque(now):\n    return now.q[7]\n")
+        assert eventually(lambda: ["line 2: IndexError" in each for each in faults()] == [True])
+        file.write_text(HOLDS + "\n")
+        assert eventually(lambda: any("took over at t" in body for _, body in page.notices))
+        assert eventually(lambda: faults() == [])
+        learner.load(SceneChoice(RunSpec("planar3-circle")))
+        assert eventually(lambda: learner.choice.run.scene == "planar3-circle")
+        assert learner.settings is not None
+        assert str(file) in learner.settings.controllers
 
 
 def test_a_saved_lesson_is_shown_at_the_same_step(tmp_path: Path) -> None:
@@ -221,32 +162,15 @@ def test_a_saved_lesson_is_shown_at_the_same_step(tmp_path: Path) -> None:
     file = tmp_path / "lesson.md"
     text = text_of("lesson", None, "lesson.md")
     file.write_text(text)
-    server = PageServer(SceneChoice.opening(str(file)), port=0, max_sessions=1)
-    try:
-        with Wire(server.link) as page:
-            assert eventually(lambda: page.shows("The hand carries 2 kg"), LONG)
-            file.write_text(text.replace("- run:", "- runs:"))
-            assert eventually(lambda: page.shows("line 15, column 3: There is no key"), LONG)
-            assert page.shows("YOUR LESSON")
-            assert page.shows("The hand carries 2 kg")
-            file.write_text(text.replace("The hand carries 2 kg", "The hand carries two kilograms"))
-            assert eventually(lambda: page.shows("The hand carries two kilograms"), LONG)
-            assert eventually(lambda: not page.shows("YOUR LESSON"), LONG)
-    finally:
-        server.close()
-
-
-def test_own_scene_and_lesson_open(tmp_path: Path) -> None:
-    from lessons.authoring.new import text_of
-
-    scene, lesson = tmp_path / "scene.py", tmp_path / "lesson.md"
-    scene.write_text(text_of("scene", None, "scene.py"))
-    lesson.write_text(text_of("lesson", None, "lesson.md"))
-    for choice in (SceneChoice.starting(str(scene)), SceneChoice.opening(str(lesson))):
-        body = SimulationRunner(choice)
-        body.tick(3)
-        assert not isinstance(body.ready(), LoadRefused)
-        body.close()
+    with served(SceneChoice.opening(str(file))) as server, Wire(server.link) as page:
+        assert eventually(lambda: page.shows("The hand carries 2 kg"), LONG)
+        file.write_text(text.replace("- run:", "- runs:"))
+        assert eventually(lambda: page.shows("line 15, column 3: There is no key"), LONG)
+        assert page.shows("YOUR LESSON")
+        assert page.shows("The hand carries 2 kg")
+        file.write_text(text.replace("The hand carries 2 kg", "The hand carries two kilograms"))
+        assert eventually(lambda: page.shows("The hand carries two kilograms"), LONG)
+        assert eventually(lambda: not page.shows("YOUR LESSON"), LONG)
 
 
 def test_a_task_that_a_robot_cannot_have_is_left_out_there(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import re
 import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from served import served
 from viser import __version__
 from websockets.sync.client import connect
 
@@ -55,11 +57,8 @@ def own(tmp_path: Path) -> Path:
 def serving(own: Path | None, **more: Any) -> Iterator[PageServer]:
     choice = more.pop("choice", SceneChoice(RunSpec("planar3-hold")))
     files = None if own is None else Folder.at(str(own))
-    server = PageServer(choice, port=0, own_files=files, **more)
-    try:
+    with served(choice, own_files=files, **more) as server:
         yield server
-    finally:
-        server.close()
 
 
 def built(page: Wire, times: int = 1) -> bool:
@@ -74,8 +73,8 @@ def code_that_runs(path: Path, mark: Path) -> Path:
 
 
 def ask(page: Wire, field: str, path: object, button: str) -> None:
-    page.write(str(page.find(field)), value=str(path))
-    page.write(str(page.find(button)), value=True)
+    page.use(field, str(path))
+    page.use(button)
 
 
 def answer(page: Wire) -> Callable[[], str]:
@@ -128,8 +127,7 @@ def test_who_watches_a_classroom_opens_no_files(own: Path) -> None:
         assert isinstance(server.sessions, Classroom)
         for link, offered in ((server.guest_link, False), (server.link, True)):
             with Wire(link) as page:
-                assert eventually(lambda page=page: page.find("Instructor's token") is not None, LONG)
-                page.write(str(page.find("Instructor's token")), value=server.sessions.token)
+                page.use("Instructor's token", server.sessions.token)
                 assert eventually(lambda page=page: not page.shows("you are watching"), LONG)
                 assert built(page, times=2)
                 assert (page.find("Your file") is not None) is offered
@@ -199,8 +197,8 @@ def test_a_code_opens_no_file_and_does_not_say_where_files_lie(own: Path, mark: 
             ('controller="mine.py@0123456789ab"', "its fingerprint is"),
             ("controller=himcp", "Choose one of"),
         ):
-            page.write(str(page.find("Somebody's code")), value=encoded(setting))
-            page.write(str(page.find("Open it")), value=True)
+            page.use("Somebody's code", encoded(setting))
+            page.use("Open it")
             assert eventually(lambda word=word: any(word in body for _, body in page.notices), 20.0), (
                 setting,
                 page.notices,
@@ -223,16 +221,11 @@ def test_meshes_of_a_robot_that_the_page_names_lie_in_its_folder(own: Path) -> N
     text = CATALOG["planar3"].path.read_text()
     at = text.index("<link", text.index("<link") + 1)
     end = text.index(">", at) + 1
-    for name, kept in (
-        ("inside.obj", True),
-        ("../outside.obj", False),
-        ("link.obj", False),
-        (f"file://{own.parent}/outside.obj", False),
-    ):
-        visual = f'<visual><geometry><mesh filename="{name}"/></geometry></visual>'
-        (own / "robot.urdf").write_text(text[:end] + visual + text[end:])
-        robot = load_robot(own / "robot.urdf", within=own.resolve())
-        assert ("not found" in str(robot.report.findings)) is not kept, name
-        assert (".obj" in robot.urdf_text) is kept
+    names = ("inside.obj", "../outside.obj", "link.obj", f"file://{own.parent}/outside.obj")
+    visuals = "".join(f'<visual><geometry><mesh filename="{name}"/></geometry></visual>' for name in names)
+    (own / "robot.urdf").write_text(text[:end] + visuals + text[end:])
+    robot = load_robot(own / "robot.urdf", within=own.resolve())
+    assert re.findall(r"\w+\.obj", robot.urdf_text) == ["inside.obj"]
+    assert "3 mesh file(s) not found" in str(robot.report.findings)
     with pytest.raises(InputError, match="not in the folder"):
         load_robot(CATALOG["planar3"].path, within=own.resolve())

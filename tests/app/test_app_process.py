@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import errno
 import os
-import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import psutil
 import pytest
 
@@ -18,10 +16,10 @@ from app.link import fork_server
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
 from app.link.fork_server import SERVER
-from app.link.messages import Load, Play, Post, SimulationFailed, Speed, StepTicks
+from app.link.messages import Load, Post, SimulationFailed
 from app.link.process import Process, Spares, wait_until
 from app.web.sessions import WORKER, Sessions
-from lessons.events import MoveTarget, Set
+from lessons.events import Set
 from lessons.scenes.run_spec import RunSpec
 
 LONG = 30.0  # s
@@ -53,34 +51,6 @@ def ticks(learner: SimulationClient) -> int:
     return 0 if learner.status is None else learner.status.ticks
 
 
-def tip(learner: SimulationClient) -> np.ndarray:
-    poses = learner.read(lambda block, _: block.poses())
-    assert poses is not None
-    return poses[-1, :3]
-
-
-def test_play_pause_step_speed_reset(start: Callable[[str], SimulationClient]) -> None:
-    learner = start("planar3-hold")
-    learner.send(Play(False))
-    assert wait_until(lambda: learner.status is not None and not learner.status.running, LONG)
-    held = ticks(learner)
-    assert not wait_until(lambda: ticks(learner) != held, 0.4)
-    learner.send(StepTicks())
-    assert wait_until(lambda: ticks(learner) == held + 1, LONG)
-    learner.send(Speed(0.1))
-    learner.send(Post(Set("horizon", 8)))
-    learner.send(Play(True))
-    assert wait_until(lambda: learner.settings is not None and learner.settings.horizon == 8, LONG)
-    assert wait_until(lambda: 0.0 < _factor(learner) < 0.5, LONG)
-    learner.reset_all()
-    assert wait_until(lambda: learner.settings is not None and learner.settings.horizon == 5, LONG)
-    assert learner.status is not None and learner.status.t < 5.0
-
-
-def _factor(learner: SimulationClient) -> float:
-    return 0.0 if learner.status is None else learner.status.real_time_factor
-
-
 def test_a_page_that_shows_the_scene_before_keeps_its_settings(
     start: Callable[[str], SimulationClient],
 ) -> None:
@@ -104,39 +74,12 @@ def test_a_page_that_shows_the_scene_before_keeps_its_settings(
     assert learner.ready is now
 
 
-def test_two_sessions_do_not_disturb_each_other(start: Callable[[str], SimulationClient]) -> None:
-    one, two = start("iiwa14-hold"), start("iiwa14-hold")
-    assert one.pid != two.pid
-    before = tip(two).copy()
-    goal = tip(one) + np.array([0.0, 0.1, 0.0])
-    one.send(Post(MoveTarget("position", tuple(goal))))
-    assert wait_until(lambda: float(np.abs(tip(one) - goal).max()) < 5e-3, LONG)
-    assert np.allclose(tip(two), before, atol=1e-3)
-    one.send(Play(False))
-    assert wait_until(lambda: one.status is not None and not one.status.running, LONG)
-    held = ticks(two)
-    assert wait_until(lambda: ticks(two) > held + 50, LONG)
-
-
 @pytest.mark.skipif(not hasattr(os, "SCHED_BATCH"), reason="Linux only")
 def test_a_simulation_lets_the_ticks_of_another_end(start: Callable[[str], SimulationClient]) -> None:
     pid = start("planar3-hold").pid
     assert pid is not None
     assert os.sched_getscheduler(pid) == os.SCHED_BATCH
     assert os.sched_getscheduler(0) != os.SCHED_BATCH
-
-
-def test_a_killed_child_is_reported_and_recovered(start: Callable[[str], SimulationClient]) -> None:
-    learner = start("planar3-hold")
-    pid = learner.pid
-    assert pid is not None
-    os.kill(pid, signal.SIGKILL)
-    assert wait_until(lambda: learner.failure is not None, LONG)
-    assert "signal 9" in str(learner.failure)
-    changed = learner.changed
-    learner.reset_all()
-    assert wait_until(lambda: learner.changed > changed and ticks(learner) > 20, LONG)
-    assert learner.failure is None and learner.pid != pid
 
 
 def test_a_bad_scene_is_a_sentence_and_the_process_waits(spares: Spares) -> None:

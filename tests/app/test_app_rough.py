@@ -249,6 +249,7 @@ def test_files_arrive_with_their_message(start: Start) -> None:
 # ---------------------------------------------------------------- everything together
 
 
+@pytest.mark.nightly("app/link", "app/client", "app/worker", "benchmarks/rough.py")
 def test_pages_get_over_a_rough_day() -> None:
     """A short version of `python -m benchmarks.rough`: every page recovers with its buttons."""
     found = treat(kills=4, stops=2, scene="planar3-hold")

@@ -7,42 +7,19 @@ import signal
 import socket
 import subprocess
 import sys
-import urllib.request
-from collections.abc import Iterator
 from pathlib import Path
 
 import psutil
 import pytest
-from viser import _messages
 
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
 from app.web import server
 from app.web.server import FIRST, PageServer
-from browsing.wire import let_in
 from lessons.scenes.run_spec import RunSpec
 from robots import InputError
 
 ROOT = Path(__file__).parents[2]
-
-
-@pytest.fixture(scope="module")
-def plain() -> Iterator[PageServer]:
-    running = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
-    yield running
-    running.close()
-
-
-def test_it_answers_on_this_machine_only(plain: PageServer) -> None:
-    page = urllib.request.Request(plain.url, headers={"Cookie": let_in(plain.link)})
-    with urllib.request.urlopen(page) as answer:
-        assert answer.status == 200
-    assert plain.url.startswith("http://127.0.0.1:")
-
-
-def test_nobody_can_open_a_tunnel(plain: PageServer) -> None:
-    handlers = plain._viser._websock_server._incoming_handlers
-    assert not handlers.get(_messages.ShareUrlRequest)
 
 
 def test_wrong_addresses_and_scenes_are_one_sentence() -> None:

@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from served import served
 
 from app.client.simulation import trouble_of
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace
 from app.link.process import Process
-from app.web.server import PageServer
 from app.web.visit import FIRST_TEXT, Visit
 from browsing.wire import Wire, eventually
 from lessons.course import COURSE, heading, load_lesson
@@ -151,17 +151,12 @@ def test_the_first_frame_is_the_labs_own_and_goes_when_the_page_is_there(
         await arrive(visit)
 
     monkeypatch.setattr(Visit, "arrive", late)
-    running = PageServer(SceneChoice.opening("two-tasks"), port=0)
-    try:
-        with First(running.link) as page:
-            assert eventually(lambda: page.shows("Starting the robot …"))
-            assert page.shows("<b>Lesson 4 · Two tasks, one arm</b>") and "himpc-lab" in page.labels
-            assert not any(FIRST_TEXT in each for each in page.scripts)
-            wait.set()
-            assert eventually(lambda: any(FIRST_TEXT in each for each in page.scripts), 60.0)
-    finally:
+    with served(SceneChoice.opening("two-tasks")) as running, First(running.link) as page:
+        assert eventually(lambda: page.shows("Starting the robot …"))
+        assert page.shows("<b>Lesson 4 · Two tasks, one arm</b>") and "himpc-lab" in page.labels
+        assert not any(FIRST_TEXT in each for each in page.scripts)
         wait.set()
-        running.close()
+        assert eventually(lambda: any(FIRST_TEXT in each for each in page.scripts), 60.0)
 
 
 def test_a_lesson_opens_by_its_title() -> None:

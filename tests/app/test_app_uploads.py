@@ -9,13 +9,12 @@ import zipfile
 from collections.abc import Iterator
 
 import pytest
+from served import served
 from viser import _messages
 
 from app.adapter import private
-from app.link.choice import SceneChoice
 from app.web.server import PageServer
 from browsing.wire import Wire, eventually
-from lessons.scenes.run_spec import RunSpec
 from robots import CATALOG
 
 pytestmark = pytest.mark.usefixtures("one_fork_server")
@@ -27,9 +26,8 @@ LARGE = 40_000_000
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[PageServer]:
-    running = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=8, grace=1.0)
-    yield running
-    running.close()
+    with served(max_sessions=8, grace=1.0) as running:
+        yield running
 
 
 def shown(page: Wire) -> str:

@@ -9,6 +9,7 @@ from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
+from served import served
 
 from app.client.decimated import History
 from app.html.text import free_name
@@ -18,7 +19,6 @@ from app.link.mission_view import MissionView
 from app.panels.velocity.plots import TrackingPlots
 from app.panels.velocity.tasks import RolesPanel
 from app.view.goals import open_row
-from app.web.server import PageServer
 from app.worker.pacing import BACKLOG, Pacer
 from app.worker.simulation import SimulationRunner
 from browsing.wire import Wire, eventually
@@ -206,26 +206,22 @@ def test_an_arm_turns_its_hand_as_it_is_told() -> None:
 
 
 def test_rings_on_the_page_turn_the_hand_of_an_arm() -> None:
-    server = PageServer(SceneChoice(RunSpec("panda-htmpc")), port=0, max_sessions=1)
-    try:
-        with Wire(server.link) as page:
-            assert eventually(lambda: page.shows("turn it by its rings"))
-            learner = server.sessions.learners[0]
-            assert eventually(lambda: learner.status is not None and learner.status.ticks > 0)
-            assert learner.status is not None
-            before = learner.status.targets["orientation"]
-            assert eventually(lambda: RINGS in page.controls_3d)
-            wanted = tuple(quaternion(exp3(np.array([0.0, 0.0, 0.5])) @ before))
+    with served("panda-htmpc") as server, Wire(server.link) as page:
+        assert eventually(lambda: page.shows("turn it by its rings"))
+        learner = server.sessions.learners[0]
+        assert eventually(lambda: learner.status is not None and learner.status.ticks > 0)
+        assert learner.status is not None
+        before = learner.status.targets["orientation"]
+        assert eventually(lambda: RINGS in page.controls_3d)
+        wanted = tuple(quaternion(exp3(np.array([0.0, 0.0, 0.5])) @ before))
 
-            def turned() -> bool:
-                row = learner.read(lambda _, history: history.latest[history.layout.fields["x/orientation"]])
-                return row is not None and bool(np.abs(log3(from_quaternion(row) @ before.T))[2] > 0.45)
+        def turned() -> bool:
+            row = learner.read(lambda _, history: history.latest[history.layout.fields["x/orientation"]])
+            return row is not None and bool(np.abs(log3(from_quaternion(row) @ before.T))[2] > 0.45)
 
-            # The message is repeated, because the first one may arrive before the control has a callback.
-            assert any(page.turn(RINGS, wanted) or eventually(turned, 10.0) for _ in range(6))
-            assert eventually(lambda: page.shows("orientation of its rings"))
-    finally:
-        server.close()
+        # The message is repeated, because the first one may arrive before the control has a callback.
+        assert any(page.turn(RINGS, wanted) or eventually(turned, 10.0) for _ in range(6))
+        assert eventually(lambda: page.shows("orientation of its rings"))
 
 
 def test_new_names_are_free() -> None:

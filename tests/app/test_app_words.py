@@ -13,6 +13,7 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
+from served import served
 from viser import _messages
 from viser.infra._messages import wire_field_names
 
@@ -23,7 +24,6 @@ from app.panels.widgets.mirror import Bindings
 from app.view.camera import look, turn
 from app.view.robot import aim
 from app.web import words
-from app.web.server import PageServer
 from app.worker.simulation import SimulationRunner
 from benchmarks.hostile import HostileUser
 from benchmarks.monkey import attack
@@ -127,40 +127,32 @@ def test_a_hostile_user_stops_nothing() -> None:
 
 
 def test_whatever_the_camera_says_the_next_scene_is_shown(capfd: pytest.CaptureFixture[str]) -> None:
-    server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
-    try:
-        with Wire(server.link) as page:
+    with served() as server, Wire(server.link) as page:
+        assert eventually(lambda: page.shows("every command, searchable"))
+        learner = server.sessions.learners[0]
+        for scene, odd in (
+            ("planar3-circle", {"image_height": 0}),
+            ("planar3-hold", {"look_at": CAMERA["position"]}),
+            ("planar3-circle", {"position": (math.inf, 0.0, 0.0)}),
+        ):
+            learner.load(SceneChoice(RunSpec(scene)))
+            for _ in range(5):
+                page.send(said("ViewerCameraMessage", CAMERA, odd))
+            ready = learner.ready
+            assert eventually(lambda: learner.ready is not ready)  # noqa: B023
             assert eventually(lambda: page.shows("every command, searchable"))
-            learner = server.sessions.learners[0]
-            for scene, odd in (
-                ("planar3-circle", {"image_height": 0}),
-                ("planar3-hold", {"look_at": CAMERA["position"]}),
-                ("planar3-circle", {"position": (math.inf, 0.0, 0.0)}),
-            ):
-                learner.load(SceneChoice(RunSpec(scene)))
-                for _ in range(5):
-                    page.send(said("ViewerCameraMessage", CAMERA, odd))
-                ready = learner.ready
-                assert eventually(lambda: learner.ready is not ready)  # noqa: B023
-                assert eventually(lambda: page.shows("every command, searchable"))
-                assert eventually(lambda: page.shows("t = ") or page.shows("cannot be shown"))
-                assert not page.shows("cannot be shown")
-    finally:
-        server.close()
+            assert eventually(lambda: page.shows("t = ") or page.shows("cannot be shown"))
+            assert not page.shows("cannot be shown")
     assert "Traceback" not in capfd.readouterr().err
 
 
 def test_what_is_written_before_there_is_a_session_is_checked(capfd: pytest.CaptureFixture[str]) -> None:
     """Invalid values are also refused on the page that says that all places are taken."""
-    server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
-    try:
-        with Wire(server.link) as first, Wire(server.link) as second:
-            assert eventually(lambda: any(page.find("Try again") for page in (first, second)))
-            page = first if first.find("Try again") else second
-            page.write(str(page.find("Try again")), no_such_thing=1)
-            assert eventually(lambda: "Not changed" in [title for title, _ in page.notices])
-    finally:
-        server.close()
+    with served() as server, Wire(server.link) as first, Wire(server.link) as second:
+        assert eventually(lambda: any(page.find("Try again") for page in (first, second)))
+        page = first if first.find("Try again") else second
+        page.write(str(page.find("Try again")), no_such_thing=1)
+        assert eventually(lambda: "Not changed" in [title for title, _ in page.notices])
     assert "Traceback" not in capfd.readouterr().err
 
 
@@ -169,61 +161,49 @@ def test_what_strangers_send_reaches_no_other_page_and_no_terminal() -> None:
     changed, even if the form does not exist."""
     with warnings.catch_warnings(record=True) as heard:
         warnings.simplefilter("always")
-        server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
-        try:
-            with Wire(server.link) as page:
-                assert eventually(lambda: page.find("Upload a URDF") is not None)
-                kept = len(server._viser._websock_server._broadcast_buffer.message_from_id)
-                for number in range(20):
-                    page.say(_messages.GuiFormDirtyMessage(f"form {number}"))
-                button = str(page.find("Upload a URDF"))
-                page.say(_messages.FileTransferStartUpload(button, "t", "r.urdf", "text/xml", 1, 1000))
-                page.say(_messages.FileTransferPart(button, "t", 0, b"short"))
-                assert eventually(lambda: "Not taken" in [title for title, _ in page.notices])
-                assert len(server._viser._websock_server._broadcast_buffer.message_from_id) == kept
-        finally:
-            server.close()
+        with served() as server, Wire(server.link) as page:
+            assert eventually(lambda: page.find("Upload a URDF") is not None)
+            kept = len(server._viser._websock_server._broadcast_buffer.message_from_id)
+            for number in range(20):
+                page.say(_messages.GuiFormDirtyMessage(f"form {number}"))
+            button = str(page.find("Upload a URDF"))
+            page.say(_messages.FileTransferStartUpload(button, "t", "r.urdf", "text/xml", 1, 1000))
+            page.say(_messages.FileTransferPart(button, "t", 0, b"short"))
+            assert eventually(lambda: "Not taken" in [title for title, _ in page.notices])
+            assert len(server._viser._websock_server._broadcast_buffer.message_from_id) == kept
     assert not [each for each in heard if "[viser]" in str(each.message)]
 
 
 def test_a_thing_that_goes_while_it_is_dragged_is_told_of(capfd: pytest.CaptureFixture[str]) -> None:
-    server = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1)
-    try:
-        with Wire(server.link) as page:
-            assert eventually(lambda: page.shows("every command, searchable"))
-            (client,) = server._viser.get_clients().values()
-            arrows = client.scene.add_transform_controls("/goes")
-            ball = client.scene.add_icosphere("/ball")
+    with served() as server, Wire(server.link) as page:
+        assert eventually(lambda: page.shows("every command, searchable"))
+        (client,) = server._viser.get_clients().values()
+        arrows = client.scene.add_transform_controls("/goes")
+        ball = client.scene.add_icosphere("/ball")
 
-            @arrows.on_update
-            async def _(_: object) -> None:
-                ball.remove()
-                ball.position = (0.0, 0.0, 1.0)
+        @arrows.on_update
+        async def _(_: object) -> None:
+            ball.remove()
+            ball.position = (0.0, 0.0, 1.0)
 
-            assert eventually(lambda: "/goes" in page.controls_3d)
-            page.turn("/goes", (0.0, 0.0, 0.0, 1.0))
-            assert eventually(lambda: "Not taken" in [title for title, _ in page.notices])
-    finally:
-        server.close()
+        assert eventually(lambda: "/goes" in page.controls_3d)
+        page.turn("/goes", (0.0, 0.0, 0.0, 1.0))
+        assert eventually(lambda: "Not taken" in [title for title, _ in page.notices])
     assert "Traceback" not in capfd.readouterr().err
 
 
 def test_a_paused_lesson_says_how_to_go_on() -> None:
     from app.link.exercise import LessonPlace
 
-    server = PageServer(SceneChoice.of_lesson(LessonPlace("one-task")), port=0, max_sessions=1)
-    try:
-        with Wire(server.link) as page:
-            assert eventually(lambda: page.find("Run this step") is not None)
-            (client,) = server._viser.get_clients().values()
+    with served(SceneChoice.of_lesson(LessonPlace("one-task"))) as server, Wire(server.link) as page:
+        assert eventually(lambda: page.find("Run this step") is not None)
+        (client,) = server._viser.get_clients().values()
 
-            def label() -> str:
-                found = client.scene._handle_from_node_name.get("/target/label")
-                return "" if found is None else str(getattr(found, "text", ""))
+        def label() -> str:
+            found = client.scene._handle_from_node_name.get("/target/label")
+            return "" if found is None else str(getattr(found, "text", ""))
 
-            assert eventually(lambda: "Run this step" in label())
-    finally:
-        server.close()
+        assert eventually(lambda: "Run this step" in label())
 
 
 # ---------------------------------------------------------------- single functions

@@ -22,7 +22,6 @@ from filecmp import dircmp
 from pathlib import Path
 from typing import Any
 
-import jsonschema
 import pytest
 
 from app.__main__ import main
@@ -112,10 +111,16 @@ GRADES = {
 }
 
 
+def validate(found: Any, schema: dict[str, Any]) -> None:
+    import jsonschema  # its import takes seconds, which all processes that collect the tests would need
+
+    jsonschema.validate(found, schema)
+
+
 @pytest.mark.parametrize("name", GRADES)
 def test_a_grade_is_what_gradescope_reads(name: str) -> None:
     found = json.loads(json.dumps(gradescope(GRADES[name], "after_due_date"), allow_nan=False))
-    jsonschema.validate(found, GRADESCOPE)
+    validate(found, GRADESCOPE)
     assert found["score"] == sum(each["score"] for each in found["tests"]) == GRADES[name].points
     assert {each["visibility"] for each in (found, *found["tests"])} == {"after_due_date"}
     if name == "some":
@@ -131,19 +136,21 @@ def test_a_grade_is_what_the_reporter_of_github_classroom_reads(name: str) -> No
     """The sums are those that the reporter computes from the data that it decodes."""
     result = base64.b64encode(json.dumps(github(GRADES[name]), allow_nan=False).encode())
     found = json.loads(base64.b64decode(result))
-    jsonschema.validate(found, GITHUB)
+    validate(found, GITHUB)
     points = sum(each["score"] for each in found["tests"])
     assert (points, found["max_score"]) == (GRADES[name].points, GRADES[name].of)
     assert found["status"] == {"some": "fail", "all": "pass", "error": "error"}[name]
 
 
 def test_the_schemas_refuse_what_the_descriptions_do_not_have() -> None:
+    import jsonschema
+
     wrong = gradescope(GRADES["some"])
     for change in ({"visibility": "never"}, {"points": 3}, {"tests": [{"name": "no score"}]}):
         with pytest.raises(jsonschema.ValidationError):
-            jsonschema.validate({**wrong, **change}, GRADESCOPE)
+            validate({**wrong, **change}, GRADESCOPE)
     with pytest.raises(jsonschema.ValidationError):
-        jsonschema.validate({**github(GRADES["some"]), "tests": []}, GITHUB)
+        validate({**github(GRADES["some"]), "tests": []}, GITHUB)
 
 
 def test_the_folder_of_an_autograder_grades_a_submission(
@@ -175,7 +182,7 @@ def test_the_folder_of_an_autograder_grades_a_submission(
     done = subprocess.run([str(source / "run_autograder")], env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     found = json.loads((results / "results.json").read_text())
-    jsonschema.validate(found, GRADESCOPE)
+    validate(found, GRADESCOPE)
     assert len(found["tests"]) == 4
     assert found["extra_data"]["exercise"] == "joint-pd"
     assert found["score"] < 10
@@ -198,12 +205,12 @@ def test_whatever_is_handed_in_has_a_grade_in_the_format(
     line = ["grade", str(place), "joint-pd", "--json", str(target), "--format"]
     assert main([*line, "gradescope"]) == 2
     found = json.loads(target.read_text())
-    jsonschema.validate(found, GRADESCOPE)
+    validate(found, GRADESCOPE)
     assert "hand in one Python file: found none" in found["output"]
     (place / "a.py").write_text("def torque(now)\n")
     assert main([*line, "github"]) == 2
     found = json.loads(target.read_text())
-    jsonschema.validate(found, GITHUB)
+    validate(found, GITHUB)
     assert "expected ':'" in found["tests"][0]["message"]
     assert main(["grade", str(place), "joint-dp", "--format", "github"]) == 2
     assert "did you mean 'joint-pd'" in capsys.readouterr().err

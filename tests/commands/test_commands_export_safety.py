@@ -187,27 +187,26 @@ def test_two_controllers_are_used_in_one_file_with_two_prefixes(tmp_path: Path) 
     """Names, header and object file have the prefix. Two headers with one prefix are an error of the
     compiler, since the second one would vanish."""
     needed("cc")
-    for prefix, scene in (("left", "iiwa14-hold"), ("right", "planar3-hold"), ("himpc", "planar3-hold")):
+    for prefix, scene in (("himpc", "iiwa14-hold"), ("right", "planar3-hold")):
         folder = exported(scene, "x86_64-linux", tmp_path / prefix, *FEW, "--prefix", prefix)
         assert f"{prefix}.h" in (folder / "README.md").read_text()
         shutil.copy(folder / f"{prefix}.h", tmp_path)
-        if prefix != "himpc":
-            shutil.copy(folder / f"{prefix}.o", tmp_path)
-    assert replayed(tmp_path / "left")[1] < 1e-9
+        shutil.copy(folder / f"{prefix}.o", tmp_path)
+    assert replayed(tmp_path / "right")[1] < 1e-9
     program = """
 #include <stdio.h>
-#include "left.h"
+#include "himpc.h"
 #include "right.h"
-#include "left.h"
+#include "himpc.h"
 int main(void) {
-    int same = left_check("", 0, LEFT_DIGEST) == right_check("", 0, RIGHT_DIGEST);
-    printf("%d %d %d\\n", LEFT_N, RIGHT_N, same);
+    int same = himpc_check("", 0, HIMPC_DIGEST) == right_check("", 0, RIGHT_DIGEST);
+    printf("%d %d %d\\n", HIMPC_N, RIGHT_N, same);
     return 0;
 }
 """
     assert run(tmp_path, "both", program).split() == ["7", "3", "1"]
     (tmp_path / "again.c").write_text(
-        '#include "left.h"\n#undef LEFT_DIGEST\n#define LEFT_DIGEST 1\n#include "left.h"\n'
+        '#include "himpc.h"\n#undef HIMPC_DIGEST\n#define HIMPC_DIGEST 1\n#include "himpc.h"\n'
     )
     answer = subprocess.run(["cc", "-c", "again.c"], cwd=tmp_path, capture_output=True, text=True)
     assert answer.returncode != 0

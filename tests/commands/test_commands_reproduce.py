@@ -124,7 +124,16 @@ def test_a_sweep_without_a_folder_has_one_of_its_own(
     assert len(folders) == 2 and all((each / "results.json").exists() for each in folders)
 
 
-@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    "stop",
+    [
+        signal.SIGINT,
+        pytest.param(
+            signal.SIGTERM,
+            marks=pytest.mark.nightly("app/commands", "lessons/parallel.py", "lessons/experiments"),
+        ),
+    ],
+)
 def test_a_sweep_that_is_stopped_carries_on(tmp_path: Path, stop: signal.Signals, whole: bytes) -> None:
     """A sweep that is interrupted by SIGINT or SIGTERM prints how many cells are finished and leaves no
     process. The same command then ends with the same results as without an interruption."""

@@ -48,24 +48,3 @@ def test_scenes_and_controllers_are_listed(capsys: pytest.CaptureFixture[str]) -
     assert main(["controllers", "--json", "-"]) == 0
     names = {each["name"] for each in json.loads(capsys.readouterr().out)}
     assert names >= {"himpc", "htmpc", "htmpc_wpt", "stmpc", "htidkc", "placo"}
-
-
-@pytest.mark.parametrize(
-    ("arguments", "says"),
-    [
-        (["--controller", "himpc"], "choose one of htmpc"),
-        (["--controller", "htmcp"], "'htmpc'"),
-        (["--set", "peak=[1]"], "give x and y"),
-        (["--set", "delta=0.1"], "'delta_m'"),
-        (["--set", "input_effort=[1,2]"], "9 joints"),
-        (["--urdf", "panda"], "brings its own robot"),
-    ],
-)
-def test_wrong_input_gets_one_sentence_and_exit_2(
-    arguments: list[str], says: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["run", SQUARE, "--duration", "0.1", *arguments]) == 2
-    shown = capsys.readouterr().err
-    assert says in shown
-    assert "Traceback" not in shown
-    assert shown.count("\n") == 1

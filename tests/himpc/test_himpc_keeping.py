@@ -64,7 +64,12 @@ DAMAGE: dict[str, Callable[[bytes], bytes]] = {
 }
 
 
-@pytest.mark.parametrize("kind", DAMAGE)
+KEEPING = pytest.mark.nightly("himpc/compilation")
+
+
+@pytest.mark.parametrize(
+    "kind", [kind if kind == "one bit" else pytest.param(kind, marks=KEEPING) for kind in DAMAGE]
+)
 def test_a_damaged_file_is_compiled_anew_and_replaced(place: Path, kind: str) -> None:
     (file,) = code_of(place)
     file.write_bytes(DAMAGE[kind](file.read_bytes()))

@@ -26,9 +26,17 @@ def session(scene: TorqueScene) -> TorqueSession:
 
 @pytest.fixture(scope="session")
 def course_runs(request: pytest.FixtureRequest) -> CourseRuns:
-    """The runs of all lessons, and those of the notes that a test of this session judges."""
+    """The runs of the lessons, of their notes, and of the notes of documents that a test of this session
+    judges."""
     from course_runs import course_runs as made
 
     judged = [item.nodeid for item in request.session.items]
-    noted = [node.partition("[")[2][:-1] for node in judged if "::test_the_notes_of_a_lesson_are_so[" in node]
-    return made(noted, any("::test_a_run_allows_a_sentence_of_a_document[" in node for node in judged))
+
+    def lessons(test: str) -> list[str]:
+        return [node.partition("[")[2][:-1] for node in judged if f"::{test}[" in node]
+
+    return made(
+        lessons("test_everything_a_lesson_claims_is_so"),
+        lessons("test_the_notes_of_a_lesson_are_so"),
+        bool(lessons("test_a_run_allows_a_sentence_of_a_document")),
+    )

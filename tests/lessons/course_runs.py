@@ -27,14 +27,14 @@ class CourseRuns(NamedTuple):
     documents: Mapping[Told, Verdict]
 
 
-def course_runs(noted: Collection[str], with_documents: bool) -> CourseRuns:
+def course_runs(claimed: Collection[str], noted: Collection[str], with_documents: bool) -> CourseRuns:
     """Computes every run once. A run that is the beginning of a longer run is taken from the longer one.
 
-    noted: the lessons whose notes are judged, too; with_documents: whether the notes of documents are.
+    claimed: the lessons that are judged; noted: those whose notes are judged, too; with_documents: whether
+    the notes of documents are.
     """
-    lessons = [
-        lesson if lesson.name in noted else without_notes(lesson) for lesson in map(load_lesson, COURSE)
-    ]
+    lessons = [load_lesson(name) for name in COURSE if name in {*claimed, *noted}]
+    lessons = [lesson if lesson.name in noted else without_notes(lesson) for lesson in lessons]
     told = {
         each: each.note.runs(each.run)
         for each in (documents() if with_documents else ())

@@ -39,7 +39,15 @@ def error(name: str, payload_kg: float, adapt: bool) -> float:
     return float(np.sqrt((found**2).sum(axis=1).mean()))
 
 
-@pytest.mark.parametrize("name", ["iiwa14-circle", "iiwa14-hold"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "iiwa14-circle",
+        pytest.param(
+            "iiwa14-hold", marks=pytest.mark.nightly("himpc/controllers", "himpc/tick", "robots/plant.py")
+        ),
+    ],
+)
 def test_a_payload_costs_no_error(name: str) -> None:
     """With 0.5 to 6 kg at the flange and adaptation, the error of the hand is smaller than without payload
     and without adaptation. On the circle, 2 kg make the arm unstable with the M̄ of the scene."""

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import pytest
 
 from benchmarks.avoidance import FAST, FAST_OFF, HARD_N, ROBOTS, run
@@ -11,8 +13,17 @@ SEED = 2
 OFF = ["avoidance.on=false"]
 
 
-@pytest.mark.parametrize("often", [False, True])
-@pytest.mark.parametrize("robot", ROBOTS)
+PUSH = (("iiwa14", True), ("baxter", False), ("generated", False))
+"""Robots, and whether a target moves often, whose drags are made at every push."""
+KEEP = pytest.mark.nightly(
+    "benchmarks/avoidance.py", "himpc/controllers", "himpc/limits", "himpc/tick", "robots/covering"
+)
+
+
+@pytest.mark.parametrize(
+    ("robot", "often"),
+    [each if each in PUSH else pytest.param(*each, marks=KEEP) for each in product(ROBOTS, (False, True))],
+)
 def test_no_drag_makes_a_robot_touch_or_loses_it(robot: str, often: bool) -> None:
     """With default settings no force between bodies whose distance is kept exceeds 50 N, and joints stay
     within 105 % of their velocity limits."""
@@ -22,7 +33,7 @@ def test_no_drag_makes_a_robot_touch_or_loses_it(robot: str, often: bool) -> Non
     assert total.speed <= FAST
 
 
-@pytest.mark.parametrize("robot", ["iiwa14", "panda"])
+@pytest.mark.parametrize("robot", ["iiwa14", pytest.param("panda", marks=KEEP)])
 def test_without_rows_a_robot_that_hits_the_floor_stays_calm(robot: str) -> None:
     """If no distance is kept, these drags end in the floor. The guard of a blocked robot keeps the joints
     within 1.5 times their limits, and the robot comes to rest."""

@@ -28,18 +28,29 @@ def record(robot: str, controller: str, seconds: float) -> Recording:
     return run(replace(scene, settings=scene.settings.changed("controller", controller)), seconds, seed=1)
 
 
+OFTEN = {
+    (controller, "planar3" if controller == "himpc_printed" else ROBOTS[place % len(ROBOTS)])
+    for place, controller in enumerate(CONTROLLERS)
+}
+"""Pairs that run at every push, with every controller and every robot."""
 PAIRS = [
     pytest.param(
         controller,
         robot,
         id=f"{controller}-{robot}",
-        marks=pytest.mark.nightly("himpc/printed.py")
-        if controller == "himpc_printed" and robot != "planar3"
-        else (),
+        marks=()
+        if (controller, robot) in OFTEN
+        else pytest.mark.nightly("himpc/printed.py")
+        if controller == "himpc_printed"
+        else pytest.mark.nightly("himpc/controllers", "himpc/tick", "himpc/limits", "robots/plant.py"),
     )
     for controller in CONTROLLERS
     for robot in ROBOTS
 ]
+
+
+def test_every_robot_runs_often() -> None:
+    assert {robot for _, robot in OFTEN} == set(ROBOTS)
 
 
 @pytest.mark.parametrize(("controller", "robot"), PAIRS)

@@ -14,7 +14,7 @@ ROBOTS = {"planar3": 2.0, "iiwa14": 1.3, "panda": 1.5, "baxter": 1.5, "ridgeback
 @pytest.mark.parametrize(
     "first",
     [
-        pytest.param(place, id=name, marks=() if place < 2 else pytest.mark.nightly("himpc/tasks"))
+        pytest.param(place, id=name, marks=() if place == 0 else pytest.mark.nightly("himpc/tasks"))
         for place, name in enumerate(ROBOTS)
     ],
 )

@@ -114,8 +114,12 @@ def test_right_solution_gets_every_grade_point(exercise: str, thirty: Graded) ->
 
 
 CONTROL_LAWS = pytest.mark.nightly(
-    "himpc/controllers/own.py", "himpc/controllers/view.py", "lessons/exercises", "tests/lessons/right_laws"
+    "himpc/controllers/own.py",
+    "himpc/controllers/view",
+    *(f"lessons/exercises/{name}." for name in ("exercise", "grade", "laws", "mistakes")),
+    *(f"lessons/exercises/{name.replace('-', '_')}." for name in EXERCISES),
 )
+"""The mark of tests that judge all known solutions and mistakes."""
 
 
 @CONTROL_LAWS

@@ -35,8 +35,15 @@ def dragged(raw: Array) -> tuple[float, ...]:
     return tuple(quaternion(exp3(np.array([0.05, -0.03, 0.0])) @ raw) if raw.ndim == 2 else raw + 0.02)
 
 
-@pytest.mark.parametrize("controller", ["himpc", "hqp"])
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    ("kind", "controller"),
+    [(kind, "himpc") for kind in KINDS]
+    + [("position", "hqp"), ("orientation", "hqp")]
+    + [
+        pytest.param(kind, "hqp", marks=pytest.mark.nightly("himpc/tasks", "himpc/controllers"))
+        for kind in list(KINDS)[2:]
+    ],
+)
 def test_every_kind_holds_and_follows(kind: str, controller: str) -> None:
     scene = torque_scene("iiwa14-hold")
     fields, tolerance = KINDS[kind]

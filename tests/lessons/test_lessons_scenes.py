@@ -124,7 +124,13 @@ def test_hold_scenes_are_sound(name: str) -> None:
     assert max(result["tasks"][0]["max_abs"]) <= 1e-3
 
 
-@pytest.mark.parametrize("file", ["ur_description/urdf/ur10_robot.urdf", "xarm_description/urdf/xarm7.urdf"])
+@pytest.mark.parametrize(
+    "file",
+    [
+        "xarm_description/urdf/xarm7.urdf",
+        pytest.param("ur_description/urdf/ur10_robot.urdf", marks=pytest.mark.nightly("robots/", "himpc/")),
+    ],
+)
 def test_hold_is_sound_on_robots_of_others(example_urdf: Callable[[str], str], file: str) -> None:
     """`run hold --urdf` is sound for a UR10 and an xArm 7 of example-robot-data."""
     result = summary(record("hold", duration=4.0, urdf=example_urdf(file)))
@@ -150,7 +156,10 @@ def test_printed_position_rows_fail_honestly() -> None:
 @pytest.mark.parametrize(
     "assignments",
     [
-        ("plant.encoder_resolution_deg=0.00125",),
+        pytest.param(
+            ("plant.encoder_resolution_deg=0.00125",),
+            marks=pytest.mark.nightly("himpc/", "lessons/session", "robots/plant.py"),
+        ),
         ("plant.encoder_resolution_deg=0.00125", "plant.friction=0.5"),
     ],
     ids=["encoder", "encoder and friction"],

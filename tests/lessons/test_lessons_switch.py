@@ -48,13 +48,21 @@ def switch(session: TorqueSession, name: str, start: Array) -> None:
     assert not session.notices
 
 
+HANDED = ("lessons/session/bumpless.py", "himpc/controllers")
 COMPILED = [name for name in CONTROLLERS if name != "himpc_printed"]
 
 
-@pytest.mark.parametrize("old", COMPILED)
+@pytest.mark.parametrize(
+    "old",
+    [
+        name if name == "himpc" else pytest.param(name, marks=pytest.mark.nightly(*HANDED))
+        for name in COMPILED
+    ],
+)
 def test_a_switch_at_rest_is_bumpless(old: str) -> None:
     """The controller is switched to each later one in the table and back, without a bump. Thus every ordered
-    pair is tested, except those with the controller in NumPy, see below."""
+    pair is tested, except those with the controller in NumPy, see below. Those with HIMPC, the first one, are
+    tested at every push."""
     session = at_rest(old)
     start = tip(session)
     for new in COMPILED[COMPILED.index(old) + 1 :]:
@@ -77,7 +85,10 @@ def test_a_switch_to_the_printed_equations_is_bumpless(other: str) -> None:
     switch(session, other, start)
 
 
-@pytest.mark.parametrize("new", CONTROLLERS)
+@pytest.mark.parametrize(
+    "new",
+    [*COMPILED, pytest.param("himpc_printed", marks=pytest.mark.nightly("himpc/printed.py"))],
+)
 def test_control_goes_on_after_a_switch(new: str) -> None:
     """The new controller follows a target. The posture is disabled, because it would stop the weighted
     controller half-way."""

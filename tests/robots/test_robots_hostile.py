@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import pickle
 import struct
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -23,8 +24,10 @@ from robots.covering.covering import covering
 from robots.geometry.cover import Capsule
 from robots.loading.importing import import_robot
 from robots.meshes.surfaces import read_meshes
+from robots.processes.isolation import DEADLINE
 from robots.shapes.link_shapes import MAX_TOTAL, link_shapes
 
+READING = pytest.mark.nightly("robots/", "tests/robots/hostile.py")
 DOCUMENTS = hostile.documents()
 GROUPS = 8  # number of tests; with one test per kind there would be 400, most of them of one millisecond
 
@@ -45,10 +48,12 @@ def equal_shapes_are_covered_once() -> Iterator[None]:
         yield
 
 
-@pytest.mark.parametrize("group", range(GROUPS))
+@pytest.mark.parametrize("group", [pytest.param(k, marks=READING) if k > 1 else k for k in range(GROUPS)])
 def test_every_kind_runs_or_is_refused_in_one_sentence(group: int) -> None:
     for kind in list(DOCUMENTS)[group::GROUPS]:
+        began = time.process_time()
         result = import_robot(DOCUMENTS[kind], "my.urdf")
+        assert time.process_time() - began < DEADLINE, kind
         assert len(result.report.findings) < 300, kind
         for finding in result.report.findings:
             assert len(str(finding)) < 400, kind

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, Page, expect
+from served import served
 
 from app.link.choice import SceneChoice
 from app.link.process import wait_until
@@ -22,9 +23,8 @@ pytestmark = pytest.mark.usefixtures("one_fork_server")
 
 @pytest.fixture(scope="module")
 def classroom() -> Iterator[PageServer]:
-    running = PageServer(SceneChoice(RunSpec("planar3-hold")), port=0, classroom=True, class_names=True)
-    yield running
-    running.close()
+    with served(classroom=True, class_names=True, max_sessions=4) as running:
+        yield running
 
 
 def test_only_the_token_steers(browser: Browser, classroom: PageServer) -> None:

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page, expect
+from served import served
 
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
@@ -31,9 +32,8 @@ ARM = 0.08
 
 @pytest.fixture(scope="module")
 def drawing() -> Iterator[PageServer]:
-    running = PageServer(SceneChoice(RunSpec("planar3-plane")), port=0, max_sessions=1, grace=2.0)
-    yield running
-    running.close()
+    with served("planar3-plane", grace=2.0) as running:
+        yield running
 
 
 @pytest.fixture(scope="module")

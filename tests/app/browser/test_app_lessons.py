@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
+from served import served
 
 from app.link.choice import SceneChoice
 from app.link.exercise import LessonPlace, parts_of
@@ -35,9 +36,8 @@ UNSEEN = 1500
 
 @pytest.fixture(scope="module")
 def school() -> Iterator[PageServer]:
-    running = PageServer(SceneChoice.of_lesson(LessonPlace(COURSE[0], 1)), port=0, max_sessions=1)
-    yield running
-    running.close()
+    with served(SceneChoice.of_lesson(LessonPlace(COURSE[0], 1))) as running:
+        yield running
 
 
 @pytest.fixture(scope="module")
@@ -59,8 +59,9 @@ def test_a_page_can_open_at_a_lesson(learner_page: Page) -> None:
     expect_part(learner_page, lesson, lesson.steps[1])
 
 
-ALWAYS = (COURSE[0], "a-blind-arm", "deliveries", COURSE[-1])
-"""Lessons that are walked through at every push; any other one at night, and at a push that changes it."""
+ALWAYS = (COURSE[0], "one-task", "first-hold-then-reach", COURSE[-1])
+"""Lessons that are walked through at every push: with all kinds of predictions, challenges, both levels, and
+a robot of one's own. Any other one at night, and at a push that changes it."""
 
 
 @pytest.mark.parametrize(
@@ -80,13 +81,10 @@ def test_a_lesson_is_walked_through(learner_page: Page, school: PageServer, name
 def test_a_lesson_of_ones_own_is_walked_through(browser: Browser, tmp_path: Path) -> None:
     file = tmp_path / "mine.md"
     file.write_text(text_of("lesson", None, "mine.md"))
-    server = PageServer(SceneChoice.opening(str(file)), port=0, max_sessions=1)
-    page = open_page(browser, server.link, 1440, 900)
-    try:
+    with served(SceneChoice.opening(str(file))) as server:
+        page = open_page(browser, server.link, 1440, 900)
         walk(page, server, lesson_named(str(file)))
-    finally:
         page.context.close()
-        server.close()
 
 
 def walk(page: Page, school: PageServer, lesson: Lesson) -> None:
@@ -113,9 +111,8 @@ def walk(page: Page, school: PageServer, lesson: Lesson) -> None:
 
 
 def test_a_phone_asks_first_then_plots(browser: Browser) -> None:
-    server = PageServer(SceneChoice.of_lesson(LessonPlace(COURSE[0])), port=0, max_sessions=1)
-    page = open_page(browser, server.link, 390, 844)
-    try:
+    with served(SceneChoice.of_lesson(LessonPlace(COURSE[0]))) as server:
+        page = open_page(browser, server.link, 390, 844)
         part = load_lesson(COURSE[0]).steps[0]
         assert part.prediction is not None
         expect(page.get_by_role("tab")).to_have_text(["Learn", "Tasks", "More"])
@@ -133,9 +130,7 @@ def test_a_phone_asks_first_then_plots(browser: Browser) -> None:
         drawn = page.get_by_role("img", name=re.compile("over time$")).first
         assert_order(option, drawn, page.get_by_text("Why", exact=True))
         expect(page.get_by_text("press P", exact=False)).to_have_count(0)
-    finally:
         page.context.close()
-        server.close()
 
 
 def next_of(page: Page) -> Locator:

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page
+from served import served
 
 from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
@@ -38,9 +39,8 @@ def joint(learner: SimulationClient) -> float:
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[PageServer]:
-    running = PageServer(one("revolute", "0 0 1"), port=0, max_sessions=1)
-    yield running
-    running.close()
+    with served(one("revolute", "0 0 1")) as running:
+        yield running
 
 
 @pytest.fixture(scope="module")

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page, expect
+from served import served
 
 from app.client.simulation_client import SimulationClient
-from app.link.choice import SceneChoice
 from app.link.messages import Post
 from app.link.mission_view import MissionView
 from app.web.server import PageServer
@@ -33,7 +33,6 @@ from browsing.browser_actions import (
 from browsing.scene_switch import reset_all
 from lessons.events import MoveTarget, Set
 from lessons.scenes.names import ALL_SCENES
-from lessons.scenes.run_spec import RunSpec
 from lessons.settings.velocity import VelocitySettings
 from robots.collision import Ball, Box, Floor
 
@@ -42,9 +41,8 @@ pytestmark = pytest.mark.usefixtures("one_fork_server")
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[PageServer]:
-    running = PageServer(SceneChoice(RunSpec("ridgeback-ur10-drag")), port=0, max_sessions=1, grace=2.0)
-    yield running
-    running.close()
+    with served("ridgeback-ur10-drag", grace=2.0) as running:
+        yield running
 
 
 @pytest.fixture(scope="module")

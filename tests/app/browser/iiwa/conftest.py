@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 from playwright.sync_api import Browser, Page
+from served import served
 
 from app.link.choice import SceneChoice
 from app.web.server import PageServer
@@ -20,9 +21,8 @@ CHOICE = SceneChoice(RunSpec("iiwa14-hold"))
 
 @pytest.fixture(scope="package")
 def server(one_fork_server: None) -> Iterator[PageServer]:
-    running = PageServer(CHOICE, port=0, max_sessions=2, grace=2.0, own_files=Folder.at("."))
-    yield running
-    running.close()
+    with served(CHOICE, max_sessions=2, grace=2.0, own_files=Folder.at(".")) as running:
+        yield running
 
 
 @pytest.fixture(scope="package")

@@ -13,6 +13,7 @@ from browsing.browser_actions import (
     drag_target,
     eventually,
     is_drawn,
+    key,
     pick,
     press,
     row,
@@ -74,6 +75,11 @@ def test_a_task_is_added_dragged_moved_reduced_merged_passed_on_and_removed(
     assert eventually(page, lambda: is_drawn(page, "/targets/elbow/control"))
     expect(page.get_by_text("2/3 free", exact=False).first).to_be_visible()
     assert error(learner, "position") < 1e-3
+    key(page, "4")  # before, this key belonged to no level
+    assert eventually(page, lambda: not settings(learner).levels[3].enabled)
+    key(page, "9")
+    key(page, "4")
+    assert eventually(page, lambda: settings(learner).levels[3].enabled)
     expect(page.get_by_text("elbow [mm]", exact=True).first).to_be_visible()  # the curve of the new task
 
     before = target_position(page, ELBOW)
@@ -128,8 +134,8 @@ def test_a_task_is_added_dragged_moved_reduced_merged_passed_on_and_removed(
     code = row(page, "Code").locator("textarea").input_value()
     with Wire(server.link) as elsewhere:
         assert eventually(page, lambda: elsewhere.find("Somebody's code") is not None)
-        elsewhere.write(str(elsewhere.find("Somebody's code")), value=code)
-        elsewhere.write(str(elsewhere.find("Open it")), value=True)
+        elsewhere.use("Somebody's code", code)
+        elsewhere.use("Open it")
         other = server.sessions.learners[1]
         assert eventually(page, lambda: other.settings == settings(learner)), elsewhere.notices
 

@@ -1,0 +1,25 @@
+"""A page for one test."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from app.link.choice import SceneChoice
+from app.web.server import PageServer
+from lessons.scenes.run_spec import RunSpec
+
+
+@contextmanager
+def served(choice: SceneChoice | str = "planar3-hold", **options: Any) -> Iterator[PageServer]:
+    """Runs a server on a free port until the context ends.
+
+    choice: also the name of a scene. options: those of `PageServer`; by default one learner has room.
+    """
+    opened = choice if isinstance(choice, SceneChoice) else SceneChoice(RunSpec(choice))
+    server = PageServer(opened, **{"port": 0, "max_sessions": 1, **options})
+    try:
+        yield server
+    finally:
+        server.close()
