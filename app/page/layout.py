@@ -52,6 +52,7 @@ _PHONE = f"<style>@media (max-width: 36em) {{ {SHEET} {{ width: 100vw !important
 """Makes viser's bottom sheet on a phone as wide as the screen; by default the sheet is narrower, with an
 empty strip beside it. The style applies while an HTML element that contains it is shown."""
 _LOW = 600  # px: in a lower window the levels would cover the robot, and begin folded
+_HEAD, _ROW = 45.0, 53.0  # px: heights of the head of a panel over the scene, and of a level in it
 _HOTKEYS = ("1", "2", "3", "4", "5", "6", "7", "8", "9")
 _FACES: dict[type[SceneSettings], Callable[[Context], Face]] = {
     TorqueSettings: TorqueFace,
@@ -100,6 +101,8 @@ class Stage:
         )
         self.shown: tuple[object, ...] | None = None
         """Identifies the instant that was shown last; None before the first instant."""
+        self.panel = 0.0
+        """The height of the panel of levels that opens over the scene, px."""
         self._resets: int | None = None
         self._ghost: GhostView | None = None
         self._shown_ghost: GhostClient | None = None
@@ -173,6 +176,8 @@ class Stage:
             low = self._comfort.window is not None and self._comfort.window[1] < _LOW
             if low or exercise is not None:  # a lesson shows little at once
                 strip.minimize()
+            else:
+                self.panel = _HEAD + _ROW * len({task.level for task in in_order(self._ready)})
 
     def _toggle(self, place: int) -> None:
         event = self._face.toggle(place)

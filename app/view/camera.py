@@ -21,6 +21,8 @@ _THICK = 0.07
 """Distance that links extend around their joints, as a share of the robot's size."""
 _SHEET = 0.6
 """Share of a phone's height, from below, that viser's sheet covers."""
+_MOST_ABOVE = 0.35
+"""Largest share of the picture's height that is left to a panel above: the robot would be too small."""
 _STEP = 0.02
 """Motion of the base, m, below which the camera stays, since a trembling camera is unpleasant."""
 _REST = 30
@@ -28,7 +30,7 @@ _REST = 30
 
 
 def fit(
-    points: np.ndarray, direction: np.ndarray, fov: float, aspect: float, phone: bool
+    points: np.ndarray, direction: np.ndarray, fov: float, aspect: float, phone: bool, above: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns (position, look_at) of a camera that shows all points in the middle of the free part of its
     picture.
@@ -39,6 +41,7 @@ def fit(
         fov: vertical opening angle, rad.
         aspect: width over height.
         phone: whether a sheet covers the lower part.
+        above: share of the picture's height that a panel covers from above.
     """
     back = direction / np.linalg.norm(direction)
     right = np.cross([0.0, 0.0, 1.0], back)
@@ -49,17 +52,23 @@ def fit(
     middle = 0.5 * (seen.min(axis=0) + seen.max(axis=0))
     away = np.abs(seen[:, :2] - middle[:2]) + _THICK * size
     high = math.tan(0.5 * fov)
-    open_ = np.array([high * aspect, high * (1.0 - _SHEET if phone else 1.0)])
+    below = _SHEET if phone else 0.0
+    open_ = np.array([high * aspect, high * (1.0 - below - above)])
     distance = float((away / (_SHARE * open_) + (seen[:, 2:] - middle[2])).max())
     at = middle @ np.array([right, up, back])
-    if phone:
-        at = at - _SHEET * distance * high * up
+    at = at + (above - below) * distance * high * up
     return at + distance * back, at
 
 
-def look(camera: viser.CameraHandle, points: np.ndarray, phone: bool, direction: np.ndarray | None) -> None:
+def look(
+    camera: viser.CameraHandle,
+    points: np.ndarray,
+    phone: bool,
+    direction: np.ndarray | None,
+    panel: float = 0.0,
+) -> None:
     """Moves the camera so that all points (k, 3), m, are visible. direction: from the points to the camera;
-    None for the present direction."""
+    None for the present direction. panel: height of a panel that covers the picture from above, px."""
     if direction is None:
         here = np.asarray(camera.position, float) - np.asarray(camera.look_at, float)
         level = float(np.linalg.norm(here[:2]))
@@ -71,7 +80,9 @@ def look(camera: viser.CameraHandle, points: np.ndarray, phone: bool, direction:
         direction = _ASIDE
     # The canvas of a folded page, or of a page without a layout, has zero height or width.
     aspect = max(max(camera.image_width, 1) / max(camera.image_height, 1), _SLIM)
-    eye, at = fit(points, np.asarray(direction), camera.fov, aspect if phone else min(aspect, _NARROW), phone)
+    above = min(panel / max(camera.image_height, 1), _MOST_ABOVE)
+    width = aspect if phone else min(aspect, _NARROW)
+    eye, at = fit(points, np.asarray(direction), camera.fov, width, phone, above)
     camera.up_direction = (0.0, 0.0, 1.0)
     turn(camera, eye, at)
 

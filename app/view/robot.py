@@ -115,14 +115,19 @@ def _home(robot: Robot) -> tuple[np.ndarray, np.ndarray, float]:
 
 
 def aim(
-    camera: viser.CameraHandle, robot: Robot, phone: bool, room: np.ndarray, ways: Sequence[np.ndarray] = ()
+    camera: viser.CameraHandle,
+    robot: Robot,
+    phone: bool,
+    room: np.ndarray,
+    ways: Sequence[np.ndarray] = (),
+    panel: float = 0.0,
 ) -> None:
     """Turns the camera to a robot. room: the points (k, 3), m, that the robot will reach; ways: the paths of
     its hand, (k, 3) each, m; phone: whether viser's sheet covers the lower part of the scene. The robot is
-    then shown smaller, in the upper part."""
+    then shown smaller, in the upper part. panel: height of a panel over the scene, px."""
     if not len(room):
         points, direction, _ = _home(robot)
-        look(camera, np.vstack([points, *ways]), phone, direction)
+        look(camera, np.vstack([points, *ways]), phone, direction, panel)
         return
     _, at, reach = camera_for(robot)
     points = np.vstack([at, room])

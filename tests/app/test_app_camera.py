@@ -42,6 +42,14 @@ def test_all_of_it_is_seen_and_in_the_middle(aspect: float, size: float) -> None
     assert np.abs(0.5 * (low + high)).max() < 0.15
 
 
+@pytest.mark.parametrize("above", [0.0, 0.2, 0.35])
+def test_it_is_below_a_panel_over_the_scene(above: float) -> None:
+    points = np.random.default_rng(2).uniform(-0.5, 0.5, (9, 3))
+    seen = on_picture(points, *fit(points, np.array([0.9, -0.9, 0.5]), 0.9, 0.75, False, above), 0.9, 0.75)
+    assert seen[:, 1].min() > -1.0 and seen[:, 1].max() < 1.0 - 2.0 * above
+    assert np.abs(seen[:, 0]).max() < 1.0
+
+
 def test_on_a_phone_it_is_above_the_sheet() -> None:
     points = np.random.default_rng(2).uniform(-0.5, 0.5, (9, 3))
     seen = on_picture(points, *fit(points, np.array([0.9, -0.9, 0.5]), 0.9, 0.46, True), 0.9, 0.46)
