@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from himpc.tasks import Damping, FrameOrientation
-from himpc.telemetry import TORQUE_ROW, Layout
+from himpc.telemetry import Layout
 from himpc.tick.configure import Span, is_built_in
 from himpc.tick.kernel.arena import Arena
 from himpc.tick.kernel.arrays import AT, IntArray
@@ -59,6 +59,6 @@ def gathered(arena: Arena, layout: Layout, spans: Sequence[Span], levels: Sequen
         for which, field in ((1, "v_d"), (2, "a_d")):
             put(f"{field}/{info.name}", "motion", which * knots + first)
     for index, level in enumerate(levels):
-        for field in TORQUE_ROW.per_level:
+        for field in ("cost", "kkt", "fallback", "time_us", "leak", "active"):
             put(f"{field}/{level}", field, index)
     return sources
