@@ -117,6 +117,9 @@ class ForkServer:
             on_thread("fork servers", self._accept_on_thread, self._listener)
         if self.pid is not None:
             return
+        # The line of a killed server ends before the server has: `multiprocessing` would then replace the
+        # server later, without the address of the line.
+        _wait_for_end(self._last, 5.0)
         path = os.pathsep.join(filter(None, sys.path))
         forkserver.set_forkserver_preload([_PRELOADED])
         resource_tracker.ensure_running()  # otherwise the next call starts it, and lets Ctrl-C through
@@ -186,9 +189,9 @@ def _started(context: BaseContext, function: Callable[..., None], args: tuple[ob
     return child
 
 
-def _wait_for_end(pid: int | None) -> None:
-    """Waits for a moment until a child that is about to end has ended; `multiprocessing` then notices it."""
-    for _ in range(50):
+def _wait_for_end(pid: int | None, seconds: float = 0.5) -> None:
+    """Waits until a child that is about to end has ended; `multiprocessing` then notices it."""
+    for _ in range(round(seconds / 0.01)):
         with contextlib.suppress(ChildProcessError):
             if pid is not None and os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT | os.WNOHANG) is None:
                 time.sleep(0.01)
