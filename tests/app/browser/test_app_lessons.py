@@ -103,8 +103,8 @@ def walk(page: Page, school: PageServer, lesson: Lesson) -> None:
         expect(marks(page, "✗")).to_have_count(0)
         expect(page.get_by_text("You predicted:")).to_have_count(int(part.prediction is not None))
         assert eventually(page, lambda: words_in_view(page) <= AFTER), words_in_view(page)
-        drawn = page.get_by_role("img", name=re.compile(f"over time$|^{PLANE}$")).first.bounding_box()
-        assert drawn is not None and drawn["height"] >= 200
+        drawn = page.get_by_role("img", name=re.compile(f"over time$|^{PLANE}$")).first
+        assert eventually(page, lambda: (drawn.bounding_box() or {"height": 0.0})["height"] >= 200)
         assert_order(page.get_by_text("Now you:"), page.get_by_text("Your knobs"), next_of(page))
         if part is not parts_of(lesson)[-1]:
             next_of(page).click()
