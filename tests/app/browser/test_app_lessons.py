@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -104,7 +105,7 @@ def walk(page: Page, school: PageServer, lesson: Lesson) -> None:
         expect(page.get_by_text("You predicted:")).to_have_count(int(part.prediction is not None))
         assert eventually(page, lambda: words_in_view(page) <= AFTER), words_in_view(page)
         drawn = page.get_by_role("img", name=re.compile(f"over time$|^{PLANE}$")).first
-        assert eventually(page, lambda: (drawn.bounding_box() or {"height": 0.0})["height"] >= 200)
+        assert eventually(page, partial(is_high, drawn))
         assert_order(page.get_by_text("Now you:"), page.get_by_text("Your knobs"), next_of(page))
         if part is not parts_of(lesson)[-1]:
             next_of(page).click()
@@ -131,6 +132,12 @@ def test_a_phone_asks_first_then_plots(browser: Browser) -> None:
         assert_order(option, drawn, page.get_by_text("Why", exact=True))
         expect(page.get_by_text("press P", exact=False)).to_have_count(0)
         page.context.close()
+
+
+def is_high(drawn: Locator) -> bool:
+    """Returns whether a drawing is at least 200 px high; a new one gets its size a moment later."""
+    box = drawn.bounding_box()
+    return box is not None and box["height"] >= 200
 
 
 def next_of(page: Page) -> Locator:
