@@ -94,7 +94,8 @@ class ForkServer:
                 break
             with contextlib.suppress(OSError, EOFError), self._request():
                 return _started(mp.get_context("forkserver"), function, args)
-            _wait_for_end(self._last)
+            with self._lock:
+                self._forget_ended(0.5)
             # A server that failed before it was ready is not replaced: the next one would fail as well.
             self._forks = self.ready or self._stopped or not self.worker
         return _started(mp.get_context("spawn"), function, args)
@@ -117,9 +118,7 @@ class ForkServer:
             on_thread("fork servers", self._accept_on_thread, self._listener)
         if self.pid is not None:
             return
-        # The line of a killed server ends before the server has: `multiprocessing` would then replace the
-        # server later, without the address of the line.
-        _wait_for_end(self._last, 5.0)
+        self._forget_ended(5.0)
         path = os.pathsep.join(filter(None, sys.path))
         forkserver.set_forkserver_preload([_PRELOADED])
         resource_tracker.ensure_running()  # otherwise the next call starts it, and lets Ctrl-C through
@@ -135,7 +134,14 @@ class ForkServer:
         if pid is not None:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGKILL)
-            _wait_for_end(pid)
+            self._forget_ended(5.0)
+
+    def _forget_ended(self, seconds: float) -> None:
+        """Waits, at most for some seconds, until a server that is about to end has ended, and forgets it. Its
+        line may end earlier or later. `multiprocessing` would replace a server that it finds dead afterwards,
+        without the address of the line."""
+        if _has_ended(self._last, seconds) and self.pid == self._last:
+            self.pid = None
 
     # ---------------------------------------------------------------- the line to the server
 
@@ -189,14 +195,16 @@ def _started(context: BaseContext, function: Callable[..., None], args: tuple[ob
     return child
 
 
-def _wait_for_end(pid: int | None, seconds: float = 0.5) -> None:
-    """Waits until a child that is about to end has ended; `multiprocessing` then notices it."""
+def _has_ended(pid: int | None, seconds: float) -> bool:
+    """Waits, at most for some seconds, until a child has ended; returns whether it has."""
     for _ in range(round(seconds / 0.01)):
-        with contextlib.suppress(ChildProcessError):
-            if pid is not None and os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT | os.WNOHANG) is None:
-                time.sleep(0.01)
-                continue
-        return
+        try:
+            if pid is None or os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT | os.WNOHANG) is not None:
+                return True
+        except ChildProcessError:
+            return True
+        time.sleep(0.01)
+    return False
 
 
 # ---------------------------------------------------------------- in the server's process
