@@ -77,13 +77,6 @@ class Learner(Wire):
         if message["type"] == "GuiTextMessage" and message["props"]["label"] == LABEL:
             self.write(message["uuid"], value=AWAKE)  # a browser shows only the curves of the step
 
-    def use(self, label: str, value: object) -> None:
-        """Uses the control with this label, as soon as the page has it."""
-        assert eventually(lambda: self.find(label) is not None, LONG), f"a page has no {label!r}"
-        found = self.find(label)
-        assert found is not None
-        self.write(found, value=value)
-
     @property
     def ready(self) -> bool:
         """Whether the page shows a step that was not run yet and that has a button to run it."""
