@@ -72,6 +72,8 @@ def main(learners: int = 20, phones: int = 200, lesson: str = "a-redundant-arm",
 class Learner(Wire):
     """A learner's page."""
 
+    longest_wait = LONG
+
     def _take(self, message: dict[str, Any]) -> None:
         super()._take(message)
         if message["type"] == "GuiTextMessage" and message["props"]["label"] == LABEL:

@@ -63,6 +63,9 @@ class Wire:
         eye: the last camera position that the server sent, m.
     """
 
+    longest_wait = 60.0
+    """The time, s, in which a control must appear that is used."""
+
     def __init__(self, url: str, headers: Mapping[str, str] | None = None, slow: bool = False) -> None:
         """headers: further headers of the handshake, from the browser or a proxy. slow: emulates a slow line,
         on which some kilobytes wait at most."""
@@ -112,7 +115,7 @@ class Wire:
     def use(self, label: str, value: object = True) -> None:
         """Writes the value of the control with a label, as a user does, as soon as there is such a control.
         True presses a button."""
-        if not eventually(lambda: self.find(label) is not None, 60.0):
+        if not eventually(lambda: self.find(label) is not None, self.longest_wait):
             raise LookupError(f"the page has no control {label!r}")
         self.write(str(self.find(label)), value=value)
 
