@@ -49,7 +49,7 @@ def made_cover(robot: Robot, meshes: bool = True, tries: int = 1) -> Cover:
     weights = {k: 1.0 - _TAPER * (1.0 - (len(own) - 1) / longest) for k, own in enumerate(supports)}
     best = _checked(robot, covering(surfaces, weights))
     for _ in range(tries - 1):
-        close = {each for pair in _own_pairs(robot, best) for each in (pair.first, pair.second)}
+        close = {each for pair in own_pairs(robot, best) for each in (pair.first, pair.second)}
         if not close:
             break
         weights = {joint: weight * (_CLOSE if joint in close else 1.0) for joint, weight in weights.items()}
@@ -58,7 +58,7 @@ def made_cover(robot: Robot, meshes: bool = True, tries: int = 1) -> Cover:
     return best
 
 
-def _own_pairs(robot: Robot, cover: Cover) -> tuple[Excluded, ...]:
+def own_pairs(robot: Robot, cover: Cover) -> tuple[Excluded, ...]:
     """Returns the pairs that a cover leaves out and the plant does not."""
     known = {(pair.first, pair.second) for pair in robot.collision.excluded}
     return tuple(pair for pair in cover.excluded if (pair.first, pair.second) not in known)
@@ -68,7 +68,7 @@ def _checked(robot: Robot, capsules: tuple[Capsule, ...]) -> Cover:
     """Returns the cover with these capsules and the pairs to leave out."""
     solids = tuple(map(as_solid, capsules))
     found = Cover(capsules, collision_model(robot, solids, near_home=NEAR).excluded)
-    excluded = (*robot.collision.excluded, *_own_pairs(robot, found))
+    excluded = (*robot.collision.excluded, *own_pairs(robot, found))
     covered = replace(robot, collision=CollisionModel(solids, excluded))
     return Cover(capsules, (*excluded, *_useless(robot, covered)))
 

@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from robots.collision import base_joint
-from robots.covering.covers import made_cover
+from robots.covering.covers import made_cover, own_pairs
 from robots.errors import listed
 from robots.floor import no_floor, stands
 from robots.geometry.collision_model import CollisionModel
@@ -87,12 +87,9 @@ def with_cover(robot: Robot, meshes: bool = True) -> Robot:
     except (ValueError, RuntimeError, ArithmeticError):
         found, text = Cover(), "no capsules contain the robot's shapes: no distance is kept"
     robot = replace(_noted(robot, "distances", text), cover=found)
-    known = {(pair.first, pair.second) for pair in robot.collision.excluded}
     parents, base = robot.model.parents, base_joint(robot)
     nested = tuple(
-        pair
-        for pair in found.excluded
-        if (pair.first, pair.second) not in known and parents[parents[pair.second]] == pair.first > base
+        pair for pair in own_pairs(robot, found) if parents[parents[pair.second]] == pair.first > base
     )
     if not nested:
         return robot
