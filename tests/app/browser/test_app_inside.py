@@ -184,7 +184,7 @@ def test_nobody_asks_while_nobody_looks(sheet: Page, drawing: PageServer) -> Non
 
 
 def test_the_hessian_opens_on_demand(sheet: Page, drawing: PageServer) -> None:
-    sheet.get_by_text("The Hessian", exact=True).click()
+    unfold(sheet, "The Hessian")
     sheet.locator(f'[data-chart="{HESSIAN}"]').scroll_into_view_if_needed()
     assert eventually(sheet, lambda: sheet.get_by_text("H = GᵀQG + R of level").is_visible())
     learner = learner_of(drawing)
