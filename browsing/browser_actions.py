@@ -245,6 +245,12 @@ def target_position(page: Page, node: str = "/target/ball") -> tuple[float, floa
     return float(found[0]), float(found[1]), float(found[2])
 
 
+def point_on_page(page: Page, node: str, at: tuple[float, float, float]) -> tuple[float, float]:
+    """Returns where the page shows a point that is given in a node's frame, m, in CSS pixels."""
+    x, y = page.evaluate(_PROJECT, [node, list(at)])
+    return float(x), float(y)
+
+
 @contextmanager
 def often(page: Page) -> Iterator[None]:
     """Within this context the time between two frames is `OFTEN`."""

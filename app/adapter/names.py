@@ -4,7 +4,7 @@ versions that have them."""
 
 PAGE = "window.__viserMutable"
 """The object of viser's page that sends messages."""
-CHART, CHART_TITLE = ".uplot", ".u-title"
+CHART, CHART_TITLE, CHART_BOX = ".uplot", ".u-title", ".uplot-container"
 NUMBER_BOX, SLIDER_LABEL = ".mantine-NumberInput-root", ".mantine-Slider-label"
 BUTTON_INNER, BUTTON_LABEL = ".mantine-Button-inner", ".mantine-Button-label"
 SHEET = 'div[style*="width: 20em"]'
@@ -13,6 +13,7 @@ ROW = ".mantine-Flex-root"
 """A control with its label."""
 ICON_BUTTON, CLOSES_NOTICE = ".mantine-ActionIcon-root", ".mantine-Notification-closeButton"
 SCROLLS = ".mantine-ScrollArea-viewport"
+FLOATING_PANEL = '.mantine-Paper-root[style*="position: absolute"]'
 FOLDED_PANEL = "[data-dock-bar]"
 """The bar of a folded panel. viser calls it a list of tabs, although it has a button that unfolds it."""
 STORED = "viser-user:"

@@ -96,7 +96,7 @@ _BEGIN = """(() => {
   document.body.append(line);
 })()"""
 _SHOWN = (
-    "position:fixed;bottom:0.6em;left:50%;transform:translateX(-50%);z-index:5;max-width:min(36em,90vw);"
+    "position:fixed;top:0.6em;left:50%;transform:translateX(-50%);z-index:5;max-width:min(36em,90vw);"
     "padding:0.2em 0.7em;border-radius:4px;pointer-events:none;font-size:0.85em;background:#222;color:#fff"
 )
 _ONLY_READ = "position:fixed;width:1px;height:1px;overflow:hidden;clip-path:inset(50%);white-space:nowrap"
@@ -147,7 +147,7 @@ class Comfort:
         switch = gui.add_checkbox(
             "Say what happens",
             self.says,
-            hint="A line below the robot, at most one sentence in two seconds. Screen readers always read it",
+            hint="A line above the robot, at most one sentence in two seconds. Screen readers always read it",
         )
 
         @switch.on_update

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import viser
 
-from app.adapter.names import SHEET
+from app.adapter.names import CHART_BOX, FLOATING_PANEL, SHEET
 from app.client.ghost import GhostClient
 from app.client.moment import Moment, moment_of
 from app.client.progress import Notebook
@@ -51,8 +51,19 @@ from lessons.settings.velocity import VelocitySettings
 _PHONE = f"<style>@media (max-width: 36em) {{ {SHEET} {{ width: 100vw !important }} }}</style>"
 """Makes viser's bottom sheet on a phone as wide as the screen; by default the sheet is narrower, with an
 empty strip beside it. The style applies while an HTML element that contains it is shown."""
+_CHARTS = f"""<style>
+div:has(> div > {CHART_BOX}) {{ display: flex; flex-wrap: wrap }}
+div:has(> div > {CHART_BOX}) > * {{ flex: 1 1 100%; min-width: 0 }}
+div:has(> div > {CHART_BOX}) > div:has(> {CHART_BOX}) {{ flex: 1 1 17em }}
+</style>"""
+"""Puts charts beside each other where a panel is wide enough; viser puts all controls below each other."""
 _LOW = 600  # px: in a lower window the levels would cover the robot, and begin folded
 _HEAD, _ROW = 45.0, 53.0  # px: heights of the head of a panel over the scene, and of a level in it
+_ROOMY = 1100, 720  # px: in a window of this width and height, the plots stand in a row below the robot
+_PLOTS, _GAP = 316.0, 8.0  # px: height of the row of plots, and its distance from the edges of the scene
+_SIDE = 400.0  # px: width of a docked panel
+_FITS = f"<style>{FLOATING_PANEL} {{ max-width: calc(100vw - {_SIDE + 2.0 * _GAP:g}px) }}</style>"
+"""Keeps a wide panel over the scene off the docked panel when the window becomes narrower."""
 _HOTKEYS = ("1", "2", "3", "4", "5", "6", "7", "8", "9")
 _FACES: dict[type[SceneSettings], Callable[[Context], Face]] = {
     TorqueSettings: TorqueFace,
@@ -101,8 +112,11 @@ class Stage:
         )
         self.shown: tuple[object, ...] | None = None
         """Identifies the instant that was shown last; None before the first instant."""
-        self.panel = 0.0
-        """The height of the panel of levels that opens over the scene, px."""
+        self.covered = 0.0, 0.0
+        """The heights that panels cover of the scene, from above and from below, px."""
+        self._row: viser.PanelHandle | None = None
+        """The row of plots below the robot if it is folded while a step of a lesson has no curves."""
+        self._has_curves = False
         self._resets: int | None = None
         self._ghost: GhostView | None = None
         self._shown_ghost: GhostClient | None = None
@@ -121,7 +135,7 @@ class Stage:
         notebook: Notebook,
         narrow: bool,
     ) -> None:
-        gui.add_html(_PHONE)
+        gui.add_html(_PHONE + _CHARTS)
         exercise = self._learner.choice_of(self._ready).exercise
         # On a phone, time and speed come after the question.
         with gui.add_folder(None, order=math.inf if narrow else -1.0):
@@ -135,6 +149,8 @@ class Stage:
             more = gui.add_tab_group()
         control, robot = places or [more.add_tab("Control"), more.add_tab("Robot")]
         plots = more if narrow else gui.add_panel()
+        width, height = self._comfort.window or (0, 0)
+        roomy = width >= _ROOMY[0] and height >= _ROOMY[1] and not self._face.opens_inside
         if not narrow:
             self._face.open_plots(plots)
         with learn:
@@ -165,19 +181,30 @@ class Stage:
             self._help = HelpPanel(gui)
         for place, key in enumerate(_HOTKEYS):  # hotkeys also for levels that may be added later
             add_command(gui, f"Level {place + 1} on or off", key, partial(self._toggle, place))
-        self._face.add_plots(gui, plots)
+        self._face.add_plots(gui, plots, more if roomy else plots)
         with plots.add_tab("Who binds"):
             self._binding = BindingPanel(gui, self._colours)
-        if isinstance(plots, viser.PanelHandle):
-            plots.dock_left()
-            plots.set_width(400)
+        above = below = 0.0
         if strip is not None:
-            strip.float(x=8.0, y=8.0, width=320.0)
-            low = self._comfort.window is not None and self._comfort.window[1] < _LOW
+            strip.float(x=_GAP, y=_GAP, width=320.0)
+            low = self._comfort.window is not None and height < _LOW
             if low or exercise is not None:  # a lesson shows little at once
                 strip.minimize()
             else:
-                self.panel = _HEAD + _ROW * len({task.level for task in in_order(self._ready)})
+                above = _HEAD + _ROW * len({task.level for task in in_order(self._ready)})
+        if isinstance(plots, viser.PanelHandle):
+            if roomy:
+                # The scene is so wide that the panel of levels stands beside the robot.
+                above, below = 0.0, _PLOTS + _GAP
+                gui.add_html(_FITS)
+                plots.float(x=_GAP, y=-_GAP, width=width - _SIDE - 2.0 * _GAP, height=_PLOTS)
+                if exercise is not None:
+                    self._row = plots
+                    plots.minimize()
+            else:
+                plots.dock_left()
+                plots.set_width(_SIDE)
+        self.covered = above, below
 
     def _toggle(self, place: int) -> None:
         event = self._face.toggle(place)
@@ -293,8 +320,21 @@ class Stage:
                 self._compare.update(now)
                 self._face.write(shown)
                 self._binding.update(shown)
-            self._course.follow(learner.lecture_of(self._ready), settings)
+            lecture = learner.lecture_of(self._ready)
+            self._course.follow(lecture, settings)
+            self._fold_row(lecture is None or not lecture.curves)
             self._bindings.refresh(settings)
+
+    def _fold_row(self, empty: bool) -> None:
+        """Folds the row of plots when a step without curves opens, and unfolds it when curves begin. Between
+        these two the learner's choice stays."""
+        if self._row is None or self._has_curves != empty:
+            return
+        self._has_curves = not empty
+        if empty:
+            self._row.minimize()
+        else:
+            self._row.expand()
 
     def close(self) -> None:
         self._course.close()

@@ -299,8 +299,8 @@ class Page:
             seen = (run.scene, run.urdf, run.tip, run.hold, ready.choice.urdf_text, ready.robot.name)
             if seen != self._seen:  # after a restart the camera stays as the learner left it
                 ways = [task.path for task in ready.tasks if task.path is not None]
-                panel = self._stage.panel
-                aim(self._client.camera, ready.robot, self._phone, ready.room, ways, panel)
+                covered = self._stage.covered
+                aim(self._client.camera, ready.robot, self._phone, ready.room, ways, covered)
                 self._seen = seen
         for sentence in ready.left_out:
             self._client.add_notification("Opened without one of your tasks", sentence, color="orange")
@@ -320,8 +320,8 @@ class Page:
         if poses is None or ready is None or not np.isfinite(poses).all():
             return
         base = np.zeros((0 if len(ready.room) else 1, 3))  # a mobile robot may be far from the origin
-        panel = 0.0 if self._stage is None else self._stage.panel
-        look(self._client.camera, np.vstack([base, poses[:, :3]]), self._phone, None, panel)
+        covered = (0.0, 0.0) if self._stage is None else self._stage.covered
+        look(self._client.camera, np.vstack([base, poses[:, :3]]), self._phone, None, covered)
 
     def _break(self, error: Exception) -> None:
         """Shows an error of the page with a sentence and a button to continue, in place of the broken

@@ -60,6 +60,9 @@ class Context:
         return np.tile(still, (self.ready.robot.model.njoints, 1)) if poses is None else poses
 
 
+Tabs = viser.PanelHandle | viser.GuiTabGroupHandle
+
+
 class Face(Protocol):
     """The user interface of a kind of scene. It is built by `open_plots`, `add_start`, `add_tasks`,
     `add_control`, `add_plant`, `add_plots` and `add_scene`, in this order. `follow` is called for every
@@ -85,13 +88,17 @@ class Face(Protocol):
         """Adds the settings of the plant."""
         ...
 
-    def open_plots(self, plots: viser.PanelHandle | viser.GuiTabGroupHandle) -> None:
-        """Adds the tab that precedes the lesson's tab in the left panel, if this kind of scene has such a
-        tab."""
+    @property
+    def opens_inside(self) -> bool:
+        """Whether the picture of a tick is what this scene is about: its tab then is the first one."""
         ...
 
-    def add_plots(self, gui: viser.GuiApi, plots: viser.PanelHandle | viser.GuiTabGroupHandle) -> None:
-        """Adds the tabs of this kind to the left panel."""
+    def open_plots(self, plots: Tabs) -> None:
+        """Adds the tab of the picture of a tick, which precedes the lesson's tab, if it is the first one."""
+        ...
+
+    def add_plots(self, gui: viser.GuiApi, plots: Tabs, inside: Tabs) -> None:
+        """Adds the plots of this kind, and to `inside` the picture of a tick, if there is one."""
         ...
 
     def add_scene(self, scene: viser.SceneApi, robot: RobotView) -> None:

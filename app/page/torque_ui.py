@@ -14,7 +14,7 @@ from app.client.moment import Moment
 from app.html.palette import LEVELS
 from app.link.exercise import signals_of
 from app.link.messages import Ready, Status
-from app.page.scene_ui import Context
+from app.page.scene_ui import Context, Tabs
 from app.panels.inside.inside import InsidePanel
 from app.panels.run.joints import JointPlots
 from app.panels.run.move import MovePanel
@@ -83,12 +83,15 @@ class TorqueFace:
     def add_plant(self, gui: viser.GuiApi) -> None:
         add_plant(gui, self._context.bindings, self._context.settings, self._context.ready.robot)
 
-    def open_plots(self, plots: viser.PanelHandle | viser.GuiTabGroupHandle) -> None:
-        # If the horizon has one knot, the QP is small enough for beginners, and its tab comes first.
-        if self._context.settings.horizon == 1:
+    @property
+    def opens_inside(self) -> bool:
+        return self._context.settings.horizon == 1  # the QP is small enough for beginners
+
+    def open_plots(self, plots: Tabs) -> None:
+        if self.opens_inside:
             self._inside_tab = plots.add_tab("Inside")
 
-    def add_plots(self, gui: viser.GuiApi, plots: viser.PanelHandle | viser.GuiTabGroupHandle) -> None:
+    def add_plots(self, gui: viser.GuiApi, plots: Tabs, inside: Tabs) -> None:
         context = self._context
         with plots.add_tab("Errors"):
             self._level_plots = LevelPlots(
@@ -96,7 +99,7 @@ class TorqueFace:
             )
         with plots.add_tab("Joints"):
             self._joint_plots = JointPlots(gui, context.in_view, context.ready.robot)
-        with self._inside_tab or plots.add_tab("Inside"):
+        with self._inside_tab or inside.add_tab("Inside"):
             self._inside_place = gui.add_folder(None)
         self._look_inside(gui)
 

@@ -13,7 +13,7 @@ from app.adapter.removed_handle_errors import unless_removed
 from app.client.moment import Moment
 from app.html.text import free_name
 from app.link.messages import Ready, Status, TaskView
-from app.page.scene_ui import Context
+from app.page.scene_ui import Context, Tabs
 from app.panels.run.joints import ACCELERATION, JointPlots
 from app.panels.run.move import MovePanel
 from app.panels.velocity.controller import HtmpcPanel
@@ -47,6 +47,7 @@ class VelocityFace:
     """The user interface of a velocity-level scene; `app.page.scene_ui.Face` describes its methods."""
 
     fastest: ClassVar[float] = 10.0
+    opens_inside = False
 
     def __init__(self, context: Context) -> None:
         self._context = context
@@ -92,10 +93,11 @@ class VelocityFace:
     def add_plant(self, gui: viser.GuiApi) -> None:
         add_servo_plant(gui, self._context.bindings, self._context.settings)
 
-    def open_plots(self, plots: viser.PanelHandle | viser.GuiTabGroupHandle) -> None:
+    def open_plots(self, plots: Tabs) -> None:
         pass
 
-    def add_plots(self, gui: viser.GuiApi, plots: viser.PanelHandle | viser.GuiTabGroupHandle) -> None:
+    def add_plots(self, gui: viser.GuiApi, plots: Tabs, inside: Tabs) -> None:
+        del inside  # the compiled cascade of this level does not show a tick
         with plots.add_tab("Errors"):
             self._plots = TrackingPlots(
                 gui, self._context.in_view, self._context.ready, self._context.colours

@@ -21,8 +21,9 @@ _THICK = 0.07
 """Distance that links extend around their joints, as a share of the robot's size."""
 _SHEET = 0.6
 """Share of a phone's height, from below, that viser's sheet covers."""
-_MOST_ABOVE = 0.35
-"""Largest share of the picture's height that is left to a panel above: the robot would be too small."""
+_MOST = 0.4
+"""Largest share of the picture's height that is left to a panel above or below: the robot would be too
+small."""
 _STEP = 0.02
 """Motion of the base, m, below which the camera stays, since a trembling camera is unpleasant."""
 _REST = 30
@@ -30,7 +31,12 @@ _REST = 30
 
 
 def fit(
-    points: np.ndarray, direction: np.ndarray, fov: float, aspect: float, phone: bool, above: float = 0.0
+    points: np.ndarray,
+    direction: np.ndarray,
+    fov: float,
+    aspect: float,
+    above: float = 0.0,
+    below: float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns (position, look_at) of a camera that shows all points in the middle of the free part of its
     picture.
@@ -40,8 +46,7 @@ def fit(
         direction: (3,) from the points to the camera; not vertical.
         fov: vertical opening angle, rad.
         aspect: width over height.
-        phone: whether a sheet covers the lower part.
-        above: share of the picture's height that a panel covers from above.
+        above, below: shares of the picture's height that panels cover from above and from below.
     """
     back = direction / np.linalg.norm(direction)
     right = np.cross([0.0, 0.0, 1.0], back)
@@ -52,7 +57,6 @@ def fit(
     middle = 0.5 * (seen.min(axis=0) + seen.max(axis=0))
     away = np.abs(seen[:, :2] - middle[:2]) + _THICK * size
     high = math.tan(0.5 * fov)
-    below = _SHEET if phone else 0.0
     open_ = np.array([high * aspect, high * (1.0 - below - above)])
     distance = float((away / (_SHARE * open_) + (seen[:, 2:] - middle[2])).max())
     at = middle @ np.array([right, up, back])
@@ -60,15 +64,25 @@ def fit(
     return at + distance * back, at
 
 
+def covered_shares(
+    camera: viser.CameraHandle, phone: bool, covered: tuple[float, float]
+) -> tuple[float, float]:
+    """Returns the shares of the picture's height that panels cover from above and from below. covered: the
+    panels' heights, px; phone: whether viser's sheet covers the lower part."""
+    above, below = (min(height / max(camera.image_height, 1), _MOST) for height in covered)
+    return above, _SHEET if phone else below
+
+
 def look(
     camera: viser.CameraHandle,
     points: np.ndarray,
     phone: bool,
     direction: np.ndarray | None,
-    panel: float = 0.0,
+    covered: tuple[float, float] = (0.0, 0.0),
 ) -> None:
     """Moves the camera so that all points (k, 3), m, are visible. direction: from the points to the camera;
-    None for the present direction. panel: height of a panel that covers the picture from above, px."""
+    None for the present direction. covered: heights of the panels that cover the picture from above and
+    from below, px."""
     if direction is None:
         here = np.asarray(camera.position, float) - np.asarray(camera.look_at, float)
         level = float(np.linalg.norm(here[:2]))
@@ -80,9 +94,9 @@ def look(
         direction = _ASIDE
     # The canvas of a folded page, or of a page without a layout, has zero height or width.
     aspect = max(max(camera.image_width, 1) / max(camera.image_height, 1), _SLIM)
-    above = min(panel / max(camera.image_height, 1), _MOST_ABOVE)
     width = aspect if phone else min(aspect, _NARROW)
-    eye, at = fit(points, np.asarray(direction), camera.fov, width, phone, above)
+    shares = covered_shares(camera, phone, covered)
+    eye, at = fit(points, np.asarray(direction), camera.fov, width, *shares)
     camera.up_direction = (0.0, 0.0, 1.0)
     turn(camera, eye, at)
 

@@ -10,7 +10,7 @@ import viser
 
 from app.adapter import private
 from app.html.palette import RGB
-from app.view.camera import look, turn
+from app.view.camera import covered_shares, look, turn
 from robots import Robot
 from robots.covering.cover_of import cover_of
 from robots.shapes.capsules import cover_parts
@@ -120,14 +120,15 @@ def aim(
     phone: bool,
     room: np.ndarray,
     ways: Sequence[np.ndarray] = (),
-    panel: float = 0.0,
+    covered: tuple[float, float] = (0.0, 0.0),
 ) -> None:
     """Turns the camera to a robot. room: the points (k, 3), m, that the robot will reach; ways: the paths of
-    its hand, (k, 3) each, m; phone: whether viser's sheet covers the lower part of the scene. The robot is
-    then shown smaller, in the upper part. panel: height of a panel over the scene, px."""
+    its hand, (k, 3) each, m; phone: whether viser's sheet covers the lower part of the scene; covered:
+    heights of the panels that cover the scene from above and from below, px. The robot is shown smaller, in
+    the free part."""
     if not len(room):
         points, direction, _ = _home(robot)
-        look(camera, np.vstack([points, *ways]), phone, direction, panel)
+        look(camera, np.vstack([points, *ways]), phone, direction, covered)
         return
     _, at, reach = camera_for(robot)
     points = np.vstack([at, room])
@@ -135,10 +136,10 @@ def aim(
     at = np.array([*(0.5 * (low + high))[:2], 0.4])
     wide = 0.5 * float(np.linalg.norm((high - low)[:2])) + 0.5 * reach
     eye = at + 1.15 * wide * np.array([0.7, -0.95, 0.9])
-    if phone:
-        eye = at + 1.7 * (eye - at)
-        down = np.array([0.0, 0.0, 0.42 * float(np.linalg.norm(eye - at))])
-        eye, at = eye - down, at - down
+    _, below = covered_shares(camera, phone, covered)
+    eye = at + (1.0 + 1.17 * below) * (eye - at)
+    down = np.array([0.0, 0.0, 0.7 * below * float(np.linalg.norm(eye - at))])
+    eye, at = eye - down, at - down
     camera.up_direction = (0.0, 0.0, 1.0)
     turn(camera, eye, at)
 

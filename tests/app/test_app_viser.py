@@ -51,6 +51,7 @@ OF_THE_PAGE = (
     ("App.tsx", "w.__viserMutable = mutable.current"),
     ("WebsocketInterface.tsx", "viewerMutable.sendMessage = (message)"),
     ("components/UplotComponent.css", f"{names.CHART} {names.CHART_TITLE} {{"),
+    ("components/UplotComponent.tsx", f'className="{names.CHART_BOX[1:]}"'),
     ("components/Slider.tsx", 'import { Slider, Flex, NumberInput } from "@mantine/core"'),
     ("components/Slider.tsx", "id={uuid}"),
     ("components/Button.tsx", 'import { Button } from "@mantine/core"'),

@@ -215,7 +215,8 @@ def _points(challenge: Challenge, lecture: Lecture, best: float | None) -> str:
 
 
 def pictures(part: Part, lecture: Lecture) -> str:
-    """Returns the signals of the step, plotted over the run: the predicted one first, and large."""
+    """Returns the signals of the step, plotted over the run: the predicted one first, and large. They stand
+    below each other in a narrow panel, and beside each other in a wide one."""
     if not lecture.curves:
         return block("No run yet.")
     claims = part.goals if isinstance(part, Challenge) else part.claims
@@ -231,7 +232,7 @@ def pictures(part: Part, lecture: Lecture) -> str:
         lines = [Line("robot" if named else "", TRUTH, own)]
         if beside is not None:
             lines.append(Line(f"ghost: {ghost}" if named else "", GHOST, beside, "5 4"))
-        drawn += chart(
+        drawing = chart(
             joints_named(signals[k].words),
             _unit(signals[k]),
             lines,
@@ -241,10 +242,13 @@ def pictures(part: Part, lecture: Lecture) -> str:
             _SMALL if drawn else _LARGE,
             lecture.phase == "done",
         )
-    return block(drawn)
+        size = _BESIDE if drawn else _FIRST
+        drawn += f'<div style="{size}">{drawing}</div>' if drawing else ""
+    return block(drawn, "display:flex;flex-wrap:wrap;gap:0 1em")
 
 
 _LARGE, _SMALL = 220, 140
+_FIRST, _BESIDE = "flex:0 1 27em", "flex:1 1 14em;max-width:24em"
 _WORDS: dict[type, str] = {
     MoveTarget: "target moves",
     Push: "push",

@@ -21,6 +21,7 @@ _TIME = (1e-2, 1e2)  # ms
 _LEAK = (1e-12, 1e2)  # m/s² or rad/s²
 _DISTANCE = (0.0, 250.0)  # mm
 _SHARE = (0.0, 120.0)  # %
+_HEIGHT = 184  # px, so that the charts of a row begin and end together
 _NO_PAIR = (
     "Before a tick has run, or if no two links or objects can come close to each other, there is no curve."
 )
@@ -90,7 +91,7 @@ class LevelPlots:
         bound = ChartLine("bound", BOUND, dashed=True)
         with self._place:
             self._charts = [
-                self._chart("Error per task, mm or °", errors, _ERROR, 200),
+                self._chart("Error per task, mm or °", errors, _ERROR),
                 self._chart("Joint nearest its bound, %", [*shares, bound], _SHARE),
             ]
             if distances:
@@ -108,11 +109,10 @@ class LevelPlots:
         title: str,
         lines: list[ChartLine],
         span: tuple[float, float],
-        height: int = 170,
         empty: str = NO_TICK,
     ) -> Chart:
         log = span not in (_DISTANCE, _SHARE)
-        return Chart(self._gui, self._in_view, title, lines, span, height=height, log=log, empty=empty)
+        return Chart(self._gui, self._in_view, title, lines, span, height=_HEIGHT, log=log, empty=empty)
 
     def draw(self, window: PlotWindow, ghost: PlotWindow | None, settings: TorqueSettings) -> None:
         """Draws the plots of the window. ghost: the ghost's data over the same interval. If the plant has

@@ -1,4 +1,5 @@
-"""The plots about a velocity-level controller: errors and bounds, solve time, base speed, manipulability."""
+"""The plots about a velocity-level controller: errors and bounds, base speed, manipulability; on
+request, solve time."""
 
 from __future__ import annotations
 
@@ -16,6 +17,7 @@ from himpc.htmpc import base_joints
 _ERROR = (1e-2, 1e4)  # mm or degrees
 _TIME = (1e-1, 1e3)  # ms
 _W = (1e-4, 1e1)  # m³
+_HEIGHT = 184  # px, so that the charts of a row begin and end together
 
 
 class TrackingPlots:
@@ -28,11 +30,12 @@ class TrackingPlots:
         self._base = list(base_joints(ready.robot))[:2]
         self._place = gui.add_folder(None)
         self._charts: list[Chart] = []
-        self._build(ghost=False)
         gui.add_html(
             block("Dashed: the upper bound of a task's error one knot ahead, which the levels below must "
                   "respect. The last level has no such bound.")
         )  # fmt: skip
+        self._inner = gui.add_folder("Computing time", expand_by_default=False)
+        self._build(ghost=False)
 
     def _build(self, ghost: bool) -> None:
         for chart in self._charts:
@@ -49,18 +52,19 @@ class TrackingPlots:
         period = ChartLine("period", GOOD, dashed=True, fill=0.12)
         w = [ChartLine("w", LEVELS[3])]
         with self._place:
+            tracking = [*errors, *bounds, *of_ghost(errors, ghost)]
             self._charts = [
-                self._chart(
-                    "Error per task, mm or °", [*errors, *bounds, *of_ghost(errors, ghost)], _ERROR, 220
-                ),
-                self._chart("Control step, ms", [*step, period, *of_ghost(step, ghost)], _TIME, 160),
-                self._chart("Manipulability of the arm w, m³", [*w, *of_ghost(w, ghost)], _W, 150),
+                self._chart("Error per task, mm or °", tracking, _ERROR),
+                self._chart("Manipulability of the arm w, m³", [*w, *of_ghost(w, ghost)], _W),
             ]
             if self._base:
                 self._charts.append(self._speed(ghost))
+        with self._inner:
+            lines = [*step, period, *of_ghost(step, ghost)]
+            self._charts.append(self._chart("Control step, ms", lines, _TIME))
 
-    def _chart(self, title: str, lines: list[ChartLine], span: tuple[float, float], height: int) -> Chart:
-        return Chart(self._gui, self._in_view, title, lines, span, height=height, log=True)
+    def _chart(self, title: str, lines: list[ChartLine], span: tuple[float, float]) -> Chart:
+        return Chart(self._gui, self._in_view, title, lines, span, height=_HEIGHT, log=True)
 
     def _speed(self, ghost: bool) -> Chart:
         limit = float(self._limits[self._base].max())
@@ -76,7 +80,7 @@ class TrackingPlots:
                 *of_ghost(speeds, ghost),
             ],
             (-1.2 * limit, 1.2 * limit),
-            height=160,
+            height=_HEIGHT,
             bands=((2, 3, GOOD),),
         )
 
@@ -87,7 +91,7 @@ class TrackingPlots:
         fields = window.layout.fields
         beside = [] if ghost is None else [ghost]
         windows = [window, *beside]
-        error, step, w = self._charts[:3]
+        error, w, *base, step = self._charts
         error.show(
             window,
             lambda: [
@@ -99,8 +103,8 @@ class TrackingPlots:
         period = np.full(2 * BUCKETS, 1e3 * T_s)
         step.show(window, lambda: [_times(window), period, *(_times(each) for each in beside)])
         w.show(window, lambda: [each.columns(fields["manipulability"])[:, 0] for each in windows])
-        if self._base:
-            self._charts[3].show(window, lambda: self._speeds(window, beside))
+        for speed in base:
+            speed.show(window, lambda: self._speeds(window, beside))
 
     def _speeds(self, window: PlotWindow, beside: list[PlotWindow]) -> list[np.ndarray]:
         fields = window.layout.fields

@@ -25,6 +25,7 @@ _STYLE = (
     "{0} button{{padding:0;min-width:0;flex:1;height:2em}}</style>"
 )
 """Puts the buttons at the right end of the text above them. Their label is for screen readers."""
+_CUT = "min-width:0;overflow:hidden;text-overflow:ellipsis"
 
 
 class LevelRow:
@@ -97,15 +98,14 @@ class LevelRow:
         self._text.content = (
             f'<div style="font-size:0.85em;line-height:1.35;height:2.8em;margin:0.2em 0 0.25em 0.75em;'
             f"padding:0 {self._room / 0.85:.1f}em 0 0.5em;border-left:5px solid {css(self._colour)};"
-            f'overflow:hidden"><div style="{line}"><b>{esc(title)}</b><span>{error_words}</span></div>'
+            f'overflow:hidden"><div style="{line}"><b style="{_CUT}" title="{esc(title)}">{esc(title)}</b>'
+            f"<span>{error_words}</span></div>"
             f'<div style="{line}"><div style="flex:1">{bar(share if on else 0.0, self._colour)}</div>'
             f"{note}</div></div>"
         )
 
 
 def error_in_words(errors: Sequence[tuple[str, float, str]]) -> str:
-    """Returns errors as HTML, each given as name, value in m or rad, and unit."""
-    alone = len(errors) == 1
-    return ", ".join(
-        ("" if alone else f"{esc(name)} ") + f"<b>{quantity(value, unit)}</b>" for name, value, unit in errors
-    )
+    """Returns errors as HTML, each given as name, value in m or rad, and unit. They have the order of the
+    tasks in the level's name; each names its task when the mouse is over it."""
+    return ", ".join(f'<b title="{esc(name)}">{quantity(value, unit)}</b>' for name, value, unit in errors)

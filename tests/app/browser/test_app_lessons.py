@@ -96,6 +96,7 @@ def walk(page: Page, school: PageServer, lesson: Lesson) -> None:
             take_challenge(page, school, part)
             continue
         assert eventually(page, lambda: words_in_view(page) <= BEFORE), words_in_view(page)
+        expect(page.get_by_text("No run yet.")).to_be_hidden()  # the row of plots is folded
         if part.prediction is not None:
             predict(page, part.prediction)
         hurry(page)
@@ -104,7 +105,8 @@ def walk(page: Page, school: PageServer, lesson: Lesson) -> None:
         expect(marks(page, "✗")).to_have_count(0)
         expect(page.get_by_text("You predicted:")).to_have_count(int(part.prediction is not None))
         assert eventually(page, lambda: words_in_view(page) <= AFTER), words_in_view(page)
-        drawn = page.get_by_role("img", name=re.compile(f"over time$|^{PLANE}$")).first
+        plots = re.compile(f"^(?!your sketch).* over time$|^{PLANE}$")
+        drawn = page.get_by_role("img", name=plots).first
         assert eventually(page, partial(is_high, drawn))
         assert_order(page.get_by_text("Now you:"), page.get_by_text("Your knobs"), next_of(page))
         if part is not parts_of(lesson)[-1]:
