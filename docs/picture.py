@@ -57,7 +57,7 @@ def played_back(page: Page, seconds: float) -> list[Image.Image]:
     """Returns pictures of the run, one per tenth of a second of simulated time. They show the playback of the
     finished run, so that the speed of the machine does not matter."""
     press(page, "Pause")  # playback requires a paused robot
-    page.mouse.move(700, 850)  # at other positions the mouse would show a hint
+    page.mouse.move(40, 300)  # at other positions the mouse would show a hint
     for _ in range(round(seconds) + 1):
         key(page, "Shift+J")
     pictures = []
