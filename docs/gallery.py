@@ -25,8 +25,7 @@ from lessons.teaching.lesson import Lesson, Step
 
 ROOT = Path(__file__).parents[1]
 WIDTH, HEIGHT = 1200, 920
-PLOTS = 404  # width, pixels, of the panel on the left, which shows nothing before a run
-SHOWN = 0.58  # scale of the stored pictures
+SHOWN = 0.5  # scale of the stored pictures
 QUALITY = 25
 
 
@@ -39,7 +38,7 @@ def walk(page: Page, lesson: Lesson) -> list[tuple[str, Image.Image, Image.Image
         expect_part(page, lesson, part)
         if isinstance(part, Step) and part.prediction is not None:
             predict(page, part.prediction)
-        before = look(page).crop((PLOTS, 0, WIDTH, HEIGHT))
+        before = look(page)
         hurry(page)
         run(page, "Run this step" if isinstance(part, Step) else "Start the run")
         found.append((title_of(part), before, look(page)))
@@ -49,7 +48,7 @@ def walk(page: Page, lesson: Lesson) -> list[tuple[str, Image.Image, Image.Image
 
 
 def look(page: Page) -> Image.Image:
-    page.mouse.move(PLOTS + 100, HEIGHT - 20)  # at other positions the mouse would show a hint
+    page.mouse.move(20, 200)  # at other positions the mouse would show a hint
     page.wait_for_timeout(1200)
     return Image.open(io.BytesIO(page.screenshot())).convert("RGB")
 
@@ -57,15 +56,14 @@ def look(page: Page) -> Image.Image:
 def sheet(screens: list[tuple[str, Image.Image, Image.Image]]) -> Image.Image:
     """Returns one picture with a row per step."""
     line = 18
-    height = round(HEIGHT * SHOWN) + line
-    left = round((WIDTH - PLOTS) * SHOWN)
-    paper = Image.new("RGB", (left + round(WIDTH * SHOWN), len(screens) * height), "white")
+    wide, high = round(WIDTH * SHOWN), round(HEIGHT * SHOWN)
+    paper = Image.new("RGB", (2 * wide, len(screens) * (high + line)), "white")
     pen, font = ImageDraw.Draw(paper), ImageFont.truetype(findfont("DejaVu Sans"), 12)
     for k, (title, before, after) in enumerate(screens):
-        for x, words, screen in ((0, "before", before), (left, "after", after)):
-            pen.text((x + 6, k * height + 3), f"{title}: {words} the run", fill="black", font=font)
-            size = (round(screen.width * SHOWN), height - line)
-            paper.paste(screen.resize(size, Image.Resampling.LANCZOS), (x, k * height + line))
+        for x, words, screen in ((0, "before", before), (wide, "after", after)):
+            y = k * (high + line)
+            pen.text((x + 6, y + 3), f"{title}: {words} the run", fill="black", font=font)
+            paper.paste(screen.resize((wide, high), Image.Resampling.LANCZOS), (x, y + line))
     return paper
 
 
