@@ -81,7 +81,7 @@ def _filmed(server: viser.ViserServer, lesson: Lesson, motion: Mapping[str, Any]
     points = np.concatenate([way[:, :, :3].reshape(-1, 3) for way in poses] + [*targets.values()])
     points = points[np.isfinite(points).all(axis=1)]
     seen_from, seen_at, _ = camera_for(robot)
-    eye, at = fit(np.vstack([points, np.zeros(3)]), seen_from - seen_at, 0.87, 1.0, phone=False)
+    eye, at = fit(np.vstack([points, np.zeros(3)]), seen_from - seen_at, 0.87, 1.0)
     server.initial_camera.position, server.initial_camera.look_at = tuple(eye), tuple(at)
     server.initial_camera.fov = 0.87
     kept = server.get_scene_serializer()

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 import viser
@@ -20,11 +19,12 @@ from app.client.simulation import Trouble
 from app.client.simulation_client import SimulationClient
 from app.html.palette import level_colours, recoloured
 from app.link.choice import SceneChoice
-from app.link.messages import Post, Ready, Status
+from app.link.messages import Ready, Status
 from app.page.comfort import Comfort
-from app.page.scene_ui import Context, Face
+from app.page.scene_ui import Face
 from app.page.torque_ui import TorqueFace
 from app.page.velocity_ui import VelocityFace
+from app.panels.context import PageContext
 from app.panels.lesson.course import Course
 from app.panels.run.active_constraints import BindingPanel
 from app.panels.run.compare import ComparePanel
@@ -36,13 +36,10 @@ from app.panels.run.scene import RobotPanel
 from app.panels.run.share import SharePanel
 from app.panels.run.timeline import TimeLine
 from app.panels.widgets.command import add_command
-from app.panels.widgets.in_view import InView
-from app.panels.widgets.mirror import Bindings
 from app.panels.widgets.snapshot import SessionSnapshot
 from app.view.coordinates import in_order
 from app.view.ghost import GhostView
 from app.view.robot import RobotView
-from lessons.events import Event
 from lessons.own.folder import Folder
 from lessons.settings.settings import SceneSettings
 from lessons.settings.torque import TorqueSettings
@@ -65,7 +62,7 @@ _SIDE = 400.0  # px: width of a docked panel
 _FITS = f"<style>{FLOATING_PANEL} {{ max-width: calc(100vw - {_SIDE + 2.0 * _GAP:g}px) }}</style>"
 """Keeps a wide panel over the scene off the docked panel when the window becomes narrower."""
 _HOTKEYS = ("1", "2", "3", "4", "5", "6", "7", "8", "9")
-_FACES: dict[type[SceneSettings], Callable[[Context], Face]] = {
+_FACES: dict[type[SceneSettings], Callable[[PageContext], Face]] = {
     TorqueSettings: TorqueFace,
     VelocitySettings: VelocityFace,
 }
@@ -80,7 +77,6 @@ class Stage:
         client: viser.ClientHandle,
         learner: SimulationClient,
         ready: Ready,
-        scenes: Mapping[str, str],
         dark: bool,
         choose: Callable[[SceneChoice], None],
         theme: Callable[[bool], None],
@@ -92,24 +88,11 @@ class Stage:
     ) -> None:
         """narrow: whether the page, for example on a phone, has no room for a panel at the left. The plots
         are then tabs of the right panel."""
-        self._client, self._learner, self._ready = client, learner, ready
+        self._client, self._learner = client, learner
         self._theme, self._comfort = theme, comfort
-        self._colours = level_colours([task.level for task in in_order(ready)])
-        self._bindings: Bindings[Any] = Bindings(self._post, loop)
-        self._in_view = InView(client)
-        self._face = face_for(
-            Context(
-                client,
-                self._in_view,
-                learner,
-                ready,
-                self._colours,
-                self._bindings,
-                loop,
-                dark,
-                self._change_theme,
-            )
-        )
+        colours = level_colours([task.level for task in in_order(ready)])
+        self.page = PageContext(client, learner, ready, colours, loop, dark, choose, self._change_theme)
+        self._face = face_for(self.page)
         self.shown: tuple[object, ...] | None = None
         """Identifies the instant that was shown last; None before the first instant."""
         self.covered = 0.0, 0.0
@@ -120,7 +103,7 @@ class Stage:
         self._resets: int | None = None
         self._ghost: GhostView | None = None
         self._shown_ghost: GhostClient | None = None
-        self._build_panels(client.gui, scenes, choose, own_files, loop, notebook, narrow)
+        self._build_panels(client.gui, own_files, notebook, narrow)
         self._build_scene(client.scene, dark)
 
     # ---------------------------------------------------------------- building
@@ -128,20 +111,17 @@ class Stage:
     def _build_panels(
         self,
         gui: viser.GuiApi,
-        scenes: Mapping[str, str],
-        choose: Callable[[SceneChoice], None],
         own_files: Folder | None,
-        loop: asyncio.AbstractEventLoop,
         notebook: Notebook,
         narrow: bool,
     ) -> None:
         gui.add_html(_PHONE + _CHARTS)
-        exercise = self._learner.choice_of(self._ready).exercise
+        exercise = self._learner.choice_of(self.page.ready).exercise
         # On a phone, time and speed come after the question.
         with gui.add_folder(None, order=math.inf if narrow else -1.0):
             brief = exercise is not None
-            self._playback = PlaybackPanel(gui, self._learner, loop, self._face.fastest, brief)
-            self._time_line = TimeLine(gui, self._learner, loop)
+            self._playback = PlaybackPanel(self.page, self._face.fastest, brief)
+            self._time_line = TimeLine(self.page)
         tabs = gui.add_tab_group(order=0.0)
         learn, tasks = tabs.add_tab("Learn"), tabs.add_tab("Tasks")
         places = [] if narrow else [tabs.add_tab("Control"), tabs.add_tab("Robot")]
@@ -155,35 +135,33 @@ class Stage:
             self._face.open_plots(plots)
         with learn:
             beside = None if narrow else plots
-            self._course = Course(
-                gui, self._learner, exercise, notebook, choose, self._settings, loop, beside
-            )
+            self._course = Course(self.page, notebook, beside)
         with learn if exercise is None else robot:
-            self._face.add_start(gui)
+            self._face.add_start()
         # The levels also stand over the scene, so that a learner who reads can see and swap them.
         strip = None if narrow else gui.add_panel()
         with tasks:
-            self._face.add_tasks(gui, None if strip is None else strip.add_tab("Levels"))
+            self._face.add_tasks(None if strip is None else strip.add_tab("Levels"))
         with control:
-            self._face.add_control(gui)
+            self._face.add_control()
         with robot:
-            self._robot_panel = RobotPanel(gui, self._ready, scenes, choose, own_files)
+            self._robot_panel = RobotPanel(self.page, own_files)
             with gui.add_folder("Plant", expand_by_default=False):
-                self._face.add_plant(gui)
+                self._face.add_plant()
         with more.add_tab("Compare"):
-            self._compare = ComparePanel(gui, self._learner, self._settings(), self._colours)
+            self._compare = ComparePanel(self.page)
         with more.add_tab("Export"):
-            ExportPanel(gui, self._learner, self._settings)
-            SharePanel(gui, self._learner, choose)
+            ExportPanel(self.page)
+            SharePanel(self.page)
             add_hand_in(gui, self._learner, notebook)
         with more.add_tab("Help"):
             self._comfort.add_switch(gui)
             self._help = HelpPanel(gui)
         for place, key in enumerate(_HOTKEYS):  # hotkeys also for levels that may be added later
             add_command(gui, f"Level {place + 1} on or off", key, partial(self._toggle, place))
-        self._face.add_plots(gui, plots, more if roomy else plots)
+        self._face.add_plots(plots, more if roomy else plots)
         with plots.add_tab("Who binds"):
-            self._binding = BindingPanel(gui, self._colours)
+            self._binding = BindingPanel(gui, self.page.colours)
         above = below = 0.0
         if strip is not None:
             strip.float(x=_GAP, y=_GAP, width=320.0)
@@ -191,7 +169,7 @@ class Stage:
             if low or exercise is not None:  # a lesson shows little at once
                 strip.minimize()
             else:
-                above = _HEAD + _ROW * len({task.level for task in in_order(self._ready)})
+                above = _HEAD + _ROW * len({task.level for task in in_order(self.page.ready)})
         if isinstance(plots, viser.PanelHandle):
             if roomy:
                 # The scene is so wide that the panel of levels stands beside the robot.
@@ -209,14 +187,14 @@ class Stage:
     def _toggle(self, place: int) -> None:
         event = self._face.toggle(place)
         if event is not None:
-            self._post(event)
+            self.page.post(event)
 
     def _build_scene(self, scene: viser.SceneApi, dark: bool) -> None:
         # Shadows triple the rendering time of a frame, which matters on a laptop or a phone.
         scene.configure_default_lights(cast_shadow=False)
-        self._floor = _floor(scene, self._ready.room)
+        self._floor = _floor(scene, self.page.ready.room)
         self._paint_floor(dark)
-        self._robot = RobotView(scene, self._ready.robot)
+        self._robot = RobotView(scene, self.page.ready.robot)
         self._face.add_scene(scene, self._robot)
 
     def _change_theme(self, dark: bool) -> None:
@@ -230,21 +208,13 @@ class Stage:
         self._floor.cell_color = (cell, cell, cell)
         self._floor.section_color = (section, section, section)
 
-    # ---------------------------------------------------------------- events out
-
-    def _settings(self) -> SceneSettings:
-        return self._learner.settings_of(self._ready)
-
-    def _post(self, event: Event) -> None:
-        self._learner.send(Post(event))
-
     def recompose(self, ready: Ready) -> None:
         """Rebuilds the controls and plots of levels and tasks when the run continues with another stack."""
-        self._ready = ready
-        colours = recoloured([task.level for task in in_order(ready)], self._colours)
-        self._colours.clear()
-        self._colours.update(colours)
-        self._face.recompose(ready)
+        self.page.ready = ready
+        colours = recoloured([task.level for task in in_order(ready)], self.page.colours)
+        self.page.colours.clear()
+        self.page.colours.update(colours)
+        self._face.recompose()
 
     # ---------------------------------------------------------------- following
 
@@ -262,12 +232,12 @@ class Stage:
         learner = self._learner
         if learner.status is not None:
             self._time_line.update(learner.status.running)
-        due, plots = plots, plots and not self._in_view.asleep
+        due, plots = plots, plots and not self.page.in_view.asleep
         moment = moment_of(learner, self._time_line.past, curves=due)
-        if moment is None or learner.ready is not self._ready:
+        if moment is None or learner.ready is not self.page.ready:
             return  # there is no report yet, or it belongs to another scene, which the page will build
         self.shown = moment.t, moment.live, learner.status.running if learner.status else None, learner.ghost
-        if not self._in_view.asleep:
+        if not self.page.in_view.asleep:
             self._draw(moment, plots)
         if texts and learner.failure is None:
             self._write(moment)
@@ -296,7 +266,7 @@ class Stage:
         if moment.ghost is None or ghost is None:
             return
         if self._ghost is None:
-            self._ghost = GhostView(self._client.scene, self._ready.robot, ghost.words)
+            self._ghost = GhostView(self._client.scene, self.page.ready.robot, ghost.words)
             self._shown_ghost = ghost
         self._ghost.move(moment.ghost)
 
@@ -305,12 +275,12 @@ class Stage:
             self._face.after_reset(status)
 
     def _write(self, moment: Moment) -> None:
-        learner, settings = self._learner, self._settings()
+        learner, settings = self._learner, self.page.settings
         found = learner.read(lambda _, history: (history.bound_ticks.copy(), history.count))
         if found is None or learner.status is None:
             return
         shown = SessionSnapshot(
-            self._ready, settings, moment.status, moment.latest.copy(), found[0] * settings.T_s
+            self.page.ready, settings, moment.status, moment.latest.copy(), found[0] * settings.T_s
         )
         now = replace(shown, status=learner.status)
         with self._client.atomic():
@@ -320,10 +290,10 @@ class Stage:
                 self._compare.update(now)
                 self._face.write(shown)
                 self._binding.update(shown)
-            lecture = learner.lecture_of(self._ready)
+            lecture = learner.lecture_of(self.page.ready)
             self._course.follow(lecture, settings)
             self._fold_row(lecture is None or not lecture.curves)
-            self._bindings.refresh(settings)
+            self.page.bindings.refresh(settings)
 
     def _fold_row(self, empty: bool) -> None:
         """Folds the row of plots when a step without curves opens, and unfolds it when curves begin. Between
@@ -339,7 +309,7 @@ class Stage:
     def close(self) -> None:
         self._course.close()
         self._help.close()
-        self._bindings.close()
+        self.page.bindings.close()
         self._playback.close()
         self._time_line.close()
         self._face.close()
@@ -354,6 +324,6 @@ def _floor(scene: viser.SceneApi, room: np.ndarray) -> viser.GridHandle:
     return scene.add_grid("/floor", width=side, height=side, cell_size=0.5, section_size=1.0)
 
 
-def face_for(context: Context) -> Face:
+def face_for(page: PageContext) -> Face:
     """Returns the user interface for the kind of scene that is loaded."""
-    return _FACES[type(context.ready.settings)](context)
+    return _FACES[type(page.ready.settings)](page)

@@ -28,7 +28,6 @@ from app.page.lesson_file import LessonFile
 from app.panels.widgets.command import add_command
 from lessons.course import COURSE, heading
 from lessons.own.folder import Folder
-from lessons.scenes.names import ALL_SCENES
 
 if TYPE_CHECKING:
     from app.page.layout import Stage
@@ -283,7 +282,6 @@ class Page:
                 self._client,
                 self.learner,
                 ready,
-                ALL_SCENES,
                 self._dark,
                 self._load,
                 self._theme,

@@ -2,63 +2,15 @@
 
 from __future__ import annotations
 
-import asyncio
-from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
 
-import numpy as np
 import viser
 
 from app.client.moment import Moment
-from app.client.simulation_client import SimulationClient
-from app.html.palette import RGB
-from app.link.messages import Post, Ready, Status
-from app.panels.widgets.in_view import InView
-from app.panels.widgets.mirror import Bindings
+from app.link.messages import Status
 from app.panels.widgets.snapshot import SessionSnapshot
 from app.view.robot import RobotView
-from lessons.events import Event, MoveTarget
-
-
-@dataclass(frozen=True, eq=False)
-class Context:
-    """The data of a page that its user interface needs. in_view: the charts that the browser shows; bindings:
-    for the settings of this kind of scene; theme: called with True for the dark theme and with False for the
-    light theme."""
-
-    client: viser.ClientHandle
-    in_view: InView
-    learner: SimulationClient
-    ready: Ready
-    colours: dict[str, RGB]
-    bindings: Bindings[Any]
-    loop: asyncio.AbstractEventLoop
-    dark: bool
-    theme: Callable[[bool], None]
-
-    def post(self, event: Event, *also: MoveTarget) -> None:
-        """Puts an event into the session's mailbox, with targets that take effect at the same tick."""
-        self.learner.send(Post(event, also))
-
-    @property
-    def settings(self) -> Any:
-        """The present settings. Their type depends on the kind of scene."""
-        return self.learner.settings_of(self.ready)
-
-    def poses(self) -> np.ndarray | None:
-        """Poses of all joints and the tip, (J, 7); None if another scene was loaded meanwhile, since
-        its robot may have another number of joints."""
-        learner = self.learner
-        return learner.read(lambda block, _: block.poses() if learner.ready is self.ready else None)
-
-    def poses_or_still(self) -> np.ndarray:
-        """Returns `poses`, or identity poses if no poses are known, for objects that are built now and
-        updated later."""
-        poses = self.poses()
-        still = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-        return np.tile(still, (self.ready.robot.model.njoints, 1)) if poses is None else poses
-
+from lessons.events import Event
 
 Tabs = viser.PanelHandle | viser.GuiTabGroupHandle
 
@@ -71,20 +23,20 @@ class Face(Protocol):
     fastest: ClassVar[float]
     """The highest useful speed of the simulation, simulated seconds per second."""
 
-    def add_start(self, gui: viser.GuiApi) -> None:
+    def add_start(self) -> None:
         """Adds what to try first: the target, pushes, what is drawn."""
         ...
 
-    def add_tasks(self, gui: viser.GuiApi, strip: viser.GuiTabHandle | None) -> None:
+    def add_tasks(self, strip: viser.GuiTabHandle | None) -> None:
         """Adds the levels and what stands with them; the rows of the levels also to the tab `strip` of a
         panel over the scene."""
         ...
 
-    def add_control(self, gui: viser.GuiApi) -> None:
+    def add_control(self) -> None:
         """Adds the settings of the controller."""
         ...
 
-    def add_plant(self, gui: viser.GuiApi) -> None:
+    def add_plant(self) -> None:
         """Adds the settings of the plant."""
         ...
 
@@ -97,7 +49,7 @@ class Face(Protocol):
         """Adds the tab of the picture of a tick, which precedes the lesson's tab, if it is the first one."""
         ...
 
-    def add_plots(self, gui: viser.GuiApi, plots: Tabs, inside: Tabs) -> None:
+    def add_plots(self, plots: Tabs, inside: Tabs) -> None:
         """Adds the plots of this kind, and to `inside` the picture of a tick, if there is one."""
         ...
 
@@ -105,7 +57,7 @@ class Face(Protocol):
         """Adds all objects except the robot and the floor to the 3D view."""
         ...
 
-    def recompose(self, ready: Ready) -> None:
+    def recompose(self) -> None:
         """Updates the interface when the run continues with another stack."""
         ...
 

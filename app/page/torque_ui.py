@@ -3,7 +3,6 @@ plant."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -13,8 +12,9 @@ from app.adapter.removed_handle_errors import unless_removed
 from app.client.moment import Moment
 from app.html.palette import LEVELS
 from app.link.exercise import signals_of
-from app.link.messages import Ready, Status
-from app.page.scene_ui import Context, Tabs
+from app.link.messages import Status
+from app.page.scene_ui import Tabs
+from app.panels.context import PageContext
 from app.panels.inside.inside import InsidePanel
 from app.panels.run.joints import JointPlots
 from app.panels.run.move import MovePanel
@@ -43,101 +43,73 @@ class TorqueFace:
 
     fastest: ClassVar[float] = 1.0
 
-    def __init__(self, context: Context) -> None:
-        self._context = context
+    def __init__(self, page: PageContext) -> None:
+        self._page = page
         self._inside_tab: viser.GuiTabHandle | None = None
         self._stale: Status | None = None
         """The last report of the previous stack."""
 
     # ---------------------------------------------------------------- building
 
-    def add_start(self, gui: viser.GuiApi) -> None:
-        context = self._context
-        self._start = StartPanel(
-            gui, context.post, context.ready, context.settings, context.colours, context.dark
-        )
-        self._move = MovePanel(gui, self._movables)
-        self._start.on_theme = context.theme
+    def add_start(self) -> None:
+        self._start = StartPanel(self._page)
+        self._move = MovePanel(self._page.gui, self._movables)
         self._start.on_recall = self._recall
 
-    def add_tasks(self, gui: viser.GuiApi, strip: viser.GuiTabHandle | None) -> None:
-        context, ready = self._context, self._context.ready
-        self._tasks = TasksPanel(
-            gui,
-            context.bindings,
-            context.loop,
-            ready.robot,
-            context.colours,
-            lambda: self._context.settings,
-            self._targets_now,
-            in_lesson=ready.choice.exercise is not None,
-            strip=strip,
-        )
-        self._horizon = HorizonPanel(
-            context.client, context.in_view, context.bindings, context.settings, ready.robot
-        )
+    def add_tasks(self, strip: viser.GuiTabHandle | None) -> None:
+        self._tasks = TasksPanel(self._page, self._targets_now, strip)
+        self._horizon = HorizonPanel(self._page)
 
-    def add_control(self, gui: viser.GuiApi) -> None:
-        self._controller = ControllerPanel(gui, self._context.bindings, self._context.settings)
+    def add_control(self) -> None:
+        self._controller = ControllerPanel(self._page)
 
-    def add_plant(self, gui: viser.GuiApi) -> None:
-        add_plant(gui, self._context.bindings, self._context.settings, self._context.ready.robot)
+    def add_plant(self) -> None:
+        add_plant(self._page)
 
     @property
     def opens_inside(self) -> bool:
-        return self._context.settings.horizon == 1  # the QP is small enough for beginners
+        return self._page.settings.horizon == 1  # the QP is small enough for beginners
 
     def open_plots(self, plots: Tabs) -> None:
         if self.opens_inside:
             self._inside_tab = plots.add_tab("Inside")
 
-    def add_plots(self, gui: viser.GuiApi, plots: Tabs, inside: Tabs) -> None:
-        context = self._context
+    def add_plots(self, plots: Tabs, inside: Tabs) -> None:
+        page = self._page
         with plots.add_tab("Errors"):
-            self._level_plots = LevelPlots(
-                gui, context.in_view, context.ready, context.settings, context.colours
-            )
+            self._level_plots = LevelPlots(page)
         with plots.add_tab("Joints"):
-            self._joint_plots = JointPlots(gui, context.in_view, context.ready.robot)
+            self._joint_plots = JointPlots(page)
         with self._inside_tab or inside.add_tab("Inside"):
-            self._inside_place = gui.add_folder(None)
-        self._look_inside(gui)
+            self._inside_place = page.gui.add_folder(None)
+        self._look_inside()
 
-    def _look_inside(self, gui: viser.GuiApi) -> None:
-        context = self._context
+    def _look_inside(self) -> None:
+        page = self._page
         with self._inside_place:
-            self._inside_parts = gui.add_folder(None)
+            self._inside_parts = page.gui.add_folder(None)
         with self._inside_parts:
-            self._inside = InsidePanel(
-                context.client,
-                context.in_view,
-                context.ready,
-                context.colours,
-                context.post,
-                context.learner.send,
-                self._horizon.spectrum,
-            )
+            self._inside = InsidePanel(page, self._horizon.spectrum)
 
-    def recompose(self, ready: Ready) -> None:
-        """Updates the interface when the run continues with another stack."""
-        context = self._context = replace(self._context, ready=ready)
-        self._stale = context.learner.status
+    def recompose(self) -> None:
+        page = self._page
+        self._stale = page.learner.status
         self._tasks.rebuild()
-        self._level_plots.rebuild(ready)
+        self._level_plots.rebuild()
         self._inside_parts.remove()
-        self._look_inside(context.client.gui)
+        self._look_inside()
         self._hand.remove()
         self._targets.remove()
-        self._add_targets(context.client.scene)
+        self._add_targets(page.client.scene)
 
     def add_scene(self, scene: viser.SceneApi, robot: RobotView) -> None:
-        context, ready = self._context, self._context.ready
+        page, ready = self._page, self._page.ready
         tip = self._tip()
         self._frames = TargetFrames(scene)
         self._frames.desired(tip[:3], tip[[4, 5, 6, 3]])  # valid until the first tick is reported
         self._add_targets(scene)
         self._links = LinkPicker(robot, ready.robot, self._tasks.choose)
-        self._ellipsoids = EllipsoidView(scene, ready.robot, context.colours)
+        self._ellipsoids = EllipsoidView(scene, ready.robot, page.colours)
         self._cover = CoverView(scene, ready.robot)
         exercise = ready.choice.exercise
         asked = exercise is not None and any(
@@ -145,24 +117,22 @@ class TorqueFace:
         )
         self._turns = JointTurns(scene, ready.robot.joints) if asked else None
         self._world, self._contacts = WorldView(scene, ready.world), ContactView(scene)
-        self._pull = Pull(scene, robot, ready.robot, context.post)
-        curves = [(task.path, context.colours[task.level]) for task in ready.tasks if task.path is not None]
+        self._pull = Pull(scene, robot, ready.robot, page.post)
+        curves = [(task.path, page.colours[task.level]) for task in ready.tasks if task.path is not None]
         position = draggable(ready.tasks)[0]
-        self._trails = Trails(
-            scene, curves, LEVELS[0] if position is None else context.colours[position.level]
-        )
+        self._trails = Trails(scene, curves, LEVELS[0] if position is None else page.colours[position.level])
 
     def _tip(self) -> np.ndarray:
-        return self._context.poses_or_still()[-1]
+        return self._page.poses_or_still()[-1]
 
     def _targets_now(self) -> dict[str, np.ndarray]:
         """Returns the present raw targets, also while a past instant is shown."""
-        ready, status = self._context.ready, self._context.learner.status
+        ready, status = self._page.ready, self._page.learner.status
         targets = {task.name: task.raw for task in ready.tasks if task.raw is not None}
         return targets if status is None or status is self._stale else targets | status.targets
 
     def _add_targets(self, scene: viser.SceneApi) -> None:
-        context, ready = self._context, self._context.ready
+        page, ready = self._page, self._page.ready
         size = gizmo_size(ready.robot)
         self._hand = Hand(
             scene,
@@ -170,18 +140,18 @@ class TorqueFace:
             self._targets_now(),
             self._tip(),
             size,
-            context.post,
+            page.post,
             lambda: bool(self._start.clamp.value),
             self._start.dragged,
-            context.loop.call_later,
+            page.loop.call_later,
         )
         self._targets = Targets(
             scene,
             ready,
-            context.colours,
-            context.poses_or_still(),
+            page.colours,
+            page.poses_or_still(),
             0.75 * size,
-            context.post,
+            page.post,
         )
 
     # ---------------------------------------------------------------- events out
@@ -193,7 +163,7 @@ class TorqueFace:
         return [*self._hand.movables(), *self._targets.movables()]
 
     def _recall(self) -> None:
-        poses = self._context.poses()
+        poses = self._page.poses()
         if poses is not None:
             self._hand.recall(poses[-1])
 
@@ -208,29 +178,29 @@ class TorqueFace:
         if moment.live:
             self._hand.follow(moment.status.targets)
         running = moment.live and moment.status.running
-        self._pull.follow(moment.poses, self._context.settings.plant, running, bool(self._start.pull.value))
+        self._pull.follow(moment.poses, self._page.settings.plant, running, bool(self._start.pull.value))
 
     def after_reset(self, status: Status) -> None:
         self._hand.after_reset(status.targets)
 
     def draw(self, moment: Moment) -> None:
-        context, T_s = self._context, self._context.settings.T_s
+        page, T_s = self._page, self._page.settings.T_s
         self._frames.show(bool(self._start.frames.value))
         self._trails.show(bool(self._start.trace.value), bool(self._start.prediction.value))
         moves = moment.status.running or not moment.live
-        paused = "" if moves else paused_words(context.learner.lecture_of(context.ready))
-        self._hand.show(self._frames, context.settings, moment.latest, context.ready.layout.fields, paused)
+        paused = "" if moves else paused_words(page.learner.lecture_of(page.ready))
+        self._hand.show(self._frames, page.settings, moment.latest, page.ready.layout.fields, paused)
         self._hand.look_back(None if moment.live else moment.status.targets)
         tips = moment.way[:, -1, :3] if len(moment.way) else np.zeros((0, 3))
         self._trails.draw(tips, moment.status.path, T_s)
         beside = None if moment.ghost is None else moment.ghost.window
-        self._level_plots.draw(moment.window, beside, context.settings)
+        self._level_plots.draw(moment.window, beside)
         self._joint_plots.draw(moment.window, beside)
         self._inside.draw(moment)
-        q = moment.latest[context.ready.layout.fields["q"]]
+        q = moment.latest[page.ready.layout.fields["q"]]
         if self._turns is not None:
             self._turns.draw(moment.t, q, moment.poses, moment.window)
-        self._ellipsoids.draw(bool(self._start.ellipsoids.value), q, context.settings.levels)
+        self._ellipsoids.draw(bool(self._start.ellipsoids.value), q, page.settings.levels)
         self._cover.draw(bool(self._start.cover.value))
 
     def write(self, now: SessionSnapshot[TorqueSettings]) -> None:
@@ -239,8 +209,8 @@ class TorqueFace:
             # The snapshot's row is a copy, which may be changed.
             now.latest[fields["gauge_norm"]], now.latest[fields["gauge_radius"]] = now.status.gauge
         self._start.show_verdict(self._hand.verdict, bool(self._start.clamp.value))
-        self._start.update(now, self._context.colours)
-        self._context.loop.call_soon_threadsafe(unless_removed, self._move.update)
+        self._start.update(now)
+        self._page.loop.call_soon_threadsafe(unless_removed, self._move.update)
         self._tasks.update(now)
         self._controller.update(now)
         self._horizon.update(now)

@@ -12,17 +12,17 @@ import viser
 from app.adapter.removed_handle_errors import unless_removed
 from app.client.moment import Moment
 from app.html.text import free_name
-from app.link.messages import Ready, Status, TaskView
-from app.page.scene_ui import Context, Tabs
+from app.link.messages import Status, TaskView
+from app.page.scene_ui import Tabs
+from app.panels.context import PageContext
 from app.panels.run.joints import ACCELERATION, JointPlots
 from app.panels.run.move import MovePanel
 from app.panels.velocity.controller import HtmpcPanel
-from app.panels.velocity.mission import MissionPanel, swap
+from app.panels.velocity.mission import MissionPanel
 from app.panels.velocity.plant import add_servo_plant
 from app.panels.velocity.plots import TrackingPlots
 from app.panels.velocity.start import BeginPanel, last_ball
 from app.panels.velocity.tasks import RolesPanel
-from app.panels.widgets.controls import Controls
 from app.panels.widgets.snapshot import SessionSnapshot
 from app.view.camera import FollowBase
 from app.view.coordinates import full
@@ -49,67 +49,44 @@ class VelocityFace:
     fastest: ClassVar[float] = 10.0
     opens_inside = False
 
-    def __init__(self, context: Context) -> None:
-        self._context = context
-        self._points = [task for task in context.ready.tasks if task.kind == "position"]
-        self._turned = next((task for task in context.ready.tasks if task.kind == "orientation"), None)
-        self._base = base_joints(context.ready.robot)
+    def __init__(self, page: PageContext) -> None:
+        self._page = page
+        self._points = [task for task in page.ready.tasks if task.kind == "position"]
+        self._turned = next((task for task in page.ready.tasks if task.kind == "orientation"), None)
+        self._base = base_joints(page.ready.robot)
 
     # ---------------------------------------------------------------- building
 
-    def add_start(self, gui: viser.GuiApi) -> None:
-        context = self._context
-        roles = [level.name for level in context.settings.levels]
-        self._begin = BeginPanel(
-            gui, context.ready.choice.run.scene, roles, context.colours, bool(self._base), context.dark
-        )
-        self._move = MovePanel(gui, self._movables)
-        self._begin.on_theme = context.theme
-        self._begin.on_swap = self._swap
+    def add_start(self) -> None:
+        self._begin = BeginPanel(self._page, bool(self._base))
+        self._move = MovePanel(self._page.gui, self._movables)
         self._begin.on_look = self._look
         self._begin.on_obstacle = self._add_obstacle
         self._begin.on_clear = self._clear_ball
 
-    def add_tasks(self, gui: viser.GuiApi, strip: viser.GuiTabHandle | None) -> None:
-        context, settings, colours = self._context, self._context.settings, self._context.colours
-        self._roles = RolesPanel(gui, context.bindings, settings, colours, self._settings, strip)
-        self._mission = MissionPanel(
-            gui,
-            self._points,
-            colours,
-            context.post,
-            self._status,
-            lambda: self._goals.places,
-            Controls(gui, context.bindings, settings),
-            settings.options,
-        )
+    def add_tasks(self, strip: viser.GuiTabHandle | None) -> None:
+        self._roles = RolesPanel(self._page, strip)
+        self._mission = MissionPanel(self._page, lambda: self._goals.places)
 
-    def add_control(self, gui: viser.GuiApi) -> None:
-        context = self._context
-        self._controller = HtmpcPanel(
-            gui, context.bindings, context.settings, context.ready.robot, self._settings
-        )
+    def add_control(self) -> None:
+        self._controller = HtmpcPanel(self._page)
 
-    def add_plant(self, gui: viser.GuiApi) -> None:
-        add_servo_plant(gui, self._context.bindings, self._context.settings)
+    def add_plant(self) -> None:
+        add_servo_plant(self._page)
 
     def open_plots(self, plots: Tabs) -> None:
         pass
 
-    def add_plots(self, gui: viser.GuiApi, plots: Tabs, inside: Tabs) -> None:
+    def add_plots(self, plots: Tabs, inside: Tabs) -> None:
         del inside  # the compiled cascade of this level does not show a tick
         with plots.add_tab("Errors"):
-            self._plots = TrackingPlots(
-                gui, self._context.in_view, self._context.ready, self._context.colours
-            )
+            self._plots = TrackingPlots(self._page)
         with plots.add_tab("Joints"):
-            self._joint_plots = JointPlots(
-                gui, self._context.in_view, self._context.ready.robot, ACCELERATION
-            )
+            self._joint_plots = JointPlots(self._page, ACCELERATION)
 
     def add_scene(self, scene: viser.SceneApi, robot: RobotView) -> None:
         del robot  # velocity servos do not react to a pull
-        context, ready = self._context, self._context.ready
+        page, ready = self._page, self._page.ready
         size = gizmo_size(ready.robot)
         self._frames = TargetFrames(scene)
         self._obstacles = Obstacles(scene, self._put)
@@ -119,44 +96,39 @@ class VelocityFace:
         self._goals = Goals(
             scene,
             ready,
-            context.colours,
-            context.poses_or_still(),
+            page.colours,
+            page.poses_or_still(),
             size,
-            context.post,
+            page.post,
             self._status,
             self._begin.dragged,
         )
         self._trails = {
-            task.name: Trails(scene, [], context.colours[task.level], f"_{task.name}", scale=1)
+            task.name: Trails(scene, [], page.colours[task.level], f"_{task.name}", scale=1)
             for task in self._points
         }
-        self._along = FollowBase(context.client.camera)
+        self._along = FollowBase(page.client.camera)
         self._circle: ReachCircle | None = None
         if self._base:
             first = len(self._base)
             self._circle = ReachCircle(scene, first, horizontal_reach(ready.robot, first))
 
-    def recompose(self, ready: Ready) -> None:
+    def recompose(self) -> None:
         """Does nothing: the mission of a velocity-level scene defines its stack, which never changes."""
 
     # ---------------------------------------------------------------- events out
 
     def _settings(self) -> VelocitySettings:
-        return self._context.settings
+        return self._page.settings
 
     def _status(self) -> Status | None:
-        return self._context.learner.status
+        return self._page.learner.status
 
     def toggle(self, place: int) -> Set | None:
         return self._roles.toggle(place)
 
-    def _swap(self) -> None:
-        status = self._status()
-        if status is not None and status.mission is not None:
-            swap(status.mission.rows, self._context.post)
-
     def _put(self, name: str, centre: tuple[float, float, float]) -> None:
-        self._context.post(Set(f"obstacles.{name}", centre))
+        self._page.post(Set(f"obstacles.{name}", centre))
 
     def _movables(self) -> list[Movable]:
         goals = self._goals.movables()
@@ -174,7 +146,7 @@ class VelocityFace:
     def _add_obstacle(self) -> None:
         """Adds a ball in front of the hand, as seen from the base. The ball is close enough to have an
         effect, but does not block the hand."""
-        poses = self._context.poses()
+        poses = self._page.poses()
         if poses is None:
             return
         base = poses[len(self._base) - 1, :2] if self._base else np.zeros(2)
@@ -183,18 +155,18 @@ class VelocityFace:
         x, y = poses[-1, :2] + _AHEAD * ahead
         taken = [each.name for each in self._settings().htmpc.obstacles]
         name = free_name("ball", taken)
-        self._context.post(Appear(name, (float(x), float(y), float(poses[-1, 2])), _RADIUS))
+        self._page.post(Appear(name, (float(x), float(y), float(poses[-1, 2])), _RADIUS))
 
     def _clear_ball(self) -> None:
         ball = last_ball(self._settings())
         if ball is not None:
-            self._context.post(Set(f"obstacles.{ball.name}", None))
+            self._page.post(Set(f"obstacles.{ball.name}", None))
 
     def _look(self) -> None:
-        poses = self._context.poses()
+        poses = self._page.poses()
         if poses is not None:
             base = poses[len(self._base) - 1, :3] if self._base else np.zeros(3)
-            look_at(self._context.client.camera, self._context.ready.robot, base)
+            look_at(self._page.client.camera, self._page.ready.robot, base)
 
     # ---------------------------------------------------------------- following
 
@@ -219,7 +191,7 @@ class VelocityFace:
 
     def draw(self, moment: Moment) -> None:
         status, latest, settings = moment.status, moment.latest, self._settings()
-        fields = self._context.ready.layout.fields
+        fields = self._page.ready.layout.fields
         self._goals.follow(status, latest, fields)
         self._obstacles.show(settings.htmpc.obstacles, bool(self._begin.arrows.value))
         t = float(latest[fields["t"]][0])
@@ -245,13 +217,13 @@ class VelocityFace:
         """Draws the present reference of the hand, position and orientation."""
         hand, turned = next((task for task in self._points if "z" in task.axes), None), self._turned
         if hand is not None:
-            fields = self._context.ready.layout.fields
+            fields = self._page.ready.layout.fields
             wanted = None if turned is None else latest[fields[f"x_d/{turned.name}"]]
             self._frames.desired(full(hand, latest[fields[f"x_d/{hand.name}"]], np.zeros(3)), wanted)
 
     def write(self, now: SessionSnapshot[VelocitySettings]) -> None:
         self._begin.update(now)
-        self._context.loop.call_soon_threadsafe(unless_removed, self._move.update)
+        self._page.loop.call_soon_threadsafe(unless_removed, self._move.update)
         self._mission.update(now)
         self._roles.update(now)
         self._controller.update(now)

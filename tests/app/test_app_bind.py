@@ -200,8 +200,10 @@ def test_controls_open_on_whatever_is_set(viser_server: viser.ViserServer) -> No
         far = far.changed(path, value)
     loop = viser_server.get_event_loop()
     bindings: Bindings[TorqueSettings] = Bindings(lambda _: None, loop)
-    ControllerPanel(viser_server.gui, bindings, far)
-    HorizonPanel(MagicMock(gui=viser_server.gui), MagicMock(), bindings, far, scene.robot)
+    page = MagicMock(gui=viser_server.gui, bindings=bindings, settings=far, robot=scene.robot)
+    page.client = page
+    ControllerPanel(page)
+    HorizonPanel(page)
     values = {handle.value for handle in viser_server.gui._gui_input_handle_from_uuid.values()}
     assert {0.04, 9.0, 0.01, 60, 1e-8} <= values
 
@@ -220,7 +222,7 @@ def test_menus_offer_every_word_a_setting_may_hold(
     for word in words:
         viser_server.gui.reset()
         changed = scene.settings.changed(path, word)
-        ControllerPanel(viser_server.gui, bindings, changed)
+        ControllerPanel(MagicMock(gui=viser_server.gui, bindings=bindings, settings=changed))
         handles = viser_server.gui._gui_input_handle_from_uuid.values()
         menus = [each for each in handles if isinstance(each, viser.GuiDropdownHandle)]
         assert any(menu.options == words and menu.value == word for menu in menus)
@@ -230,14 +232,15 @@ def test_menus_offer_every_word_a_setting_may_hold(
 def test_a_setting_that_names_a_group_has_a_control(name: str) -> None:
     """A setting is added to the page by the name of a folder, which must be one of the page's folders."""
     scene, bound = load_scene(name), MagicMock()
-    settings, robot = scene.settings, scene.robot
+    settings = scene.settings
+    page = MagicMock(bindings=bound, settings=settings, robot=scene.robot)
     if isinstance(settings, VelocitySettings):
-        HtmpcPanel(MagicMock(), bound, settings, robot, lambda: settings)
-        add_servo_plant(MagicMock(), bound, settings)
+        HtmpcPanel(page)
+        add_servo_plant(page)
     else:
         assert isinstance(settings, TorqueSettings)
-        ControllerPanel(MagicMock(), bound, settings)
-        HorizonPanel(MagicMock(), MagicMock(), bound, settings, robot)
-        add_plant(MagicMock(), bound, settings, robot)
+        ControllerPanel(page)
+        HorizonPanel(page)
+        add_plant(page)
     paths = {call.args[2](1).path for call in bound.bind.call_args_list}
     assert {each.path for each in settings.table().values() if each.shown.group} <= paths

@@ -37,7 +37,7 @@ def test_the_next_lesson_is_built_once_so_that_no_answer_is_lost(monkeypatch: py
 
     def slow(stage: Stage, moment: Moment) -> None:
         learner = stage._learner
-        late = leaving.is_set() and stage._ready.choice.exercise == LessonPlace("one-task")
+        late = leaving.is_set() and stage.page.ready.choice.exercise == LessonPlace("one-task")
         if late:
             writing.set()
             eventually(lambda: learner.lecture is not None and learner.lecture.exercise == NEXT)

@@ -256,7 +256,10 @@ def test_a_chart_whose_first_curve_has_no_values_draws_the_others(body: Simulati
     """The hand has no task any more, and the error of the base is drawn. Bounds alone are no values."""
     gui = MagicMock()
     in_view = MagicMock(sees=lambda title: title.startswith("Error"))
-    plots = TrackingPlots(gui, in_view, body.ready(), dict.fromkeys(("ee", "base"), (0, 0, 0)))
+    ready = body.ready()
+    page = MagicMock(gui=gui, in_view=in_view, ready=ready, robot=ready.robot)
+    page.colours = dict.fromkeys(("ee", "base"), (0, 0, 0))
+    plots = TrackingPlots(page)
     note = gui.add_html.return_value
     note.visible = False
     layout, drawn = body.session.layout, gui.add_uplot.return_value
@@ -279,14 +282,14 @@ def test_a_level_has_its_name_on_the_page_as_it_is(
     body: SimulationRunner, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A label is shown as text, so that nothing in it is replaced."""
-    gui = MagicMock()
+    page = MagicMock(colours=dict.fromkeys(("<ee>", "<base>"), (0, 0, 0)))
     settings = body.session.settings
     assert isinstance(settings, VelocitySettings)
     tasks = [replace(level.tasks[0], name=f"<{level.name}>") for level in settings.levels]
-    named = MagicMock(levels=[Level((task,)) for task in tasks])
+    page.settings = MagicMock(levels=[Level((task,)) for task in tasks])
     monkeypatch.setattr("app.panels.velocity.tasks.Controls", MagicMock())
-    RolesPanel(gui, MagicMock(), named, dict.fromkeys(("<ee>", "<base>"), (0, 0, 0)), lambda: settings, None)
-    labels = [call.args[0] for call in gui.add_folder.call_args_list if call.args[0]]
+    RolesPanel(page, None)
+    labels = [call.args[0] for call in page.gui.add_folder.call_args_list if call.args[0]]
     assert labels == ["Settings of <ee>", "Settings of <base>"]
 
 

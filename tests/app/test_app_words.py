@@ -9,6 +9,7 @@ import warnings
 from concurrent.futures import ThreadPoolExecutor
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import MagicMock
 
 import msgspec
 import numpy as np
@@ -19,7 +20,7 @@ from viser.infra._messages import wire_field_names
 
 from app.client.decimated import History
 from app.link.choice import SceneChoice
-from app.page.scene_ui import Context
+from app.panels.context import PageContext
 from app.panels.widgets.mirror import Bindings
 from app.view.camera import look, turn
 from app.view.robot import aim
@@ -265,15 +266,16 @@ def test_a_camera_that_looks_at_where_it_will_be_is_turned(position: tuple[float
     assert np.array_equal(seen.position, eye) and np.array_equal(seen.look_at, at)
 
 
-def test_poses_of_another_scene_are_none_of_this_page() -> None:
+def test_poses_of_another_scene_are_none_of_this_page(monkeypatch: pytest.MonkeyPatch) -> None:
     """The next scene, whose robot has other joints, arrives while the page is still the one of the scene
     before. This page gets no poses of the new robot."""
     robot, now = load_robot("iiwa14"), object()
     block = SimpleNamespace(poses=lambda: np.ones((4, 7)))
     learner = SimpleNamespace(ready=now, read=lambda look: look(block, None))
     ready = SimpleNamespace(robot=robot)
-    rest: Any = [None] * 4
-    page = Context(rest[0], rest[1], learner, ready, {}, rest[2], rest[3], False, lambda _: None)  # pyright: ignore[reportArgumentType]
+    mock = MagicMock()
+    monkeypatch.setattr("app.panels.context.InView", mock)  # it sends a script to the browser
+    page = PageContext(mock, learner, ready, {}, mock, False, mock, mock)  # pyright: ignore[reportArgumentType]
     assert page.poses() is None
     assert page.poses_or_still().shape == (robot.n + 1, 7)
     learner.ready = ready

@@ -6,18 +6,14 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 
-import viser
-
 from app.client.moment import Moment
-from app.client.pending_edit import Send
-from app.html.palette import RGB
 from app.html.text import block
 from app.link.inside import Inside, InsideRequest
-from app.link.messages import Command, Ready, Status
+from app.link.messages import Status
+from app.panels.context import PageContext
 from app.panels.inside.matrix import MatrixPanel
 from app.panels.inside.plane import PlanePanel
 from app.panels.inside.spectrum import SpectrumPicture
-from app.panels.widgets.in_view import InView
 from lessons.settings.torque import TorqueSettings
 
 _AGAIN = 0.4
@@ -46,27 +42,20 @@ class InsidePanel:
 
     def __init__(
         self,
-        client: viser.ClientHandle,
-        in_view: InView,
-        ready: Ready,
-        colours: dict[str, RGB],
-        post: Send,
-        send: Callable[[Command], None],
+        page: PageContext,
         spectrum: SpectrumPicture,
     ) -> None:
-        """post: posts an event to the session; send: sends a command; spectrum: the picture beside the
-        controls of M̄."""
-        levels = tuple(dict.fromkeys(task.level for task in ready.tasks))
+        """spectrum: the picture beside the controls of M̄."""
+        gui, levels = page.gui, tuple(dict.fromkeys(task.level for task in page.ready.tasks))
         self._plane: PlanePanel | None = None
-        if ready.robot.n > 1:
-            in_lesson = ready.choice.exercise is not None
-            self._plane = PlanePanel(client, in_view, ready.robot, levels, colours, post, in_lesson)
+        if page.robot.n > 1:
+            self._plane = PlanePanel(page, levels)
         else:
-            client.gui.add_html(block("This robot has one joint with one Δτ; the plane needs two."))
-        with client.gui.add_folder("The Hessian", expand_by_default=False):
-            self._matrix = MatrixPanel(client, in_view, ready.robot, levels)
+            gui.add_html(block("This robot has one joint with one Δτ; the plane needs two."))
+        with gui.add_folder("The Hessian", expand_by_default=False):
+            self._matrix = MatrixPanel(page, levels)
         self._spectrum = spectrum
-        self._watching = InsideSubscription(send)
+        self._watching = InsideSubscription(page.send)
 
     def draw(self, moment: Moment) -> None:
         """Draws the data of an instant, and requests the data for the next one."""

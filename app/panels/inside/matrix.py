@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-import viser
-
 from app.html.palette import BAD, BOUND, LEVELS, css, ink
 from app.html.text import block, esc, figure, joint_labels
 from app.link.inside import Inside
-from app.panels.widgets.in_view import InView
+from app.panels.context import PageContext
 from app.panels.widgets.picture import SvgPicture
-from robots import Robot
 
 if TYPE_CHECKING:
     from lessons.geometry.matrix import Matrix
@@ -27,16 +24,14 @@ _SHADES = 6
 class MatrixPanel:
     """The heat map. It requests the Hessian while the browser shows the map."""
 
-    def __init__(
-        self, client: viser.ClientHandle, in_view: InView, robot: Robot, levels: Sequence[str]
-    ) -> None:
+    def __init__(self, page: PageContext, levels: Sequence[str]) -> None:
         """levels: names, highest priority first."""
-        self._names = joint_labels(robot.joint_names)
-        self._level = client.gui.add_dropdown("Level", tuple(levels), initial_value=levels[0])
+        self._names = joint_labels(page.robot.joint_names)
+        self._level = page.gui.add_dropdown("Level", tuple(levels), initial_value=levels[0])
         self._picture = SvgPicture(
-            client, in_view, TITLE, SIZE, "Run (Space), or take one tick (T), to see H."
+            page.client, page.in_view, TITLE, SIZE, "Run (Space), or take one tick (T), to see H."
         )
-        self._words = client.gui.add_html("")
+        self._words = page.gui.add_html("")
 
     @property
     def wish(self) -> str | None:

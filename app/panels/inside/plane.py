@@ -8,19 +8,16 @@ from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import viser
 
 from app.client.moment import Moment
-from app.client.pending_edit import Send
 from app.html.palette import BAD, BOUND, GHOST, RGB, css, ink
 from app.html.text import block, esc, figure, joint_labels, swatch
 from app.link.inside import Inside, InsideRequest
+from app.panels.context import PageContext
 from app.panels.widgets.command import on_click
-from app.panels.widgets.in_view import InView
 from app.panels.widgets.picture import SvgPicture
 from lessons.events import Set
 from lessons.settings.torque import TorqueSettings
-from robots import Robot
 
 if TYPE_CHECKING:
     from lessons.geometry.plane import LevelCut, Plane
@@ -305,26 +302,21 @@ class PlanePanel:
 
     def __init__(
         self,
-        client: viser.ClientHandle,
-        in_view: InView,
-        robot: Robot,
+        page: PageContext,
         levels: tuple[str, ...],
-        colours: dict[str, RGB],
-        post: Send,
-        in_lesson: bool,
     ) -> None:
-        """levels: names, highest priority first; post: posts an event to the session; in_lesson: the legend
-        is folded, because a lesson has a text of its own."""
-        gui = client.gui
-        self._colours = colours
+        """levels: names, highest priority first. In a lesson, which has a text of its own, the legend is
+        folded."""
+        gui, robot = page.gui, page.robot
+        self._colours = page.colours
         self._half: float | None = None
         self._names = joint_labels(robot.joint_names)
         self._pairs = {
             f"{self._names[a]}, {self._names[b]}": (a, b) for a, b in combinations(range(robot.n), 2)
         }
-        self._picture = SvgPicture(client, in_view, TITLE, SIZE, _EMPTY)
+        self._picture = SvgPicture(page.client, page.in_view, TITLE, SIZE, _EMPTY)
         self._why_not = gui.add_html("")
-        with gui.add_folder("Legend", expand_by_default=not in_lesson) as self._folder:
+        with gui.add_folder("Legend", expand_by_default=not page.in_lesson) as self._folder:
             self._words = gui.add_html("")
         self._fewer = gui.add_button(
             "Look one knot ahead (N = 1)",
@@ -351,7 +343,7 @@ class PlanePanel:
                 hint="Offset of the other joints' Δτ from this solution",
             )
 
-        on_click(self._fewer, lambda: post(Set("horizon", 1)))
+        on_click(self._fewer, lambda: page.post(Set("horizon", 1)))
 
     @property
     def wish(self) -> InsideRequest:

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import asyncio
-from collections.abc import Callable
-
 import viser
 
 from app.client.progress import Notebook
-from app.client.simulation_client import SimulationClient
 from app.link.choice import SceneChoice
-from app.link.exercise import Lecture, LessonPlace
+from app.link.exercise import Lecture
+from app.panels.context import PageContext
 from app.panels.lesson.cards import add_cards, add_invitation, exercise_cards
 from app.panels.lesson.step import LessonPanel
 from app.panels.widgets.command import on_click
@@ -24,22 +21,18 @@ class Course:
 
     def __init__(
         self,
-        gui: viser.GuiApi,
-        learner: SimulationClient,
-        exercise: LessonPlace | None,
+        page: PageContext,
         notebook: Notebook,
-        choose: Callable[[SceneChoice], None],
-        settings: Callable[[], SceneSettings],
-        loop: asyncio.AbstractEventLoop,
         plots: viser.PanelHandle | viser.GuiTabGroupHandle | None,
     ) -> None:
-        """exercise: the active step, if there is one; plots: gets a tab with the curves of the step. If it
+        """plots: gets a tab with the curves of the step. If it
         is None, the curves are in the panel of the step."""
-        self._gui, self._notebook, self._choose = gui, notebook, choose
+        gui, exercise = page.gui, page.learner.choice_of(page.ready).exercise
+        self._page, self._notebook = page, notebook
         self._list = PopupWindow(gui, "All lessons", "L", self._fill)
         self._panel: LessonPanel | None = None
         if exercise is None:
-            add_invitation(gui, notebook, choose)
+            add_invitation(gui, notebook, page.choose)
             on_click(gui.add_button("All lessons", hint="Key L"), self._list.open)
             return
         pictures = None
@@ -47,17 +40,15 @@ class Course:
             with plots.add_tab("This step"):
                 pictures = gui.add_html("")
         tab = gui.add_folder(None)
-        self._panel = LessonPanel(
-            gui, tab, pictures, exercise, learner, choose, self._list.open, notebook, settings, loop
-        )
+        self._panel = LessonPanel(page, tab, pictures, exercise, self._list.open, notebook)
 
     def _fill(self) -> None:
-        add_cards(self._gui, self._notebook, self._leave_for)
-        self._gui.add_html(exercise_cards())
+        add_cards(self._page.gui, self._notebook, self._leave_for)
+        self._page.gui.add_html(exercise_cards())
 
     def _leave_for(self, choice: SceneChoice) -> None:
         self._list.close()
-        self._choose(choice)
+        self._page.choose(choice)
 
     def follow(self, lecture: Lecture | None, settings: SceneSettings) -> None:
         """Updates the progress of the lesson."""

@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Callable
 from dataclasses import replace
 
 import viser
 
 from app.client.progress import Notebook
-from app.client.simulation_client import SimulationClient
 from app.html.palette import LEVELS, button
-from app.link.choice import SceneChoice
 from app.link.exercise import Lecture, LessonPlace, parts_of
-from app.link.messages import Post, Predict, ResetAll, RunStep
+from app.link.messages import Predict, ResetAll, RunStep
 from app.link.threads import on_thread
+from app.panels.context import PageContext
 from app.panels.lesson.cards import belonging_to
 from app.panels.lesson.claims import heading, idea, now_you, pictures, state, why
 from app.panels.lesson.prediction import Asking
 from app.panels.widgets.command import add_command, on_click
 from app.panels.widgets.controls import add_control
 from app.panels.widgets.mirror import Bindings
-from lessons.events import Event
 from lessons.settings.settings import SceneSettings
 from lessons.teaching.challenge import Challenge
 from lessons.teaching.lesson import Step
@@ -35,33 +32,25 @@ class LessonPanel:
 
     def __init__(
         self,
-        gui: viser.GuiApi,
+        page: PageContext,
         tab: viser.GuiFolderHandle,
         pictures: viser.GuiHtmlHandle | None,
         exercise: LessonPlace,
-        learner: SimulationClient,
-        choose: Callable[[SceneChoice], None],
         all_lessons: Callable[[], None],
         notebook: Notebook,
-        settings: Callable[[], SceneSettings],
-        loop: asyncio.AbstractEventLoop,
     ) -> None:
         """pictures: where the curves of the run are drawn. If it is None, as on a phone, they are drawn here
         below the answers, and the idea follows."""
-        self._gui, self._tab, self._far, self._loop = gui, tab, pictures, loop
-        self._learner, self._send, self._choose = learner, learner.send, choose
-        self._all_lessons, self._notebook, self._settings = all_lessons, notebook, settings
-        self._fast, self._beside = False, learner.shows_ghosts
+        self._page, self._tab, self._far = page, tab, pictures
+        self._all_lessons, self._notebook = all_lessons, notebook
+        self._fast, self._beside = False, page.learner.shows_ghosts
         self._turn_to(exercise)
         for label, key, does in (
             ("Lesson: run this step", "P", self.run),
             ("Lesson: next step", "N", self.next),
             ("Lesson: previous step", "B", self.back),
         ):
-            add_command(gui, label, key, does)
-
-    def _post(self, event: Event) -> None:
-        self._send(Post(event))
+            add_command(page.gui, label, key, does)
 
     # ---------------------------------------------------------------- building
 
@@ -72,14 +61,14 @@ class LessonPanel:
         last = exercise.place + 1 >= len(parts_of(exercise.whole))
         self._exercises = belonging_to(exercise.lesson) if last else ""
         self._shown: dict[str, str] = {}
-        self._bindings: Bindings[SceneSettings] = Bindings(self._post, self._loop)
+        self._bindings: Bindings[SceneSettings] = Bindings(self._page.post, self._page.loop)
         with self._tab:
-            self._all = self._gui.add_folder(None)
+            self._all = self._page.gui.add_folder(None)
         with self._all:
             self._build()
 
     def _build(self) -> None:
-        gui, part = self._gui, self._part
+        gui, part = self._page.gui, self._part
         self._heading = gui.add_html(heading(self._exercise))
         if self._far is not None:
             self._idea = gui.add_html("")
@@ -89,7 +78,7 @@ class LessonPanel:
         if isinstance(part, Challenge) and self._knobs_first is not None:
             with self._knobs_first:
                 for knob in part.knobs:
-                    add_control(gui, self._bindings, knob, self._settings())
+                    add_control(gui, self._bindings, knob, self._page.settings)
         self._run = gui.add_button("Run this step", color=button(LEVELS[1]), hint="Key P")
         self._hurry = gui.add_checkbox(
             "As fast as possible", self._fast, hint="Faster than real time, if you have seen the run before"
@@ -104,7 +93,7 @@ class LessonPanel:
         with self._free:
             if isinstance(part, Step):
                 for control in part.controls:
-                    add_control(gui, self._bindings, control, self._settings())
+                    add_control(gui, self._bindings, control, self._page.settings)
             self._rerun = gui.add_button_group(
                 "Script", (_AGAIN, _MINE, _RESET), hint="The run of this step, with its own settings or yours"
             )
@@ -137,7 +126,9 @@ class LessonPanel:
         @self._rerun.on_click
         async def _(_: object) -> None:
             choice = str(self._rerun.value)
-            self._send(ResetAll() if choice == _RESET else RunStep(own=choice == _AGAIN, fast=self._fast))
+            self._page.send(
+                ResetAll() if choice == _RESET else RunStep(own=choice == _AGAIN, fast=self._fast)
+            )
 
         on_click(
             self._where,
@@ -147,7 +138,7 @@ class LessonPanel:
     def _begin_with_ghost(self, lecture: Lecture) -> None:
         """Starts or stops the ghost when the learner comes to a step. A ghost that starts later would put the
         robot back to its start."""
-        if lecture.phase == "waiting" and self._learner.shows_ghosts:
+        if lecture.phase == "waiting" and self._page.learner.shows_ghosts:
             on_thread("ghost", self._show_ghost_on_thread)
 
     def _show_ghost_on_thread(self) -> None:
@@ -155,9 +146,9 @@ class LessonPanel:
         ghost."""
         ghost = self._part.ghost if isinstance(self._part, Step) else None
         if ghost is not None and self._beside:
-            self._learner.start_ghost(ghost)
-        elif self._learner.ghost is not None:
-            self._learner.stop_ghost()
+            self._page.learner.start_ghost(ghost)
+        elif self._page.learner.ghost is not None:
+            self._page.learner.stop_ghost()
 
     def _next_label(self) -> str:
         lesson = self._exercise.whole
@@ -170,7 +161,7 @@ class LessonPanel:
     # ---------------------------------------------------------------- doing
 
     def _predict(self, answer: Predict | object) -> None:
-        self._send(Predict(answer))  # pyright: ignore[reportArgumentType]
+        self._page.send(Predict(answer))  # pyright: ignore[reportArgumentType]
 
     def run(self) -> None:
         """Runs the step's script from its start."""
@@ -178,8 +169,8 @@ class LessonPanel:
         if asking is not None and lecture is not None and lecture.answer is None:
             suggested = asking.suggested
             if suggested is not None:
-                self._send(Predict(suggested))
-        self._send(RunStep(own=True, fast=self._fast))
+                self._page.send(Predict(suggested))
+        self._page.send(RunStep(own=True, fast=self._fast))
 
     def next(self) -> None:
         """Opens the next step; after the last step, the list of lessons."""
@@ -194,7 +185,7 @@ class LessonPanel:
             self._go(self._exercise.place - 1)
 
     def _go(self, place: int) -> None:
-        self._choose(self._learner.choice.at(replace(self._exercise, place=place)))
+        self._page.choose(self._page.learner.choice.at(replace(self._exercise, place=place)))
 
     # ---------------------------------------------------------------- showing
 

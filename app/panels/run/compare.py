@@ -8,10 +8,10 @@ from collections.abc import Callable
 import viser
 
 from app.client.run_statistics import RunFigures
-from app.client.simulation_client import SimulationClient
-from app.html.palette import BAD, BOUND, GHOST, RGB, button, ink
+from app.html.palette import BAD, BOUND, GHOST, button, ink
 from app.html.text import badge, block, esc, quantity, swatch
 from app.link.messages import Post
+from app.panels.context import PageContext
 from app.panels.widgets.snapshot import SessionSnapshot
 from lessons.session.ghost import swapped
 from lessons.settings.presets import usual_settings
@@ -30,12 +30,10 @@ class ComparePanel:
 
     def __init__(
         self,
-        gui: viser.GuiApi,
-        learner: SimulationClient,
-        settings: SceneSettings,
-        colours: dict[str, RGB],
+        page: PageContext,
     ) -> None:
-        self._learner, self._colours = learner, colours
+        gui, learner, settings = page.gui, page.learner, page.settings
+        self._learner, self._colours = learner, page.colours
         self._choices = {each.shown.name: each for each in usual_settings(settings)}
         self._intro = gui.add_html(_INTRO)
         self._controller = gui.add_dropdown(

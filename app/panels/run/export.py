@@ -11,12 +11,11 @@ import viser
 
 from app.client.rows import RATE
 from app.client.simulation import Simulation
-from app.client.simulation_client import SimulationClient
 from app.html.text import block
+from app.panels.context import PageContext
 from lessons.plots.recorded import Recorded, run_picture
 from lessons.recording.arrays import named
 from lessons.recording.table import as_csv, as_npz
-from lessons.settings.settings import SceneSettings
 
 _MINUTE, _WHOLE = "the last minute", "all since the last reset"
 
@@ -25,10 +24,8 @@ class ExportPanel:
     """The panel of downloads. Files are made from the recorded data, on viser's threads and without the
     simulation."""
 
-    def __init__(
-        self, gui: viser.GuiApi, learner: SimulationClient, settings: Callable[[], SceneSettings]
-    ) -> None:
-        self._learner, self._settings = learner, settings
+    def __init__(self, page: PageContext) -> None:
+        gui, self._page, self._learner = page.gui, page, page.learner
         gui.add_html(_INTRO)
         self._span = gui.add_dropdown("Of", (_MINUTE, _WHOLE), initial_value=_MINUTE)
         for label, make, hint in (
@@ -67,7 +64,7 @@ class ExportPanel:
         return None if rows is None or len(rows) < 2 else Recorded(record.layout, rows)
 
     def _name(self, ending: str) -> str:
-        return f"{self._learner.choice.run.scene}-{self._settings().controller}.{ending}"
+        return f"{self._learner.choice.run.scene}-{self._page.settings.controller}.{ending}"
 
     def _npz(self) -> tuple[str, bytes] | None:
         run, ready = self._rows(self._learner), self._learner.ready
@@ -82,7 +79,7 @@ class ExportPanel:
             "seed": spec.seed,
             "rows_per_second": float(1 / np.median(gap)),
         }
-        return self._name("npz"), as_npz(named(ready.robot, self._settings(), run.layout, run.rows, how))
+        return self._name("npz"), as_npz(named(ready.robot, self._page.settings, run.layout, run.rows, how))
 
     def _csv(self) -> tuple[str, bytes] | None:
         run = self._rows(self._learner)
@@ -98,7 +95,7 @@ class ExportPanel:
         beside = None if ghost is None else self._rows(ghost)
         name = self._name("png")
         with tempfile.TemporaryDirectory() as folder:
-            picture = run_picture(name.removesuffix(".png"), run, beside, self._settings().T_s)
+            picture = run_picture(name.removesuffix(".png"), run, beside, self._page.settings.T_s)
             return name, draw(picture, Path(folder)).read_bytes()
 
 

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-import viser
 
 from app.client.decimated import PlotWindow
 from app.html.palette import BAD, BOUND, GOOD, ink, joint_colour, joint_dash
 from app.html.text import block, joints_named
+from app.panels.context import PageContext
 from app.panels.widgets.chart import Chart, ChartLine, of_ghost
-from app.panels.widgets.in_view import InView
 from robots import Robot
 from robots.joints import joint_axis
 
@@ -59,8 +58,9 @@ ACCELERATION = Input("Acceleration, largest", "acceleration", None, "a_limit", (
 class JointPlots:
     """Three charts. The callback only stores the choice; the page's loop builds and draws the charts."""
 
-    def __init__(self, gui: viser.GuiApi, in_view: InView, robot: Robot, driven: Input = TORQUE) -> None:
-        self._gui, self._in_view = gui, in_view
+    def __init__(self, page: PageContext, driven: Input = TORQUE) -> None:
+        gui, robot = page.gui, page.robot
+        self._gui, self._in_view = gui, page.in_view
         self._robot, self._input = robot, driven
         self._sheet = data_sheet(robot, driven)
         self._prismatic = [joint_axis(robot.model, joint)[0] for joint in robot.joints]

@@ -3,7 +3,6 @@ tabs."""
 
 from __future__ import annotations
 
-import asyncio
 import math
 import time
 from contextlib import nullcontext
@@ -14,10 +13,10 @@ import viser
 from app.adapter.removed_handle_errors import unless_removed
 from app.client.pending_edit import HOLD, PendingEdit
 from app.client.simulation import Trouble
-from app.client.simulation_client import SimulationClient
 from app.html.palette import LEVELS, ink
 from app.html.text import block, esc, in_trouble
 from app.link.messages import Play, Post, Speed, Status, StepTicks
+from app.panels.context import PageContext
 from app.panels.widgets.command import add_command, on_click
 from app.panels.widgets.snapshot import SessionSnapshot
 from lessons.events import Reset
@@ -35,15 +34,13 @@ class PlaybackPanel:
 
     def __init__(
         self,
-        gui: viser.GuiApi,
-        learner: SimulationClient,
-        loop: asyncio.AbstractEventLoop,
+        page: PageContext,
         fastest: float,
         brief: bool,
     ) -> None:
         """fastest: the highest selectable speed, simulated seconds per second; brief: whether the controls
         that a lesson does not need are folded."""
-        self._learner, self._loop = learner, loop
+        gui, self._learner, self._loop = page.gui, page.learner, page.loop
         self._running: PendingEdit[bool] = PendingEdit()
         self._closed, self._brief = False, brief
         self._trouble = gui.add_html("", visible=False)
@@ -70,13 +67,13 @@ class PlaybackPanel:
         self._touched = -math.inf
 
         on_click(self._buttons, lambda: self._click(str(self._buttons.value)))
-        self._again.on_click(lambda _: learner.restart())  # on a thread, as it starts a process
+        self._again.on_click(lambda _: page.learner.restart())  # on a thread, as it starts a process
 
         @self._speed.on_update
         async def _(event: viser.GuiEvent[viser.GuiSliderHandle[float]]) -> None:
             if event.client is not None:
                 self._touched = time.monotonic()
-                learner.send(Speed(float(self._speed.value)))
+                page.send(Speed(float(self._speed.value)))
 
         for label, key, choice in (
             ("Run or pause", "space", _RUN),

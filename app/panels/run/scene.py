@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import viser
@@ -13,10 +12,12 @@ from app.html.text import badge, block, esc
 from app.link.choice import SceneChoice
 from app.link.messages import Ready
 from app.link.threads import on_thread
+from app.panels.context import PageContext
 from app.panels.widgets.command import on_click
 from lessons.experiments.verdict import verdict
 from lessons.own.files import is_file, is_lesson
 from lessons.own.folder import Folder
+from lessons.scenes.names import ALL_SCENES
 from lessons.scenes.run_spec import RunSpec
 from robots import CATALOG, InputError
 
@@ -32,15 +33,13 @@ class RobotPanel:
 
     def __init__(
         self,
-        gui: viser.GuiApi,
-        ready: Ready,
-        scenes: Mapping[str, str],
-        choose: Callable[[SceneChoice], None],
+        page: PageContext,
         own_files: Folder | None,
     ) -> None:
         """own_files: the folder whose files this page may name by path; None if it may name no files."""
+        gui, ready, scenes = page.gui, page.ready, ALL_SCENES
         robot = ready.robot
-        self._choose = choose
+        self._choose = page.choose
         gui.add_html(
             block(
                 f"<b>{esc(robot.name)}</b>: {robot.n} joints, hand at <b>{esc(robot.tip)}</b>, "

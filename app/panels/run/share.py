@@ -6,11 +6,11 @@ from collections.abc import Callable
 
 import viser
 
-from app.client.simulation_client import SimulationClient
 from app.client.state_code import refuse_uploaded_robot, state_now
 from app.html.text import block
 from app.link.choice import SceneChoice
 from app.link.messages import RunDescription
+from app.panels.context import PageContext
 from lessons.replay.script import script
 from lessons.replay.state import decode, encode
 from robots import InputError
@@ -19,10 +19,8 @@ from robots import InputError
 class SharePanel:
     """The panel of texts, which are made on request, on viser's threads."""
 
-    def __init__(
-        self, gui: viser.GuiApi, learner: SimulationClient, choose: Callable[[SceneChoice], None]
-    ) -> None:
-        self._learner = learner
+    def __init__(self, page: PageContext) -> None:
+        gui, self._learner = page.gui, page.learner
         with gui.add_folder("Share the setting"):
             gui.add_html(_INTRO)
             make = gui.add_button("Write it down")
@@ -47,7 +45,7 @@ class SharePanel:
         @take.on_click
         def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:  # on a worker: a scene is loaded twice
             try:
-                choose(SceneChoice.of_state(decode(str(given.value))))
+                page.choose(SceneChoice.of_state(decode(str(given.value))))
             except InputError as error:
                 _refuse(event.client, error)
 

@@ -3,15 +3,14 @@ whenever it can be used."""
 
 from __future__ import annotations
 
-import asyncio
 import math
 from functools import partial
 
 import viser
 
 from app.adapter.removed_handle_errors import unless_removed
-from app.client.simulation_client import SimulationClient
 from app.html.text import block
+from app.panels.context import PageContext
 from app.panels.widgets.command import add_command, on_click
 
 _STEP = 0.05  # s
@@ -23,9 +22,9 @@ class TimeLine:
     """The time line. `past` is the past moment that is shown, or None for the present. When simulated time
     continues (run, step or reset), the view returns to the present."""
 
-    def __init__(self, gui: viser.GuiApi, learner: SimulationClient, loop: asyncio.AbstractEventLoop) -> None:
+    def __init__(self, page: PageContext) -> None:
+        gui, self._learner, self._loop = page.gui, page.learner, page.loop
         self.past: float | None = None
-        self._learner, self._loop = learner, loop
         self._paused_at: float | None = None  # s, simulated time at which the run is paused
         self._closed = False
         self._slider = gui.add_slider(

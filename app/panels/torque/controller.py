@@ -8,13 +8,11 @@ import viser
 
 from app.html.palette import BAD, GOOD
 from app.html.text import bar, block, esc, formula, joint_labels
+from app.panels.context import PageContext
 from app.panels.inside.spectrum import SpectrumPicture
 from app.panels.widgets.controls import Controls
-from app.panels.widgets.in_view import InView
-from app.panels.widgets.mirror import Bindings
 from app.panels.widgets.snapshot import SessionSnapshot
 from lessons.settings.torque import TorqueSettings
-from robots import Robot
 
 _LOOKS = 9
 """Number of updates over which the share of late ticks is computed: about two seconds."""
@@ -23,10 +21,9 @@ _LOOKS = 9
 class ControllerPanel:
     """The settings of the controller that can be changed while it runs, except the horizon and M̄."""
 
-    def __init__(
-        self, gui: viser.GuiApi, bindings: Bindings[TorqueSettings], settings: TorqueSettings
-    ) -> None:
-        controls = Controls(gui, bindings, settings)
+    def __init__(self, page: PageContext) -> None:
+        gui, settings = page.gui, page.settings
+        controls = Controls(gui, page.bindings, settings)
         with gui.add_folder("Which controller"):
             controls.add("controller")
             self._what = gui.add_html(block(esc(settings.controllers[settings.controller]), lines=2))
@@ -53,24 +50,17 @@ class HorizonPanel:
     spectrum: the picture of the eigenvalues, beside the controls of M̄.
     """
 
-    def __init__(
-        self,
-        client: viser.ClientHandle,
-        in_view: InView,
-        bindings: Bindings[TorqueSettings],
-        settings: TorqueSettings,
-        robot: Robot,
-    ) -> None:
-        gui = client.gui
-        controls = Controls(gui, bindings, settings)
+    def __init__(self, page: PageContext) -> None:
+        gui = page.gui
+        controls = Controls(gui, page.bindings, page.settings)
         with gui.add_folder("Horizon and inertia estimate M̄", order=1.0):
             controls.add_group("Horizon")
             controls.add_group("Inertia estimate M̄")
             self._gauge = gui.add_html("")
-            controls.add_elements("M_bar", joint_labels(robot.joint_names), "Per joint, kg·m²")
+            controls.add_elements("M_bar", joint_labels(page.robot.joint_names), "Per joint, kg·m²")
             with gui.add_folder("Why M̄ matters", expand_by_default=False):
                 self._norm = gui.add_html("")
-                self.spectrum = SpectrumPicture(client, in_view)
+                self.spectrum = SpectrumPicture(page.client, page.in_view)
                 gui.add_html(
                     formula(r"\tau = \tau_0 + \bar M (\ddot q - \ddot q_0)")
                     + block("Time-delay estimation: torque and acceleration of the previous tick replace a "

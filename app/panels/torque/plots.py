@@ -7,12 +7,11 @@ import numpy as np
 import viser
 
 from app.client.decimated import BUCKETS, PlotWindow
-from app.html.palette import BAD, BOUND, GOOD, JOINTS, LEVELS, RGB
+from app.html.palette import BAD, BOUND, GOOD, JOINTS, LEVELS
 from app.html.text import block
-from app.link.messages import Ready
+from app.panels.context import PageContext
 from app.panels.run.joints import TORQUE, data_sheet, quantities
 from app.panels.widgets.chart import NO_TICK, Chart, ChartLine, of_ghost
-from app.panels.widgets.in_view import InView
 from lessons.settings.torque import TorqueSettings
 from robots.collision import Floor
 
@@ -38,32 +37,26 @@ class LevelPlots:
 
     def __init__(
         self,
-        gui: viser.GuiApi,
-        in_view: InView,
-        ready: Ready,
-        settings: TorqueSettings,
-        colours: dict[str, RGB],
+        page: PageContext,
     ) -> None:
-        self._gui, self._in_view = gui, in_view
-        self._tasks, self._colours = ready.tasks, colours
-        self._sheet = data_sheet(ready.robot, TORQUE)
+        gui, self._page = page.gui, page
+        self._sheet = data_sheet(page.robot, TORQUE)
         self._place = gui.add_folder(None)
         self._inner = gui.add_folder("Computing time and leaks", expand_by_default=False)
         self._charts: list[Chart] = []
         self._covers: viser.GuiHtmlHandle | None = None
-        self._furnished = any(not isinstance(thing.shape, Floor) for thing in ready.world)
-        self._settings = settings
+        self._furnished = any(not isinstance(thing.shape, Floor) for thing in page.ready.world)
         self._build(ghost=False)
 
-    def rebuild(self, ready: Ready) -> None:
+    def rebuild(self) -> None:
         """Rebuilds the charts for other tasks."""
-        self._tasks = ready.tasks
         self._build(self._shown[0])
 
     def _wanted(self, ghost: bool) -> tuple[bool, bool, bool]:
         """Returns whether there is a ghost, whether contacts are marked, and whether distances are drawn."""
-        kept = self._settings.limits.avoidance.on
-        return ghost, self._settings.plant.contacts, kept or self._furnished
+        settings: TorqueSettings = self._page.settings
+        kept = settings.limits.avoidance.on
+        return ghost, settings.plant.contacts, kept or self._furnished
 
     def _build(self, ghost: bool) -> None:
         for chart in self._charts:
@@ -74,8 +67,8 @@ class LevelPlots:
         self._shown = self._wanted(ghost)
         _, contacts, distances = self._shown
         errors = [
-            ChartLine(f"{t.name} [{'mm' if t.unit == 'm' else '°'}]", self._colours.get(t.level, BOUND))
-            for t in self._tasks
+            ChartLine(f"{t.name} [{'mm' if t.unit == 'm' else '°'}]", self._page.colours.get(t.level, BOUND))
+            for t in self._page.ready.tasks
         ]
         step = [ChartLine("whole step", LEVELS[1], width=2.0)]
         leaks = [ChartLine("priority (own model)", LEVELS[2]), ChartLine("dynamic (true plant)", BAD)]
@@ -97,7 +90,7 @@ class LevelPlots:
             if distances:
                 title = "Distance of the nearest pair, mm"
                 self._charts.append(self._chart(title, [*near, kept], _DISTANCE, empty=_NO_PAIR))
-                self._covers = self._gui.add_html(block(_COVERS))
+                self._covers = self._page.gui.add_html(block(_COVERS))
         with self._inner:
             self._charts += [
                 self._chart("Control step, ms", [*step, budget], _TIME),
@@ -112,15 +105,16 @@ class LevelPlots:
         empty: str = NO_TICK,
     ) -> Chart:
         log = span not in (_DISTANCE, _SHARE)
-        return Chart(self._gui, self._in_view, title, lines, span, height=_HEIGHT, log=log, empty=empty)
+        return Chart(
+            self._page.gui, self._page.in_view, title, lines, span, height=_HEIGHT, log=log, empty=empty
+        )
 
-    def draw(self, window: PlotWindow, ghost: PlotWindow | None, settings: TorqueSettings) -> None:
+    def draw(self, window: PlotWindow, ghost: PlotWindow | None) -> None:
         """Draws the plots of the window. ghost: the ghost's data over the same interval. If the plant has
         contacts, the plot of errors marks them. If distances are kept, there is a plot of them."""
-        self._settings = settings
         if self._wanted(ghost is not None) != self._shown:
             self._build(ghost is not None)
-        windows, T_s = [window] if ghost is None else [window, ghost], settings.T_s
+        windows, T_s = [window] if ghost is None else [window, ghost], self._page.settings.T_s
         error, share, *distance, step, leak = self._charts
         error.show(window, lambda: self._errors_and_contacts(window, windows))
         share.show(window, lambda: [*self._shares(windows), np.full(2 * BUCKETS, 100.0)])
@@ -149,7 +143,7 @@ class LevelPlots:
             * (1e3 if task.unit == "m" else np.degrees(1.0))
             if f"error/{task.name}" in fields
             else nothing
-            for task in self._tasks
+            for task in self._page.ready.tasks
         ]
 
 

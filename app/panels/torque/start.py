@@ -7,10 +7,10 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 import viser
 
-from app.client.pending_edit import Send
 from app.html.palette import BAD, BOUND, GOOD, RGB, TARGET, ink
 from app.html.text import block, esc, joint_labels, joints_named, quantity, swatch
-from app.link.messages import Ready, TaskView
+from app.link.messages import TaskView
+from app.panels.context import PageContext
 from app.panels.widgets.command import add_command, on_click
 from app.panels.widgets.controls import in_colours_of_axes
 from app.panels.widgets.snapshot import SessionSnapshot
@@ -121,18 +121,12 @@ class StartPanel:
 
     def __init__(
         self,
-        gui: viser.GuiApi,
-        post: Send,
-        ready: Ready,
-        settings: TorqueSettings,
-        colours: Mapping[str, RGB],
-        dark: bool,
+        page: PageContext,
     ) -> None:
-        """settings: the present settings; colours: the colour of each level."""
-        self.on_theme: Callable[[bool], None] = lambda _: None
+        gui, ready, self._colours = page.gui, page.ready, page.colours
         self.on_recall: Callable[[], None] = lambda: None
         self._dragged = False
-        told = guide(ready.tasks, settings.levels, colours, dragged=False)
+        told = guide(ready.tasks, page.settings.levels, page.colours, dragged=False)
         self._guide = gui.add_html(told)
         draggable = any(task.kind == "position" and task.raw is not None for task in ready.tasks)
         self._where = gui.add_html("", visible=draggable)
@@ -190,26 +184,26 @@ class StartPanel:
                 hint="The capsules that contain the links. A controller that keeps distances measures them "
                 "between these capsules, which are a few millimetres thicker than the links",
             )
-        self.dark = gui.add_checkbox("Dark theme", dark)
+        self.dark = gui.add_checkbox("Dark theme", page.dark)
 
         @buttons.on_click
         async def _(_: object) -> None:
             direction = np.array(_DIRECTIONS[str(buttons.value)], float)
             vector = tuple(float(x) for x in force.value * direction)
-            post(Push(bodies[str(body.value)], vector, (0.0, 0.0, 0.0), PUSH_SECONDS))
+            page.post(Push(bodies[str(body.value)], vector, (0.0, 0.0, 0.0), PUSH_SECONDS))
 
         add_command(gui, "Turn pulling links by hand on or off", "G", self._grab)
 
         @self._load.on_click
         async def _(_: object) -> None:
-            post(Set("plant.payload_kg", 0.0 if self._load.label == _DROP else self._kg))
+            page.post(Set("plant.payload_kg", 0.0 if self._load.label == _DROP else self._kg))
 
         on_click(recall, lambda: self.on_recall())
 
         @self.dark.on_update
         async def _(event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:
             if event.client is not None:
-                self.on_theme(bool(self.dark.value))
+                page.theme(bool(self.dark.value))
 
     def _grab(self) -> None:
         self.pull.value = not self.pull.value
@@ -242,10 +236,10 @@ class StartPanel:
             text += " The robot cannot have this orientation there: the lower level keeps an error."
         self._where.content = block(f'<b style="color:{colour}">●</b> {esc(text)}')
 
-    def update(self, now: SessionSnapshot[TorqueSettings], colours: Mapping[str, RGB]) -> None:
+    def update(self, now: SessionSnapshot[TorqueSettings]) -> None:
         """Updates the names of the levels in the guide, and the label of the button."""
         tasks, levels = now.ready.tasks, now.settings.levels
-        told = guide(tasks, levels, colours, self._dragged)
+        told = guide(tasks, levels, self._colours, self._dragged)
         if self._guide.content != told:
             self._guide.content = told
         label = _DROP if now.settings.plant.payload_kg > 0 else self._pick_up

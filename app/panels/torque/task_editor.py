@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import fields
 from typing import Any
 
 import viser
 
-from app.client.pending_edit import Send
 from app.html.palette import BAD, RGB, button
 from app.html.text import block, esc, joint_labels
+from app.panels.context import PageContext
 from app.panels.widgets.mirror import Bindings
 from himpc.stack import Stack
 from himpc.tasks import KINDS, Task
@@ -74,11 +74,9 @@ class TaskEditor:
 class AddTask:
     """A folder whose controls depend on the chosen kind of task. The button Add creates the task."""
 
-    def __init__(
-        self, gui: viser.GuiApi, post: Send, robot: Robot, stack: Stack, own: Mapping[str, Task]
-    ) -> None:
-        """own: tasks of the user's own files, by path."""
-        self._post, self._own = post, own
+    def __init__(self, page: PageContext) -> None:
+        gui, robot, stack = page.gui, page.robot, page.settings.levels
+        own = self._own = dict(page.settings.own_tasks)  # tasks of the user's own files, by path
         self._joints = dict(zip(joint_labels(robot.joint_names), robot.joint_names, strict=True))
         with gui.add_folder("Add a task", expand_by_default=False, order=899.0):
             self._kind = gui.add_dropdown("Kind", (*KINDS, *own), initial_value="position")
@@ -111,7 +109,7 @@ class AddTask:
             with gui.add_folder(None):
                 self._name = gui.add_text("Its name", "", hint="If empty, the name of the kind")
             self._add = gui.add_button("Add")
-        self._add.on_click(lambda _: self._post(Set("stack.add", self._wish())))
+        self._add.on_click(lambda _: page.post(Set("stack.add", self._wish())))
         self._kind.on_update(lambda _: self._show())
         self._show()
 

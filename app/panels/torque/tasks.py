@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Callable, Mapping
 from functools import partial
 
@@ -11,8 +10,9 @@ import viser
 from numpy.typing import NDArray
 
 from app.client.pending_edit import PendingEdit
-from app.html.palette import BOUND, DAMPING, RGB
+from app.html.palette import BOUND, DAMPING
 from app.html.text import block, esc, formula, joints_named, swatch
+from app.panels.context import PageContext
 from app.panels.torque.task_editor import AddTask, TaskEditor
 from app.panels.widgets.controls import Controls
 from app.panels.widgets.level_row import DOWN, MORE, OFF, ON, UP, LevelRow, error_in_words
@@ -37,13 +37,10 @@ class LevelCard:
 
     def __init__(
         self,
-        gui: viser.GuiApi,
+        page: PageContext,
         bindings: Bindings[TorqueSettings],
-        settings: TorqueSettings,
         level: Level,
-        colours: dict[str, RGB],
         place: int,
-        robot: Robot,
         targets: Callable[[], Targets],
         moves: Bindings[Targets],
         press: Callable[[str, str], None],
@@ -51,12 +48,14 @@ class LevelCard:
         unfolded: bool,
         strip: viser.GuiFolderHandle | None,
     ) -> None:
-        """targets: returns the present targets, which `moves` shows; press: called with the name of the level
+        """bindings: for the controls of this stack; targets: returns the present targets, which `moves`
+        shows; press: called with the name of the level
         and the button that was pressed; opened: whether its settings are open; unfolded: whether the controls
         that edit the tasks are unfolded; strip: the place over the scene."""
+        gui, robot, settings = page.gui, page.robot, page.settings
         name = self.name = level.name
         hint = f"On or off: key {place + 1}. ▲ ▼: priority"
-        colour, buttons = colours.get(name, BOUND), (ON if level.enabled else OFF, UP, DOWN)
+        colour, buttons = page.colours.get(name, BOUND), (ON if level.enabled else OFF, UP, DOWN)
         settings_hint = f"{hint}. ⋯: gains, weights and tasks of this level"
         row = LevelRow(gui, name, colour, buttons, settings_hint, partial(press, name), opened or unfolded)
         self._rows = [row]
@@ -194,36 +193,28 @@ class TasksPanel:
 
     def __init__(
         self,
-        gui: viser.GuiApi,
-        bindings: Bindings[TorqueSettings],
-        loop: asyncio.AbstractEventLoop,
-        robot: Robot,
-        colours: dict[str, RGB],
-        current: Callable[[], TorqueSettings],
+        page: PageContext,
         targets: Callable[[], Targets],
-        in_lesson: bool,
         strip: viser.GuiTabHandle | None,
     ) -> None:
-        """bindings: for controls that exist in every stack; loop: viser's event loop; current, targets:
-        return the present settings and targets; in_lesson: true if a lesson forbids other stacks; strip: the
-        tab of a panel over the scene, which shows the rows, too."""
-        self._gui, self._loop, self._colours = gui, loop, colours
-        self._current, self._targets = current, targets
-        self._robot, self._in_lesson = robot, in_lesson
-        self._post, self._edited, self._strip = bindings.post, "", strip
+        """targets: returns the present targets; strip: the tab of a panel over the scene, which shows the
+        rows, too. In a lesson, whose stack is given, no task can be added."""
+        gui = page.gui
+        self._page, self._targets = page, targets
+        self._edited, self._strip = "", strip
         self._open: set[str] = set()
         gui.add_html(block("Each level gets the freedom that the levels above leave."), order=-1.0)
         self._place = gui.add_folder(None, order=0.0)
-        self._build(current())
+        self._build(page.settings)
         with gui.add_folder("Last level: damping", order=900.0):
             damping = gui.add_checkbox(
                 "Damp what no level controls",
-                current().damping,
+                page.settings.damping,
                 hint="R weighs changes of torque only, so a direction without a task keeps its torque and "
                 "does not stop when pushed. This last level stops the motion. Switch the level off and push.",
             )
             self._damping = gui.add_html("")
-        bindings.bind(damping, lambda s: s.damping, lambda on: Set("damping", bool(on)))
+        page.bindings.bind(damping, lambda s: s.damping, lambda on: Set("damping", bool(on)))
         with gui.add_folder("What a level minimises", expand_by_default=False, order=901.0):
             gui.add_html(formula(r"e = \ddot x - \ddot x_d + K_V (\dot x - \dot x_d) + K_P (x - x_d)"))
             gui.add_html(formula(r"\sum_j Q \lVert e_{k+j} \rVert^2 + R \lVert \Delta\tau_{k+j} \rVert^2"))
@@ -237,24 +228,21 @@ class TasksPanel:
     def _build(self, settings: TorqueSettings) -> None:
         self._order: PendingEdit[tuple[str, ...]] = PendingEdit()
         self._enabled: dict[str, PendingEdit[bool]] = {level.name: PendingEdit() for level in settings.levels}
-        self._bindings: Bindings[TorqueSettings] = Bindings(self._ask, self._loop)
-        self._moves: Bindings[Targets] = Bindings(self._post, self._loop)
+        self._bindings: Bindings[TorqueSettings] = Bindings(self._ask, self._page.loop)
+        self._moves: Bindings[Targets] = Bindings(self._page.post, self._page.loop)
         with self._place:
-            self._levels = self._gui.add_folder(None)
+            self._levels = self._page.gui.add_folder(None)
         self._rows_over_scene: viser.GuiFolderHandle | None = None
         if self._strip is not None:
             with self._strip:
-                self._rows_over_scene = self._gui.add_folder(None)
+                self._rows_over_scene = self._page.gui.add_folder(None)
         with self._levels:
             self._cards = [
                 LevelCard(
-                    self._gui,
+                    self._page,
                     self._bindings,
-                    settings,
                     level,
-                    self._colours,
                     place,
-                    self._robot,
                     self._targets,
                     self._moves,
                     self._press,
@@ -264,10 +252,8 @@ class TasksPanel:
                 )
                 for place, level in enumerate(settings.levels)
             ]
-            if not self._in_lesson:
-                self._add = AddTask(
-                    self._gui, self._post, self._robot, settings.levels, dict(settings.own_tasks)
-                )
+            if not self._page.in_lesson:
+                self._add = AddTask(self._page)
 
     def _ask(self, event: Event) -> None:
         """Posts an edit. The folder of the edited task stays unfolded in the resulting stack."""
@@ -280,7 +266,7 @@ class TasksPanel:
                 self._edited = name
             case _:
                 self._edited = ""
-        self._post(event)
+        self._page.post(event)
 
     def rebuild(self) -> None:
         """Shows the new stack."""
@@ -288,12 +274,12 @@ class TasksPanel:
         self._levels.remove()
         if self._rows_over_scene is not None:
             self._rows_over_scene.remove()
-        self._build(self._current())
+        self._build(self._page.settings)
 
     @property
     def picking(self) -> bool:
         """Whether a click on a link chooses a frame."""
-        return not self._in_lesson and self._add.picking
+        return not self._page.in_lesson and self._add.picking
 
     def choose(self, frame: str) -> None:
         """Chooses the frame for the new task. Called when a link was clicked; `frame` is its frame."""
@@ -301,14 +287,14 @@ class TasksPanel:
 
     def toggle(self, place: int) -> Set | None:
         """Returns the event for the hotkey of an index (0-based); None if there is no such level."""
-        levels = {level.name: level for level in self._current().levels}
+        levels = {level.name: level for level in self._page.settings.levels}
         names = self._order.now(tuple(levels))
         if place >= len(names) or names[place] not in levels:
             return None
         return self._switch(names[place])
 
     def _switch(self, name: str) -> Set | None:
-        levels = {level.name: level for level in self._current().levels}
+        levels = {level.name: level for level in self._page.settings.levels}
         if name not in levels:
             return None
         wish = self._enabled.setdefault(name, PendingEdit())
@@ -323,17 +309,17 @@ class TasksPanel:
         else:
             event = self._switch(name)
             if event is not None:
-                self._post(event)
+                self._page.post(event)
 
     def _move(self, name: str, by: int) -> None:
         """Moves a level one place up (−1) or down (+1), if possible."""
-        names = list(self._order.now(tuple(level.name for level in self._current().levels)))
+        names = list(self._order.now(tuple(level.name for level in self._page.settings.levels)))
         to = names.index(name) + by if name in names else -1
         if 0 <= to < len(names):
             names.remove(name)
             names.insert(to, name)
             self._order.ask(tuple(names))
-            self._post(MoveLevel(name, to))
+            self._page.post(MoveLevel(name, to))
 
     def update(self, now: SessionSnapshot[TorqueSettings]) -> None:
         for place, level in enumerate(now.settings.levels):

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-import viser
 
 from app.html.text import block, esc, formula
+from app.panels.context import PageContext
 from app.panels.widgets.controls import Controls
-from app.panels.widgets.mirror import Bindings
 from app.panels.widgets.snapshot import SessionSnapshot
 from himpc.catalog import VELOCITY_CONTROLLERS
 from himpc.htmpc import base_joints
 from himpc.htmpc.settings import efforts
 from lessons.settings.velocity import VelocitySettings
-from robots import Robot
 
 _COST = r"J_l = \tfrac12 \sum_{k<N} \lVert e_k \rVert_Q^2 + \tfrac12 \lVert e_N \rVert_P^2"
 
@@ -24,17 +21,10 @@ _COST = r"J_l = \tfrac12 \sum_{k<N} \lVert e_k \rVert_Q^2 + \tfrac12 \lVert e_N 
 class HtmpcPanel:
     """All settings of the controller that can be changed while it runs."""
 
-    def __init__(
-        self,
-        gui: viser.GuiApi,
-        bindings: Bindings[VelocitySettings],
-        settings: VelocitySettings,
-        robot: Robot,
-        current: Callable[[], VelocitySettings],
-    ) -> None:
-        self._gui, self._robot, self._current = gui, robot, current
-        self._controls = controls = Controls(gui, bindings, settings)
-        self._settings = settings
+    def __init__(self, page: PageContext) -> None:
+        gui, settings = page.gui, page.settings
+        self._page, self._robot = page, page.robot
+        self._controls = controls = Controls(gui, page.bindings, settings)
         with gui.add_folder("Which controller"):
             controls.add("controller")
             self._what = gui.add_html(block(esc(VELOCITY_CONTROLLERS[settings.controller]), lines=2))
@@ -60,7 +50,7 @@ class HtmpcPanel:
             controls.add_group("Delay")
 
     def _weights(self) -> None:
-        gui = self._gui
+        gui = self._page.gui
         with gui.add_folder("Weights"):
             self._controls.add("terminal")
             self._effort("velocity_effort", "S", "all")
@@ -81,11 +71,11 @@ class HtmpcPanel:
             return np.array(getattr(efforts(robot, settings.htmpc), symbol), float)
 
         def made(value: float) -> list[float]:
-            weights = now(self._current())
+            weights = now(self._page.settings)
             weights[joints] = value
             return weights.tolist()
 
-        setting = self._settings.setting(path)
+        setting = self._page.settings.setting(path)
         if part != "all":
             setting = replace(setting, shown=replace(setting.shown, label=f"{setting.shown.label}, {part}"))
         self._controls.add_as(setting, lambda settings: now(settings)[joints].tolist(), made)

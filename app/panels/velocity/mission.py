@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
-import viser
 
-from app.client.pending_edit import Send
 from app.html.palette import GOOD, RGB, button, css
 from app.html.text import badge, block, esc, free_name, swatch
-from app.link.messages import Status, TaskView
 from app.link.mission_view import MissionRow
+from app.panels.context import PageContext
 from app.panels.widgets.command import on_click
 from app.panels.widgets.controls import Controls
 from app.panels.widgets.snapshot import SessionSnapshot
 from lessons.events import InsertTask, MoveLevel, Release, RemoveTask
-from lessons.settings.missions import ArchitectureOptions, MissionOptions
+from lessons.settings.missions import ArchitectureOptions
 from lessons.settings.obstacle_missions import PerceptionOptions
 from lessons.settings.velocity import VelocitySettings
 
@@ -30,20 +28,14 @@ class MissionPanel:
 
     def __init__(
         self,
-        gui: viser.GuiApi,
-        points: Sequence[TaskView],
-        colours: dict[str, RGB],
-        post: Send,
-        status: Callable[[], Status | None],
+        page: PageContext,
         places: Callable[[], dict[str, np.ndarray]],
-        controls: Controls[VelocitySettings],
-        options: MissionOptions,
     ) -> None:
-        """points: the points that can get a target; colours: by role; status: returns the newest status;
-        places: returns the position at which each role's goal is drawn, (3,) m; options: the scene's
-        options."""
-        self._points = {task.name: task for task in points}
-        self._colours, self._post, self._status, self._places = colours, post, status, places
+        """places: returns the position at which each role's goal is drawn, (3,) m."""
+        gui, settings = page.gui, page.settings
+        controls, options = Controls(gui, page.bindings, settings), settings.options
+        self._points = {task.name: task for task in page.ready.tasks if task.kind == "position"}
+        self._page, self._places = page, places
         self._filled = False
         self._list = gui.add_html("")
         self._swap = gui.add_button("Swap which comes first", hint="The first two tasks change places")
@@ -69,13 +61,13 @@ class MissionPanel:
             hold = gui.add_checkbox("Hold until released", False)
             add = gui.add_button("Add")
 
-        on_click(self._swap, lambda: swap(self._rows(), post))
+        on_click(self._swap, lambda: swap(page))
 
         @self._release.on_click
         async def _(_: object) -> None:
-            waiting = _waiting(self._rows())
+            waiting = _waiting(mission_rows(page))
             if waiting is not None:
-                post(Release(waiting.name))
+                page.post(Release(waiting.name))
 
         on_click(self._change, lambda: self._changed(str(self._change.value), str(self._task.value)))
 
@@ -85,10 +77,6 @@ class MissionPanel:
 
         on_click(add, lambda: self._add(bool(hold.value)))
 
-    def _rows(self) -> tuple[MissionRow, ...]:
-        status = self._status()
-        return () if status is None or status.mission is None else status.mission.rows
-
     def _start(self) -> tuple[float, float, float]:
         """Returns the position at which the role's goal is drawn now. A new goal of this role begins at this
         position."""
@@ -96,22 +84,22 @@ class MissionPanel:
         return round(float(x), 2), round(float(y), 2), round(float(z), 2)
 
     def _changed(self, what: str, name: str) -> None:
-        ahead = [row.name for row in self._rows() if row.state != "done"]
+        ahead = [row.name for row in mission_rows(self._page) if row.state != "done"]
         if name not in ahead:
             return
         if what == _REMOVE:
-            self._post(RemoveTask(name))
+            self._page.post(RemoveTask(name))
             return
         to = ahead.index(name) + (-1 if what == _EARLIER else 1)
         if 0 <= to < len(ahead):
-            self._post(MoveLevel(name, to))
+            self._page.post(MoveLevel(name, to))
 
     def _add(self, hold: bool) -> None:
         role, before = str(self._role.value), str(self._before.value)
         axes = self._points[role].axes
         goal = tuple(float(self._goal.value["xyz".index(axis)]) for axis in axes)
-        name = free_name(f"{role} added", [row.name for row in self._rows()])
-        self._post(
+        name = free_name(f"{role} added", [row.name for row in mission_rows(self._page)])
+        self._page.post(
             InsertTask(name, role, goal, None if before == _END else before, hold=None if hold else 0.0)
         )
 
@@ -119,7 +107,7 @@ class MissionPanel:
         mission = now.status.mission
         if mission is None:
             return
-        self._list.content = block(_listed(mission.rows, self._colours, mission.done))
+        self._list.content = block(_listed(mission.rows, self._page.colours, mission.done))
         ahead = tuple(row.name for row in mission.rows if row.state != "done")
         for menu, options in ((self._task, _options(*ahead)), (self._before, _options(_END, *ahead))):
             if menu.options != options:
@@ -134,11 +122,16 @@ class MissionPanel:
             self._release.label = f"Release {waiting.name}"
 
 
-def swap(rows: tuple[MissionRow, ...], post: Send) -> None:
+def mission_rows(page: PageContext) -> tuple[MissionRow, ...]:
+    status = page.learner.status
+    return () if status is None or status.mission is None else status.mission.rows
+
+
+def swap(page: PageContext) -> None:
     """Moves the second open task to the first place."""
-    ahead = [row.name for row in rows if row.state != "done"]
+    ahead = [row.name for row in mission_rows(page) if row.state != "done"]
     if len(ahead) > 1:
-        post(MoveLevel(ahead[1], 0))
+        page.post(MoveLevel(ahead[1], 0))
 
 
 def _options(*names: str) -> tuple[str, ...]:

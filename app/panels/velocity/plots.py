@@ -4,14 +4,13 @@ request, solve time."""
 from __future__ import annotations
 
 import numpy as np
-import viser
 
 from app.client.decimated import BUCKETS, PlotWindow
-from app.html.palette import BOUND, GOOD, JOINTS, LEVELS, RGB
+from app.html.palette import BOUND, GOOD, JOINTS, LEVELS
 from app.html.text import block
-from app.link.messages import Ready, TaskView
+from app.link.messages import TaskView
+from app.panels.context import PageContext
 from app.panels.widgets.chart import Chart, ChartLine, of_ghost
-from app.panels.widgets.in_view import InView
 from himpc.htmpc import base_joints
 
 _ERROR = (1e-2, 1e4)  # mm or degrees
@@ -24,10 +23,10 @@ class TrackingPlots:
     """Plots with a logarithmic error axis of fixed range, which shows a millimetre as well as three
     metres."""
 
-    def __init__(self, gui: viser.GuiApi, in_view: InView, ready: Ready, colours: dict[str, RGB]) -> None:
-        self._in_view, self._tasks = in_view, ready.tasks
-        self._gui, self._colours, self._limits = gui, colours, ready.robot.v_limit
-        self._base = list(base_joints(ready.robot))[:2]
+    def __init__(self, page: PageContext) -> None:
+        gui, self._page, self._tasks = page.gui, page, page.ready.tasks
+        self._limits = page.robot.v_limit
+        self._base = list(base_joints(page.robot))[:2]
         self._place = gui.add_folder(None)
         self._charts: list[Chart] = []
         gui.add_html(
@@ -42,11 +41,11 @@ class TrackingPlots:
             chart.remove()
         self._with_ghost = ghost
         errors = [
-            ChartLine(f"{t.name} [{'mm' if t.unit == 'm' else '°'}]", self._colours[t.level], width=2.0)
+            ChartLine(f"{t.name} [{'mm' if t.unit == 'm' else '°'}]", self._page.colours[t.level], width=2.0)
             for t in self._tasks
         ]
         bounds = [
-            ChartLine(f"|e*| + δ of {t.name}", self._colours[t.level], dashed=True) for t in self._tasks
+            ChartLine(f"|e*| + δ of {t.name}", self._page.colours[t.level], dashed=True) for t in self._tasks
         ]
         step = [ChartLine("whole step", LEVELS[1], width=2.0)]
         period = ChartLine("period", GOOD, dashed=True, fill=0.12)
@@ -64,14 +63,14 @@ class TrackingPlots:
             self._charts.append(self._chart("Control step, ms", lines, _TIME))
 
     def _chart(self, title: str, lines: list[ChartLine], span: tuple[float, float]) -> Chart:
-        return Chart(self._gui, self._in_view, title, lines, span, height=_HEIGHT, log=True)
+        return Chart(self._page.gui, self._page.in_view, title, lines, span, height=_HEIGHT, log=True)
 
     def _speed(self, ghost: bool) -> Chart:
         limit = float(self._limits[self._base].max())
         speeds = [ChartLine("x", JOINTS[0]), ChartLine("y", JOINTS[3])]
         return Chart(
-            self._gui,
-            self._in_view,
+            self._page.gui,
+            self._page.in_view,
             "Base speed, m/s",
             [
                 *speeds,

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 
 import viser
 
-from app.html.palette import RGB
 from app.html.text import badge, block, esc, quantity, swatch
+from app.panels.context import PageContext
+from app.panels.velocity.mission import swap
 from app.panels.widgets.command import on_click
 from app.panels.widgets.snapshot import SessionSnapshot
 from lessons.settings.velocity import VelocitySettings
@@ -25,27 +26,21 @@ class BeginPanel:
 
     def __init__(
         self,
-        gui: viser.GuiApi,
-        scene: str,
-        roles: Sequence[str],
-        colours: dict[str, RGB],
+        page: PageContext,
         drives: bool,
-        dark: bool,
     ) -> None:
-        """scene: the name of the scene; roles: names, in their order; drives: whether the robot has a mobile
-        base."""
-        self.on_theme: Callable[[bool], None] = lambda _: None
-        self.on_swap: Callable[[], None] = lambda: None
+        """drives: whether the robot has a mobile base."""
+        gui, scene = page.gui, page.ready.choice.run.scene
         self.on_look: Callable[[], None] = lambda: None
         self.on_obstacle: Callable[[], None] = lambda: None
         self.on_clear: Callable[[], None] = lambda: None
-        self._colours = colours
+        self._colours = page.colours
         self._dragged = False
         self._scene, self._drives = scene, drives
-        places = {role: place for place, role in enumerate(roles, start=1)}
+        places = {level.name: place for place, level in enumerate(page.settings.levels, start=1)}
         self._guide = gui.add_html(guide(scene, drives, places, dragged=False))
         self._live = gui.add_html("")
-        swap = gui.add_button("Swap which comes first", hint="The first two tasks change places")
+        swap_button = gui.add_button("Swap which comes first", hint="The first two tasks change places")
         look = gui.add_button("Look at the robot", hint="Turns the camera to the robot's present place")
         obstacle = gui.add_button(
             "Put an obstacle in the way", hint="A ball in front of the hand; drag it by its arrows"
@@ -62,9 +57,9 @@ class BeginPanel:
             )
             self.arrows = gui.add_checkbox("Arrows of obstacles", True)
             self.frames = gui.add_checkbox("Target and actual frames", True)
-        self.dark = gui.add_checkbox("Dark theme", dark)
+        self.dark = gui.add_checkbox("Dark theme", page.dark)
 
-        on_click(swap, lambda: self.on_swap())
+        on_click(swap_button, lambda: swap(page))
         on_click(look, lambda: self.on_look())
 
         on_click(obstacle, lambda: self.on_obstacle())
@@ -73,7 +68,7 @@ class BeginPanel:
         @self.dark.on_update
         async def _(event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:
             if event.client is not None:
-                self.on_theme(bool(self.dark.value))
+                page.theme(bool(self.dark.value))
 
     def dragged(self) -> None:
         """Called when a target is dragged: the guide then shows the next step."""

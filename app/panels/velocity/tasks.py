@@ -7,11 +7,10 @@ from collections.abc import Callable
 import viser
 
 from app.client.pending_edit import PendingEdit
-from app.html.palette import RGB
 from app.html.text import block, quantity
+from app.panels.context import PageContext
 from app.panels.widgets.controls import Controls
 from app.panels.widgets.level_row import MORE, OFF, ON, LevelRow
-from app.panels.widgets.mirror import Bindings
 from app.panels.widgets.snapshot import SessionSnapshot
 from himpc.stack import Level
 from lessons.events import Set
@@ -23,22 +22,15 @@ class RolesPanel:
 
     def __init__(
         self,
-        gui: viser.GuiApi,
-        bindings: Bindings[VelocitySettings],
-        settings: VelocitySettings,
-        colours: dict[str, RGB],
-        current: Callable[[], VelocitySettings],
+        page: PageContext,
         strip: viser.GuiTabHandle | None,
     ) -> None:
         """strip: the tab of a panel over the scene, which shows the rows, too."""
-        self._current = current
-        self._order = tuple(level.name for level in settings.levels)
+        self._page, levels = page, page.settings.levels
+        self._order = tuple(level.name for level in levels)
         self._enabled: dict[str, PendingEdit[bool]] = {name: PendingEdit() for name in self._order}
-        gui.add_html(block("The mission below sets the order of the levels."), order=-1.0)
-        self._cards = [
-            _Card(gui, bindings, settings, level, colours[level.name], place, self._switch, strip)
-            for place, level in enumerate(settings.levels)
-        ]
+        page.gui.add_html(block("The mission below sets the order of the levels."), order=-1.0)
+        self._cards = [_Card(page, level, place, self._switch, strip) for place, level in enumerate(levels)]
 
     def toggle(self, place: int) -> Set | None:
         """Returns the event for the hotkey of an index (0-based); None if there is no such level."""
@@ -47,7 +39,7 @@ class RolesPanel:
         return self._switch(self._order[place])
 
     def _switch(self, name: str) -> Set:
-        enabled = next(level.enabled for level in self._current().levels if level.name == name)
+        enabled = next(level.enabled for level in self._page.settings.levels if level.name == name)
         wish = self._enabled[name]
         return Set(f"levels.{name}.enabled", wish.ask(not wish.now(enabled)))
 
@@ -65,20 +57,18 @@ class _Card:
 
     def __init__(
         self,
-        gui: viser.GuiApi,
-        bindings: Bindings[VelocitySettings],
-        settings: VelocitySettings,
+        page: PageContext,
         level: Level,
-        colour: RGB,
         place: int,
         switch: Callable[[str], Set],
         strip: viser.GuiTabHandle | None,
     ) -> None:
         name = self.name = level.name
+        gui, colour = page.gui, page.colours[name]
 
         def press(button: str) -> None:
             if button != MORE:
-                bindings.post(switch(name))
+                page.post(switch(name))
 
         button = (ON if level.enabled else OFF,)
         row = LevelRow(gui, name, colour, button, "⋯: the weight of this level", press)
@@ -89,7 +79,7 @@ class _Card:
         for shown in self._rows:
             shown.update(place + 1, self._title(place), level.enabled)
         with row.details:
-            Controls(gui, bindings, settings).add(f"levels.{name}.Q")
+            Controls(gui, page.bindings, page.settings).add(f"levels.{name}.Q")
 
     def _title(self, place: int) -> str:
         return f"{place + 1} · {self.name}"
