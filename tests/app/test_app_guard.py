@@ -246,39 +246,6 @@ def test_a_message_has_a_size(plain: PageServer) -> None:
         assert closed_with(page) == 1003
 
 
-def test_files_on_their_way_have_a_size(plain: PageServer) -> None:
-    """An upload that is larger than the importer reads is dropped before it is decoded; the page stays
-    open."""
-    with dial(plain) as page:
-        page.send(pack(camera()))
-        assert wait_until(lambda: bool(plain._viser.get_clients()), LONG)
-        client = list(plain._viser.get_clients().values())[-1]
-        button = client.gui.add_upload_button("File")
-        count = 6
-        start = _messages.FileTransferStartUpload(
-            source_component_uuid=private.dom_id(button),
-            transfer_uuid="one",
-            filename="robot.urdf",
-            mime_type="text/xml",
-            part_count=count,
-            size_bytes=100,  # a wrong size
-        )
-        page.send(pack(start))
-        for index in range(count):
-            part = _messages.FileTransferPart(
-                source_component_uuid=private.dom_id(button),
-                transfer_uuid="one",
-                part_index=index,
-                content=bytes(3_000_000),
-            )
-            page.send(pack(part))
-        last = camera()
-        last.position = (0.0, 0.0, 7.0)
-        page.send(pack(last))
-        assert wait_until(lambda: tuple(client.camera.position) == last.position, LONG)
-        assert private.unfinished_uploads(client) == 0
-
-
 def test_two_thousand_pings_end_a_connection(plain: PageServer) -> None:
     with dial(plain) as page, pytest.raises(ConnectionClosed):
         for _ in range(2000):
