@@ -28,7 +28,7 @@ NAMES = (
 def test_every_control_takes_values_of_its_kind_only(viser_server: viser.ViserServer) -> None:
     """A value that is taken has the type of the present one, is finite, and lies within the control's
     range."""
-    gui = viser_server.gui
+    gui: Any = viser_server.gui
     slider, number = gui.add_slider("N", 1, 30, 1, 5), gui.add_number("Q", 2.0, min=0.0, max=1e6)
     menu, group = gui.add_dropdown("Solver", ("a", "b")), gui.add_button_group("Playback", ("Run", "Step"))
     upload = gui.add_upload_button("Upload a URDF")
