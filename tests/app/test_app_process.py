@@ -121,7 +121,12 @@ def rings() -> int:
     return Path("/proc/self/maps").read_text().count("memfd:himpc-lab")
 
 
-def test_sessions_resume_end_and_are_limited(one_fork_server: None) -> None:
+def test_sessions_resume_end_and_are_limited(one_fork_server: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Free memory is given back when the last page has gone, not while one is open, as this takes some
+    milliseconds."""
+    given: list[int] = []
+    monkeypatch.setattr("app.web.sessions.give_back", lambda: given.append(len(sessions.learners)))
+    monkeypatch.setattr("app.web.sessions._TIDY", LONG)
     sessions = Sessions(SceneChoice(RunSpec("planar3-hold")), max_sessions=2, grace=1.0)
     try:
         one, two = sessions.enter([]), sessions.enter([])
@@ -137,6 +142,9 @@ def test_sessions_resume_end_and_are_limited(one_fork_server: None) -> None:
         sessions.leave(one)
         three = sessions.enter([])
         assert three is not None and three is not one
+        assert given == []
+        sessions.leave(three)
+        assert wait_until(lambda: given == [0], LONG)
     finally:
         sessions.close()
     assert not sessions.learners
