@@ -40,13 +40,14 @@ def start(one_fork_server: None) -> Iterator[Start]:
     started: list[SimulationClient] = []
     own: list[bool] = []
 
-    def run(scene: str, worker: str = WORKER, own_server: bool = False) -> SimulationClient:
+    def run(scene: str | RunSpec, worker: str = WORKER, own_server: bool = False) -> SimulationClient:
         if own_server and not own:
             SERVER.end()
             own.append(True)
         if not made:
             made.append(Spares(worker))
-        learner = SimulationClient(f"token{len(started)}", SceneChoice(RunSpec(scene)), made[-1])
+        choice = SceneChoice(RunSpec(scene) if isinstance(scene, str) else scene)
+        learner = SimulationClient(f"token{len(started)}", choice, made[-1])
         started.append(learner)
         return learner
 

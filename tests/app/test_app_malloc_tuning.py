@@ -1,5 +1,5 @@
-"""The server's threads share few arenas of the memory allocator, and large arrays are given back. The tests use
-a process of its own, because the options cannot be reset."""
+"""The server's threads share few arenas of the memory allocator, and large arrays are given back. The tests
+use a process of its own, because the options cannot be reset."""
 
 from __future__ import annotations
 

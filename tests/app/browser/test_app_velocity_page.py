@@ -15,7 +15,6 @@ from app.link.messages import Post
 from app.link.mission_view import MissionView
 from app.web.server import PageServer
 from browsing.browser_actions import (
-    camera,
     drag_target,
     eventually,
     is_drawn,
@@ -31,7 +30,7 @@ from browsing.browser_actions import (
     wait_for_scene,
 )
 from browsing.scene_switch import reset_all
-from lessons.events import MoveTarget, Set
+from lessons.events import Set
 from lessons.scenes.names import ALL_SCENES
 from lessons.settings.velocity import VelocitySettings
 from robots.collision import Ball, Box, Floor
@@ -137,27 +136,6 @@ def test_the_base_stops_out_of_reach_and_goes_when_it_comes_first(
     assert eventually(page, lambda: error(learner, "base") < 0.01)
     assert [each.name for each in mission(learner).rows] == ["base", "ee"]
     assert error(learner, "ee") > 0.2
-
-
-def test_the_camera_goes_along_with_the_base(page: Page, learner: SimulationClient) -> None:
-    """The camera moves by the same distance as the base, although a browser without a graphics card reports
-    its camera late."""
-    load(page, learner, "ridgeback-ur10-drag")
-    tab(page, "Learn")
-    unfold(page, "Show")
-    along = row(page, "Camera follows the base").locator("input")
-    along.click()
-    expect(along).to_be_checked()
-    eye, start = np.array(camera(page)), latest(learner, "x/base")
-    learner.send(Post(MoveTarget("base", (float(start[0]), float(start[1]) - 1.0))))
-
-    def gone() -> float:
-        return float(np.linalg.norm(latest(learner, "x/base") - start))
-
-    assert eventually(page, lambda: gone() > 0.8 and at_rest(learner))
-    assert eventually(page, lambda: abs(float(np.linalg.norm(np.array(camera(page)) - eye)) - gone()) < 0.05)
-    along.click()
-    page.get_by_text("Show", exact=True).first.click()
 
 
 def test_a_mission_runs_to_its_end_though_a_task_is_moved_meanwhile(
