@@ -58,6 +58,7 @@ _UNDRAWN = """(() => {
 done as usual: scene, poses, visibility, the search for the object under the mouse, triangles."""
 
 _PICTURES = """() => new Promise((done) => {
+  window.setTimeout(done, 60000);
   let left = 3;
   const next = () => (left-- > 0 ? window.requestAnimationFrame(next) : done());
   next();
@@ -305,7 +306,7 @@ def turn_target(page: Page, degrees: float) -> None:
 
 
 def _see(page: Page) -> None:
-    """Waits, without a time limit, until the browser has drawn the next frames, and then for 0.25 s."""
+    """Waits until the browser has drawn the next frames, at most a minute, and then for 0.25 s."""
     page.evaluate(_PICTURES)
     page.wait_for_timeout(250)
 

@@ -37,6 +37,11 @@ from robots.collision import Ball, Box, Floor
 
 pytestmark = pytest.mark.usefixtures("one_fork_server")
 
+MISSIONS = pytest.mark.nightly(
+    *(f"app/{part}" for part in ("adapter", "html", "link", "page", "panels", "view", "worker")),
+    *("browsing/", "himpc/htmpc", "himpc/missions", "lessons/scenes", "lessons/session", "lessons/settings"),
+)
+
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[PageServer]:
@@ -166,6 +171,7 @@ def test_a_mission_runs_to_its_end_though_a_task_is_moved_meanwhile(
     assert latest(learner, "clearance")[0] > 0.0
 
 
+@MISSIONS
 def test_tasks_are_added_released_and_settings_changed(page: Page, learner: SimulationClient) -> None:
     load(page, learner, "ridgeback-ur10-handover")
     assert eventually(page, lambda: is_drawn(page, "/person/1"))
@@ -195,6 +201,7 @@ def test_tasks_are_added_released_and_settings_changed(page: Page, learner: Simu
     assert learner.failure is None
 
 
+@MISSIONS
 def test_obstacles_are_moved_by_hand_and_put_in_the_way(page: Page, learner: SimulationClient) -> None:
     load(page, learner, "ridgeback-ur10-cluttered")
     assert eventually(page, lambda: is_drawn(page, "/obstacle_arrows/1"))
@@ -231,6 +238,7 @@ def test_obstacles_are_moved_by_hand_and_put_in_the_way(page: Page, learner: Sim
     assert eventually(page, lambda: obstacles() == before)
 
 
+@MISSIONS
 def test_a_crate_is_outlined_where_it_is_reported(page: Page, learner: SimulationClient) -> None:
     """The outline is drawn while the report is wrong; the solid crate stays where it is."""
     load(page, learner, "ridgeback-ur10-perception")
