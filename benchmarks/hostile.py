@@ -1,20 +1,47 @@
-"""A user who sends messages that no browser would send, at the wrong moments, by the page's protocol."""
+"""A user who sends messages that no browser would send, at the wrong moments, by the page's protocol. The
+page must keep working. `benchmarks.fuzz` judges the torques under hostile states, settings and events.
+
+    python -m benchmarks.hostile [--minutes M] [--seed N] [--scene S]
+
+Every action is done at least once; then actions are chosen at random. After each action everything that
+happened is judged, and the attack ends early after a fault. The program prints all actions as JSON. The exit
+code is 1 if there was a fault.
+"""
 
 from __future__ import annotations
 
+import json
 import math
+import os
+import sys
+import tempfile
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from random import Random
 from typing import Any, final
 
+import tyro
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import msgspec
+import numpy as np
 from websockets.exceptions import ConnectionClosed
 
+from app.client.decimated import History
+from app.client.simulation_client import SimulationClient
+from app.link.choice import SceneChoice
+from app.link.ring import Block
 from app.web.server import PageServer
-from benchmarks.monkey import Findings, User
 from browsing.wire import Wire, camera, eventually, pack
+from lessons.scenes.run_spec import RunSpec
 
+ANSWER = 60.0
+"""Time, s, after which a page counts as dead if it shows nothing new although its robot should move."""
+COMPLAINTS = ("Traceback", "Exception", "Warning", "[viser]")
+"""Words on the terminal that are faults."""
 ODD: tuple[Any, ...] = (
     None, True, False, 0, -1, 3.7, math.nan, math.inf, -math.inf, 1e308, -1e308, 1e-320, 2**63 - 1, -(2**63),
     "", "word", "nan", "x" * 300_000, "\x00", "🤖" * 50, [], [1], [1, 2, 3], [1, 2, 3, 4], [math.nan] * 3,
@@ -39,6 +66,124 @@ LOOKS: tuple[dict[str, Any], ...] = (
 Actions = Sequence[tuple[Callable[[], None], float]]
 Control = tuple[str, dict[str, Any]]
 """The id of a control, and the message that created it."""
+
+
+@dataclass
+class Findings:
+    """The actions of a random walk and the faults that it found."""
+
+    seed: int
+    actions: Counter[str] = field(default_factory=Counter)
+    rows: int = 0
+    scenes: dict[str, None] = field(default_factory=dict)
+    lessons: dict[str, None] = field(default_factory=dict)
+    faults: list[str] = field(default_factory=list)
+
+    def blame(self, sentence: str) -> None:
+        if sentence not in self.faults:
+            self.faults.append(sentence)
+
+
+def attack(scene: str, seconds: float, seed: int, pages: int = 4) -> Findings:
+    """Lets a user act on a new server for a time, with each action at least once. It ends early after a
+    fault."""
+    found = Findings(seed)
+    with StandardError() as terminal:
+        server = PageServer(SceneChoice(RunSpec(scene)), port=0, max_sessions=pages, grace=0.2)
+        try:
+            user, judge = HostileUser(server, found), Judge(server, found)
+            try:
+                end = time.monotonic() + seconds
+                while (time.monotonic() < end or not user.once_all) and not found.faults:
+                    user.act()
+                    judge.look(user, terminal.read())
+                if not found.faults and not user.answers():
+                    found.blame("the page does not answer any more")
+                judge.look(user, terminal.read())
+            finally:
+                user.close()
+        finally:
+            server.close()
+    return found
+
+
+class Judge:
+    """Judges everything that happened since the last look: the terminal, the simulations, and their rows."""
+
+    def __init__(self, server: PageServer, found: Findings) -> None:
+        self.found, self._server = found, server
+        self._seen = 0
+        self._block: Block | None = None
+        self._moved = (time.monotonic(), -1)
+
+    def look(self, user: HostileUser, said: str) -> None:
+        """Adds all faults. said: everything that was written to standard error so far."""
+        for word in COMPLAINTS:
+            if word in said:
+                self.found.blame("on the terminal: " + said[max(0, said.index(word) - 200) :][:2500])
+        user.look()
+        for learner in self._server.sessions.learners:
+            if learner.failure is not None:
+                self.found.blame(f"the simulation: {learner.failure}")
+            if learner.ready is not None:
+                self.found.scenes[learner.choice.run.scene] = None
+            if learner.lecture is not None:
+                self.found.lessons[learner.lecture.exercise.lesson] = None
+        for learner in self._server.sessions.learners[:1]:
+            learner.read(lambda block, history: self._judge(learner, block, history))  # noqa: B023
+            self._is_alive(learner)
+
+    def _judge(self, learner: SimulationClient, block: Block, history: History) -> None:
+        if block is not self._block:
+            self._block, self._seen = block, 0
+        start, rows = block.since(self._seen)
+        self._seen = start + len(rows)
+        self.found.rows += len(rows)
+        if not len(rows):
+            return
+        fields, where = history.layout.fields, _where(learner)
+        for name in ("q", "v", "tau"):
+            if not np.isfinite(rows[:, fields[name]]).all():
+                self.found.blame(f"{name} is not a number in {where}")
+
+    def _is_alive(self, learner: SimulationClient) -> None:
+        status, now = learner.status, time.monotonic()
+        ticks = -1 if status is None else status.ticks
+        if (status is not None and not status.running) or ticks != self._moved[1]:
+            self._moved = (now, ticks)
+        if now - self._moved[0] > ANSWER:
+            speeds = (
+                "" if status is None else f", {status.speed:g} and {status.real_time_factor:.2g} × real time"
+            )
+            self.found.blame(f"no new tick after tick {ticks} for {ANSWER:g} s in {_where(learner)}{speeds}")
+
+
+def _where(learner: SimulationClient) -> str:
+    ready, settings = learner.ready, learner.settings
+    return f"{ready.choice.run.scene if ready else '?'} with {settings.controller if settings else '?'}"
+
+
+class StandardError:
+    """Stores what this process and its children write to standard error, and passes it on."""
+
+    def __enter__(self) -> StandardError:
+        self._file = tempfile.TemporaryFile()
+        self._before = os.dup(2)
+        sys.stderr.flush()
+        os.dup2(self._file.fileno(), 2)
+        return self
+
+    def read(self) -> str:
+        sys.stderr.flush()
+        size = os.fstat(self._file.fileno()).st_size
+        return os.pread(self._file.fileno(), size, 0).decode(errors="replace")
+
+    def __exit__(self, *_: object) -> None:
+        said = self.read()
+        os.dup2(self._before, 2)
+        os.close(self._before)
+        self._file.close()
+        sys.stderr.write(said)
 
 
 @final
@@ -81,19 +226,20 @@ class Odd(Random):
                 return pack(camera())[: self.randrange(60)]
 
 
-class HostileUser(User):
+class HostileUser:
     """One connection. Normal actions change the state of the page for the next action."""
 
-    complaints = ("Traceback", "Exception", "Warning", "[viser]")
-
     def __init__(self, server: PageServer, found: Findings) -> None:
-        self.odd = Odd(found.seed)
-        super().__init__(server, found, self.odd)
+        self.server, self.found, self.odd = server, found, Odd(found.seed)
+        self._due = [each for each, _ in self.table()]
+        self.odd.shuffle(self._due)
+        self.once_all = False
         self.page = Wire(server.link)
         if not eventually(lambda: self.page.shows("t = ")):
             found.blame("the page does not begin")
 
     def table(self) -> Actions:
+        """Returns the actions and their weights."""
         return (
             (self._look, 3.0),
             (self._write_odd, 4.0),
@@ -111,7 +257,14 @@ class HostileUser(User):
             (self._reload, 0.1),
         )
 
-    def do(self, action: Callable[[], None]) -> None:
+    def act(self) -> None:
+        """Does an action, which may come too late for the page."""
+        if not self._due:
+            self.once_all = True
+            actions, weights = zip(*self.table(), strict=True)
+            self._due = self.odd.choices(actions, weights)
+        action = self._due.pop()
+        self.found.actions[action.__name__.strip("_")] += 1
         try:
             action()
             time.sleep(self.odd.choice((0.0, 0.0, 0.01, 0.05, 0.3)))
@@ -119,6 +272,7 @@ class HostileUser(User):
             self._reload()
 
     def look(self) -> None:
+        """Adds the faults of the page."""
         if self.page.shows("cannot be shown"):
             self.found.blame("the page ended")
 
@@ -337,3 +491,14 @@ class HostileUser(User):
 
     def _send(self, kind: str, **said: Any) -> None:
         self.page.send(msgspec.msgpack.encode({**said, "type": kind}))
+
+
+def main(minutes: float = 1.0, seed: int = 0, scene: str = "iiwa14-hold") -> int:
+    """Does what the module says."""
+    found = attack(scene, 60.0 * minutes, seed)
+    print(json.dumps(vars(found) | {"scenes": list(found.scenes), "lessons": list(found.lessons)}, indent=1))
+    return 1 if found.faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(tyro.cli(main, description=__doc__))

@@ -11,6 +11,7 @@ depend on the cores and on their other load. They are printed, but they do not c
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import io
 import json
@@ -20,12 +21,15 @@ import threading
 import time
 from collections import defaultdict
 from collections.abc import Callable, Sequence
+from math import sqrt
 from pathlib import Path
 from statistics import median
 from typing import Any
 
 import psutil
 import tyro
+from websockets.asyncio.client import ClientConnection
+from websockets.asyncio.client import connect as joined
 from websockets.sync.client import connect
 
 from app.__main__ import main as himpc_lab
@@ -35,7 +39,6 @@ from app.panels.widgets.controls import STEPS
 from app.panels.widgets.in_view import AWAKE, LABEL
 from app.web.server import PageServer
 from benchmarks.child import Child, tell
-from benchmarks.phones import crowd
 from browsing.wire import Wire, eventually
 from lessons.replay.progress import read_key
 from lessons.teaching.prediction import Choice, Value
@@ -44,8 +47,14 @@ KEY = "a key of a rehearsal"
 LONG = 300.0  # s
 
 
-def main(learners: int = 20, phones: int = 200, lesson: str = "a-redundant-arm", serve: bool = False) -> int:
+def main(
+    learners: int = 20, phones: int = 200, lesson: str = "a-redundant-arm", serve: bool = False,
+    at: str | None = None,
+) -> int:  # fmt: skip
     """Does what the module says."""
+    if at is not None:
+        asyncio.run(be_phones(at, phones))
+        return 0
     if serve:
         be_a_server(learners, lesson)
         return 0
@@ -58,9 +67,6 @@ def main(learners: int = 20, phones: int = 200, lesson: str = "a-redundant-arm",
         for k, page in enumerate(pages):
             page.use("Your name", f"learner {k}")
         voters = all_leave.enter_context(crowd(links["phones"], phones))
-        voters.say()  # begins the counting of pictures
-        voters.say()  # ends the counting; from now on, each line is a vote
-        voters.hear("slowest_hz")
         found = Rehearsal(host, pages, voters, teacher, lesson, len(pages) + phones).held()
     print(json.dumps(found, indent=1))
     return 1 if found["lost"] else 0
@@ -114,6 +120,62 @@ class Teacher(contextlib.AbstractContextManager["Teacher"]):
     def __exit__(self, *_: object) -> None:
         self._line.close()
         self._reader.join(5.0)
+
+
+# ------------------------------------------------------------------ the phones
+
+
+async def be_phones(address: str, count: int) -> None:
+    """Connects all phones. Each line on stdin lets all phones vote, after which a line with the longest
+    waiting time is printed."""
+    phones = await asyncio.gather(*(Phone.open(address, k) for k in range(count)))
+    tell(phones=len(phones))
+    while await asyncio.to_thread(sys.stdin.readline):
+        waits = await asyncio.gather(*(phone.vote() for phone in phones))
+        tell(longest_s=round(max(waits), 3))
+
+
+class Phone:
+    """A phone."""
+
+    def __init__(self, line: ClientConnection, number: int) -> None:
+        self._line, self._number = line, number
+        self._asked: dict[str, Any] = {}
+        self._answer: asyncio.Future[None] | None = None
+        self._reader = asyncio.ensure_future(self._read())
+
+    @classmethod
+    async def open(cls, address: str, number: int) -> Phone:
+        """Returns a phone that has sent its first message."""
+        await asyncio.sleep(0.01 * number)
+        line = await joined(address, max_size=None, open_timeout=LONG, ping_interval=None)
+        await line.send('{"do":"hello"}')
+        await line.recv()
+        return cls(line, number)
+
+    async def _read(self) -> None:
+        async for text in self._line:
+            told = json.loads(text)
+            self._asked = told.get("all", {}).get("asked") or self._asked
+            if "say" in told and self._answer is not None and not self._answer.done():
+                self._answer.set_result(None)
+
+    async def vote(self) -> float:
+        """Votes. Returns the time until the answer, s."""
+        self._answer = asyncio.get_running_loop().create_future()
+        began = time.monotonic()
+        options, scale = self._asked.get("options"), self._asked.get("scale")
+        answer = self._number % len(options or (0,)) if scale is None else sqrt(scale["low"] * scale["high"])
+        await self._line.send(json.dumps({"do": "vote", "answer": answer}))
+        await self._answer
+        return time.monotonic() - began
+
+
+def crowd(address: str, count: int) -> Child:
+    """Returns phones in a process of their own that have joined a class."""
+    phones = Child("benchmarks.rehearsal", "--phones", str(count), "--at", address)
+    assert phones.hear("phones")["phones"] == count
+    return phones
 
 
 # ------------------------------------------------------------------ the server
@@ -233,7 +295,7 @@ class Rehearsal:
             elif isinstance(asked, Value):
                 page.use("My guess", STEPS // 2 + 1 + k % 7)  # the slider begins in the middle
         self._phones.say()
-        self.waits["phone's vote"].append(1e-3 * self._phones.hear("longest_ms")["longest_ms"])
+        self.waits["phone's vote"].append(self._phones.hear("longest_s")["longest_s"])
         since, told = time.monotonic(), self._teacher.told
         eventually(lambda: told["all"]["voted"] >= self._voters, 20.0)
         self.waits["votes counted"].append(time.monotonic() - since)

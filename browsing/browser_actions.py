@@ -15,6 +15,8 @@ CHROMIUM_ARGS = ["--no-sandbox", "--disable-dev-shm-usage", "--enable-unsafe-swi
 SLOW = 60_000  # time limit of an action, ms, for WebGL in software on two shared cores
 BETWEEN = 120  # ms between two controls: viser throttles a container to one change per 50 ms
 
+FAULTS: list[str] = []
+"""The errors that the scripts of all pages of `new_page` have raised so far."""
 SCALE = 0.25
 """Pixels per CSS pixel for pages that nobody looks at."""
 OFTEN, SELDOM = 80, 300
@@ -56,6 +58,7 @@ _UNDRAWN = """(() => {
 done as usual: scene, poses, visibility, the search for the object under the mouse, triangles."""
 
 _PICTURES = """() => new Promise((done) => {
+  window.setTimeout(done, 60000);
   let left = 3;
   const next = () => (left-- > 0 ? window.requestAnimationFrame(next) : done());
   next();
@@ -108,6 +111,7 @@ def new_page(
         viewport={"width": width, "height": height}, device_scale_factor=scale
     ).new_page()
     page.set_default_timeout(SLOW)
+    page.on("pageerror", lambda error: FAULTS.append(str(error)))
     page.add_init_script(_RESTING.replace("REST", str(rest)))
     if scale < 1:
         page.add_init_script(_PLAIN)
@@ -308,7 +312,7 @@ def turn_target(page: Page, degrees: float) -> None:
 
 
 def _see(page: Page) -> None:
-    """Waits, without a time limit, until the browser has drawn the next frames, and then for 0.25 s."""
+    """Waits until the browser has drawn the next frames, at most a minute, and then for 0.25 s."""
     page.evaluate(_PICTURES)
     page.wait_for_timeout(250)
 

@@ -60,6 +60,7 @@ class Wire:
         notices: (title, body) of every notification.
         standing: (title, body) of the notifications that are still shown, by id.
         nodes: kinds of the objects in the 3D view by name.
+        scripts: the scripts that the server sent.
         eye: the last camera position that the server sent, m.
     """
 
@@ -78,6 +79,7 @@ class Wire:
         self.notices: list[tuple[str, str]] = []
         self.standing: dict[str, tuple[str, str]] = {}
         self.nodes: dict[str, str] = {}
+        self.scripts: list[str] = []
         self.eye: tuple[float, ...] = ()
         # Browsers send no pings, and a busy machine would answer them too late.
         self._socket = connect(
@@ -179,6 +181,8 @@ class Wire:
                 self.standing[message["uuid"]] = self.notices[-1]
             case "RemoveNotificationMessage":
                 self.standing.pop(message["uuid"], None)
+            case "RunJavascriptMessage":
+                self.scripts.append(message["source"])
             case "SetCameraPositionMessage":
                 self.eye = tuple(message["position"])
             case "TransformControlsMessage":

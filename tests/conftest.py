@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 from shutil import rmtree
 from tempfile import mkdtemp
@@ -133,10 +134,13 @@ _TESTED = {
     "tests/robots/": ("robots/",),
     "tests/himpc/": ("robots/", "himpc/"),
     "tests/lessons/": ("robots/", "himpc/", "lessons/", "benchmarks/"),
+    "tests/commands/": ("robots/", "himpc/", "lessons/", "app/commands/", "app/__", "app/link/threads.py"),
 }
 """What the tests of a package can find wrong: the package and those that it imports. Imports go in one
 direction (`tests/test_structure.py`), so that no change of another package can break it. If none of these has
 changed, a run of all tests leaves these out, like those that are marked nightly."""
+_LESSON_TEXT = re.compile(r"lessons/course/.*\.md")
+"""Files that only a test can read whose file names the course, or a module that reads it."""
 _ALWAYS = (
     *_QUICK,
     "tests/robots/test_robots_hostile.py",
@@ -148,9 +152,15 @@ _ALWAYS = (
     "tests/lessons/test_lessons_every_controller.py",
     "tests/lessons/test_lessons_grade_attacks.py",
     "tests/lessons/test_lessons_session.py",
+    "tests/commands/test_commands.py",
+    "tests/commands/test_commands_interrupted.py",
+    "tests/commands/test_commands_light.py",
 )
 """Files of these folders that run at every push, with a representative of each kind of test."""
-_EVERYTHING = ("tests/conftest.py", "constraints.txt", "pyproject.toml", ".ci/")
+_EVERYTHING = (
+    *("tests/conftest.py", "constraints.txt", "pyproject.toml", ".ci/"),
+    *("tests/broken_solver.py", "tests/printed_levels.py"),
+)
 """Files whose change may break any test."""
 
 
@@ -177,7 +187,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         tested = next((of for folder, of in _TESTED.items() if item.nodeid.startswith(folder)), None)
         always = item.nodeid.startswith(_ALWAYS) or item.get_closest_marker("nightly") is not None
         if whole and tested and not always:
-            item.add_marker(pytest.mark.nightly(*tested, *_EVERYTHING, since="half a day"))
+            item.add_marker(pytest.mark.nightly(*tested, *_EVERYTHING))
     left_out = [item for item in items if not _runs(item, config)]
     if left_out:
         items[:] = [item for item in items if item not in set(left_out)]
@@ -193,32 +203,36 @@ def _runs(item: pytest.Item, config: pytest.Config) -> bool:
         return True
     file = item.path.relative_to(_ROOT).as_posix()
     beside = re.compile(rf"{re.escape(file.rpartition('/')[0])}/(?!test_)\w+\.py")
-    recent, half_a_day = config.stash[_CHANGED]
-    changed = half_a_day if "since" in mark.kwargs else recent
+    changed = config.stash[_CHANGED]
+    if not _reads_lessons(item.path):
+        changed = [path for path in changed if not _LESSON_TEXT.fullmatch(path)]
     return any(path.startswith((file, *mark.args)) or beside.match(path) for path in changed)
 
 
-def _changed() -> tuple[list[str], list[str]]:
-    """Returns the files that the last ten commits have changed, and those that have changed in the half day
-    before the last commit; both with those that are changed and not committed. Without a repository these are
-    not known: the tests of all packages run, but none that is marked nightly in its file."""
+@cache
+def _reads_lessons(path: Path) -> bool:
+    return re.search("course|progress|teaching|authoring", path.read_text("utf-8")) is not None
+
+
+def _changed() -> list[str]:
+    """Returns the files that the last ten commits have changed, of which a merge counts as one with all that
+    it brings, and those that are changed and not committed. Without a repository these are not known: the
+    tests of all packages run, but none that is marked nightly in its file."""
 
     def git(*words: str) -> list[str]:
         command = ["git", "-C", str(_ROOT), *words]
         return subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()
 
     try:
-        last = int(git("log", "-1", "--format=%ct")[0])
         now = git("diff", "--name-only", "HEAD")
-        log = ("log", "--no-merges", "--name-only", "--format=")
-        recent, half_a_day = git(*log, "-n", "10"), git(*log, f"--since={last - 43200}")
-    except (OSError, subprocess.CalledProcessError, IndexError):
-        return [_EVERYTHING[0]], [_EVERYTHING[0]]
-    return tuple(sorted({*found, *now} - {""}) for found in (recent, [*recent, *half_a_day]))  # pyright: ignore[reportReturnType]
+        recent = git("log", "--first-parent", "-m", "-n", "10", "--name-only", "--format=")
+    except (OSError, subprocess.CalledProcessError):
+        return [_EVERYTHING[0]]
+    return sorted({*recent, *now} - {""})
 
 
 _ROOT = Path(__file__).parents[1]
-_CHANGED = pytest.StashKey[tuple[list[str], list[str]]]()
+_CHANGED = pytest.StashKey[list[str]]()
 _COMPILE = "from himpc.compilation.compiling import compile_all; compile_all(lambda *_: None)"
 _COLD = pytest.StashKey[tuple[str, str]]()
 

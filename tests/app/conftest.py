@@ -1,11 +1,12 @@
-"""Fixtures that start simulations. The fork server of the tests' process lives through all tests, because its
-start takes a second of a core."""
+"""Fixtures that start simulations, and viser's own server. The fork server of the tests' process lives
+through all tests, because its start takes a second of a core."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
 import pytest
+import viser
 from children import Start
 
 from app.client.simulation_client import SimulationClient
@@ -14,6 +15,13 @@ from app.link.fork_server import SERVER
 from app.link.process import Spares
 from app.web.sessions import WORKER
 from lessons.scenes.run_spec import RunSpec
+
+
+@pytest.fixture(scope="module")
+def viser_server() -> Iterator[viser.ViserServer]:
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    yield server
+    server.stop()
 
 
 @pytest.fixture(scope="session")
@@ -32,13 +40,14 @@ def start(one_fork_server: None) -> Iterator[Start]:
     started: list[SimulationClient] = []
     own: list[bool] = []
 
-    def run(scene: str, worker: str = WORKER, own_server: bool = False) -> SimulationClient:
+    def run(scene: str | RunSpec, worker: str = WORKER, own_server: bool = False) -> SimulationClient:
         if own_server and not own:
             SERVER.end()
             own.append(True)
         if not made:
             made.append(Spares(worker))
-        learner = SimulationClient(f"token{len(started)}", SceneChoice(RunSpec(scene)), made[-1])
+        choice = SceneChoice(RunSpec(scene) if isinstance(scene, str) else scene)
+        learner = SimulationClient(f"token{len(started)}", choice, made[-1])
         started.append(learner)
         return learner
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import replace
 from typing import Any
@@ -28,13 +28,6 @@ from lessons.events import Event, Set
 from lessons.scenes.catalog import load_scene, torque_scene
 from lessons.settings.torque import TorqueSettings
 from lessons.settings.velocity import VelocitySettings
-
-
-@pytest.fixture(scope="module")
-def viser_server() -> Iterator[viser.ViserServer]:
-    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-    yield server
-    server.stop()
 
 
 @pytest.fixture

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import socket
 from collections.abc import Iterator
-from urllib.parse import quote, urlsplit
+from urllib.parse import quote
 
 import pytest
 from served import served
 from test_app_class import LONG, Line, cookie_of
 from test_app_load import get
-from viser import __version__
 from websockets.exceptions import InvalidStatus
 
 from app.__main__ import main
@@ -80,32 +78,6 @@ def test_the_account_is_the_name_of_the_row(server: PageServer) -> None:
     other = enter([learner.token], print, "max")
     assert other is not None and other is not learner
     assert enter([learner.token], print, "zoë") is learner
-
-
-def test_where_the_proxy_asks_for_no_password_nobody_gets_a_robot(server: PageServer) -> None:
-    """The proxy treats these addresses as addresses below /v/, and passes on an account that it did not
-    check. The last addresses go to a server without a class."""
-    assert server.hall is not None
-    with served(START, token=TOKEN, proxy_only=True, trusted_origins=[ORIGIN]) as alone:
-        for url, path in (
-            *((server.url, path) for path in ("//v/x", "/%76/x", "/x/../v/x", "/v/x")),
-            *((alone.url, path) for path in ("//v/x", "/%76/x", "/x/../v/x", "/v/x", "/class")),
-        ):
-            assert upgraded(url, path, **by_proxy("prof")) == 403, path
-        assert upgraded(alone.url, "/", **by_proxy("prof")) == 101
-
-
-def upgraded(url: str, path: str, **headers: str) -> int:
-    """Returns the status of the response to an upgrade request; the address is sent exactly as it is
-    written."""
-    where = urlsplit(url)
-    asking = {"Host": where.netloc, "Connection": "Upgrade", "Upgrade": "websocket", **headers}
-    asking |= {"Sec-WebSocket-Version": "13", "Sec-WebSocket-Key": "x" * 22 + "=="}
-    asking |= {"Sec-WebSocket-Protocol": f"viser-v{__version__}"}
-    lines = [f"GET {path} HTTP/1.1", *(f"{name}: {value}" for name, value in asking.items()), "", ""]
-    with socket.create_connection((where.hostname, where.port), timeout=LONG) as line:
-        line.sendall("\r\n".join(lines).encode())
-        return int(line.makefile("rb").readline().split()[1])
 
 
 def test_an_account_keeps_its_row_and_names_may_be_left_out() -> None:

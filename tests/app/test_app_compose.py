@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Iterator
 
 import numpy as np
@@ -12,9 +11,9 @@ from served import served
 from app.link.choice import SceneChoice
 from app.link.messages import Post
 from app.link.process import wait_until
-from app.panels.torque.task_editor import AddTask
 from app.web.server import PageServer
 from browsing.wire import Wire
+from himpc.catalog import CONTROLLERS
 from lessons.events import MoveTarget, Reset
 from lessons.scenes.run_spec import RunSpec
 
@@ -81,33 +80,13 @@ def test_where_a_posture_wants_what_slides_is_set_in_metres() -> None:
         assert wire.notices == []
 
 
-def test_a_control_may_be_written_after_its_panel_was_rebuilt(
-    server: PageServer, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
-    """A callback that runs after its controls were removed ends without an error message."""
-    begun, rebuilt, ended = (threading.Event() for _ in range(3))
-    show = AddTask._show
-
-    def slowly(panel: AddTask) -> None:
-        if threading.current_thread().name.startswith("page_"):
-            begun.set()
-            rebuilt.wait(LONG)
-            try:
-                show(panel)
-            finally:
-                ended.set()
-        else:
-            show(panel)
-
-    monkeypatch.setattr(AddTask, "_show", slowly)
+def test_the_menu_switches_the_controller(server: PageServer) -> None:
+    """The menu offers every registered name, and the page describes the chosen one."""
     with Wire(server.link) as wire:
-        wire.use("Kind", "com")
-        assert begun.wait(LONG)
-        wire.use("Add")
-        shown(wire, "Remove com")
-        rebuilt.set()
-        assert ended.wait(LONG)
-        wire.use("Kind", "damping")  # its callback runs after the other one has ended
-        assert wait_until(lambda: wire.shows("all joints come to rest"), LONG)
-    said = capfd.readouterr()
-    assert "removed" not in said.err + said.out
+        menu = shown(wire, "Controller")
+        assert list(wire.controls[menu]["props"]["options"]) == list(CONTROLLERS)
+        learner = server.sessions.learners[0]
+        for name in ("hqp", "himpc"):
+            wire.write(menu, value=name)
+            assert wait_until(lambda name=name: getattr(learner.settings, "controller", "") == name, LONG)
+            assert wait_until(lambda name=name: wire.shows(CONTROLLERS[name]), LONG)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import asyncio
 import multiprocessing
 import os
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import psutil
 import pytest
+from children import LONG, Start, begun, rings
 from served import served
 
 from app.client.simulation_client import SimulationClient
@@ -19,21 +19,13 @@ from app.link.choice import SceneChoice
 from app.link.connection import receive, send
 from app.link.exercise import LessonPlace
 from app.link.messages import Lead, Load, Play, Post, ResetAll, Script, WaitAt
-from app.link.process import Spares, wait_until
-from app.web.sessions import WORKER
+from app.link.process import wait_until
 from app.worker.ghost import GhostBody
 from app.worker.simulation import SimulationRunner
 from browsing.wire import Wire, eventually
 from lessons.events import Push, Reset, Set
 from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.lesson import Ghost
-
-LONG = 60.0  # s
-
-
-def rings() -> int:
-    """Returns the number of telemetry rings that this process maps."""
-    return Path("/proc/self/maps").read_text().count("memfd:himpc-lab")
 
 
 @pytest.fixture
@@ -111,22 +103,6 @@ def test_leading_begins_anew_with_every_fresh_start(body: SimulationRunner) -> N
     assert body.leader.script(body.session) is None and not body.leader.waits(1e9)
 
 
-@pytest.fixture
-def start(one_fork_server: None) -> Iterator[Callable[[str], SimulationClient]]:
-    spares, started = Spares(WORKER), list[SimulationClient]()
-
-    def run(scene: str) -> SimulationClient:
-        learner = SimulationClient("token", SceneChoice(RunSpec(scene)), spares)
-        started.append(learner)
-        assert wait_until(lambda: learner.status is not None and learner.status.ticks > 20, LONG)
-        return learner
-
-    yield run
-    for learner in started:
-        learner.close()
-    spares.close()
-
-
 def together(learner: SimulationClient) -> bool:
     """Returns whether both are paused at the same time t > 0.1 s."""
     status, ghost = learner.status, learner.ghost
@@ -136,8 +112,8 @@ def together(learner: SimulationClient) -> bool:
     return t is not None and t > 0.1 and ghost.look() == t
 
 
-def test_a_ghost_begins_follows_and_ends(start: Callable[[str], SimulationClient]) -> None:
-    learner = start("planar3-hold")
+def test_a_ghost_begins_follows_and_ends(start: Start) -> None:
+    learner = begun(start)
     learner.start_ghost(Ghost("no preview", ("horizon=1",)))
     ghost = learner.ghost
     assert ghost is not None
@@ -163,10 +139,8 @@ def test_a_ghost_begins_follows_and_ends(start: Callable[[str], SimulationClient
     assert wait_until(lambda: (learner.look() or 0.0) > t + 0.5, LONG)
 
 
-def test_a_ghost_that_does_not_fit_is_a_notice_and_stops_nothing(
-    start: Callable[[str], SimulationClient],
-) -> None:
-    learner = start("planar3-hold")
+def test_a_ghost_that_does_not_fit_is_a_notice_and_stops_nothing(start: Start) -> None:
+    learner = begun(start)
     learner.start_ghost(Ghost("nonsense", ("horizn=3",)))
     notices: list[str] = []
     assert wait_until(lambda: bool(notices.extend(learner.take_messages()[1]) or notices), LONG)
@@ -175,9 +149,9 @@ def test_a_ghost_that_does_not_fit_is_a_notice_and_stops_nothing(
     assert wait_until(lambda: (learner.look() or 0.0) > t + 0.5, LONG)
 
 
-def test_a_scene_that_comes_too_late_leaves_no_memory(start: Callable[[str], SimulationClient]) -> None:
+def test_a_scene_that_comes_too_late_leaves_no_memory(start: Start) -> None:
     """A `Ready` message that arrives after the learner was closed is discarded and its memory is released."""
-    learner = start("planar3-hold")
+    learner = begun(start)
     learner.close()
     late = SimulationRunner(SceneChoice(RunSpec("planar3-hold")))
     ends: tuple[Any, Any] = multiprocessing.Pipe()
@@ -192,8 +166,8 @@ def test_a_scene_that_comes_too_late_leaves_no_memory(start: Callable[[str], Sim
         each.close()
 
 
-def test_a_ghost_goes_along_to_another_scene(start: Callable[[str], SimulationClient]) -> None:
-    learner = start("planar3-hold")
+def test_a_ghost_goes_along_to_another_scene(start: Start) -> None:
+    learner = begun(start)
     learner.start_ghost(Ghost("N = 1", ("horizon=1",)))
     ghost = learner.ghost
     learner.send(Load(SceneChoice(RunSpec("iiwa14-hold"))))

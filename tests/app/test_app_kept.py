@@ -10,20 +10,12 @@ import re
 import tempfile
 
 import pytest
-from served import served
 
 from app.link.choice import SceneChoice
-from app.link.process import wait_until
 from app.worker.simulation import SimulationRunner
-from browsing.wire import Wire
 from lessons.scenes.run_spec import RunSpec
 
-pytestmark = pytest.mark.usefixtures("one_fork_server")
-
 TICKS = 1000
-
-
-LONG = 240.0  # s: the first start of a checkout compiles
 
 
 def allocated() -> int:
@@ -90,18 +82,3 @@ def test_ten_changes_of_the_scene_make_one_robot_of_placo() -> None:
     visit(3)
     before = visit(1)
     assert visit(10) - before < 500_000
-
-
-def test_memory_is_given_back_after_the_last_page(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Not while another page is open, as this takes some milliseconds."""
-    given: list[int] = []
-    monkeypatch.setattr("app.web.sessions.give_back", lambda: given.append(len(sessions.learners)))
-    monkeypatch.setattr("app.web.sessions._TIDY", LONG)
-    with served(max_sessions=2, grace=0.1) as server:
-        sessions = server.sessions
-        with Wire(server.guest_link):
-            with Wire(server.guest_link):
-                assert wait_until(lambda: len(sessions.learners) == 2, LONG)
-            assert wait_until(lambda: len(sessions.learners) == 1, LONG)
-            assert given == []
-        assert wait_until(lambda: given == [0], LONG)

@@ -75,18 +75,12 @@ def test_a_limit_that_comes_and_goes_is_not_said_again_and_again() -> None:
 
 
 class Reader(Wire):
-    """A browser whose user asked for less motion; it keeps the scripts that it was sent."""
-
-    def __init__(self, url: str) -> None:
-        self.scripts: list[str] = []
-        super().__init__(url)
+    """A browser whose user asked for less motion."""
 
     def __enter__(self) -> Reader:
         return self
 
     def _take(self, message: dict[str, Any]) -> None:
-        if message["type"] == "RunJavascriptMessage":
-            self.scripts.append(message["source"])
         if message["type"] == "LocalStorageGetItemRequestMessage" and message["key"] == MOTION:
             self.say(_messages.LocalStorageGetItemResponseMessage(REDUCED, None, message["request_uuid"]))
         else:

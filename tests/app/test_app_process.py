@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import errno
 import os
-from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 import psutil
 import pytest
+from children import LONG, Start, begun, rings
 
 from app.client.simulation_client import SimulationClient
 from app.link import fork_server
@@ -22,41 +21,15 @@ from app.web.sessions import WORKER, Sessions
 from lessons.events import Set
 from lessons.scenes.run_spec import RunSpec
 
-LONG = 30.0  # s
-
-
-@pytest.fixture
-def spares(one_fork_server: None) -> Iterator[Spares]:
-    made = Spares(WORKER)
-    yield made
-    made.close()
-
-
-@pytest.fixture
-def start(spares: Spares) -> Iterator[Callable[[str], SimulationClient]]:
-    started: list[SimulationClient] = []
-
-    def run(scene: str) -> SimulationClient:
-        learner = SimulationClient(f"token{len(started)}", SceneChoice(RunSpec(scene)), spares)
-        started.append(learner)
-        assert wait_until(lambda: learner.status is not None and learner.status.ticks > 20, LONG)
-        return learner
-
-    yield run
-    for learner in started:
-        learner.close()
-
 
 def ticks(learner: SimulationClient) -> int:
     return 0 if learner.status is None else learner.status.ticks
 
 
-def test_a_page_that_shows_the_scene_before_keeps_its_settings(
-    start: Callable[[str], SimulationClient],
-) -> None:
+def test_a_page_that_shows_the_scene_before_keeps_its_settings(start: Start) -> None:
     """Until a page has built the next scene, it has the settings of the scene that it shows. The settings of
     the next scene may be of another type."""
-    learner = start("planar3-hold")
+    learner = begun(start)
     learner.send(Post(Set("horizon", 8)))
     before = learner.ready
     assert before is not None
@@ -75,25 +48,21 @@ def test_a_page_that_shows_the_scene_before_keeps_its_settings(
 
 
 @pytest.mark.skipif(not hasattr(os, "SCHED_BATCH"), reason="Linux only")
-def test_a_simulation_lets_the_ticks_of_another_end(start: Callable[[str], SimulationClient]) -> None:
-    pid = start("planar3-hold").pid
+def test_a_simulation_lets_the_ticks_of_another_end(start: Start) -> None:
+    pid = begun(start).pid
     assert pid is not None
     assert os.sched_getscheduler(pid) == os.SCHED_BATCH
     assert os.sched_getscheduler(0) != os.SCHED_BATCH
 
 
-def test_a_bad_scene_is_a_sentence_and_the_process_waits(spares: Spares) -> None:
-    learner = SimulationClient("token", SceneChoice(RunSpec("hold", urdf="/nowhere/robot.urdf")), spares)
-    refusals: list[str] = []
-    try:
-        assert wait_until(lambda: bool(refusals.extend(learner.take_messages()[0]) or refusals), LONG)
-        assert "/nowhere/robot.urdf" in refusals[0] and learner.failure is None
-    finally:
-        learner.close()
+def test_a_bad_scene_is_a_sentence_and_the_process_waits(start: Start) -> None:
+    learner, refusals = start(RunSpec("hold", urdf="/nowhere/robot.urdf")), list[str]()
+    assert wait_until(lambda: bool(refusals.extend(learner.take_messages()[0]) or refusals), LONG)
+    assert "/nowhere/robot.urdf" in refusals[0] and learner.failure is None
 
 
-def test_no_child_and_no_memory_is_left(start: Callable[[str], SimulationClient]) -> None:
-    learner = start("planar3-hold")
+def test_no_child_and_no_memory_is_left(start: Start) -> None:
+    learner = begun(start)
     pid, before = learner.pid, rings()
     assert pid is not None and before > 0
     learner.close()
@@ -116,12 +85,12 @@ def test_a_fork_server_outlives_who_used_it_first(one_fork_server: None) -> None
     assert len(parents) == 1
 
 
-def rings() -> int:
-    """Returns the number of telemetry rings that this process maps."""
-    return Path("/proc/self/maps").read_text().count("memfd:himpc-lab")
-
-
-def test_sessions_resume_end_and_are_limited(one_fork_server: None) -> None:
+def test_sessions_resume_end_and_are_limited(one_fork_server: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Free memory is given back when the last page has gone, not while one is open, as this takes some
+    milliseconds."""
+    given: list[int] = []
+    monkeypatch.setattr("app.web.sessions.give_back", lambda: given.append(len(sessions.learners)))
+    monkeypatch.setattr("app.web.sessions._TIDY", LONG)
     sessions = Sessions(SceneChoice(RunSpec("planar3-hold")), max_sessions=2, grace=1.0)
     try:
         one, two = sessions.enter([]), sessions.enter([])
@@ -137,6 +106,9 @@ def test_sessions_resume_end_and_are_limited(one_fork_server: None) -> None:
         sessions.leave(one)
         three = sessions.enter([])
         assert three is not None and three is not one
+        assert given == []
+        sessions.leave(three)
+        assert wait_until(lambda: given == [0], LONG)
     finally:
         sessions.close()
     assert not sessions.learners

@@ -21,7 +21,6 @@ from app.link.choice import SceneChoice
 from app.link.messages import Load, Play, Post, RunDescription
 from app.link.process import MOST, wait_until
 from app.link.ring import MAX_ROWS, MIN_ROWS, Block
-from benchmarks.rough import treat
 from lessons.events import MoveTarget
 from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.lesson import Ghost
@@ -244,13 +243,3 @@ def test_files_arrive_with_their_message(start: Start) -> None:
     assert wait_until(lambda: learner.status is not None and not learner.status.running, LONG)
     assert len(os.listdir("/proc/self/fd")) <= open_before
     assert isinstance(learner.read(lambda block, _: block), Block)
-
-
-# ---------------------------------------------------------------- everything together
-
-
-@pytest.mark.nightly("app/link", "app/client", "app/worker", "benchmarks/rough.py")
-def test_pages_get_over_a_rough_day() -> None:
-    """A short version of `python -m benchmarks.rough`: every page recovers with its buttons."""
-    found = treat(kills=4, stops=2, scene="planar3-hold")
-    assert found["recovered"] == found["treated"] and not found["left behind"], found

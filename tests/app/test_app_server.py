@@ -50,8 +50,8 @@ def test_a_port_that_was_taken_meanwhile_gives_one_sentence(monkeypatch: pytest.
             PageServer(FIRST, port=taken.getsockname()[1], max_sessions=1)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_one_line_and_a_clean_end(number: signal.Signals) -> None:
+def test_one_line_and_a_clean_end() -> None:
+    """After SIGTERM; Ctrl-C is in test_commands_interrupted.py."""
     code = (
         "import app.commands.early, sys; from app.web.server import FIRST, PageServer; "
         "from app.web.serving import serve; "
@@ -71,7 +71,7 @@ def test_one_line_and_a_clean_end(number: signal.Signals) -> None:
     found = psutil.Process(process.pid)
     assert wait_until(lambda: bool(found.children(recursive=True)), 20.0)
     children = found.children(recursive=True)
-    process.send_signal(number)
+    process.send_signal(signal.SIGTERM)
     out, errors = process.communicate(timeout=30)
     assert process.returncode == 0, errors
     assert out == "" and "Traceback" not in errors

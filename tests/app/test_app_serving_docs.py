@@ -19,7 +19,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
-from urllib.parse import urljoin
 
 import pytest
 from viser import __version__
@@ -178,117 +177,6 @@ def test_the_printed_proxy_shows_the_page(proxied: tuple[PageServer, int, Path])
         page.send(pack(camera()))
         assert page.recv(timeout=LONG)
         assert wait_until(lambda: len(server.sessions.learners) == 1, LONG)
-
-
-_BARE = """
-server {
-    listen 127.0.0.1:PORT;
-    location / {
-        proxy_pass URL;
-        proxy_http_version 1.1;
-        proxy_set_header Host HOST;
-        proxy_set_header Upgrade $http_upgrade;
-        proxy_set_header Connection "upgrade";
-        MORE
-    }
-}
-"""
-
-
-@NGINX
-@pytest.mark.parametrize("host", ["$proxy_host", "127.0.0.1", "$http_host"])
-def test_strangers_that_a_forgotten_proxy_lets_through_run_nothing(
-    host: str, nginx: str, tmp_path: Path
-) -> None:
-    """The server behind the proxy was started without --trusted-origin. Whatever host the proxy passes on,
-    visitors need the token; and through a proxy that adds forwarding headers, even the owner cannot open
-    files."""
-    server = PageServer(
-        SceneChoice(RunSpec("planar3-hold")), port=0, max_sessions=1, own_files=Folder.at(str(tmp_path))
-    )
-    port = free_port()
-    forwarded = "" if host == "$proxy_host" else "proxy_set_header X-Forwarded-For $remote_addr;"
-    site = _BARE
-    for word, here in (("PORT", str(port)), ("URL", server.url), ("HOST", host), ("MORE", forwarded)):
-        site = site.replace(word, here)
-    proxy = f"http://127.0.0.1:{port}"
-    try:
-        with nginx_with(nginx, tmp_path, site, port):
-            for forged in ({}, {"Host": "127.0.0.1"}, {"Host": "localhost:8080"}):
-                with pytest.raises(urllib.error.HTTPError) as refused:
-                    urllib.request.urlopen(urllib.request.Request(proxy, headers=forged))
-                assert refused.value.code == 403
-            with pytest.raises(InvalidStatus) as closed:
-                connect(proxy.replace("http", "ws"), subprotocols=PROTOCOL)
-            assert closed.value.response.status_code == 403
-            assert not server.sessions.learners
-            brought = (server.link if forwarded else server.guest_link).partition("?")[2]
-            with Wire(f"{proxy}/?{brought}") as page:
-                assert eventually(lambda: page.folders("Import report") > 0, LONG)
-                assert page.find("Your file") is None and page.find("File") is None
-    finally:
-        server.close()
-
-
-_PREFIXED = """
-server {
-    listen 127.0.0.1:PORT;
-    location /user/zoe/lab/ {
-        proxy_pass URL/;
-        proxy_set_header X-Forwarded-Prefix /user/zoe/lab;
-        proxy_http_version 1.1;
-        proxy_set_header Host $http_host;
-        proxy_set_header Upgrade $http_upgrade;
-        proxy_set_header Connection "upgrade";
-    }
-}
-"""
-
-
-@NGINX
-def test_the_page_works_below_any_path(nginx: str, tmp_path: Path) -> None:
-    """The proxy removes a prefix. The token, but not the prefix, is removed from the address; the cookie
-    belongs to the prefix; the question for the token leads back to it; a page gets a robot at its name."""
-    port, prefix = free_port(), "/user/zoe/lab/"
-    server = PageServer(
-        SceneChoice(RunSpec("planar3-hold")),
-        port=0,
-        max_sessions=1,
-        trusted_origins=[f"http://127.0.0.1:{port}"],
-    )
-    site = _PREFIXED.replace("PORT", str(port)).replace("URL", server.url)
-    try:
-        with nginx_with(nginx, tmp_path, site, port):
-
-            def ask(path: str, cookie: str = "") -> tuple[int, http.client.HTTPMessage, str]:
-                connection = http.client.HTTPConnection("127.0.0.1", port, timeout=LONG)
-                connection.request("GET", path, headers={"Cookie": cookie})
-                found = connection.getresponse()
-                text = found.read().decode()
-                connection.close()
-                return found.status, found.headers, text
-
-            status, _, text = ask(prefix)
-            assert status == 403
-            links = re.findall(r'(?:href|action|src)="([^"]*)"', text)
-            assert links and {urljoin(prefix, each) for each in links} == {prefix}
-            token = (server.guest_link).partition("?")[2]
-            status, headers, _ = ask(f"{prefix}?{token}")
-            assert status == 303 and urljoin(prefix, headers["Location"]) == prefix
-            cookie, *attributes = headers["Set-Cookie"].split("; ")
-            assert not any(each.startswith("Path") for each in attributes)  # the browser uses the prefix
-            status, headers, _ = ask(f"{prefix}?fixedDpr=1", cookie)
-            assert status == 303 and urljoin(prefix, headers["Location"]) == f"{prefix}page?fixedDpr=1"
-            status, _, page = ask(f"{prefix}page", cookie)
-            assert status == 200 and not re.findall(r'(?:href|action|src)="/', page)
-            assert ask(f"{prefix}health")[0] == 200
-            # The address at which viser's page of this name opens its web socket; nginx would redirect the
-            # prefix without its last slash.
-            assert ask(prefix.rstrip("/"))[0] == 301
-            with Wire(f"http://127.0.0.1:{port}{prefix}page?{token}"):
-                assert eventually(lambda: len(server.sessions.learners) == 1, LONG)
-    finally:
-        server.close()
 
 
 @NGINX

@@ -125,16 +125,13 @@ def test_a_page_says_at_once_what_is_compiled() -> None:
 
 
 class First(Wire):
-    """A browser that keeps the scripts and the labels of the panel that it was sent."""
+    """A browser that keeps the labels of the panel that it was sent."""
 
     def __init__(self, url: str) -> None:
-        self.scripts: list[str] = []
         self.labels: list[str] = []
         super().__init__(url)
 
     def _take(self, message: dict[str, Any]) -> None:
-        if message["type"] == "RunJavascriptMessage":
-            self.scripts.append(message["source"])
         if message["type"] == "SetGuiPanelLabelMessage":
             self.labels.append(message["label"])
         super()._take(message)

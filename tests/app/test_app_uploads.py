@@ -122,6 +122,20 @@ def test_the_robot_tab_asks_for_the_hand_and_shows_how_the_robot_follows(server:
         assert eventually(lambda: page.shows("hand at <b>ee_a</b>"), LONG), page.notices
 
 
+ONE_JOINT = """<robot name="one"><link name="base"/><link name="arm"><inertial><mass value="1"/>
+<inertia ixx="0.01" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial></link><joint name="j"
+type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 0 1"/><origin xyz="0.3 0 0"/>
+<limit lower="-1" upper="1" velocity="3" effort="50"/></joint></robot>"""
+
+
+def test_a_robot_with_one_joint_has_a_page(server: PageServer) -> None:
+    """How it is controlled is tested in test_lessons_one_joint.py."""
+    with Wire(server.link) as page:
+        upload(page, "one", ONE_JOINT.encode())
+        assert eventually(lambda: page.shows("1 joint"), LONG), page.notices
+        assert eventually(lambda: page.shows("Running") and "/target" in page.controls_3d, LONG)
+
+
 def test_a_file_for_what_was_replaced_is_told(server: PageServer) -> None:
     with Wire(server.link) as page:
         assert eventually(lambda: page.find("Upload a URDF") is not None, LONG)

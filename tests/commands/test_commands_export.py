@@ -26,6 +26,11 @@ from lessons.scenes.run_spec import RunSpec
 from lessons.session.torque import TorqueSession
 from tests.commands.exported import controller_in, exported, needed, replayed, rows_of, told
 
+pytestmark = pytest.mark.nightly(
+    *("himpc/", "app/commands/export.py", "app/__main__.py", "robots/settings.py"),
+    *(f"lessons/{part}" for part in ("events", "recording", "runs", "scenes", "session", "settings")),
+)
+"""Compiling a controller for export takes a minute of a core."""
 SCENES = ("planar3-conflict", "iiwa14-circle", "iiwa14-hold")
 M_BAR, GAINS, Q, R, LIMITS, ENABLED, ORDER = range(1, 8)
 BRAKE, HOLD = 5, 6

@@ -40,11 +40,3 @@ def test_run_shows_people_a_table(capsys: pytest.CaptureFixture[str]) -> None:
     shown = capsys.readouterr().out
     assert "way of the base" in shown
     assert "peak" in shown
-
-
-def test_scenes_and_controllers_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["scenes", "--json", "-"]) == 0
-    assert SQUARE in {each["name"] for each in json.loads(capsys.readouterr().out)}
-    assert main(["controllers", "--json", "-"]) == 0
-    names = {each["name"] for each in json.loads(capsys.readouterr().out)}
-    assert names >= {"himpc", "htmpc", "htmpc_wpt", "stmpc", "htidkc", "placo"}

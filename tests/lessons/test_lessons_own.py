@@ -302,22 +302,6 @@ def test_own_scene_begins_with_any_there_is(file) -> None:
     assert scene.settings.horizon == 10
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("SCENE = 3\n", "its scene is a int"),
-        ("def scene():\n    return 1 / 0\n", "line 2: ZeroDivisionError"),
-        (HOLDS, "is a controller, but a scene is needed"),
-        (text_of("task", None, "").replace("max(np.hypot(p[0], p[1]), 1e-6)", "2.0"), "is off by"),
-        ("TASK = 3\n", "TASK is a int"),
-        (text_of("task", None, "").replace("[:, None, :]", ""), "the Jacobian of task 'reach' has shape"),
-    ],
-)
-def test_own_scene_that_is_wrong_is_one_sentence(text: str, words: str, file) -> None:
-    with pytest.raises(InputError, match=words):
-        scene_named(file(text))
-
-
 def test_own_lesson_is_named_after_its_file(file) -> None:
     path = file(text_of("lesson", None, "mine.md"), "mine.md")
     lesson = lesson_named(path)

@@ -1,13 +1,23 @@
-"""Reports of browser tests that failed contain the text that their pages showed."""
+"""Reports of browser tests that failed contain the text that their pages showed. A test fails if a script of
+a page raised an error."""
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
 from contextlib import suppress
 from typing import Any
 
 import pytest
 from playwright.sync_api import Error, Page
+
+from browsing.browser_actions import FAULTS
+
+
+@pytest.fixture(autouse=True)
+def no_script_fails() -> Iterator[None]:
+    FAULTS.clear()
+    yield
+    assert FAULTS == []
 
 
 @pytest.hookimpl(wrapper=True)

@@ -18,7 +18,13 @@ from app.web.server import PageServer
 from browsing.browser_actions import open_page, press, write
 from lessons.scenes.run_spec import RunSpec
 
-pytestmark = pytest.mark.usefixtures("one_fork_server")
+pytestmark = [
+    pytest.mark.usefixtures("one_fork_server"),
+    pytest.mark.nightly(
+        *(f"app/{part}" for part in ("adapter", "classes", "client", "link", "page", "panels/run", "web")),
+        "browsing/",
+    ),
+]
 
 
 @pytest.fixture(scope="module")

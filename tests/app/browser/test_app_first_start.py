@@ -9,6 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from playwright.sync_api import Browser
 
 from app.link.process import wait_until
@@ -18,6 +19,7 @@ ROOT = Path(__file__).parents[3]
 COMMAND = [sys.executable, "-m", "app", "--port", "0", "--scene", "iiwa14-hold"]
 
 
+@pytest.mark.nightly("app/", "browsing/", "himpc/compilation")
 def test_the_page_opens_while_it_is_compiled(browser: Browser, tmp_path: Path) -> None:
     """The command opens a file in the browser, which redirects to the page. The page counts the compiled
     functions and shows a recorded run."""

@@ -26,6 +26,10 @@ from lessons.scenes.run_spec import RunSpec
 
 pytestmark = pytest.mark.usefixtures("one_fork_server")
 
+INSIDE = pytest.mark.nightly(
+    *(f"app/{part}" for part in ("adapter", "html", "link/inside", "page", "panels", "worker")),
+    *("browsing/", "lessons/geometry", "lessons/scenes/planar"),
+)
 ARM = 0.08
 """Distance from the arm at which the gizmo of this small arm is grasped, m."""
 
@@ -141,6 +145,7 @@ def test_dragging_the_target_moves_both_optima(sheet: Page, drawing: PageServer)
     expect(sheet.get_by_text("Geometry and solver agree to")).to_be_visible()
 
 
+@INSIDE
 def test_swapping_levels_swaps_their_roles(sheet: Page, drawing: PageServer) -> None:
     learner = learner_of(drawing)
     before = plane(drawing)
@@ -156,6 +161,7 @@ def test_swapping_levels_swaps_their_roles(sheet: Page, drawing: PageServer) -> 
     assert after.apart < 1e-6
 
 
+@INSIDE
 def test_a_torque_bound_cuts(sheet: Page, drawing: PageServer) -> None:
     learner = learner_of(drawing)
     assert plane(drawing).box.kinds == (("velocity", "velocity"),) * 2
@@ -172,6 +178,7 @@ def test_a_torque_bound_cuts(sheet: Page, drawing: PageServer) -> None:
     expect(sheet.locator(f'[data-chart="{PLANE}"]').get_by_text("torque", exact=True).first).to_be_visible()
 
 
+@INSIDE
 def test_nobody_asks_while_nobody_looks(sheet: Page, drawing: PageServer) -> None:
     learner = learner_of(drawing)
     tab(sheet, "Errors")
@@ -183,6 +190,7 @@ def test_nobody_asks_while_nobody_looks(sheet: Page, drawing: PageServer) -> Non
     assert inside is not None and inside.matrix is None and inside.spectrum is None
 
 
+@INSIDE
 def test_the_hessian_opens_on_demand(sheet: Page, drawing: PageServer) -> None:
     unfold(sheet, "The Hessian")
     sheet.locator(f'[data-chart="{HESSIAN}"]').scroll_into_view_if_needed()
@@ -194,6 +202,7 @@ def test_the_hessian_opens_on_demand(sheet: Page, drawing: PageServer) -> None:
     sheet.get_by_text("The Hessian", exact=True).click()
 
 
+@INSIDE
 def test_eigenvalues_move_with_M_bar(sheet: Page, drawing: PageServer) -> None:
     def farthest() -> float:
         found = sheet.evaluate(
@@ -214,6 +223,7 @@ def test_eigenvalues_move_with_M_bar(sheet: Page, drawing: PageServer) -> None:
     tab(sheet, "Learn")
 
 
+@INSIDE
 def test_one_knot_is_a_click_away(shared: Page, drawing: PageServer) -> None:
     """This test leaves another scene on the page, so it is the last one."""
     page, learner = shared, learner_of(drawing)

@@ -15,7 +15,6 @@ from app.link.messages import Post
 from app.link.mission_view import MissionView
 from app.web.server import PageServer
 from browsing.browser_actions import (
-    camera,
     drag_target,
     eventually,
     is_drawn,
@@ -31,12 +30,17 @@ from browsing.browser_actions import (
     wait_for_scene,
 )
 from browsing.scene_switch import reset_all
-from lessons.events import MoveTarget, Set
+from lessons.events import Set
 from lessons.scenes.names import ALL_SCENES
 from lessons.settings.velocity import VelocitySettings
 from robots.collision import Ball, Box, Floor
 
 pytestmark = pytest.mark.usefixtures("one_fork_server")
+
+MISSIONS = pytest.mark.nightly(
+    *(f"app/{part}" for part in ("adapter", "html", "link", "page", "panels", "view", "worker")),
+    *("browsing/", "himpc/htmpc", "himpc/missions", "lessons/scenes", "lessons/session", "lessons/settings"),
+)
 
 
 @pytest.fixture(scope="module")
@@ -139,27 +143,6 @@ def test_the_base_stops_out_of_reach_and_goes_when_it_comes_first(
     assert error(learner, "ee") > 0.2
 
 
-def test_the_camera_goes_along_with_the_base(page: Page, learner: SimulationClient) -> None:
-    """The camera moves by the same distance as the base, although a browser without a graphics card reports
-    its camera late."""
-    load(page, learner, "ridgeback-ur10-drag")
-    tab(page, "Learn")
-    unfold(page, "Show")
-    along = row(page, "Camera follows the base").locator("input")
-    along.click()
-    expect(along).to_be_checked()
-    eye, start = np.array(camera(page)), latest(learner, "x/base")
-    learner.send(Post(MoveTarget("base", (float(start[0]), float(start[1]) - 1.0))))
-
-    def gone() -> float:
-        return float(np.linalg.norm(latest(learner, "x/base") - start))
-
-    assert eventually(page, lambda: gone() > 0.8 and at_rest(learner))
-    assert eventually(page, lambda: abs(float(np.linalg.norm(np.array(camera(page)) - eye)) - gone()) < 0.05)
-    along.click()
-    page.get_by_text("Show", exact=True).first.click()
-
-
 def test_a_mission_runs_to_its_end_though_a_task_is_moved_meanwhile(
     page: Page, learner: SimulationClient
 ) -> None:
@@ -188,6 +171,7 @@ def test_a_mission_runs_to_its_end_though_a_task_is_moved_meanwhile(
     assert latest(learner, "clearance")[0] > 0.0
 
 
+@MISSIONS
 def test_tasks_are_added_released_and_settings_changed(page: Page, learner: SimulationClient) -> None:
     load(page, learner, "ridgeback-ur10-handover")
     assert eventually(page, lambda: is_drawn(page, "/person/1"))
@@ -217,6 +201,7 @@ def test_tasks_are_added_released_and_settings_changed(page: Page, learner: Simu
     assert learner.failure is None
 
 
+@MISSIONS
 def test_obstacles_are_moved_by_hand_and_put_in_the_way(page: Page, learner: SimulationClient) -> None:
     load(page, learner, "ridgeback-ur10-cluttered")
     assert eventually(page, lambda: is_drawn(page, "/obstacle_arrows/1"))
@@ -253,6 +238,7 @@ def test_obstacles_are_moved_by_hand_and_put_in_the_way(page: Page, learner: Sim
     assert eventually(page, lambda: obstacles() == before)
 
 
+@MISSIONS
 def test_a_crate_is_outlined_where_it_is_reported(page: Page, learner: SimulationClient) -> None:
     """The outline is drawn while the report is wrong; the solid crate stays where it is."""
     load(page, learner, "ridgeback-ur10-perception")

@@ -20,6 +20,9 @@ _RUN = """(own) => axe.run(
   { runOnly: ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa"], resultTypes: ["violations"] })"""
 
 
+AXE = pytest.mark.nightly("app/adapter", "app/html", "app/page", "app/panels", "app/view", "browsing/")
+
+
 @pytest.fixture(scope="module")
 def checked(shared_page: Page) -> Page:
     shared_page.evaluate((files("axe_playwright_python") / "axe.min.js").read_text(encoding="utf-8"))
@@ -36,6 +39,7 @@ def violations(page: Page, where: str) -> list[str]:
     ]
 
 
+@AXE
 def test_axe_finds_no_violation_of_wcag_on_any_tab(page: Page, checked: Page) -> None:
     found: list[str] = []
     press(page, "Pause")  # axe needs the processor
@@ -60,6 +64,7 @@ def test_axe_finds_no_violation_of_wcag_on_any_tab(page: Page, checked: Page) ->
     assert not found, "\n".join(found)
 
 
+@AXE
 def test_axe_would_find_what_is_wrong(page: Page, checked: Page) -> None:
     """The check can fail: it finds a control without a name, and text of low contrast."""
     page.evaluate(
@@ -83,7 +88,7 @@ def test_keys_move_the_target_and_a_line_says_what_happened(page: Page) -> None:
     field.focus()
     page.keyboard.press("ArrowUp")
     assert abs(float(field.input_value()) - before - 0.01) < 1e-9
-    page.locator("body").click(position={"x": 650, "y": 20})
+    field.blur()
     key(page, "1")
     line = page.locator(f"#{LINE}")
     expect(line).to_contain_text("level 1, position, switched off", ignore_case=True)
@@ -91,3 +96,4 @@ def test_keys_move_the_target_and_a_line_says_what_happened(page: Page) -> None:
     assert box is not None and box["width"] <= 1, "nothing on the screen by default"
     assert line.get_attribute("role") == "status" and line.get_attribute("aria-live") == "polite"
     key(page, "1")
+    page.get_by_text("Move a target by keys", exact=True).first.click()

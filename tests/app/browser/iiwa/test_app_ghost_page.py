@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from pathlib import Path
 
 import numpy as np
 from playwright.sync_api import Page, expect
@@ -63,6 +64,10 @@ def test_a_ghost_a_look_back_and_a_file(page: Page, server: PageServer) -> None:
         lines = list(csv.DictReader(file))
     assert len(lines) > 100 and float(lines[-1]["t"]) > 1.5
     assert download.value.suggested_filename == "iiwa14-hold-himpc.csv"
+    with page.expect_download() as download:
+        press(page, "Script as .py")
+    assert download.value.suggested_filename == "iiwa14-hold.py"
+    compile(Path(download.value.path()).read_text(), "iiwa14-hold.py", "exec")
 
     tab(page, "More")
     tab(page, "Compare")
