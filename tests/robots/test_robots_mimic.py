@@ -7,7 +7,7 @@ import pickle
 import numpy as np
 import pinocchio as pin
 import pytest
-from arms import full_mass_matrix, joint, link, load, robot
+from arms import INERTIAL, full_mass_matrix, joint, link, load, robot
 
 from app.link.poses import LinkPoses
 from himpc.htmpc.clearance import CollisionModel
@@ -152,6 +152,22 @@ def test_the_mass_matrix_does_not_depend_on_the_posture_before(text: str) -> Non
 def test_a_telescope_follows_a_dragged_target() -> None:
     motion = dragged(load_urdf_text(TELESCOPE))
     assert motion.follows and motion.rest, str(motion)
+
+
+@pytest.mark.parametrize("axis", ["1 0 0", "0 1 0"])
+def test_the_segments_of_a_telescope_slide_in_one_another(axis: str) -> None:
+    """Each segment has a motor of its own. Slides along different axes are no telescope."""
+    tube = '<collision><geometry><box size="0.8 0.1 0.1"/></geometry></collision>'
+    arm = load(
+        robot(
+            *(link(name, INERTIAL + tube) for name in ("base", "l1", "l2", "l3")),
+            joint("turn", "base", "l1", axis="0 0 1"),
+            joint("out", "l1", "l2", "prismatic", SLIDE.format(0.5, 1.0), "1 0 0"),
+            joint("further", "l2", "l3", "prismatic", SLIDE.format(0.5, 1.0), axis),
+        )
+    )
+    pairs = {pair.names for pair in arm.collision.excluded if pair.why == "neighbours"}
+    assert (("l1", "l3") in pairs) is (axis == "1 0 0"), pairs
 
 
 def test_a_finger_follows_its_leader_in_the_picture() -> None:
