@@ -19,7 +19,7 @@ _NAMES = tuple(
     )
 )
 """Names of frames that are made to be the tip; earlier ones are preferred."""
-_LEG = re.compile(r"(?<![a-z])leg|foot|ankle|toe|sole|wheel|caster", re.IGNORECASE)
+_LEG = re.compile(r"(?<![a-z])leg|thigh|knee|shin|calf|foot|ankle|toe|sole|wheel|caster", re.IGNORECASE)
 _PART = re.compile(
     r"finger|knuckle|thumb|jaw|(?<![a-z])pad|mover|camera|sensor|optical|imu|lidar|range|meter", re.IGNORECASE
 )
