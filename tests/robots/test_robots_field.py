@@ -274,8 +274,12 @@ def test_a_joint_that_carries_an_arm_moves_although_a_rod_follows_it() -> None:
 
 
 def test_the_shin_of_a_leg_without_a_foot_is_no_tip() -> None:
-    """A humanoid that is welded at its torso: its legs have more joints than its arms."""
-    names = {"arm": ("shoulder", "upper_arm", "lower_arm"), "leg": ("hip_1", "hip_2", "thigh", "shin")}
+    """A humanoid that is welded at its torso: its legs have more joints than its arms. The pelvis has as many
+    as an arm, but carries a leg."""
+    names = {
+        "arm": ("shoulder", "upper_arm", "lower_arm"),
+        "leg": ("waist_1", "waist_2", "pelvis", "thigh", "shin"),
+    }
     parts = [
         link(name) + joint(f"j_{name}", before, name)
         for limb in names.values()
