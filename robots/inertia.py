@@ -52,15 +52,15 @@ def _symmetric(M: np.ndarray) -> np.ndarray:
     return np.where(np.tri(M.shape[-1], k=-1, dtype=bool), M.swapaxes(-1, -2), M)
 
 
-def largest_loads(
+def sampled_loads(
     model: pin.Model, q_lower: np.ndarray, q_upper: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the largest gravity load |g_i|, (n,) N·m, and the largest M_ii, (n,) kg·m², over samples."""
+    """Returns the gravity loads |g_i| of 64 samples, (64, n) N·m, and the largest M_ii, (n,) kg·m²."""
     data = model.createData()
     samples = sample_configurations(q_lower, q_upper, 64)
     gravity = np.array([pin.computeGeneralizedGravity(model, data, q) for q in samples])
     inertia = np.array([np.diag(mass_matrix(model, data, q)) for q in samples])
-    return np.abs(gravity).max(axis=0), inertia.max(axis=0)
+    return np.abs(gravity), inertia.max(axis=0)
 
 
 def rotor_inertia(model: pin.Model, q_lower: np.ndarray, q_upper: np.ndarray) -> np.ndarray:
@@ -72,7 +72,7 @@ def rotor_inertia(model: pin.Model, q_lower: np.ndarray, q_upper: np.ndarray) ->
     speed limit in 5 ms at its effort limit. The values of MuJoCo Menagerie and of the PUMA 560 (Armstrong,
     Khatib, Burdick, ICRA 1986) correspond to 2 to 20 ms.
     """
-    _, load = largest_loads(model, q_lower, q_upper)
+    _, load = sampled_loads(model, q_lower, q_upper)
     least = np.maximum(0.1 * load, 5e-3 * model.effortLimit / model.velocityLimit)
     return np.array([float(f"{value:.1e}") for value in least])
 

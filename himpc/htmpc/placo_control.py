@@ -30,9 +30,6 @@ Array = NDArray[np.float64]
 Aim = Callable[[Configuration, Array], None]
 """Gives placo's task its target: the present value of our task, moved by the given coordinates, (m,)."""
 
-_FLOATING = 7
-"""placo gives every robot a floating base, with this number of coordinates before those of the joints; a mask
-keeps it in place."""
 _FASTEST = 1e4
 """Stands for an infinite bound on a velocity, rad/s or m/s."""
 _NO_ROWS = ActiveMotionRows(
@@ -62,24 +59,30 @@ class Placo(DifferentialController):
             raise InputError(
                 f"solver={settings.solver} changes nothing here: placo has its own QP solver; set solver=daqp"
             )
-        if self.robot.model.njoints - 1 > self.robot.n:
-            raise InputError(
-                f"placo moves every joint by itself, and joints of '{self.robot.name}' follow others: "
-                "choose another controller"
-            )
         import placo
 
-        solver = placo.KinematicsSolver(_wrapper(self.robot.urdf_text))
+        wrapper = _wrapper(self.robot.urdf_text)
+        solver = placo.KinematicsSolver(wrapper)
         aims: dict[str, Aim] = {}
         for index, level in enumerate(levels):
             priority, weight = settings.first_level if index == 0 else "soft", _weight(level)
             for task in level.tasks:
                 aims[task.name] = _added(self.robot, solver, task, priority, weight)
         solver.add_regularization_task(settings.rho)
-        solver.mask_fbase(True)
+        solver.mask_fbase(True)  # placo gives every robot a floating base
         solver.enable_velocity_limits(False)  # the box contains these limits, as they are set now
         solver.enable_joint_limits(False)
-        rows = np.hstack([np.zeros((self.robot.n, _FLOATING)), np.eye(self.robot.n)])
+        # To placo, every joint moves by itself: equations tie those that follow others to their leaders.
+        told = _followers(self.robot.urdf_text)
+        place = wrapper.get_joint_offset
+        self._own = np.array([place(name) for name in self.robot.joint_names])
+        self._followers = np.array([place(name) for name, *_ in told], np.intp)
+        self._leaders = np.array([place(leader) for _, leader, *_ in told], np.intp)
+        self._factors = np.array([factor for *_, factor, _ in told])
+        self._offsets = np.array([offset for *_, offset in told])
+        every = np.eye(wrapper.state.q.size)
+        ties = every[self._followers] - self._factors[:, None] * every[self._leaders]
+        rows = np.vstack([every[self._own], ties])
         self._rows = solver.add_joint_space_half_spaces_constraint(
             np.vstack([rows, -rows]), np.zeros(len(rows) * 2)
         )
@@ -96,13 +99,16 @@ class Placo(DifferentialController):
             goals.append(np.concatenate(velocities))
         begun = perf_counter_ns()
         steps = T * np.clip(box, -_FASTEST, _FASTEST)
-        self._rows.b = np.concatenate([here.q + steps[1], -here.q - steps[0]])
+        self._rows.b = np.concatenate([here.q + steps[1], self._offsets, -here.q - steps[0], -self._offsets])
         wrapper = _wrapper(self.robot.urdf_text)
         try:
             with _ONE_AT_A_TIME:
-                wrapper.state.q[_FLOATING:] = here.q
+                posture = wrapper.state.q
+                posture[self._own] = here.q
+                posture[self._followers] = self._factors * posture[self._leaders] + self._offsets
+                wrapper.state.q = posture
                 wrapper.update_kinematics()
-                free = self._solver.solve(False)[_FLOATING - 1 :] / T
+                free = self._solver.solve(False)[self._own - 1] / T
             command = np.clip(free, box.lower, box.upper)
             outside = float(np.abs(free - command).max())
         except RuntimeError as fault:
@@ -142,6 +148,18 @@ def _wrapper(urdf_text: str) -> placo.RobotWrapper:
         for shape in [*link.findall("visual"), *link.findall("collision")]:
             link.remove(shape)  # placo would look for the meshes
     return placo.RobotWrapper("", placo.Flags.ignore_collisions, ET.tostring(tree, encoding="unicode"))
+
+
+def _followers(urdf_text: str) -> list[tuple[str, str, float, float]]:
+    """Returns the joints that follow others: name, leader, factor and offset, rad or m."""
+    joints = [
+        (joint.get("name", ""), joint.find("mimic")) for joint in ET.fromstring(urdf_text).iter("joint")
+    ]
+    return [
+        (name, told.get("joint", ""), float(told.get("multiplier", "1")), float(told.get("offset", "0")))
+        for name, told in joints
+        if told is not None
+    ]
 
 
 def _added(robot: Robot, solver: placo.KinematicsSolver, task: Task, priority: str, weight: float) -> Aim:

@@ -16,6 +16,7 @@ from lessons.events import MoveTarget
 from lessons.scenes.hold import hold_robot
 from lessons.session.start import begin
 from robots import Robot
+from robots.covering.covers import near
 from robots.errors import listed, shortened
 from robots.loading.home import chain_length
 from robots.plant import Plant
@@ -84,7 +85,9 @@ def dragged(robot: Robot) -> Motion:
     2 s, and drags it back for 2 s, with HIMPC and the scene's own settings."""
     scene = hold_robot(robot)
     length = SHARE * chain_length(robot.model, robot.frame_id(robot.tip))
-    there, home = target(robot, length, bool(scene.world)), _points(robot, robot.home)[-1]
+    avoidance = scene.settings.limits.avoidance
+    kept = avoidance.d_safe + avoidance.margin if avoidance.on else 0.0
+    there, home = target(robot, length, bool(scene.world), kept), _points(robot, robot.home)[-1]
     if there is None:
         return Motion(0.0)
     points, drag = (there, home), float(np.linalg.norm(there - home))
@@ -134,21 +137,22 @@ def _at_limits(plant: Plant, distance: float, kept: float) -> str:
     return "; ".join([*list(touching)[:2], *notes])
 
 
-def target(robot: Robot, drag: float, floor: bool) -> Array | None:
+def target(robot: Robot, drag: float, floor: bool, kept: float = 0.0) -> Array | None:
     """Returns the place (3,), m, to which the tip is dragged.
 
     Inverse kinematics from home tries 26 places, at the distance `drag`, m, along the axes and their
     diagonals. Of those that the tip can reach with all joints 20 mrad or mm away from their limits, the one
     is taken for which the joints turn by the least share of their range. If it can reach none of them, as
     with two joints, a place counts that is nearest to one of them and at least half as far. Above a floor,
-    joints and tip stay half the drag above it, or as far as at home if that is less. None: there is no such
-    place.
+    joints and tip stay half the drag above it, or as far as at home if that is less. A place at which links
+    are nearer to one another than the distance `kept`, m, and are not so at home, as in the robot's own
+    base, is only taken if there is no other. None: there is no place.
     """
     judge, span = ReachJudge(robot), np.clip(robot.q_upper - robot.q_lower, 0.0, 2.0 * np.pi)
     low, high = robot.q_lower + _MARGIN, robot.q_upper - _MARGIN
     home = _points(robot, robot.home)
     least = min(0.5 * drag, float(home[:, 2].min())) - 1e-3 if floor else -math.inf
-    candidates: list[tuple[bool, float, int, Array]] = []
+    candidates: list[tuple[bool, float, int, Array, Array]] = []
     for index, signs in enumerate(corner for corner in product((0.0, 1.0, -1.0), repeat=3) if any(corner)):
         way = np.array(signs) / np.linalg.norm(signs)
         result = judge.solve(home[-1] + drag * way)
@@ -158,8 +162,12 @@ def target(robot: Robot, drag: float, floor: bool) -> Array | None:
         if far and float(points[:, 2].min()) >= least:
             turn = float((np.abs(q - robot.home) / span).max())
             far_off = float(np.linalg.norm(points[-1] - home[-1] - drag * way)) > 0.1 * drag
-            candidates.append((far_off, turn, index, points[-1]))
-    return min(candidates)[3] if candidates else None
+            candidates.append((far_off, turn, index, q, points[-1]))
+    places = sorted(candidates)
+    at_home = near(robot, robot.home, kept)
+    apart = (each for each in places if not near(robot, each[3], kept) - at_home)
+    best = next(apart, places[0] if places else None)
+    return None if best is None else best[-1]
 
 
 def _points(robot: Robot, q: Array) -> Array:

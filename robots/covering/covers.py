@@ -12,7 +12,7 @@ from robots.covering.covered import patches
 from robots.covering.covering import covering
 from robots.geometry.collision_model import CollisionModel, Excluded, Solid
 from robots.geometry.cover import Capsule, Cover
-from robots.mechanics.exclusions import collision_model, touching_often
+from robots.mechanics.exclusions import Bodies, collision_model, touching, touching_often
 from robots.per_robot import per_robot
 from robots.robot import Robot
 
@@ -62,6 +62,15 @@ def own_pairs(robot: Robot, cover: Cover) -> tuple[Excluded, ...]:
     """Returns the pairs that a cover leaves out and the plant does not."""
     known = {(pair.first, pair.second) for pair in robot.collision.excluded}
     return tuple(pair for pair in cover.excluded if (pair.first, pair.second) not in known)
+
+
+def near(robot: Robot, q: np.ndarray, distance: float) -> set[Bodies]:
+    """Returns the pairs of bodies whose capsules are nearer than a distance, m, at q (n,), rad, except the
+    pairs that the cover leaves out."""
+    if robot.cover is None or not robot.cover.capsules:
+        return set()
+    solids = tuple(map(as_solid, robot.cover.capsules))
+    return touching(replace(robot, collision=CollisionModel(solids, robot.cover.excluded)), q, distance)
 
 
 def _checked(robot: Robot, capsules: tuple[Capsule, ...]) -> Cover:

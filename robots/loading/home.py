@@ -12,6 +12,8 @@ _CANDIDATES = 300
 _STEPS = 60
 _ROOM = 0.125  # height of the frame above the floor, as a share of the reach
 _PLAIN = 0.05  # accepted loss of score if a joint is put at the middle of its range
+_SINGULAR = 1e-6  # a singular value of J that is smaller counts as zero
+_HOLDS = 0.8  # share of an effort limit that holding the robot may use without loss of score
 
 
 def find_home(
@@ -25,11 +27,13 @@ def find_home(
     """Returns a configuration (n,), rad, inside the limits and away from singularities and from the limits.
 
     The configuration maximises log σ_min(J) + log(joint margin) − 0.1‖q − middle‖², first over samples and
-    then by random steps; the linear part of J is divided by the reach. The result is deterministic. Joints
+    then by random steps; the linear part of J is divided by the reach, and σ_min is the least singular value
+    that is not zero everywhere, as some are for a planar arm. The result is deterministic. Joints
     that do not move the frame are at the middle of their range (unbounded joints at 0). A chain that reaches
     below the floor (z = 0, or the height of the first joint if lower) gets a lower score, and so does a frame
     that is less than an eighth of the reach above it, or lower than `least_height`, m: one could not drag it
-    down. An elbow above the tip gets a higher score.
+    down. A joint gets a lower score for a posture that its effort limit hardly holds. An elbow above the tip
+    gets a higher score.
     """
     lower, upper = finite_range(q_lower, q_upper)
     middle, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
@@ -44,28 +48,35 @@ def find_home(
     floor = min(0.0, float(data.oMi[chain[0]].translation[2]))
     least_height = max(least_height, floor + _ROOM * reach)
 
-    def score(q: np.ndarray) -> float:
+    def singular_values(q: np.ndarray) -> np.ndarray:
         # For a single joint Pinocchio returns the Jacobian as a one-dimensional array.
         J = pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL_WORLD_ALIGNED).reshape(6, model.nv)
         jacobian = J[:, moving]
         jacobian[:3] /= reach
+        return np.linalg.svd(jacobian, compute_uv=False)
+
+    def score(q: np.ndarray) -> float:
+        singular = singular_values(q)[:rank]
         pin.forwardKinematics(model, data, q)
         tip = pin.updateFramePlacement(model, data, frame)
         heights = [float(data.oMi[j].translation[2]) for j in chain]
         height = float(tip.translation[2])
         lowest = min(height, *heights)
         elbow = min(max(heights) - height, 0.3 * reach) / reach
-        singular = np.linalg.svd(jacobian, compute_uv=False)
         margin = float(((half - np.abs(q - middle)) / half)[moving].min())
         bend = float(np.square((q - middle)[moving] / np.pi).mean())
         below = 8.0 * max(0.0, floor - lowest, least_height - height) / reach
-        return float(np.log(singular.min() + 1e-9) + 0.5 * np.log(max(margin, 1e-9)) - bend - below + elbow)
+        load = np.abs(pin.computeGeneralizedGravity(model, data, q)) / model.effortLimit
+        heavy = 8.0 * float(np.clip(load - _HOLDS, 0.0, 1.0).sum())
+        easy = float(np.log(singular.min() + 1e-9) + 0.5 * np.log(max(margin, 1e-9)))
+        return easy - bend - below - heavy + elbow
 
     samples = sample_configurations(
         np.maximum(q_lower, middle - np.pi), np.minimum(q_upper, middle + np.pi), _CANDIDATES, seed
     )
     full = np.tile(middle, (_CANDIDATES, 1))
     full[:, moving] = samples[:, moving]
+    rank = max(int((singular_values(q) > _SINGULAR).sum()) for q in full)
     best = max((*full, middle), key=score)
     best_score = score(best)
     rng = np.random.default_rng(seed)

@@ -13,7 +13,7 @@ import numpy as np
 from robots.collision import base_joint
 from robots.geometry.collision_model import CollisionModel, Excluded, Solid, Why
 from robots.inertia import sample_configurations
-from robots.joints import every_joint, joint_axis, motions
+from robots.joints import every_joint, joint_axis
 from robots.mechanics.model import compiled
 from robots.robot import Robot
 from robots.settings import PlantSettings
@@ -22,6 +22,7 @@ NEAR = 2e-3
 """Two bodies that are nearer than this at home, m, count as touching there."""
 SAMPLES = 300
 Bodies = tuple[int, int]
+_SAME_AXIS = 0.999  # cosine between the axes of two slides of a telescope
 OFTEN = 0.9
 """A pair is excluded if it touches in more than this share of random postures."""
 
@@ -60,14 +61,18 @@ def collision_model(
 
 
 def _neighbours(robot: Robot, joint: int) -> Iterator[int]:
-    """Yields the body that carries a joint, and for a segment of a telescope, whose segments slide together
-    in one another, the bodies of all segments below it and the one that carries them."""
-    model, (column, _) = robot.model, motions(robot.model)
+    """Yields the body that carries a joint, and for a segment of a telescope, whose segments slide in one
+    another along the same axis, the bodies of all segments below it and the one that carries them."""
+    model = robot.model
     below = model.parents[joint]
     yield below
-    slides = joint_axis(model, joint)[0]
-    while slides and below > 0 and column[below] == column[joint] and joint_axis(model, below)[0]:
-        below = model.parents[below]
+    slides, axis = joint_axis(model, joint)
+    while slides and below > 0:
+        axis = model.jointPlacements[joint].rotation @ axis  # in the frame of the joint below
+        slides, along = joint_axis(model, below)
+        if not slides or abs(float(axis @ along)) < _SAME_AXIS:
+            return
+        joint, below = below, model.parents[below]
         yield below
 
 

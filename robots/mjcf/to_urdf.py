@@ -17,7 +17,7 @@ from robots.errors import shortened
 from robots.mjcf.compile import Compiled, compiled_mjcf
 from robots.report import Finding
 from robots.urdf.read import Refusal
-from robots.urdf.structure import HOME
+from robots.urdf.structure import HOME, UNDERACTUATED
 
 _TIP = re.compile(r"attach|grip|grasp|tcp|tool|pinch|flange|(^|_)(tip|ee|eef)(_|$)|end_?eff", re.IGNORECASE)
 _CUBE = (np.pi / 6.0) ** (1.0 / 3.0)
@@ -40,11 +40,15 @@ def as_urdf(
     """
     found = compiled_mjcf(data, source, folder, within)
     model = found.model
-    kept = [body for body in range(model.nbody) if not _is_object(model, body)]
+    moved = _moved(model)
+    kept = [body for body in range(model.nbody) if not _is_object(model, body, moved)]
     root = etree.Element("robot", name=found.name.strip() or "robot")
     for body in kept:
         _add_link(root, model, body, found.meshes)
-    followed = dict(_followed(model))
+    followed = {k: told for k, told in _followed(model) if model.jnt_bodyid[told[0]] in kept}
+    own = {joint for body in kept for joint in _joints(model, body) if model.jnt_type[joint] != _FREE}
+    if moved and own - moved - followed.keys():
+        root.set(UNDERACTUATED, "true")
     home, why_not = _home(found)
     for body in kept[1:]:
         _add_joints(root, model, body, followed, home)
@@ -78,13 +82,14 @@ def _joints(model: mujoco.MjModel, body: int) -> range:
     return range(first, first + int(model.body_jntnum[body]))
 
 
-def _is_object(model: mujoco.MjModel, body: int) -> bool:
+def _is_object(model: mujoco.MjModel, body: int, moved: set[int]) -> bool:
     """Whether a body is part of a thing beside the robot: it floats, or follows a mocap target, and none of
-    its parts has a joint of its own."""
+    its parts has a joint of its own; or it has joints, and actuators move only those of other things."""
     root = int(model.body_rootid[body])
     own = [j for j in range(model.njnt) if model.body_rootid[model.jnt_bodyid[j]] == root and body]
     floats = any(model.jnt_type[j] == _FREE for j in own) or model.body_mocapid[root] >= 0
-    return floats and all(model.jnt_type[j] == _FREE for j in own)
+    passive = bool(own) and bool(moved) and moved.isdisjoint(own)
+    return passive or (floats and all(model.jnt_type[j] == _FREE for j in own))
 
 
 def _add_link(root: Element, model: mujoco.MjModel, body: int, meshes: dict[str, Path]) -> None:
@@ -243,6 +248,13 @@ def _effort(model: mujoco.MjModel, joint: int) -> float:
         most = float(np.abs(model.jnt_actfrcrange[joint]).max())
         total = min(total or np.inf, most)
     return total if np.isfinite(total) else 0.0
+
+
+def _moved(model: mujoco.MjModel) -> set[int]:
+    """Returns the joints that actuators move, directly or by a tendon."""
+    on_joints = model.actuator_trntype <= int(mujoco.mjtTrn.mjTRN_JOINTINPARENT)
+    by_tendon = model.wrap_type == int(mujoco.mjtWrap.mjWRAP_JOINT)
+    return {*model.actuator_trnid[on_joints, 0].tolist(), *model.wrap_objid[by_tendon].tolist()}
 
 
 def _followed(model: mujoco.MjModel) -> Iterator[tuple[int, tuple[int, float, float]]]:

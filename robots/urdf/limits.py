@@ -9,18 +9,22 @@ import pinocchio as pin
 from lxml import etree
 from lxml.etree import _Element as Element
 
-from robots.inertia import largest_loads
+from robots.inertia import sampled_loads
 from robots.report import Finding
 from robots.urdf.inertials import ASSUMED, lighten
 from robots.urdf.joints import coupling, finite_bounds
 from robots.urdf.read import Refusal, label, limit_value
-from robots.urdf.structure import followers, movable_joints
+from robots.urdf.structure import UNDERACTUATED, followers, movable_joints
 
 _SPEED = {"revolute": np.pi, "prismatic": 0.5}  # rad/s, m/s: fast, but safe for an unknown arm
 _LEAST = 1e-6  # rad/s, N·m: a smaller limit counts as missing, because it would allow no motion
 _LEVER = 3.0  # effort limit divided by the largest gravity load
 _FASTEST = 50.0  # rad/s: no arm's joint is faster, but a limit in degrees says so
 _ACCELERATION = 10.0  # rad/s², m/s²: acceleration that the effort limit allows in addition to gravity
+_HELPLESS = 0.5
+"""The given effort limits contradict the masses if they cannot hold the robot in more than this share of its
+postures. Data sheets reach 0.36 (Talos) and 0.45 (Alicia M); a PR2, whose arms are carried by springs that a
+URDF cannot describe, has 0.83."""
 _OF_CARRIER = 0.2
 """An estimated effort limit is at least this share of that of the joint that carries this one: a wrist that
 only turns the hand carries no weight, but its motor is hardly smaller. The smallest shares in data sheets are
@@ -79,7 +83,7 @@ def fit_masses(root: Element, model: pin.Model) -> Iterator[Finding]:
     are often drawn thicker than the robot, and a motor carries its arm."""
     if root.find(f"link/inertial[@{ASSUMED}]") is None:
         return
-    gravity, _ = _loads(model)
+    gravity = _loads(model)[0].max(axis=0)
     places = {joint: _coordinate(model, joint) for joint in movable_joints(root)}
     loads = [gravity[place] / effort for joint, place in places.items() if (effort := _effort(joint)) > 0.0]
     share = 1.0 / (_LEVER * float(max(loads, default=0.0)) + 1e-12)
@@ -91,12 +95,20 @@ def fit_masses(root: Element, model: pin.Model) -> Iterator[Finding]:
 
 def fill_efforts(root: Element, model: pin.Model) -> Iterator[Finding]:
     """Fills the effort limits that are 0, in the tree and in its model: three times the largest gravity load
-    plus an effort for acceleration. Yields a note for each given limit that cannot hold the robot everywhere.
+    plus an effort for acceleration. If the given limits cannot hold the robot in most postures, those that
+    are too small are filled as if they were missing, unless the robot is underactuated on purpose. Yields a
+    note for each other given limit that cannot hold the robot everywhere.
 
     τ_i = 3 max|g_i(q)| + 10 rad/s² · max M_ii(q) over sampled configurations, and at least a fifth of the
     limit of the joint of the same kind that carries joint i, to two digits.
     """
     gravity, inertia = _loads(model)
+    given = np.zeros(model.nv)
+    for joint in movable_joints(root):
+        given[_coordinate(model, joint)] = _effort(joint)
+    over = (given > 0.0) & (gravity > given)
+    helpless = over.any(axis=1).mean() > _HELPLESS and UNDERACTUATED not in root.attrib
+    gravity = gravity.max(axis=0)
     limits = model.effortLimit.copy()
     kind: dict[int, str | None] = {}
     for joint in sorted(movable_joints(root), key=lambda each: _coordinate(model, each)):
@@ -104,11 +116,12 @@ def fill_efforts(root: Element, model: pin.Model) -> Iterator[Finding]:
         index = model.getJointId(joint.get("name", ""))
         kind[index], carrier = joint.get("type"), int(model.parents[index])
         unit = "N" if joint.get("type") == "prismatic" else "N·m"
-        given = _effort(joint)
-        if given > 0.0:
-            if given < gravity[place]:
-                text = f"its effort limit is {given:.3g} {unit}; holding the robot takes up to"
-                yield Finding("note", label(joint), f"{text} {gravity[place]:.2g} {unit}")
+        weak = 0.0 < given[place] < gravity[place]
+        too_small = f"its effort limit is {given[place]:.3g} {unit}; holding the robot takes up to"
+        too_small += f" {gravity[place]:.2g} {unit}"
+        if given[place] > 0.0 and not (weak and helpless):
+            if weak:
+                yield Finding("note", label(joint), too_small)
             continue
         own = max(_LEVER * gravity[place] + _ACCELERATION * inertia[place], 1e-3)
         alike = kind.get(carrier) == joint.get("type")
@@ -119,8 +132,9 @@ def fill_efforts(root: Element, model: pin.Model) -> Iterator[Finding]:
         if limit is not None:
             limit.set("effort", repr(effort))
         source = "the weight it carries" if own >= least else "the joint that carries it"
-        text = f"no effort limit; {effort:g} {unit} was estimated from {source}"
-        yield Finding("filled", label(joint), text)
+        kind_of, why = ("repaired", too_small) if weak else ("filled", "no effort limit")
+        text = f"{why}; {effort:g} {unit} was estimated from {source}"
+        yield Finding(kind_of, label(joint), text)
     model.effortLimit = limits
 
 
@@ -134,9 +148,9 @@ def _effort(joint: Element) -> float:
 
 
 def _loads(model: pin.Model) -> tuple[np.ndarray, np.ndarray]:
-    """Returns `largest_loads` inside the limits of a canonical model."""
+    """Returns `sampled_loads` inside the limits of a canonical model."""
     pairs = zip(model.lowerPositionLimit, model.upperPositionLimit, strict=True)
     bounded = np.array([finite_bounds(low, high) for low, high in pairs])
     lower = np.where(bounded, model.lowerPositionLimit, -np.inf)
     upper = np.where(bounded, model.upperPositionLimit, np.inf)
-    return largest_loads(model, lower, upper)
+    return sampled_loads(model, lower, upper)

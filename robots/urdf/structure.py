@@ -22,6 +22,8 @@ MAX_NAME = 100
 HOME = "home"
 """Attribute of a joint with its value in the posture from which the robot starts, rad or m. Other readers
 ignore it."""
+UNDERACTUATED = "underactuated"
+"""Attribute of a robot that leaves joints without an actuator on purpose. Other readers ignore it."""
 MOVABLE = ("revolute", "continuous", "prismatic")
 _KNOWN = (*MOVABLE, "fixed", "floating", "planar")
 _GUESSES = 5

@@ -19,7 +19,7 @@ _NAMES = tuple(
     )
 )
 """Names of frames that are made to be the tip; earlier ones are preferred."""
-_LEG = re.compile(r"(?<![a-z])leg|foot|ankle|toe|sole|wheel|caster", re.IGNORECASE)
+_LEG = re.compile(r"(?<![a-z])leg|thigh|knee|shin|calf|foot|ankle|toe|sole|wheel|caster", re.IGNORECASE)
 _PART = re.compile(
     r"finger|knuckle|thumb|jaw|(?<![a-z])pad|mover|camera|sensor|optical|imu|lidar|range|meter", re.IGNORECASE
 )
@@ -57,9 +57,12 @@ def choose_tip(root: Element) -> tuple[str, tuple[str, ...]]:
 
 
 def not_legs(root: Element) -> list[str]:
-    """Returns the links that are not at the end of a leg; all links if no arm with three joints remains."""
+    """Returns the links that are not at the end of a leg, and carry none by a joint, as a pelvis does; all
+    links if no arm with three joints remains."""
     carried = chains(root)
-    arms = [name for name in carried if not _LEG.search(name)]
+    legs = {name for name in carried if _LEG.search(name)}
+    carriers = {carried[leg][:count] for leg in legs for count in range(1, len(carried[leg]))}
+    arms = [name for name in carried if name not in legs and carried[name] not in carriers]
     return arms if max((len(carried[name]) for name in arms), default=0) >= 3 else list(carried)
 
 

@@ -50,6 +50,21 @@ def test_the_drag_stays_within_reach_and_above_the_floor() -> None:
     assert low is not None and low[2] > 0.04
 
 
+def test_the_drag_does_not_end_in_the_robots_own_base() -> None:
+    """The place for which the joints turn least is in a block of the base: another one is taken."""
+    text = (FIELD / "no_inertials_7_joints.urdf").read_text()
+    free = load_urdf_text(text)
+    there = target(free, 0.25, floor=False, kept=0.02)
+    assert there is not None
+    at = " ".join(map(str, there))
+    block = f'<collision><origin xyz="{at}"/><geometry><box size="0.04 0.04 0.04"/></geometry></collision>'
+    blocked = load_urdf_text(text.replace('<link name="l0"/>', f'<link name="l0">{block}</link>'))
+    np.testing.assert_array_equal(blocked.home, free.home)
+    other = target(blocked, 0.25, floor=False, kept=0.02)
+    assert other is not None and np.linalg.norm(other - there) > 0.05
+    assert dragged(blocked).follows
+
+
 def test_a_robot_of_two_tonnes_follows_and_a_small_one_keeps_the_printed_weights() -> None:
     """In the units of a heavy robot, R = 10 per (N m)^2 would outweigh Q = 200 per (m/s^2)^2."""
     parts = ['<link name="l0"/>']
@@ -78,7 +93,7 @@ def test_a_drag_does_not_end_at_a_position_limit() -> None:
 
 def test_the_verdict_says_why_a_robot_does_not_follow() -> None:
     """An arm with links of 1 kg has motors of 1 N m: it cannot hold itself; the verdict names them."""
-    text = (FIELD / "mimic_in_chain.urdf").read_text()
+    text = (FIELD / "mimic_in_chain.urdf").read_text().replace("<robot ", '<robot underactuated="true" ')
     told = str(dragged(load_urdf_text(text.replace('effort="50"', 'effort="1"'))))
     assert "mm away" in told and "'j2' at the torque limit" in told, told
 

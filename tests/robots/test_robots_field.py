@@ -3,11 +3,13 @@ to change. Each file has one kind of fault."""
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
-from arms import humanoid, joint, link, load, two_joint_arm
+from arms import humanoid, joint, link, load, robot, two_joint_arm
 
 from robots import InputError, Robot, load_robot, load_urdf_text
 from robots.urdf import canonicalise
@@ -115,10 +117,42 @@ def test_unlimited_speed_and_effort_are_filled() -> None:
         assert "no effort limit" in told
 
 
-def test_an_effort_that_cannot_hold_the_arm_is_reported_and_kept() -> None:
-    weak = load(ARM.replace('effort="50"', 'effort="0.1"'))
-    assert "its effort limit is 0.1 N·m; holding the robot takes up to" in str(weak.report.findings)
-    np.testing.assert_array_equal(weak.tau_limit, 0.1)
+def test_an_effort_that_hardly_holds_the_arm_is_reported_and_kept() -> None:
+    """Real arms hold less than their whole range; home is a posture that the motors hold easily."""
+    strong, weak = load(ARM), load(ARM.replace('effort="50"', 'effort="4"'))
+    assert "its effort limit is 4 N·m; holding the robot takes up to" in str(weak.report.findings)
+    assert "estimated" not in str(weak.report.of_kind("repaired"))
+    np.testing.assert_array_equal(weak.tau_limit, 4.0)
+    loads = [
+        np.abs(pin.computeGeneralizedGravity(arm.model, arm.model.createData(), arm.home)).max()
+        for arm in (strong, weak)
+    ]
+    assert loads[0] > 4.0 and loads[1] < 0.8 * 4.0, loads
+
+
+def test_efforts_that_contradict_the_masses_are_estimated() -> None:
+    """Limits with which the arm cannot hold itself in most postures are placeholders. The others are kept."""
+    text = ARM.replace('effort="50"', 'effort="1"', 1)
+    contrary = load(text)
+    told = " | ".join(map(str, contrary.report.of_kind("repaired")))
+    assert "'j1': its effort limit is 1 N·m; holding the robot takes up to" in told
+    assert contrary.tau_limit[0] > 15.0 and contrary.tau_limit[1] == 50.0
+    again = load(contrary.urdf_text)
+    np.testing.assert_array_equal(again.tau_limit, contrary.tau_limit)
+    on_purpose = load(text.replace("<robot ", '<robot underactuated="true" '))
+    np.testing.assert_array_equal(on_purpose.tau_limit, (1.0, 50.0))
+
+
+def test_the_home_of_a_planar_arm_is_bent() -> None:
+    """A planar arm has fewer independent motions than joints: its Jacobian has no largest least singular
+    value, and it stood stretched."""
+    arm = load(
+        robot(
+            *map(link, ("base", "l1", "l2", "l3", "l4")),
+            *(joint(f"j{k}", f"l{k - 1}" if k > 1 else "base", f"l{k}") for k in range(1, 5)),
+        )
+    )
+    assert np.abs(arm.home[1:]).max() > 0.3, arm.home
 
 
 def test_masses_that_are_put_there_are_not_heavier_than_the_motors_carry() -> None:
@@ -237,6 +271,21 @@ def test_a_joint_that_carries_an_arm_moves_although_a_rod_follows_it() -> None:
 
 
 # ------------------------------------------------------------------ joints that are held
+
+
+def test_the_shin_of_a_leg_without_a_foot_is_no_tip() -> None:
+    """A humanoid that is welded at its torso: its legs have more joints than its arms. The pelvis has as many
+    as an arm, but carries a leg."""
+    names = {
+        "arm": ("shoulder", "upper_arm", "lower_arm"),
+        "leg": ("waist_1", "waist_2", "pelvis", "thigh", "shin"),
+    }
+    parts = [
+        link(name) + joint(f"j_{name}", before, name)
+        for limb in names.values()
+        for before, name in pairwise(("torso", *limb))
+    ]
+    assert load(robot(link("torso"), *parts)).tip == "lower_arm"
 
 
 def test_joints_that_do_not_move_the_tip_are_held_where_too_many_move() -> None:

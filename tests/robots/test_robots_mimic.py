@@ -7,13 +7,16 @@ import pickle
 import numpy as np
 import pinocchio as pin
 import pytest
-from arms import full_mass_matrix, joint, link, load, robot
+from arms import INERTIAL, full_mass_matrix, joint, link, load, robot
 
 from app.link.poses import LinkPoses
+from himpc import FramePosition, Level
+from himpc.htmpc import HTMPCSettings, Placo
 from himpc.htmpc.clearance import CollisionModel
 from himpc.htmpc.geometry import frame_at, placed
 from himpc.kinematics.configuration import Configuration
 from himpc.kinematics.geometry import geometry
+from himpc.references import Hold
 from lessons.experiments.drag import dragged
 from robots import Robot, load_urdf_text
 from robots.collision import Ball
@@ -152,6 +155,39 @@ def test_the_mass_matrix_does_not_depend_on_the_posture_before(text: str) -> Non
 def test_a_telescope_follows_a_dragged_target() -> None:
     motion = dragged(load_urdf_text(TELESCOPE))
     assert motion.follows and motion.rest, str(motion)
+
+
+@pytest.mark.parametrize("axis", ["1 0 0", "0 1 0"])
+def test_the_segments_of_a_telescope_slide_in_one_another(axis: str) -> None:
+    """Each segment has a motor of its own. Slides along different axes are no telescope."""
+    tube = '<collision><geometry><box size="0.8 0.1 0.1"/></geometry></collision>'
+    arm = load(
+        robot(
+            *(link(name, INERTIAL + tube) for name in ("base", "l1", "l2", "l3")),
+            joint("turn", "base", "l1", axis="0 0 1"),
+            joint("out", "l1", "l2", "prismatic", SLIDE.format(0.5, 1.0), "1 0 0"),
+            joint("further", "l2", "l3", "prismatic", SLIDE.format(0.5, 1.0), axis),
+        )
+    )
+    pairs = {pair.names for pair in arm.collision.excluded if pair.why == "neighbours"}
+    assert (("l1", "l3") in pairs) is (axis == "1 0 0"), pairs
+
+
+def test_placo_moves_the_hand_of_a_telescope_to_its_target() -> None:
+    """A segment moves by half of the motion of the one below it, from 0.1 m on, and with the hand."""
+    slide = mimic("out", 0.5, 0.1, SLIDE.format(0.5, 0.5))
+    arm = load(TELESCOPE.replace(mimic("out", limit=SLIDE.format(0.4, 0.5)), slide))
+    stack = (Level((FramePosition(name="hand", axes="xy"),), Q=10.0),)
+    settings = HTMPCSettings(stack, rate_hz=50.0, gains=(2.0,), first_level="soft")
+    controller, q, v = Placo(arm, settings), np.array([0.0, 0.2, 0.1]), np.zeros(3)
+    goal = at(arm, arm.tip, np.array([0.3, 0.3, 0.1])).translation[:2]
+    assert np.linalg.norm(goal - at(arm, arm.tip, q).translation[:2]) > 0.2
+    preview = {"hand": Hold(goal).preview(0.0, settings.dt, settings.horizon)}
+    for _ in range(300):
+        plan = controller.step(q, v, preview)
+        assert plan.notice is None and plan.levels[0].kkt_residual < 1e-6
+        q, v = plan.motion.position(settings.period), plan.motion.velocity(settings.period)
+    np.testing.assert_allclose(at(arm, arm.tip, q).translation[:2], goal, atol=1e-3)
 
 
 def test_a_finger_follows_its_leader_in_the_picture() -> None:

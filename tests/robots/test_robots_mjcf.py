@@ -102,6 +102,28 @@ def test_an_arm_has_the_mechanics_of_mujoco() -> None:
     assert "joint 'turn'" in told, "without limits"
 
 
+def test_motors_that_are_too_weak_are_estimated_unless_joints_have_none_on_purpose() -> None:
+    """Nothing moves the joint 'turn', as in an acrobot: the other motors keep their limits."""
+    weak = ARM.replace('gear="50"', 'gear="1"')
+    moved = weak.replace("</actuator>", '<motor joint="turn" ctrlrange="-9 9"/></actuator>')
+    for text, kept in ((weak, True), (moved, False)):
+        robot = loaded(text)
+        lift = float(robot.tau_limit[robot.joint_names.index("lift")])
+        assert (lift == 1.0) is kept, lift
+        assert (loaded_again(robot).tau_limit == robot.tau_limit).all()
+
+
+def test_a_thing_with_joints_that_no_motor_moves_stands_beside_the_robot() -> None:
+    """A door of a kitchen, or the goal of an exercise, is no part of the robot and no tip."""
+    door = '<body name="door" pos="9 0 0"><joint name="hinge" axis="0 0 1"/><geom size="0.1"/></body>'
+    kitchen = ARM.replace('<body name="base">', f'{door}<body name="base">')
+    robot = loaded(kitchen)
+    assert robot.n == 4 and "door" not in robot.frames
+    assert "1 parts of things that stand beside the robot" in str(robot.report.findings)
+    motors = kitchen[kitchen.index("<actuator>") : kitchen.index("</actuator>") + len("</actuator>")]
+    assert loaded(kitchen.replace(motors, "")).n == 5, "without motors it is not known which is the robot"
+
+
 def loaded_again(robot: Robot) -> Robot:
     return import_robot(robot.urdf_text.encode(), "the text").used()
 
