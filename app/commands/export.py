@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from app.commands.robots import HeldJoints, RobotFile
+from app.commands.robots import HeldJoints, RobotFile, Tool
 from robots import InputError
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ def export(
     out: str,
     urdf: RobotFile = None,
     tip: str | None = None,
+    tool: Tool = None,
     hold: HeldJoints = (),
     controller: str | None = None,
     stack: str | None = None,
@@ -41,6 +42,8 @@ def export(
         urdf: robot for the scene "hold": a URDF or MuJoCo model (.xml), a folder or zip with one, or a name
             of the catalog.
         tip: end-effector frame, for the scene "hold".
+        tool: place of a tool in that frame, m and rad; the tool's frame is then the end effector. A number
+            with a minus in front: --tool=-0.1,0,0.
         hold: hold the joints with this name or regular expression, as for himpc-lab run.
         controller: himpc, hiqp, nhimpc or weighted; the scene's own by default.
         stack: the levels as JSON, as --set stack=… of himpc-lab run takes them.
@@ -60,7 +63,7 @@ def export(
     from himpc.limits import in_force
     from lessons.own.files import is_file
     from lessons.scenes.catalog import as_torque_scene
-    from lessons.scenes.run_spec import RunSpec
+    from lessons.scenes.run_spec import RunSpec, tip_with_tool
     from lessons.session.torque import TorqueSession
     from robots.mechanics.saving import saved
 
@@ -82,6 +85,7 @@ def export(
                 f"{each} is Python, which export cannot translate: give a scene and a controller of the lab"
             )
     assignments = (*([f"stack={stack}"] if stack is not None else ()), *set)
+    tip = tip_with_tool(tip, tool)
     spec = RunSpec(scene, urdf, tip, controller=controller, seed=seed, hold=hold).but(*assignments)
     loaded = as_torque_scene(spec.for_export().prepared(), "export's")
     if loaded.settings.limits != as_torque_scene(spec.prepared(), "export's").settings.limits:

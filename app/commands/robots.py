@@ -14,6 +14,8 @@ RobotFile = Annotated[str | None, tyro.conf.arg(aliases=("--robot",), metavar="F
 """The option that names a robot."""
 HeldJoints = Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="PATTERN")]
 """The option that holds joints."""
+Tool = Annotated[str | None, tyro.conf.arg(metavar="X,Y,Z[,ROLL,PITCH,YAW]")]
+"""The option that adds a tool."""
 
 
 def robots(

@@ -9,7 +9,7 @@ import tyro
 
 from app.commands.output import check_file, figure, print_table, readable_unit, write_file, write_json
 from app.commands.progress import progress_bar
-from app.commands.robots import HeldJoints, RobotFile
+from app.commands.robots import HeldJoints, RobotFile, Tool
 from robots import InputError
 
 if TYPE_CHECKING:
@@ -21,6 +21,7 @@ def run(
     scene: tyro.conf.Positional[str | None] = None,
     urdf: RobotFile = None,
     tip: str | None = None,
+    tool: Tool = None,
     hold: HeldJoints = (),
     controller: str | None = None,
     task: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="FILE.py")] = (),
@@ -40,6 +41,8 @@ def run(
         urdf: robot for the scene "hold": a URDF or MuJoCo model (.xml), a folder or zip with one, or a name
             of the catalog.
         tip: end-effector frame, for the scene "hold".
+        tool: place of a tool in that frame, m and rad; the tool's frame is then the end effector. A number
+            with a minus in front: --tool=-0.1,0,0.
         hold: hold the joints with this name or regular expression where the file's home has them, or at 0;
             with PATTERN=VALUE at VALUE (rad or m). For the scene "hold"; e.g. --hold 'left_.*' --hold
             gripper_joint=0.02.
@@ -59,8 +62,9 @@ def run(
     from lessons.recording.run import run
     from lessons.recording.summary import summary
     from lessons.recording.table import as_npz
+    from lessons.scenes.run_spec import tip_with_tool
 
-    spec = _given(scene, urdf, tip, hold, state)
+    spec = _given(scene, urdf, tip_with_tool(tip, tool), hold, state)
     if controller is not None:
         told = (each for each in spec.set if not each.startswith("controller="))
         spec = replace(spec, controller=controller, set=tuple(told))
@@ -105,7 +109,7 @@ def _given(
             raise InputError("run needs a scene, e.g. himpc-lab run iiwa14-hold, or --state CODE")
         return RunSpec(scene, urdf, tip, hold=hold)
     if (scene, urdf, tip, hold) != (None, None, None, ()):
-        others = "the scene, --urdf, --tip and --hold"
+        others = "the scene, --urdf, --tip, --tool and --hold"
         raise InputError(f"--state brings its own scene and robot: leave out {others}")
     return decode(code).run
 

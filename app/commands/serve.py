@@ -8,7 +8,7 @@ from typing import Annotated
 
 import tyro
 
-from app.commands.robots import HeldJoints, RobotFile
+from app.commands.robots import HeldJoints, RobotFile, Tool
 from robots import InputError
 
 
@@ -17,6 +17,7 @@ def serve(
     scene: str | None = None,
     urdf: RobotFile = None,
     tip: str | None = None,
+    tool: Tool = None,
     hold: HeldJoints = (),
     controller: str | None = None,
     task: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="FILE.py")] = (),
@@ -51,6 +52,8 @@ def serve(
         task: Python file with a task of your own, which can then be added to the stack.
         urdf: your own robot: a URDF or MuJoCo model (.xml), or a folder or zip with one.
         tip: end-effector frame of that robot.
+        tool: place of a tool in that frame, m and rad; the tool's frame is then the end effector. A number
+            with a minus in front: --tool=-0.1,0,0.
         hold: hold the joints of that robot with this name or regular expression where the file's home has
             them, or at 0; with PATTERN=VALUE at VALUE (rad or m).
         state: a state code, as the page shows it; the page gets its scene, robot, settings, seed, lesson and
@@ -88,6 +91,7 @@ def serve(
     from app.web.serving import serve as serve_page
     from lessons.own.folder import Folder
     from lessons.replay.progress import read_key
+    from lessons.scenes.run_spec import tip_with_tool
 
     if no_own_files and own_files is not None:
         raise InputError("--own-files DIR and --no-own-files contradict each other: leave one out")
@@ -101,12 +105,12 @@ def serve(
     if not 0.0 <= drain <= 3600.0:
         raise InputError(f"--drain {drain}: give a time from 0 to 3600 s")
     bringing = [name for name, given in (("--lesson", lesson), ("--state", state)) if given is not None]
-    if len(bringing) > 1 or (bringing and (scene, urdf, tip, hold) != (None, None, None, ())):
-        others = "--scene, --urdf, --tip, --hold and --"
+    if len(bringing) > 1 or (bringing and (scene, urdf, tip, tool, hold) != (None, None, None, None, ())):
+        others = "--scene, --urdf, --tip, --tool, --hold and --"
         others += "state" if bringing[0] == "--lesson" else "lesson"
         raise InputError(f"{bringing[0]} brings its own scene and robot: leave out {others}")
     first = scene or ("hold" if urdf else FIRST.run.scene)
-    own = SceneChoice.starting(first, urdf, tip, controller, task, hold)
+    own = SceneChoice.starting(first, urdf, tip_with_tool(tip, tool), controller, task, hold)
     if lesson is not None:
         choice = SceneChoice.opening(lesson).admitting(own)
     elif state is not None:

@@ -42,7 +42,7 @@ def scene_named(
     if not is_file(name):
         return load_scene(name, urdf, tip, urdf_text, hold)
     if (urdf, tip, urdf_text, hold) != (None, None, None, ()):
-        raise InputError(f"{name} brings its own robot: leave out --urdf, --tip and --hold")
+        raise InputError(f"{name} brings its own robot: leave out --urdf, --tip, --tool and --hold")
     return _scene_of(read(name))
 
 

@@ -78,7 +78,7 @@ def load_scene(
         return hold_scene(urdf, tip, urdf_text, hold=hold)
     if (urdf, tip, urdf_text, hold) != (None, None, None, ()):
         raise InputError(
-            f"scene '{name}' brings its own robot: use the scene 'hold' with --urdf, --tip and --hold"
+            f"scene '{name}' brings its own robot: use the scene 'hold' with --urdf, --tip, --tool and --hold"
         )
     return velocity_scene(name) if name in VELOCITY_SCENES else _MAKERS[name]()
 

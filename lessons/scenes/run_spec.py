@@ -31,7 +31,7 @@ class RunSpec:
     Attributes:
         scene: name of a scene, or path of a file that creates a scene.
         urdf: for the scene "hold": name of a catalog robot, or path of a URDF file.
-        tip: end-effector frame, for the scene "hold".
+        tip: end-effector frame, for the scene "hold"; with a tool as of `robots.load_robot`.
         controller: name of a controller, or path of a file; None: the controller that `set` names, or that of
             the scene.
         set: assignments "PATH=VALUE" as of `himpc-lab run --set`, in order.
@@ -114,6 +114,11 @@ class RunSpec:
         for assignment in assignments:
             words += ["--set", assignment]
         return shlex.join(words)
+
+
+def tip_with_tool(tip: str | None, tool: str | None) -> str | None:
+    """Returns the tip of a run whose tip carries a tool at x,y,z or x,y,z,roll,pitch,yaw, m and rad."""
+    return tip if tool is None else f"{tip or ''}@{tool}"
 
 
 def check_seed(seed: int) -> None:

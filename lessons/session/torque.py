@@ -9,6 +9,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
+from himpc.catalog import CONTROLLERS
 from himpc.controllers import Controller
 from himpc.kinematics.configuration import Configuration
 from himpc.plan import Plan, write_plan
@@ -31,12 +32,20 @@ from lessons.settings.settings import SceneSettings
 from lessons.settings.stack import same_tasks
 from lessons.settings.torque import TorqueSettings
 from robots import InputError, Plant, PlantState, Robot, convergence_gauge
+from robots.inertia import tracking_bandwidth
 from robots.mechanics.model import compiled
 
 Array = NDArray[np.float64]
 
 TRUTH_TICKS = 20
 """Ticks between two updates of the values that need the plant's M (gauge of M̄, true leak)."""
+
+
+_WITH_MODEL = ("osf", "osf_damped", "hqp")
+"""Controllers that use a model of the dynamics instead of time-delay estimation."""
+_SWINGS = 2.0
+"""√K_p, divided by the largest bandwidth of a well-damped loop, above which a notice says that the robot may
+swing."""
 
 
 @final
@@ -154,7 +163,22 @@ class TorqueSession(Session):
         if recomposed:
             self.references, self.plan, self.controller_input = references, None, None
             self._arrange(layout)
+        longer = settings.T_s > self.settings.T_s
         self.settings = settings
+        if longer and settings.controller in CONTROLLERS and settings.controller not in _WITH_MODEL:
+            self._tell_lag()
+
+    def _tell_lag(self) -> None:
+        """Leaves a notice if time-delay estimation is too slow for the gains (see `tracking_bandwidth`)."""
+        gains = [task.K_p for task in _tasks(tuple(each for each in self.settings.levels if each.enabled))]
+        fastest = math.sqrt(max((float(np.max(K_p)) for K_p in gains), default=0.0))
+        bandwidth = tracking_bandwidth(self.plant.mass_matrix(), self.M_bar, self.settings.T_s)
+        if fastest > _SWINGS * bandwidth:
+            ms = 1e3 * self.settings.T_s
+            self.notices.append(
+                f"T_s = {ms:g} ms: with this M̄, time-delay estimation allows a bandwidth of {bandwidth:g} "
+                f"1/s, and √K_p is {fastest:.3g} 1/s: the robot may swing. A shorter T_s helps."
+            )
 
     def _hand_over(self, taking: Controller) -> None:
         taking.reset(self.plant.tau)

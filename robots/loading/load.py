@@ -26,6 +26,7 @@ from robots.processes.isolation import Allowance, Fault, isolated
 from robots.report import Finding, ImportReport
 from robots.robot import Robot
 from robots.urdf import canonicalise, load_bytes
+from robots.urdf.tip import TOOL
 
 _SHORT = 200_000  # bytes; the robots of the last four files up to this size stay in memory
 _GEOMETRY = Allowance(24.0)
@@ -42,18 +43,20 @@ def load_robot(
 
     name_or_path: also a URDF file, a folder or a zip with one, or the path of a URDF inside a zip.
     tip: the default end-effector frame; None: the tip of the catalog, or the end of the longest chain.
+    "FRAME@x,y,z,roll,pitch,yaw" is a tool at this place (m, rad) on a frame, "@x,y,z" one on the default tip.
     within: a folder, given without symbolic links. It must contain the URDF file and its meshes, except
     installed meshes. None: files may be anywhere.
     hold: joints that are not controlled, "REGEX" or "REGEX=VALUE" with the whole name of a joint or a regular
     expression for it, and the value at which it is held, rad or m (0 without it, and always inside its
-    limits). Home, M̄ and shapes of a robot of the catalog with held joints are estimated as for a file.
+    limits). Home, M̄ and shapes of a robot of the catalog with held joints or a tool are estimated as for a
+    file.
 
     Raises InputError for an unknown name, a missing file, a description that cannot be used, an unknown tip,
     or a pattern that fits no joint. The message is one sentence that tells the user what to do.
     """
     text = str(name_or_path)
-    if text in CATALOG and hold:
-        return import_file(CATALOG[text].path, tip or CATALOG[text].tip, hold=hold).used()
+    if text in CATALOG and (hold or TOOL in (tip or "")):
+        return import_file(CATALOG[text].path, _on(CATALOG[text].tip, tip), hold=hold).used()
     if text in CATALOG:
         robot = _catalog_robot(CATALOG[text])
         return robot if tip is None else robot.with_tip(tip)
@@ -61,6 +64,11 @@ def load_robot(
     if "/" not in text and not path.suffix and not _exists(path):
         raise unknown_name("robot in the catalog called", text, CATALOG, "or give the path of a URDF file")
     return import_file(path, tip, within, hold).used()
+
+
+def _on(tip: str, asked: str | None) -> str:
+    """Returns the tip that was asked for; a tool without a frame is on the tip of the catalog."""
+    return tip + asked if asked is not None and asked.startswith(TOOL) else asked or tip
 
 
 def load_urdf_text(text: str | bytes, tip: str | None = None, hold: tuple[str, ...] = ()) -> Robot:

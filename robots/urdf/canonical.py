@@ -23,7 +23,7 @@ from robots.urdf.limits import fill_efforts, fill_speeds, fit_masses
 from robots.urdf.read import Refusal, named, parse, without_shapes
 from robots.urdf.shapes import remove_unusable_shapes
 from robots.urdf.structure import check_structure, followers, movable_joints
-from robots.urdf.tip import choose_tip
+from robots.urdf.tip import TOOL, add_tool, choose_tip
 
 MAX_FINDINGS = 200
 _ALIKE = 4  # largest number of other frames that the note about the tip lists
@@ -112,8 +112,14 @@ def _report(source: str, findings: list[Finding]) -> ImportReport:
 
 
 def _tip(root: Element, asked: str | None) -> tuple[str, tuple[str, ...], tuple[Finding, ...]]:
-    """Returns the tip, the frames that are as likely, and a note of them if nobody has named the tip."""
+    """Returns the tip, the frames that are as likely, and a note of them if nobody has named the tip. A tip
+    with a tool, "FRAME@x,y,z,roll,pitch,yaw", is a new frame."""
     links = named(root, "link")
+    if asked is not None and asked not in links and TOOL in asked:
+        frame, place = asked.rsplit(TOOL, 1)
+        carrier, *_ = _tip(root, frame or None)
+        text = f"a tool at {shortened(place)} (m, rad) on '{shortened(carrier)}'"
+        return add_tool(root, carrier, place), (), (Finding("note", "tip", text),)
     if asked is not None and asked not in links:
         name = shortened(root.get("name", "").strip())
         raise unknown_name(f"frame of robot '{name}' called", asked, links)

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
+from collections.abc import Container
+from itertools import count
 
+from lxml import etree
 from lxml.etree import _Element as Element
 
+from robots.errors import InputError, shortened
 from robots.urdf.read import named
 from robots.urdf.structure import chains
 
@@ -24,6 +29,38 @@ _PART = re.compile(
     r"finger|knuckle|thumb|jaw|(?<![a-z])pad|mover|camera|sensor|optical|imu|lidar|range|meter", re.IGNORECASE
 )
 """Parts of a hand whose frames are turned or displaced from the axis of the hand."""
+
+
+TOOL = "@"
+"""Separates the name of a tip from the place of a tool that it carries."""
+_FAR = 10.0  # m, rad: the largest number of a tool's place
+
+
+def add_tool(root: Element, carrier: str, place: str) -> str:
+    """Adds a frame to a link, and returns the frame's name. place: "x,y,z" or "x,y,z,roll,pitch,yaw" in the
+    frame of the link, m and rad. Raises InputError for anything else."""
+    try:
+        numbers = [float(number) for number in place.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in (3, 6) or not all(math.isfinite(x) and abs(x) <= _FAR for x in numbers):
+        raise InputError(
+            f"The place '{shortened(place)}' of a tool is not x,y,z or x,y,z,roll,pitch,yaw, in m and rad, "
+            f"each at most {_FAR:g}: give for example --tool 0,0,0.1."
+        )
+    name = _free(named(root, "link"))
+    etree.SubElement(root, "link", name=name)
+    joint = etree.SubElement(root, "joint", name=_free(named(root, "joint")), type="fixed")
+    etree.SubElement(joint, "parent", link=carrier)
+    etree.SubElement(joint, "child", link=name)
+    xyz, rpy = (" ".join(map(repr, part)) for part in (numbers[:3], numbers[3:] or (0.0, 0.0, 0.0)))
+    etree.SubElement(joint, "origin", xyz=xyz, rpy=rpy)
+    return name
+
+
+def _free(taken: Container[str]) -> str:
+    names = (f"tool_{k}" if k else "tool" for k in count())
+    return next(name for name in names if name not in taken)
 
 
 def choose_tip(root: Element) -> tuple[str, tuple[str, ...]]:

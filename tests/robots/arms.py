@@ -44,9 +44,9 @@ def full_mass_matrix(model: pin.Model, q: np.ndarray) -> np.ndarray:
     return upper + np.triu(upper, 1).T
 
 
-def load(text: str) -> Robot:
+def load(text: str, tip: str | None = None) -> Robot:
     """Loads a URDF like `load_urdf_text`, but in this process."""
-    return import_robot(text.encode(), "the URDF text").used()
+    return import_robot(text.encode(), "the URDF text", tip=tip).used()
 
 
 def humanoid() -> str:

@@ -39,6 +39,37 @@ def test_a_clean_urdf_has_nothing_to_report() -> None:
     assert np.all((loaded.home > loaded.q_lower) & (loaded.home < loaded.q_upper))
 
 
+def test_a_tool_is_a_frame_at_its_place_on_the_tip() -> None:
+    """Also on a tip that is chosen by the program, on one of a robot of the catalog, and beside a link with
+    the tool's name."""
+    arm = two_joint_arm()
+    bare = load(arm)
+    place = pin.SE3(pin.rpy.rpyToMatrix(0.1, -0.2, 0.3), np.array([0.1, 0.0, -0.05]))
+    where = "0.1,0,-0.05,0.1,-0.2,0.3"
+    of_catalog = load_robot("panda", f"@{where}"), load_robot("panda")
+    for with_tool, without in (
+        (load(arm, tip=f"@{where}"), bare),
+        (load(arm, tip=f"{bare.tip}@{where}"), bare),
+        (load(arm.replace(bare.tip, "tool"), tip=f"tool@{where}"), bare),
+        of_catalog,
+    ):
+        q = with_tool.home
+        model, data = with_tool.model, with_tool.model.createData()
+        pin.framesForwardKinematics(model, data, q)
+        found = data.oMf[with_tool.frame_id(with_tool.tip)]
+        data = without.model.createData()
+        pin.framesForwardKinematics(without.model, data, q)
+        wanted = data.oMf[without.frame_id(without.tip)] * place
+        assert found.isApprox(wanted, 1e-9), (with_tool.tip, without.tip)
+        assert "a tool at" in texts(with_tool, "note")
+
+
+@pytest.mark.parametrize("place", ["", "0,0", "0,0,x", "0,0,nan", "0,0,1e9", "0,0,0,0", "0,0,0,0,0,0,0"])
+def test_a_wrong_place_of_a_tool_is_refused_in_one_sentence(place: str) -> None:
+    with pytest.raises(InputError, match=r"^The place '.*' of a tool is not x,y,z or .*--tool 0,0,0.1\.$"):
+        load(two_joint_arm(), tip=f"@{place}")
+
+
 def test_continuous_becomes_unbounded_with_one_coordinate() -> None:
     text = two_joint_arm(j2=joint("j2", "l1", "l2", "continuous", '<limit velocity="3" effort="5"/>'))
     loaded = load(text)

@@ -70,7 +70,10 @@ class RobotPanel:
             load_robot = gui.add_button("Load robot")
         with gui.add_folder("Your own URDF"):
             tip = gui.add_text(
-                "Hand frame", "", hint="Name of a link; if empty, the end of the longest chain"
+                "Hand frame",
+                "",
+                hint="Name of a link; if empty, the end of the longest chain. NAME@x,y,z,roll,pitch,yaw "
+                "puts a tool on it, m and rad",
             )
             hold = gui.add_text(
                 "Held joints",
