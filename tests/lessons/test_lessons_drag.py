@@ -16,8 +16,10 @@ from robots import load_robot, load_urdf_text
 FIELD = Path(__file__).parents[1] / "robots" / "field"
 
 
-def test_the_check_ends_with_the_motion(capfd: pytest.CaptureFixture[str]) -> None:
-    file = str(FIELD / "no_inertials_7_joints.urdf")
+@pytest.mark.parametrize("name", ["no_inertials_7_joints", "light_wrist_7_joints"])
+def test_the_check_ends_with_the_motion(capfd: pytest.CaptureFixture[str], name: str) -> None:
+    """Both arms have no rotor inertia in their files, without which they would swing or be far too fast."""
+    file = str(FIELD / f"{name}.urdf")
     assert main(["robots", "--check", file, "--json", "-"]) == 0
     told = json.loads(capfd.readouterr().out)["motion"]
     assert told["follows"] is True and told["rest"] is True

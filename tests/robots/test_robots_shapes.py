@@ -193,6 +193,13 @@ def test_the_unit_of_a_collada_file_is_applied_before_the_scale(tmp_path, unit: 
     np.testing.assert_allclose(extents, metres * np.array([50.0, 100.0, 150.0]), rtol=1e-5)
 
 
+def test_meshes_in_millimetres_of_a_file_as_it_was_found_are_drawn_in_metres() -> None:
+    robot = load_robot(FIELD / "dae_in_mm.urdf")
+    sizes = [np.ptp(shape.vertices, axis=0).max() for shape in link_shapes(robot)]
+    assert len(sizes) == 4
+    np.testing.assert_allclose(sizes, 0.3)
+
+
 def test_a_mesh_that_is_far_larger_than_the_robot_is_reported(tmp_path) -> None:
     """An STL has no unit. Millimetres that are read as metres are drawn 1000 times too large."""
     import trimesh
