@@ -201,6 +201,26 @@ def test_controls_open_on_whatever_is_set(viser_server: viser.ViserServer) -> No
     assert {0.04, 9.0, 0.01, 60, 1e-8} <= values
 
 
+@pytest.mark.parametrize(
+    ("name", "longest"), [("panda-hold", 2.0), ("iiwa14-hold", 2.5), ("planar3-hold", 5.0)]
+)
+def test_the_slider_of_the_period_ends_where_the_arm_would_swing(
+    viser_server: viser.ViserServer, name: str, longest: float
+) -> None:
+    """A code or a lesson may set a longer period: the slider then reaches it."""
+    scene, bindings = torque_scene(name), Bindings(lambda _: None, viser_server.get_event_loop())
+    for T_s in (1e-3, 0.02):
+        viser_server.gui.reset()
+        settings = scene.settings.changed("T_s", T_s)
+        page = MagicMock(gui=viser_server.gui, bindings=bindings, settings=settings, robot=scene.robot)
+        page.client = page
+        HorizonPanel(page)
+        handles = viser_server.gui._gui_input_handle_from_uuid.values()
+        sliders = [each for each in handles if isinstance(each, viser.GuiSliderHandle)]
+        (slider,) = (each for each in sliders if "T_s" in each.label)
+        assert slider.max == max(longest, 1e3 * T_s) and slider.value == 1e3 * T_s
+
+
 @pytest.mark.parametrize("path", ["solver", "R_on", "limits.position"])
 def test_menus_offer_every_word_a_setting_may_hold(
     viser_server: viser.ViserServer, path: str, monkeypatch: pytest.MonkeyPatch

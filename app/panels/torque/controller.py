@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 
+import numpy as np
 import viser
 
 from app.html.palette import BAD, GOOD
@@ -13,7 +14,12 @@ from app.panels.inside.spectrum import SpectrumPicture
 from app.panels.widgets.controls import Controls
 from app.panels.widgets.snapshot import SessionSnapshot
 from lessons.settings.torque import TorqueSettings
+from robots import tracking_bandwidth
+from robots.inertia import mass_matrix
+from robots.truth import true_model
 
+_SLOWEST = 3.0
+"""Smallest bandwidth, 1/s, with which an arm follows a dragged target; `robots --check` warns below it."""
 _LOOKS = 9
 """Number of updates over which the share of late ticks is computed: about two seconds."""
 
@@ -54,7 +60,7 @@ class HorizonPanel:
         gui = page.gui
         controls = Controls(gui, page.bindings, page.settings)
         with gui.add_folder("Horizon and inertia estimate M̄", order=1.0):
-            controls.add_group("Horizon")
+            controls.add_group("Horizon", highest={"T_s": _longest_period(page)})
             controls.add_group("Inertia estimate M̄")
             self._gauge = gui.add_html("")
             controls.add_elements("M_bar", joint_labels(page.robot.joint_names), "Per joint, kg·m²")
@@ -72,6 +78,16 @@ class HorizonPanel:
     def update(self, now: SessionSnapshot[TorqueSettings]) -> None:
         self._gauge.content = _measured("spectral radius of I − M⁻¹M̄", now.number("gauge_radius"))
         self._norm.content = _measured("norm ‖I − M⁻¹M̄‖₂", now.number("gauge_norm"))
+
+
+def _longest_period(page: PageContext) -> float:
+    """Returns the control period, ms, at which the bandwidth of time-delay estimation is `_SLOWEST` at home:
+    with a longer one the arm swings, or is too slow to follow. The slider ends there."""
+    settings = page.settings
+    model = true_model(page.robot, settings.plant)
+    M = mass_matrix(model, model.createData(), page.robot.home)
+    bandwidth = tracking_bandwidth(M, np.array(settings.M_bar), 1e-3)
+    return max(1.0, 0.5 * round(2.0 * bandwidth / _SLOWEST))
 
 
 def _measured(name: str, value: float) -> str:

@@ -23,6 +23,7 @@ from lessons.teaching.control import Control, chosen
 from robots.ranges import Shown
 
 NONE: Mapping[str, str] = MappingProxyType({})
+NO_RANGES: Mapping[str, float] = MappingProxyType({})
 STEPS = 200
 """Number of steps of a logarithmic slider."""
 S = TypeVar("S", bound=SceneSettings)
@@ -74,16 +75,26 @@ class Controls(Generic[S]):
         for path in paths:
             self.add_as(self._settings.setting(path))
 
-    def add_group(self, name: str, lists: Mapping[str, str] = NONE, elements: Sequence[str] = ()) -> None:
+    def add_group(
+        self,
+        name: str,
+        lists: Mapping[str, str] = NONE,
+        elements: Sequence[str] = (),
+        highest: Mapping[str, float] = NO_RANGES,
+    ) -> None:
         """Adds a control for each setting whose description names this group.
 
         Args:
             name: the group.
             lists: titles, by path, of folders with the elements of lists.
             elements: the labels of the elements.
+            highest: ends, by path, of sliders that are shorter than usual.
         """
         for setting in self._settings.table().values():
             if setting.shown.group == name:
+                if setting.path in highest:
+                    end = min(setting.shown.high, highest[setting.path])
+                    setting = replace(setting, shown=replace(setting.shown, high=end))
                 self.add_as(setting)
                 if setting.path in lists:
                     self.add_elements(setting.path, elements, lists[setting.path])
