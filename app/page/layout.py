@@ -86,7 +86,7 @@ class Stage:
         comfort: Comfort,
         narrow: bool,
     ) -> None:
-        """narrow: whether the page, for example on a phone, has no room for a panel at the left. The plots
+        """narrow: whether the page, for example on a phone, has no room for a second panel. The plots
         are then tabs of the right panel."""
         self._client, self._learner = client, learner
         self._theme, self._comfort = theme, comfort

@@ -38,7 +38,7 @@ class InsideSubscription:
 
 
 class InsidePanel:
-    """A tab of the left panel. It requests only the data of pictures that the browser shows."""
+    """The tab *Inside*. It requests only the data of pictures that the browser shows."""
 
     def __init__(
         self,
