@@ -80,7 +80,7 @@ def test_equal_settings_give_equal_rows_whatever_happens(scene: TorqueScene) -> 
         (Set("plant.payload_kg", 2.0), Set("controller", "hqp")),
         (Set("controller", "himpc"), Set("levels.orientation.enabled", False)),
         (Reset(), MoveTarget("position", target)),
-        (Set("T_s", 0.002), Set("M_bar_scale", 1.3)),
+        (Set("T_s", 0.0005), Set("M_bar_scale", 1.3)),
     )
     for events in script:
         if any(isinstance(event, Reset) for event in events):
