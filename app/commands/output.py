@@ -88,7 +88,9 @@ def print_list(title: str, column: str, lines: Mapping[str, str], json_target: s
 
 
 _FULL = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
-_MEMORY = ("failed to map segment", "allocate memory")
+_MEMORY = ("failed to map segment", "allocate memory", "' is required for ")
+"""Parts of messages about too little memory. The last one is of Python's own parser, whose node lacks a field
+that could not be allocated, while a module is imported."""
 
 
 def machine_failure(error: BaseException) -> str | None:
