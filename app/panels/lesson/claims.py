@@ -248,7 +248,7 @@ def pictures(part: Part, lecture: Lecture) -> str:
 
 
 _LARGE, _SMALL = 220, 140
-_FIRST, _BESIDE = "flex:0 1 27em", "flex:1 1 14.4em;max-width:24em"
+_FIRST, _BESIDE = "flex:0 1 27em", "flex:1 1 200px;max-width:24em"
 _WORDS: dict[type, str] = {
     MoveTarget: "target moves",
     Push: "push",
