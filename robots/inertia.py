@@ -126,6 +126,10 @@ def suggest_M_bar(
     return LARGEST_EIGENVALUE * shape / largest
 
 
+SLOW = 3.0
+"""1/s: a robot with less bandwidth needs seconds to reach a target."""
+
+
 def tracking_bandwidth(M: np.ndarray, M_bar: np.ndarray, T_s: float) -> float:
     """Returns the largest bandwidth, 1/s, of a well-damped loop with time-delay estimation: half the inverse
     of the lag T_s/λ_min(M⁻¹M̄) of its acceleration, to two digits. M is a mass matrix (n, n), M̄ a diagonal

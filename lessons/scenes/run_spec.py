@@ -118,7 +118,11 @@ class RunSpec:
 
 def tip_with_tool(tip: str | None, tool: str | None) -> str | None:
     """Returns the tip of a run whose tip carries a tool at x,y,z or x,y,z,roll,pitch,yaw, m and rad."""
-    return tip if tool is None else f"{tip or ''}@{tool}"
+    if tool is None:
+        return tip
+    from robots.urdf.tip import TOOL  # late, as it loads a reader of XML
+
+    return f"{tip or ''}{TOOL}{tool}"
 
 
 def check_seed(seed: int) -> None:

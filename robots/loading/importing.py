@@ -14,7 +14,7 @@ from lxml import etree
 from lxml.etree import _Element as Element
 
 from robots.errors import InputError
-from robots.inertia import mass_matrix, rotor_inertia, suggest_M_bar, tracking_bandwidth
+from robots.inertia import SLOW, mass_matrix, rotor_inertia, suggest_M_bar, tracking_bandwidth
 from robots.joints import joint_names
 from robots.loading.home import chain_length, find_home, sensible_a_max
 from robots.loading.imported import with_collision
@@ -28,7 +28,6 @@ from robots.urdf.structure import HOME, resting
 
 _TRIAL = 5  # number of periods of 1 ms
 _ROUNDING = 1e-4  # rad or m: what a file's rounded home may be outside the limits
-_SLOW = 3.0  # 1/s: a robot with less bandwidth needs seconds to reach a target
 
 
 @dataclass(frozen=True)
@@ -183,7 +182,7 @@ def _assumed(model: pin.Model, given: np.ndarray, home: np.ndarray, M_bar: np.nd
         text = f"their inertia is not described; {values} kg·m² were assumed, plant.armature changes them"
         yield Finding("filled", "rotors", text)
     bandwidth = tracking_bandwidth(mass_matrix(model, model.createData(), home), M_bar, 1e-3)
-    if bandwidth < _SLOW:
+    if bandwidth < SLOW:
         text = (
             f"M̄ has to be so small beside M that tasks settle with at most {bandwidth:g} 1/s: the arm is slow"
         )

@@ -15,11 +15,9 @@ from app.panels.widgets.controls import Controls
 from app.panels.widgets.snapshot import SessionSnapshot
 from lessons.settings.torque import TorqueSettings
 from robots import tracking_bandwidth
-from robots.inertia import mass_matrix
+from robots.inertia import SLOW, mass_matrix
 from robots.truth import true_model
 
-_SLOWEST = 3.0
-"""Smallest bandwidth, 1/s, with which an arm follows a dragged target; `robots --check` warns below it."""
 _LOOKS = 9
 """Number of updates over which the share of late ticks is computed: about two seconds."""
 
@@ -81,13 +79,13 @@ class HorizonPanel:
 
 
 def _longest_period(page: PageContext) -> float:
-    """Returns the control period, ms, at which the bandwidth of time-delay estimation is `_SLOWEST` at home:
+    """Returns the control period, ms, at which the bandwidth of time-delay estimation is `SLOW` at home:
     with a longer one the arm swings, or is too slow to follow. The slider ends there."""
     settings = page.settings
     model = true_model(page.robot, settings.plant)
     M = mass_matrix(model, model.createData(), page.robot.home)
     bandwidth = tracking_bandwidth(M, np.array(settings.M_bar), 1e-3)
-    return max(1.0, 0.5 * round(2.0 * bandwidth / _SLOWEST))
+    return max(1.0, 0.5 * round(2.0 * bandwidth / SLOW))
 
 
 def _measured(name: str, value: float) -> str:
