@@ -156,9 +156,8 @@ export class Plant {
 
   /** Returns position, quaternion w x y z and velocity of each free object; they exist only with contacts. */
   free(): number[][] {
-    const { data: { qpos, qvel }, n } = this;
-    return Array.from({ length: (qvel.length - n) / 6 }, (_, k) =>
-      [...(qpos as Vector).subarray(n + 7 * k, n + 7 * k + 7), ...(qvel as Vector).subarray(n + 6 * k, n + 6 * k + 3)]);
+    const n = this.n, q = this.data.qpos as Vector, v = this.data.qvel as Vector, count = (v.length - n) / 6;
+    return Array.from({ length: count }, (_, k) => [...q.subarray(n + 7 * k, n + 7 * k + 7), ...v.subarray(n + 6 * k, n + 6 * k + 3)]);
   }
 
   private placed(bodies: string[]): Float32Array {
@@ -169,10 +168,7 @@ export class Plant {
     }));
   }
 
-  delete(): void {
-    this.data.delete();
-    this.model.delete();
-  }
+  delete(): void { this.data.delete(); this.model.delete(); }
 }
 
 /** Rounds to the nearest whole number, and halves to the nearest even number, as NumPy does. */

@@ -60,11 +60,9 @@ export class Session {
     this.controller.view("raw").set(this.begun);
     this.controller.reset(this.plant.tau);
     this.script = [...this.scene.events];
-    this.pushUntil = Infinity;
     this.ticks = this.fallback = 0;
     this.held = this.waiting = null;
-    this.truth = [NaN, NaN];
-    this.lost = false;
+    [this.pushUntil, this.truth, this.lost] = [Infinity, [NaN, NaN], false];
     this.rows.clear();
   }
 
@@ -77,7 +75,9 @@ export class Session {
     }
     const { plant, scene, rows, controller } = this;
     const q = plant.q, v = plant.v, [q_measured, v_measured] = plant.measure(), before = plant.tau;
-    if (this.manifest.objects.length) this.look();
+    // Objects that move, as in lessons/session/observed.py.
+    for (const [at, [x, y, z, w, , , k, ...velocity]] of (this.manifest.objects.length ? plant.free() : []).entries())
+      controller.set(OBJECT, scene.free[at].index, [x, y, z + scene.free[at].above, 2 * Math.atan2(k, w), ...velocity]);
     const [found, fallback] = controller.tick(q_measured, v_measured, before), tau = Float64Array.from(found);
     this.fallback = fallback;
     if (this.ticks++ % TRUTH_TICKS === 0) this.truth = plant.gauge(this.M_bar());
@@ -98,14 +98,6 @@ export class Session {
     put({ tau: plant.tau, contact_force: [plant.force] });
     const wild = v.some((each, a) => !(Math.abs(each) <= LOST_SPEED * limit(this.robot.v_limit[a])));
     this.lost ||= plant.broken || wild;
-  }
-
-  /** Tells the controller where the objects are that move, as lessons/session/observed.py does. */
-  private look(): void {
-    for (const [at, [x, y, z, w, , , k, ...velocity]] of this.plant.free().entries()) {
-      const { index, above } = this.scene.free[at];
-      this.controller.set(OBJECT, index, [x, y, z + above, 2 * Math.atan2(k, w), ...velocity]);
-    }
   }
 
   /** Returns the torque that acts: if the present one is late, an earlier one, as in lessons/session/deadline.py. */
