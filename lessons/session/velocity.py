@@ -16,11 +16,11 @@ from himpc.stack import Level, Stack
 from himpc.telemetry import velocity_layout_of
 from lessons.events import Event, InsertTask, MoveLevel, MoveTarget, Release, RemoveTask
 from lessons.scenes.velocity_scene import VelocityScene
-from lessons.session.obstacle_distances import ObstacleDistances
-from lessons.session.servo_commands import Commands, command_step
+from lessons.session.commands import Commands, command_step
+from lessons.session.controllers import VelocityController, make_velocity_controller
+from lessons.session.distances import ObstacleDistances
+from lessons.session.rows import write_bounds, write_plan, write_truth
 from lessons.session.session import Session
-from lessons.session.velocity_controllers import VelocityController, make_velocity_controller
-from lessons.session.velocity_rows import write_bounds, write_plan, write_truth
 from lessons.settings.missions import OrderOptions
 from lessons.settings.settings import SceneSettings
 from lessons.settings.velocity import VelocitySettings
@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 
 
 @final
-class VelocitySession(Session):
+class VelocitySession(Session[VelocityPlan]):
     """A run whose controller gives velocities. A control period has one or more commands to the servos;
     `advance` sends one of them.
 
@@ -44,7 +44,6 @@ class VelocitySession(Session):
     scene: VelocityScene
     settings: VelocitySettings
     plant: VelocityPlant
-    plan: VelocityPlan | None
 
     def __init__(self, scene: VelocityScene, seed: int = 0) -> None:
         """Raises InputError if the scene's settings do not fit its robot."""

@@ -44,7 +44,7 @@ class TorqueSettings(ControllerSettings, SceneSettings):
     Attributes:
         M_bar: diagonal of M̄ before scaling, unlike that of the controller.
         deadline_ms: a torque that is ready later than this after the beginning of its tick acts one tick
-            later; see `lessons.session.deadline`. 0: lockstep, simulated time waits while the controller
+            later; see `lessons.session.commands`. 0: lockstep, simulated time waits while the controller
             computes.
         solve_ms_per_knot: assumed computing time for each of the N knots, so that runs are the same
             everywhere. 0: the measured computing time, and then no two runs are the same.
