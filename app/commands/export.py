@@ -14,7 +14,7 @@ from robots import InputError
 
 if TYPE_CHECKING:
     from himpc.export.folder import Recorded
-    from lessons.scenes.torque_scene import TorqueScene
+    from lessons.scenes.scene import TorqueScene
 
 
 def export(

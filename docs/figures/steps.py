@@ -11,8 +11,7 @@ from docs.figures.pack import Pack
 from docs.figures.scene import refuse, scene_data
 from lessons.course import load_lesson
 from lessons.scenes.run_spec import RunSpec
-from lessons.scenes.scene import Scene
-from lessons.scenes.torque_scene import TorqueScene
+from lessons.scenes.scene import Scene, TorqueScene
 from lessons.settings.assignments import differences
 from lessons.teaching.claim import Claim
 from lessons.teaching.lesson import Lesson, Step

@@ -10,7 +10,7 @@ import numpy as np
 
 from lessons.recording.run import Recording, run
 from lessons.recording.summary import summary
-from lessons.scenes.torque_scene import TorqueScene
+from lessons.scenes.scene import TorqueScene
 from robots import InputError
 
 MAX_STEPS = 60

@@ -15,9 +15,8 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from lessons.outputs import write_files
-from lessons.plots.draw import png
+from lessons.plots.draw import label_values, png
 from lessons.plots.style import RC
-from lessons.plots.ticks import label_values
 
 Array = NDArray[np.float64]
 _HATCHED: dict[str, Any] = {"edgecolor": "#B3261E", "linewidth": 0.0}

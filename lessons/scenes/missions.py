@@ -12,19 +12,17 @@ from himpc.stack import Level
 from himpc.tasks import FrameOrientation, FramePosition
 from lessons.events import Event, MoveTarget, Release
 from lessons.scenes.names import VELOCITY_SCENES
-from lessons.scenes.velocity_scene import VelocityScene
+from lessons.scenes.scene import VelocityScene
 from lessons.settings.missions import (
-    DeliveryOptions,
-    MissionOptions,
-    SquareOptions,
-    Stay,
-    WaypointOptions,
-)
-from lessons.settings.obstacle_missions import (
     BESIDE_THE_WAY,
     CLUTTER,
     ClutteredOptions,
+    DeliveryOptions,
+    MissionOptions,
     PerceptionOptions,
+    SquareOptions,
+    Stay,
+    WaypointOptions,
 )
 from lessons.settings.velocity import STAGE_WEIGHT, VelocitySettings
 from robots import Robot, load_robot

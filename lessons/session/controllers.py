@@ -14,11 +14,9 @@ from himpc.controllers.answers import OwnFault
 from himpc.controllers.own import OwnController
 from himpc.htmpc import HTIDKC, HTMPC, HTMPC_WPT, STMPC, HTMPCSettings, Placo, VelocityPlan
 from himpc.references import Preview
-from lessons.own.deadline import CallDeadline, TooLong
 from lessons.own.files import Source, is_file, read, sentence
-from lessons.own.judge import judged
 from lessons.own.kinds import law_of, line_of
-from lessons.own.load import alone, load
+from lessons.own.load import CallDeadline, TooLong, alone, judged, load
 from lessons.settings.torque import TorqueSettings
 from robots import Robot
 

@@ -19,7 +19,7 @@ from himpc.stack import Stack, about, ranks
 from himpc.tasks import FramePosition, Task
 from himpc.telemetry import layout_of
 from lessons.events import Event, MoveTarget, Push
-from lessons.scenes.torque_scene import TorqueScene
+from lessons.scenes.scene import TorqueScene
 from lessons.session.bumpless import Handover, settled
 from lessons.session.commands import DelayedTorque
 from lessons.session.controllers import controller_of

@@ -15,7 +15,7 @@ from himpc.references import Reference, previews
 from himpc.stack import Level, Stack
 from himpc.telemetry import velocity_layout_of
 from lessons.events import Event, InsertTask, MoveLevel, MoveTarget, Release, RemoveTask
-from lessons.scenes.velocity_scene import VelocityScene
+from lessons.scenes.scene import VelocityScene
 from lessons.session.commands import Commands, command_step
 from lessons.session.controllers import VelocityController, make_velocity_controller
 from lessons.session.distances import ObstacleDistances

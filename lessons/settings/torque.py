@@ -14,11 +14,9 @@ from himpc.stack import Stack
 from himpc.tasks import Task
 from lessons.events import Event, MoveLevel
 from lessons.own.files import by_name, is_file, with_fingerprint
-from lessons.settings.levels import moved, ordered
 from lessons.settings.schema import Setting, Shape, setting_of_all_levels, settings_of_levels
 from lessons.settings.settings import SceneSettings
-from lessons.settings.stack import Own, read_stack, same_tasks, stack_as_data
-from lessons.settings.stack_changes import CHANGES, add
+from lessons.settings.stack import CHANGES, Own, add, moved, ordered, read_stack, same_tasks, stack_as_data
 from lessons.settings.values import WORD, Form
 from robots import InputError, PlantSettings, Robot
 from robots.errors import shortened, unknown_name

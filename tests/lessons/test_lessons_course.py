@@ -18,8 +18,7 @@ from lessons.course import COURSE, load_lesson
 from lessons.events import MoveTarget, Push, Set
 from lessons.parallel import one_by_one
 from lessons.scenes.run_spec import RunSpec
-from lessons.scenes.scene import Scene
-from lessons.scenes.torque_scene import TorqueScene
+from lessons.scenes.scene import Scene, TorqueScene
 from lessons.settings.assignments import parse_assignment
 from lessons.teaching.challenge import Challenge, Score
 from lessons.teaching.check import Verdict, check, measured

@@ -13,7 +13,7 @@ from lessons.events import MoveTarget, Push, Set
 from lessons.recording.run import run
 from lessons.recording.summary import summary
 from lessons.scenes.catalog import load_scene, prepared
-from lessons.scenes.torque_scene import TorqueScene
+from lessons.scenes.scene import TorqueScene
 from lessons.session.start import begin
 from lessons.session.torque import TorqueSession
 from lessons.settings.assignments import with_assignments

@@ -14,8 +14,7 @@ from lessons.papers.himpc_paper.planar import (
     rt1,
 )
 from lessons.papers.item import Item, Row, Section, Table, between
-from lessons.papers.printed import printed
-from lessons.papers.words import gain_rows, number, trouble
+from lessons.papers.words import gain_rows, number, printed, trouble
 from lessons.plots.style import name
 
 

@@ -18,8 +18,7 @@ from lessons.papers.himpc_paper.planar import (
     whole_run,
 )
 from lessons.papers.item import Item, PaperCheck, Row, Section, Table, at_most, between
-from lessons.papers.printed import printed
-from lessons.papers.words import number, trouble, unprinted
+from lessons.papers.words import number, printed, trouble, unprinted
 from lessons.plots.style import name
 
 ACCURATE = 5e-4

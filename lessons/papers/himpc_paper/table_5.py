@@ -7,8 +7,7 @@ import numpy as np
 from lessons.experiments.jobs import Job, Results
 from lessons.papers.himpc_paper.iiwa import COORDINATES, DISTURBED, OPEN, RT4, RT4_DATA_SHEET, SOURCE, rt4
 from lessons.papers.item import Item, PaperCheck, Row, Section, Table, between
-from lessons.papers.printed import printed
-from lessons.papers.words import gain_rows, number, trouble, unprinted
+from lessons.papers.words import gain_rows, number, printed, trouble, unprinted
 from lessons.scenes.run_spec import RunSpec
 
 _SCENES = {False: (RT4, RT4_DATA_SHEET), True: (RT4,)}

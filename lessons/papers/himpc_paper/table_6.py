@@ -9,8 +9,7 @@ import numpy as np
 from lessons.experiments.jobs import Job, Results
 from lessons.papers.himpc_paper.iiwa import OPEN, SOURCE, rt4
 from lessons.papers.item import Item, Row, Section, between
-from lessons.papers.printed import printed
-from lessons.papers.words import trouble
+from lessons.papers.words import printed, trouble
 from lessons.plots.style import name
 
 _ON = {

@@ -9,8 +9,7 @@ import numpy as np
 from lessons.experiments.jobs import Job, JobResult, Results
 from lessons.papers.himpc_paper.iiwa import RT4, SOURCE
 from lessons.papers.item import Item, Row, Section, Table, between
-from lessons.papers.printed import printed
-from lessons.papers.words import number, trouble
+from lessons.papers.words import number, printed, trouble
 from lessons.plots.style import name
 from lessons.scenes.run_spec import RunSpec
 

@@ -10,8 +10,7 @@ import numpy as np
 from lessons.experiments.jobs import Job, JobResult, Results
 from lessons.papers.himpc_paper.iiwa import SOURCE, rt4
 from lessons.papers.item import Item, PaperCheck, Row, Section, between
-from lessons.papers.printed import printed
-from lessons.papers.words import trouble
+from lessons.papers.words import printed, trouble
 
 _FREE = ("limits.position=off",)
 """Settings without state bounds: an active bound would hide the sensor noise, which Table VIII measures."""

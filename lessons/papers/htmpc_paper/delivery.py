@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from lessons.experiments.jobs import Job, Results
 from lessons.papers.htmpc_paper.runs import SOURCE
 from lessons.papers.item import Item, PaperCheck, Row, Section, Table, at_most, between
-from lessons.papers.printed import printed
-from lessons.papers.words import number
+from lessons.papers.words import number, printed
 from lessons.plots.panels import Panel, Picture, PlotCurve
 from lessons.scenes.run_spec import RunSpec
 
