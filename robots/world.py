@@ -7,7 +7,7 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import Annotated
 
-from robots.collision import Ball, Box, Floor, Point
+from robots.collision import Ball, Box, Floor, Post, WorldShape
 from robots.errors import InputError
 from robots.ranges import Range, check_fields
 
@@ -29,21 +29,6 @@ _TABLE_TOP = 0.04  # m, thickness
 
 
 @dataclass(frozen=True)
-class Post:
-    """An upright cylinder: the middle of its lower end, its height and its radius, m."""
-
-    name: str
-    foot: Point
-    height: float
-    radius: float
-
-    def __post_init__(self) -> None:
-        sizes = (self.height, self.radius)
-        if not all(map(math.isfinite, (*self.foot, *sizes))) or min(sizes) <= 0.0:
-            raise InputError(f"post '{self.name}' needs finite coordinates and sizes above 0")
-
-
-@dataclass(frozen=True)
 class Thing:
     """An object of a world.
 
@@ -53,7 +38,7 @@ class Thing:
         friction: coefficient of sliding friction between the object and the robot.
     """
 
-    shape: Ball | Box | Post | Floor
+    shape: WorldShape
     mass_kg: Annotated[float | None, Range(1e-3, 1e3)] = None
     friction: Annotated[float, Range(0.0, 10.0)] = 0.5
 

@@ -65,7 +65,7 @@ def export(
     from lessons.scenes.catalog import as_torque_scene
     from lessons.scenes.run_spec import RunSpec, tip_with_tool
     from lessons.session.torque import TorqueSession
-    from robots.mechanics.saving import saved
+    from robots.mechanics.model import saved
 
     wanted = target_named(target)
     check_prefix(prefix)

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+
 _PER_JOINT = (
     *("q", "v", "q_measured", "v_measured", "tau_0", "tau", "tau_demand"),
     *("tau_lower", "tau_upper", "v_limit", "v_limit_lowered", "q_lower", "q_upper"),

@@ -20,6 +20,9 @@ from lessons.own.load import CallDeadline, TooLong, alone, judged, load
 from lessons.settings.torque import TorqueSettings
 from robots import Robot
 
+Array = NDArray[np.float64]
+
+
 LONGEST_TICK = 0.5
 """Time, s, that one call may compute or sleep; a control period is one or a few milliseconds."""
 
@@ -52,9 +55,6 @@ def _guarded(source: Source, watch: CallDeadline, function: Callable[..., Any], 
         raise OwnFault(f"{location}: one call takes longer than {LONGEST_TICK:g} s") from None
     except (Exception, SystemExit) as error:
         raise OwnFault(sentence(source.path, error)) from None
-
-
-Array = NDArray[np.float64]
 
 
 class VelocityController(Protocol):

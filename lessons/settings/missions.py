@@ -18,6 +18,8 @@ from robots.collision import Ball, Box, Floor, Obstacle
 from robots.ranges import Range, Shown, check_fields
 
 Array = NDArray[np.float64]
+
+
 Home = Mapping[str, Array]
 Architecture = Literal["hierarchical", "single_task", "decoupled"]
 """How a sequence is carried out: two tasks at a time (L = 2), one task at a time by the whole body (L = 1),

@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 import pinocchio as pin
 
-from robots.geometry.collision_model import Point, Solid, SolidKind, Source
+from robots.geometry import Point, Solid, SolidKind, Source
 from robots.robot import Robot
 from robots.shapes.limbs import limbs
 from robots.shapes.read import DescribedShape, described_shapes, mesh_surfaces

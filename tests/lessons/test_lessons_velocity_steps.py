@@ -16,7 +16,7 @@ from lessons.scenes.run_spec import RunSpec
 from lessons.scenes.scene import VelocityScene
 from lessons.session.velocity import VelocitySession
 from robots import InputError
-from robots.stretch import horizontal_reach
+from robots.reach import horizontal_reach
 
 OUT_OF_REACH = MoveTarget("base", (-1.5, 0.0))
 EVENTS: dict[int, Event] = {

@@ -1,11 +1,15 @@
-"""The collision geometry of a robot as data: convex solids on its bodies, and the pairs of bodies whose
-contact is left out."""
+"""The geometry of a robot as data: convex solids for contacts, capsules for distances, the pairs of bodies
+that are left out, the surfaces that are drawn, and the files of the catalog."""
 
 from __future__ import annotations
 
+import json
 from collections import Counter
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any, Literal, TypeVar, get_args, get_type_hints
+
+import numpy as np
 
 Point = tuple[float, float, float]
 SolidKind = Literal["box", "sphere", "cylinder", "capsule", "hull"]
@@ -100,3 +104,84 @@ def excluded_pairs(excluded: tuple[Excluded, ...]) -> str:
         shown = ", ".join(pairs[:_SHOWN]) + (f" and {len(pairs) - _SHOWN} more" if pairs[_SHOWN:] else "")
         text += f", and {shown}, which {said}" if pairs else ""
     return text
+
+
+@dataclass(frozen=True)
+class Capsule:
+    """A capsule: all points that are nearer to a segment than a radius; a ball if the segment is a point.
+
+    Attributes:
+        joint: Pinocchio index of the joint that carries the capsule, 0 for the world.
+        link: the link that the capsule belongs to, for messages.
+        start, end: the ends of the segment in the joint's axes, m.
+        radius: m.
+    """
+
+    joint: int
+    link: str
+    start: Point
+    end: Point
+    radius: float
+
+
+@dataclass(frozen=True)
+class Cover:
+    """The capsules of a robot, in the order of their joints (those of the base come last), and the pairs of
+    bodies whose distance is not checked. The default is a robot without capsules."""
+
+    capsules: tuple[Capsule, ...] = ()
+    excluded: tuple[Excluded, ...] = ()
+
+    def __str__(self) -> str:
+        """Returns one line for the import report."""
+        if not self.capsules:
+            return "the robot has no capsules: no distance is kept"
+        near = sum(pair.why == "neighbours" for pair in self.excluded)
+        text = f"distances use {len(self.capsules)} capsules that contain the links"
+        return f"{text}; left out are {near} pair(s) of neighbours{excluded_pairs(self.excluded)}"
+
+
+Geometry = TypeVar("Geometry", CollisionModel, Cover)
+
+
+def stored(kind: type[Geometry], path: Path) -> Geometry:
+    """Reads the collision geometry or the cover of a robot."""
+    data = json.loads(path.read_text())
+    parts = {name: get_args(hint)[0] for name, hint in get_type_hints(kind).items()}
+    return kind(
+        **{
+            name: tuple(part(**{key: _frozen(value) for key, value in each.items()}) for each in data[name])
+            for name, part in parts.items()
+        }
+    )
+
+
+def as_json(geometry: CollisionModel | Cover) -> str:
+    """Returns the text of the file that `stored` reads, with one line per solid, capsule or pair."""
+    lists = (
+        f'"{field.name}": [\n  '
+        + ",\n  ".join(json.dumps(asdict(each)) for each in getattr(geometry, field.name))
+        + "]"
+        for field in fields(geometry)
+    )
+    return "{" + ",\n".join(lists) + "}\n"
+
+
+def _frozen(value: Any) -> Any:
+    return tuple(map(_frozen, value)) if isinstance(value, list) else value
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """One coloured piece of a robot's surface.
+
+    joint: the Pinocchio joint to which the piece is fixed, 0 = the world; vertices (V, 3) float32, m, in the
+    joint's frame; faces (F, 3) int32, counter-clockwise seen from outside; colour 0–255; name: unique. Faces
+    share vertices only where the surface is smooth: averaged vertex normals can be used for shading.
+    """
+
+    joint: int
+    vertices: np.ndarray
+    faces: np.ndarray
+    colour: tuple[int, int, int]
+    name: str
