@@ -65,7 +65,7 @@ class Exercise:
 
     Attributes:
         name: its key in `lessons.exercises.EXERCISES`, or the name of a teacher's own exercise.
-        card: the docstring of its file.
+        card: title, question, duration and required knowledge.
         equation: the equation in LaTeX.
         plain: the equation as plain text, for a terminal.
         hints: hints for students, shown one by one.

@@ -366,6 +366,18 @@ def read_note(path: str, line: int, text: str) -> Note:
     return _note(_Part(path, line, 1, "text", ""), _Part(path, line, 1, "note", text, "[^]"), "")
 
 
+def read_test(path: str, text: str) -> Claim:
+    """Returns a measure with its bound, as after `is:` in a lesson. Raises InputError."""
+    item = _Part(path, 1, 1, "is", text)
+    groups = item.groups()
+    return Claim("", _measure(item), groups["relation"], groups["bound"])
+
+
+def read_event(path: str, text: str) -> events.Event:
+    """Returns an event, as after `at 0.5 s:` in a lesson. Raises InputError."""
+    return _event(_Part(path, 1, 1, "at", text))
+
+
 def _step(part: _Part, notes: tuple[Note, ...]) -> Step:
     duration, script = _run(part)
     ghost, prediction = part.one("ghost"), part.one("predict")
