@@ -15,9 +15,8 @@ from himpc.kinematics.configuration import Configuration
 from himpc.references import Preview
 from himpc.references.hold import still
 from lessons.experiments.jobs import Job, JobResult, Results, Work
-from lessons.papers.himpc_paper.iiwa import RT4, RT4_DATA_SHEET
+from lessons.papers.himpc_paper.iiwa import RT4, RT4_DATA_SHEET, step_seconds
 from lessons.papers.himpc_paper.planar import RT1
-from lessons.papers.himpc_paper.table_7 import step_seconds
 from lessons.papers.item import Item, PaperCheck, Section, Table
 from lessons.papers.words import number, stated, trouble
 from lessons.plots.panels import Panel, Picture, PlotCurve

@@ -1,4 +1,4 @@
-"""Measures the errors of the incremental and of the nominal model, section III-B."""
+"""What section III-B says of the two models' errors, and section IV-B of the value function V_N(k)."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from himpc.kinematics.configuration import Configuration
 from lessons.experiments.jobs import Job, JobResult, Results
 from lessons.papers.himpc_paper.planar import RT1
-from lessons.papers.item import Item, Section, Table, between
+from lessons.papers.item import Item, PaperCheck, Section, Table, between
 from lessons.papers.words import number, trouble
 from lessons.plots.panels import Panel, Picture, PlotCurve
 from lessons.scenes.catalog import prepared, torque_scene
@@ -81,12 +82,12 @@ def model_errors(run: JobResult) -> ModelErrors:
     return ModelErrors(*np.sqrt(np.mean(squares, axis=0)).tolist())
 
 
-def _jobs(quick: bool) -> tuple[Job, ...]:
+def _accuracy_jobs(quick: bool) -> tuple[Job, ...]:
     scales = SCALES if not quick else (1.0,)
     return (*map(_at_period, PERIODS), *map(_at_scale, scales), *(() if quick else (_RT4,)))
 
 
-def _section(results: Results, quick: bool) -> Section:
+def _accuracy(results: Results, quick: bool) -> Section:
     periods = {ms: results[_at_period(ms)] for ms in PERIODS}
     scales = {} if quick else {scale: results[_at_scale(scale)] for scale in SCALES}
     rows = [(f"{RT1}, T_s = {ms:g} ms", run) for ms, run in periods.items()]
@@ -147,12 +148,93 @@ def _panel(label: str, errors: dict[float, ModelErrors]) -> Panel:
     return Panel("RMS error", curves, label, log_x=True, log_y=True)
 
 
+Array = NDArray[np.float64]
+
+_JOB = Job(RunSpec("iiwa14-circle", controller="himpc", duration=1.5))
+"""The run starts from rest, but the reference starts with a velocity, so that V_N begins far above its final
+value."""
+_LEVELS = ("position", "orientation", "q1")
+_SETTLED_AFTER = 1.0
+_FAR = 10.0
+"""V_N above this many times ε_N counts as far from the reference."""
+
+
+def decrease(V: Array, t: Array) -> tuple[float, float]:
+    """Returns (ε_N, α) with V(k+1) − V(k) ≤ −α V(k) + ε_N on all ticks far from the reference, see (39).
+
+    ε_N is the largest value after V has settled. α is the largest value for which (39) holds with this ε_N at
+    all ticks before, as long as V > 10 ε_N. If α > 0, V decreases there. Without such ticks α is NaN.
+    """
+    late = V[t >= _SETTLED_AFTER]
+    if not len(late):
+        return float("nan"), float("nan")
+    epsilon = float(late.max())
+    ends = np.flatnonzero(_FAR * epsilon >= V)
+    first = int(ends[0]) if len(ends) else len(V) - 1
+    if first < 2:
+        return epsilon, float("nan")
+    far = V[: first + 1]
+    return epsilon, float(((far[:-1] - far[1:] + epsilon) / far[:-1]).min())
+
+
+def _value_function(results: Results, quick: bool) -> Section:
+    run = results[_JOB]
+    epsilon, alpha = decrease(run.column("cost/position"), run.t)
+    curves = tuple(_value(run, level, k) for k, level in enumerate(_LEVELS))
+    V = run.column("cost/position")
+    ratio = PlotCurve(V[:-1], V[1:] / V[:-1], "level 1", "0", "dots") if len(V) else PlotCurve(V, V)
+    panels = (
+        Panel("$V_N(k)$", curves, log_y=True),
+        Panel(
+            "$V_N(k+1) / V_N(k)$, level 1",
+            (ratio,),
+            "$V_N(k)$, level 1",
+            title="below 1 it decreases",
+            bounds=(1.0,),
+            log_x=True,
+            y_range=(0.0, 2.0),
+        ),
+    )
+    caption = (
+        "Value functions of the three levels from rest on RT4, and the ratio of successive values for level "
+        "1. The value of level 3 rises: its reference is faster than joint 1 is allowed to turn, and (39) "
+        "guarantees nothing for lower levels."
+    )
+    return Section(
+        notes=(
+            "V_N(k) is the optimal cost of each level, from the telemetry. By (39), the cost of level 1 must "
+            "decrease as long as it is far above the bound ε_N that the estimation error leaves. The cost of "
+            "a lower level decreases only as far as level 1 permits. "
+            f"ε_N = {number(epsilon)}. {trouble(run)}",
+        ),
+        checks=(
+            PaperCheck(
+                f"level 1, ticks with V_N above {_FAR:g} ε_N: least α of (39) > 0",
+                alpha,
+                bool(alpha > 0),
+            ),
+        ),
+        pictures=(Picture("himpc-value", caption, panels),),
+    )
+
+
+def _value(run: JobResult, level: str, index: int) -> PlotCurve:
+    return PlotCurve(run.t, run.column(f"cost/{level}"), f"level {index + 1}", str(index))
+
+
 ITEMS = (
     Item(
         "himpc-accuracy",
         "Accuracy of the incremental model",
         "HIMPC (T-RO 2024), section III-B, (21), (24), (25), (27)",
-        _jobs,
-        _section,
+        _accuracy_jobs,
+        _accuracy,
+    ),
+    Item(
+        "himpc-value",
+        "The value function of level 1 decreases",
+        "HIMPC (T-RO 2024), section IV-B, (37) to (39)",
+        lambda quick: (_JOB,),
+        _value_function,
     ),
 )

@@ -1,4 +1,5 @@
-"""Fig. 9: the delivery rounds by architecture, and by the rule for when the base counts as arrived."""
+"""Fig. 8: base paths for two EE waypoints, by height and architecture. Fig. 9: the delivery rounds by
+architecture, and by the rule for when the base counts as arrived."""
 
 from __future__ import annotations
 
@@ -11,9 +12,46 @@ from numpy.typing import NDArray
 from lessons.experiments.jobs import Job, Results
 from lessons.papers.htmpc_paper.runs import SOURCE
 from lessons.papers.item import Item, PaperCheck, Row, Section, Table, at_most, between
-from lessons.papers.words import number, printed
+from lessons.papers.words import number, printed, trouble
 from lessons.plots.panels import Panel, Picture, PlotCurve
 from lessons.scenes.run_spec import RunSpec
+
+HEIGHTS = (0.5, 0.8, 1.2)
+
+
+def _cases() -> dict[str, Job]:
+    scene = "ridgeback-ur10-waypoints"
+    cases: dict[str, Job] = {
+        f"HT, h = {height} m": Job(RunSpec(scene, controller="htmpc", set=(f"height={height}",)))
+        for height in HEIGHTS
+    }
+    cases["ST, h = 0.8 m"] = Job(RunSpec(scene, controller="htmpc", set=("architecture=single_task",)))
+    return cases
+
+
+def _waypoints(results: Results, quick: bool) -> Section:
+    curves, lines = [], []
+    for index, (words, job) in enumerate(_cases().items()):
+        run = results[job]
+        lines.append(
+            (
+                words,
+                number(run.figure("base_path_m")),
+                number(run.figure("completion_time_s")),
+                trouble(run) or "completed" if run.figure("completed") == 1.0 else "not completed",
+            )
+        )
+        if len(run.t):
+            base = run["x/base"]
+            curves.append(PlotCurve(base[:, 0], base[:, 1], words, str(index)))
+    caption = "Base paths. The paper's waypoints are not printed: these are ours."
+    panel = Panel("y (m)", tuple(curves), "x (m)", equal=True)
+    columns = ("architecture", "way of the base (m)", "time (s)", "mission")
+    return Section(
+        tables=(Table("Two waypoints", columns, tuple(lines)),),
+        pictures=(Picture("htmpc-fig-8", caption, (panel,)),),
+    )
+
 
 Array = NDArray[np.float64]
 
@@ -40,11 +78,11 @@ def _job(seats: tuple[int, ...], architecture: str, rule: str) -> Job:
     return Job(RunSpec("ridgeback-ur10-delivery", controller="htmpc", set=assignments))
 
 
-def _jobs(quick: bool) -> tuple[Job, ...]:
+def _rounds_jobs(quick: bool) -> tuple[Job, ...]:
     return tuple(_job(seats, *case) for seats in _layouts(quick) for case in CASES)
 
 
-def _report(results: Results, quick: bool) -> Section:
+def _rounds(results: Results, quick: bool) -> Section:
     layouts = _layouts(quick)
 
     def all_of(figure: str, case: tuple[str, str]) -> Array:
@@ -130,7 +168,16 @@ def _ratios(time: dict[tuple[str, str], Array]) -> tuple[Row, ...]:
 
 
 def _largest(results: Results, quick: bool, kind: str) -> float:
-    return float(np.max([results[job].figure("limits", kind, "max_ratio") for job in _jobs(quick)]))
+    return float(np.max([results[job].figure("limits", kind, "max_ratio") for job in _rounds_jobs(quick)]))
 
 
-ITEMS = (Item("htmpc-fig-9", "Delivery rounds", f"{SOURCE}-D, Fig. 9", _jobs, _report),)
+ITEMS = (
+    Item(
+        "htmpc-fig-8",
+        "Base paths, two waypoints",
+        f"{SOURCE}-D, Fig. 8",
+        lambda quick: tuple(_cases().values()),
+        _waypoints,
+    ),
+    Item("htmpc-fig-9", "Delivery rounds", f"{SOURCE}-D, Fig. 9", _rounds_jobs, _rounds),
+)
