@@ -267,9 +267,7 @@ ROBOTS = {
     ),
     "floor": ("mechanics", "world", "collision", "robot"),
     "covering": ("mechanics", "shapes", "per_robot", "robot", "geometry"),
-    "plant": (
-        *("joints", "mechanics", "world", "truth", "robot", "settings", "signals", "errors"),
-    ),
+    "plant": (*("joints", "mechanics", "world", "truth", "robot", "settings", "signals", "errors"),),
     "servo": ("plant", "robot", "settings", "ranges", "signals"),
     "loading": (
         *(

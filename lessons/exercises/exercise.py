@@ -12,9 +12,7 @@ from lessons.exercises.mistakes import Law, Mistake
 from lessons.scenes.run_spec import RunSpec
 from lessons.settings.schema import settings_of
 from lessons.settings.torque import TorqueSettings
-from lessons.teaching.claim import Relation, condition, holds
-from lessons.teaching.control import Script
-from lessons.teaching.lesson import Card
+from lessons.teaching.lesson import Card, Relation, Script, condition, holds
 from lessons.teaching.measure import Measure
 
 TORQUE_UNIT = "N·m"

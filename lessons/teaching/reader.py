@@ -19,12 +19,8 @@ from typing import Any, get_args
 
 from lessons import events
 from lessons.settings.assignments import parse_assignment
-from lessons.teaching.challenge import Challenge, Score
-from lessons.teaching.claim import Claim
-from lessons.teaching.control import Control
-from lessons.teaching.lesson import Card, Ghost, Lesson, Step
+from lessons.teaching.lesson import Card, Challenge, Claim, Control, Ghost, Lesson, Note, Score, Step
 from lessons.teaching.measure import Measure, Signal, Statistic
-from lessons.teaching.note import Note
 from lessons.teaching.prediction import Choice, Option, Prediction, Sketch, Value
 from robots import InputError
 from robots.errors import shortened, unknown_name
