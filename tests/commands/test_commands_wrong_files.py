@@ -9,7 +9,7 @@ import pytest
 
 from app.__main__ import main
 from lessons.authoring.new import text_of
-from lessons.own import judge
+from lessons.own import load
 
 SCENE, TASK, LESSON = (text_of(kind, None, "mine.py") for kind in ("scene", "task", "lesson"))
 
@@ -213,7 +213,7 @@ def test_a_file_that_would_take_the_program_along_is_a_sentence(
 ) -> None:
     from dataclasses import replace
 
-    monkeypatch.setattr(judge, "LOADING", replace(judge.LOADING, seconds=4.0))
+    monkeypatch.setattr(load, "LOADING", replace(load.LOADING, seconds=4.0))
     Path("mine.py").write_text(text + f"# {kind}\n")
     assert main(LINES[kind]) == 2
     assert f"mine.py: loading it {words}" in capsys.readouterr().err

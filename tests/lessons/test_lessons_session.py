@@ -65,7 +65,7 @@ def test_a_row_contains_the_figures_of_every_level(name: str, controller: str) -
     session = begin(prepared(load_scene(name), controller, ()))
     for _ in range(3):
         row = session.tick()
-        assert session.plan.levels
+        assert session.plan is not None and session.plan.levels
         for level in session.plan.levels:
             fields = "cost", "kkt", "fallback", "time_us", "active"
             code = session.layout.fallbacks.index(level.fallback)
