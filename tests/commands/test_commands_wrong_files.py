@@ -187,7 +187,7 @@ def test_a_wrong_file_is_a_sentence(
     name = "mine.md" if kind == "lesson" else "mine.py"
     Path(name).write_bytes(text if isinstance(text, bytes) else text.encode())
     # None of these files harms the process that loads it; the tests below have files that do.
-    monkeypatch.setattr(judge, "isolated", lambda function, source, **_: function(source))
+    monkeypatch.setattr(load, "isolated", lambda function, source, **_: function(source))
     assert main(LINES[kind]) == 2
     said, *shown = capsys.readouterr().err.strip().split("\n")
     assert words in said
