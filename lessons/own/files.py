@@ -1,4 +1,5 @@
-"""Reads a user's file, executes it if it is Python, and reports an error in it as one sentence."""
+"""Reads a user's file, executes it if it is Python, and reports an error in it as one sentence. `Folder` is
+the folder with the files that may be named not only at the start of the program, but also later."""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
 """Loads a user's file within limits: a deadline, no other processes, no signals. If the file replaces
-something in a library, the original is restored.
+something in a library, the original is restored. `judged` loads a file first in a separate process, where it
+can do no harm, and `CallDeadline` ends calls of its functions that take too long.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 """Covers the surfaces of a robot with few capsules. The triangles of each body are divided into groups, and
-each group gets a capsule."""
+each group gets a capsule. The best groups are those whose capsules stand out least from the body."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""MuJoCo's model of a robot and of the objects around it."""
+"""MuJoCo's model of a robot and of the objects around it, also as a file for MuJoCo's C library."""
 
 from __future__ import annotations
 
