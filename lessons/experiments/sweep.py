@@ -27,7 +27,7 @@ from lessons.experiments.jobs import TIMING_KEYS
 from lessons.outputs import write_files
 from lessons.own.files import fingerprint, is_file
 from lessons.parallel import FailedJob, Spread
-from lessons.plots.heat import draw_map
+from lessons.plots.heat import SweepMap, draw_map
 from lessons.recording.run import run
 from lessons.recording.summary import summary
 from lessons.scenes.run_spec import RunSpec
@@ -370,8 +370,7 @@ def draw_sweep(sweep: Sweep, cells: Sequence[Cell], metric: str, folder: Path) -
         return None
     shape = tuple(len(axis.values) for axis in sweep.axes)
     path, unit = folder / "map.png", unit_of(cells, metric)
-    draw_map(
-        path,
+    swept = SweepMap(
         f"{sweep.base.scene} · {sweep.base.controller}",
         f"{metric} ({unit})" if unit else metric,
         tuple(axis.path for axis in sweep.axes),
@@ -381,4 +380,5 @@ def draw_sweep(sweep: Sweep, cells: Sequence[Cell], metric: str, folder: Path) -
         np.array([cell.diverged for cell in cells]).reshape(shape),
         np.array([cell.error is not None for cell in cells]).reshape(shape),
     )
+    draw_map(path, swept)
     return path
