@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from dataclasses import asdict, dataclass, fields
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal, TypeVar, get_args, get_type_hints
 
@@ -185,3 +186,12 @@ class Shape:
     faces: np.ndarray
     colour: tuple[int, int, int]
     name: str
+
+
+@lru_cache(maxsize=4)
+def directions(count: int) -> np.ndarray:
+    """Returns unit vectors (count, 3) that are evenly spread on a spiral over the sphere."""
+    k = np.arange(count) + 0.5
+    z, turn = 1.0 - 2.0 * k / count, np.pi * (1.0 + np.sqrt(5.0)) * k
+    ring = np.sqrt(1.0 - z**2)
+    return np.column_stack([ring * np.cos(turn), ring * np.sin(turn), z])
