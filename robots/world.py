@@ -11,17 +11,6 @@ from robots.collision import Ball, Box, Floor, Post, WorldShape
 from robots.errors import InputError
 from robots.ranges import Range, check_fields
 
-__all__ = [
-    "Ball",
-    "Box",
-    "Floor",
-    "Post",
-    "Thing",
-    "World",
-    "check_world",
-    "table",
-]
-
 MOST = 50
 """Largest number of objects of a world. Each object increases the computing time of every step of the
 plant."""

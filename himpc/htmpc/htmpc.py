@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.htmpc.active_set import ActiveSetSolver
-from himpc.htmpc.avoidance import Avoidance, clearance
-from himpc.htmpc.clearance import CollisionModel
+from himpc.htmpc.clearance import Avoidance, CollisionModel, clearance
 from himpc.htmpc.continuing import braking, shifted
 from himpc.htmpc.cost import Effort
 from himpc.htmpc.kernel.kinds import COLLISION, LEXICOGRAPHIC

@@ -93,22 +93,8 @@ _FORMS: dict[str, tuple[str, str]] = {
 """The form of a value by its key (# is a number), and an example."""
 
 _TEXT_GROUPS = {
-    "name",
-    "unit",
-    "statistic",
-    "over_ghost",
-    "relation",
-    "words",
-    "path",
-    "choices",
-    "numbers",
-    "log",
-    "statement",
-    "on",
-    "ghost",
-    "set",
-    "effect",
-    "without",
+    *("name", "unit", "statistic", "over_ghost", "relation", "words", "path", "choices", "numbers", "log"),
+    *("statement", "on", "ghost", "set", "effect", "without"),
 }
 _MARK = re.compile(r"\[\^([\w-]+)\]")
 _NOTE = re.compile(r"(\[\^[\w-]+\]): +(.*)")
