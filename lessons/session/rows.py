@@ -58,7 +58,7 @@ _AT = 1e-3
 """A value whose distance from its bound is less than this share of the bound counts as at the bound."""
 
 
-def write_plan(row: Array, layout: Layout, plan: VelocityPlan, delta: float | None) -> None:
+def write_velocity_plan(row: Array, layout: Layout, plan: VelocityPlan, delta: float | None) -> None:
     """Writes the values of a plan into a row filled with NaN; a level without a role is left out.
 
     delta: δ of (12), m (or rad), which gives `bound`: the bound on a level's error at knot 1 that the levels

@@ -19,7 +19,7 @@ from lessons.scenes.scene import VelocityScene
 from lessons.session.commands import Commands, command_step
 from lessons.session.controllers import VelocityController, make_velocity_controller
 from lessons.session.distances import ObstacleDistances
-from lessons.session.rows import write_bounds, write_plan, write_truth
+from lessons.session.rows import write_bounds, write_truth, write_velocity_plan
 from lessons.session.session import Session
 from lessons.settings.missions import OrderOptions
 from lessons.settings.settings import SceneSettings
@@ -168,7 +168,7 @@ class VelocitySession(Session[VelocityPlan]):
         row[fields["tau_0"]] = self._commanded
         l_0 = row[fields["place"]] = self.progress.l_0
         row[fields["left"]] = len(self.progress.mission) - l_0
-        write_plan(row, self.layout, plan, settings.lexicographic_delta)
+        write_velocity_plan(row, self.layout, plan, settings.lexicographic_delta)
         at = Configuration(self.robot, self._data, q, v)
         level_index = {level.name: index for index, level in enumerate(self._stack, start=1)}
         write_truth(row, self.layout, t, at, self.roles, level_index, references)
