@@ -44,6 +44,14 @@ _SWINGS = 2.0
 swing."""
 
 
+class ControllerInput(NamedTuple):
+    """The measured state, (n,) each, and the references' previews: all inputs of a controller at a tick."""
+
+    q: Array
+    v: Array
+    previews: Mapping[str, Preview]
+
+
 @final
 class TorqueSession(Session[Plan]):
     """A run whose controller gives torques: every step is a control tick.
@@ -260,11 +268,3 @@ class TorqueSession(Session[Plan]):
 
 def _tasks(stack: Stack) -> list[Task]:
     return [task for level in stack for task in level.tasks]
-
-
-class ControllerInput(NamedTuple):
-    """The measured state, (n,) each, and the references' previews: all inputs of a controller at a tick."""
-
-    q: Array
-    v: Array
-    previews: Mapping[str, Preview]
