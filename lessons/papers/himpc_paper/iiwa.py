@@ -37,6 +37,8 @@ def rt4(controller: str = "himpc", *assignments: str, seconds: float | None = No
     return Job(RunSpec(RT4, controller=controller, set=assignments, duration=seconds))
 
 
+# ---------------------------------------- Tables IV and V: gains, RMSE with the inertia 20 % off
+
 _SCENES = {False: (RT4, RT4_DATA_SHEET), True: (RT4,)}
 _READINGS = {
     "nominal": (),
@@ -229,6 +231,8 @@ def _table_5_checks(results: Results, quick: bool) -> tuple[PaperCheck, ...]:
     return tuple(checks)
 
 
+# ---------------------------------------- Table VI: RMSE against the horizon
+
 _ON = {
     "Δτ, as printed": (),
     "M̄⁻¹Δτ, with viability": ("R_on=acceleration", "limits.position=viability"),
@@ -316,6 +320,9 @@ def _table_6(results: Results, quick: bool) -> Section:
     )
 
 
+# ---------------------------------------- Table VII: computing time
+
+
 def timed(controller: str, N: int, quick: bool) -> Job:
     """Returns the run of RT4 for step times: half a second, alone on the machine."""
     return Job(
@@ -397,6 +404,8 @@ MACHINE = 9.0
 def _iterations(run: JobResult) -> tuple[float, float, float]:
     return run.figure("solver", "iterations", "mean"), 1.5, 3.5
 
+
+# ---------------------------------------- Table VIII: smoothness of the torque
 
 _FREE = ("limits.position=off",)
 """Settings without state bounds: an active bound would hide the sensor noise, which Table VIII measures."""

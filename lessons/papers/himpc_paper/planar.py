@@ -63,6 +63,9 @@ def roughness(run: JobResult) -> float:
     return float(np.sqrt((steps**2).sum(axis=1).mean())) if len(steps) else math.nan
 
 
+# ---------------------------------------- Tables I and II: gains, RMSE on RT1
+
+
 def _table_1(results: Results, quick: bool) -> Section:
     return Section(
         notes=("The gains that the scene uses, read from it.",),
@@ -177,6 +180,8 @@ def _whole_run(results: Results) -> Table:
         ),
     )
 
+
+# ---------------------------------------- Table III: properties of the controllers
 
 ACCURATE = 5e-4
 """Largest RMSE that counts as accurate, m: between the paper's 9e-5 (✓) and 3e-3 (✗)."""

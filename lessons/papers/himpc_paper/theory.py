@@ -18,6 +18,11 @@ from lessons.scenes.catalog import prepared, torque_scene
 from lessons.scenes.run_spec import RunSpec
 from robots import NominalModel
 
+Array = NDArray[np.float64]
+
+
+# ---------------------------------------- section III-B: the errors of the models
+
 PERIODS = (0.5, 1.0, 2.0, 4.0)
 """Sampling periods T_s, ms."""
 SCALES = (0.25, 0.5, 1.0, 2.0, 4.0)
@@ -148,7 +153,7 @@ def _panel(label: str, errors: dict[float, ModelErrors]) -> Panel:
     return Panel("RMS error", curves, label, log_x=True, log_y=True)
 
 
-Array = NDArray[np.float64]
+# ---------------------------------------- section IV-B: the value function
 
 _JOB = Job(RunSpec("iiwa14-circle", controller="himpc", duration=1.5))
 """The run starts from rest, but the reference starts with a velocity, so that V_N begins far above its final

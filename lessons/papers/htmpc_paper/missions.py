@@ -16,6 +16,11 @@ from lessons.papers.words import number, printed, trouble
 from lessons.plots.panels import Panel, Picture, PlotCurve
 from lessons.scenes.run_spec import RunSpec
 
+Array = NDArray[np.float64]
+
+
+# ---------------------------------------- Fig. 8: two waypoints
+
 HEIGHTS = (0.5, 0.8, 1.2)
 
 
@@ -53,7 +58,7 @@ def _waypoints(results: Results, quick: bool) -> Section:
     )
 
 
-Array = NDArray[np.float64]
+# ---------------------------------------- Fig. 9: delivery rounds
 
 RULES = {"80 cm": (), "5 cm, at rest": ("base_tolerance=0.05", "base_at_rest=true")}
 """When a task of the base counts as completed: the scene's own rule, and a strict one."""
