@@ -27,8 +27,10 @@ from lessons.plots.panels import Bars, Panel, Picture, PlotCurve
 from lessons.plots.style import name
 from robots import Robot, load_robot
 
+Array = NDArray[np.float64]
 DEG = 180 / np.pi
 INCREMENTAL = ("tdeosf", "hiqp", "himpc")
+CONFLICT = (rt2("hqp"), rt2("himpc"))
 
 
 def encoder_runs(controllers: Sequence[str]) -> tuple[Job, ...]:
@@ -181,14 +183,11 @@ def _fig_7(results: Results, quick: bool) -> Section:
     return _torques(results, 7, ("hiqp", "himpc"))
 
 
-Array = NDArray[np.float64]
-
-
 # ------------------------------------------------------------------------ Figs. 10 to 13: conflict
 
 
 def _fig_10(results: Results, quick: bool) -> Section:
-    runs = _runs(results, (rt2("hqp"), rt2("himpc")))
+    runs = _runs(results, CONFLICT)
     caption = "Tracking errors on RT2. While the tasks conflict, level 2 gives way."
     return drawn("himpc-fig-10", caption, error_panels(runs, PLANAR_ERRORS))
 
@@ -238,13 +237,13 @@ _CHATTER = (0.5, 1.6)
 
 
 def _fig_12(results: Results, quick: bool) -> Section:
-    runs = _runs(results, (rt2("hqp"), rt2("himpc")))
+    runs = _runs(results, CONFLICT)
     panels = joint_panels(runs, "tau_demand", r"\tau", "N·m", bound="tau_upper", weights=_CHATTER)
     return drawn("himpc-fig-12", "Torque demands on RT2, with their bounds.", panels)
 
 
 def _fig_13(results: Results, quick: bool) -> Section:
-    runs = _runs(results, (rt2("hqp"), rt2("himpc")))
+    runs = _runs(results, CONFLICT)
     panels = joint_panels(runs, "v", r"\dot q", "deg/s", DEG, bound="v_limit", weights=_CHATTER)
     return drawn("himpc-fig-13", "Joint velocities on RT2, with their bounds.", panels)
 
@@ -312,36 +311,30 @@ def _fig_15(results: Results, quick: bool) -> Section:
     return drawn("himpc-fig-15", "Tracking errors of HIMPC on RT3.", panels, rows=tuple(rows))
 
 
-_BOTH = (rt2("hqp"), rt2("himpc"))
-
-
-ITEMS = (
-    *figures(
-        (3, "RT1 and RT2", f"{SOURCE}-B, Fig. 3", (rt1("himpc"), rt2("himpc")), _fig_3),
-        (4, "Errors, four controllers", f"{SOURCE}-B, Fig. 4", encoder_runs(COMPARED), _fig_4),
-        (5, "Errors with TDE", f"{SOURCE}-B, Fig. 5", encoder_runs(INCREMENTAL), _fig_5),
-        (6, "Torques of TDEOSF and HIMPC", f"{SOURCE}-B, Fig. 6", encoder_runs(("tdeosf", "himpc")), _fig_6),
-        (7, "Torques of HIQP and HIMPC", f"{SOURCE}-B, Fig. 7", encoder_runs(("hiqp", "himpc")), _fig_7),
-        (
-            8,
-            "Average cost",
-            f"{SOURCE}-B, Fig. 8 and (41)",
-            encoder_runs(("himpc", "tdeosf", "hiqp")),
-            _fig_8,
-        ),
-        (9, "RT3", f"{SOURCE}-C, Fig. 9", (rt3("himpc"),), _fig_9),
+ITEMS = figures(
+    (3, "RT1 and RT2", f"{SOURCE}-B, Fig. 3", (rt1("himpc"), rt2("himpc")), _fig_3),
+    (4, "Errors, four controllers", f"{SOURCE}-B, Fig. 4", encoder_runs(COMPARED), _fig_4),
+    (5, "Errors with TDE", f"{SOURCE}-B, Fig. 5", encoder_runs(INCREMENTAL), _fig_5),
+    (6, "Torques of TDEOSF and HIMPC", f"{SOURCE}-B, Fig. 6", encoder_runs(("tdeosf", "himpc")), _fig_6),
+    (7, "Torques of HIQP and HIMPC", f"{SOURCE}-B, Fig. 7", encoder_runs(("hiqp", "himpc")), _fig_7),
+    (
+        8,
+        "Average cost",
+        f"{SOURCE}-B, Fig. 8 and (41)",
+        encoder_runs(("himpc", "tdeosf", "hiqp")),
+        _fig_8,
     ),
-    *figures(
-        *(
-            (number, title, f"{SOURCE}-C, Fig. {number}", runs, report)
-            for number, title, runs, report in (
-                (10, "Errors under conflict", _BOTH, _fig_10),
-                (11, "Level 1 with and without conflict", (rt1("hqp"), rt1("himpc"), *_BOTH), _fig_11),
-                (12, "Torques under conflict", _BOTH, _fig_12),
-                (13, "Velocities under conflict", _BOTH, _fig_13),
-                (14, "Through the singularity, poses", (rt3("himpc"),), _fig_14),
-                (15, "Through the singularity, errors", (rt3("himpc"),), _fig_15),
-            )
-        )
+    (9, "RT3", f"{SOURCE}-C, Fig. 9", (rt3("himpc"),), _fig_9),
+    (10, "Errors under conflict", f"{SOURCE}-C, Fig. 10", CONFLICT, _fig_10),
+    (
+        11,
+        "Level 1 with and without conflict",
+        f"{SOURCE}-C, Fig. 11",
+        (rt1("hqp"), rt1("himpc"), *CONFLICT),
+        _fig_11,
     ),
+    (12, "Torques under conflict", f"{SOURCE}-C, Fig. 12", CONFLICT, _fig_12),
+    (13, "Velocities under conflict", f"{SOURCE}-C, Fig. 13", CONFLICT, _fig_13),
+    (14, "Through the singularity, poses", f"{SOURCE}-C, Fig. 14", (rt3("himpc"),), _fig_14),
+    (15, "Through the singularity, errors", f"{SOURCE}-C, Fig. 15", (rt3("himpc"),), _fig_15),
 )
