@@ -447,7 +447,7 @@ CHANGES = (
 @FIGURES
 def test_what_is_changed_while_the_robot_moves_acts_as_in_the_lab(simulated: Page) -> None:
     """Targets, order, levels, N, M̄, gains, weights, limits, payload, friction and pushes are changed."""
-    scene = RunSpec("iiwa14-hold").for_export().prepared()
+    scene = RunSpec("iiwa14-hold").prepared()
     assert isinstance(scene, TorqueScene)
     changed, pack = replace(scene, events=CHANGES), Pack()
     script = pack.script("scene/changed", {"scene": scene_data(changed, pack, (2, 10))})

@@ -154,6 +154,13 @@ export class Plant {
     return this.scene.plant.contacts ? this.placed(objects.map(({ body }) => body)) : Float32Array.from(objects.flatMap(({ pose }) => pose));
   }
 
+  /** Returns position, quaternion w x y z and velocity of each free object; they exist only with contacts. */
+  free(): number[][] {
+    const { data: { qpos, qvel }, n } = this;
+    return Array.from({ length: (qvel.length - n) / 6 }, (_, k) =>
+      [...(qpos as Vector).subarray(n + 7 * k, n + 7 * k + 7), ...(qvel as Vector).subarray(n + 6 * k, n + 6 * k + 3)]);
+  }
+
   private placed(bodies: string[]): Float32Array {
     return Float32Array.from(bodies.flatMap((name) => {
       using body = this.data.body(name);

@@ -1,6 +1,6 @@
 /** One run with its references, controller, plant, script and settings, as in lessons/session/torque.py. */
 import type { MainModule } from "@mujoco/mujoco";
-import { ENABLED, FALLBACKS, GAINS, LIMITS, M_BAR, ORDER, Q, R, TARGET, type Manifest, type kernel } from "../../../himpc/export/files/himpc.mjs";
+import { ENABLED, FALLBACKS, GAINS, LIMITS, M_BAR, OBJECT, ORDER, Q, R, TARGET, type Manifest, type kernel } from "../../../himpc/export/files/himpc.mjs";
 import { each, limit, pieceOf, type Pack, type RobotData, type SceneData, type SceneEvent, type Scenes } from "./data";
 import { Plant } from "./plant";
 import { Rows } from "./rows";
@@ -77,6 +77,7 @@ export class Session {
     }
     const { plant, scene, rows, controller } = this;
     const q = plant.q, v = plant.v, [q_measured, v_measured] = plant.measure(), before = plant.tau;
+    if (this.manifest.objects.length) this.look();
     const [found, fallback] = controller.tick(q_measured, v_measured, before), tau = Float64Array.from(found);
     this.fallback = fallback;
     if (this.ticks++ % TRUTH_TICKS === 0) this.truth = plant.gauge(this.M_bar());
@@ -97,6 +98,14 @@ export class Session {
     put({ tau: plant.tau, contact_force: [plant.force] });
     const wild = v.some((each, a) => !(Math.abs(each) <= LOST_SPEED * limit(this.robot.v_limit[a])));
     this.lost ||= plant.broken || wild;
+  }
+
+  /** Tells the controller where the objects are that move, as lessons/session/observed.py does. */
+  private look(): void {
+    for (const [at, [x, y, z, w, , , k, ...velocity]] of this.plant.free().entries()) {
+      const { index, above } = this.scene.free[at];
+      this.controller.set(OBJECT, index, [x, y, z + above, 2 * Math.atan2(k, w), ...velocity]);
+    }
   }
 
   /** Returns the torque that acts: if the present one is late, an earlier one, as in lessons/session/deadline.py. */
@@ -198,8 +207,9 @@ export class Session {
     this.send();
     this.controller.reset(this.plant.tau);
     const now = this.controller, path = now.view("path"), target = now.view("target"), samples = now.view("samples");
-    for (const name of ["q_was", "v_was", "limits", "scalars", "state", "raw", "target", "weight"])
+    for (const name of ["q_was", "v_was", "limits", "scalars", "state", "raw", "target", "weight", "v_ramped"])
       now.view(name).set(old.view(name));
+    now.view("state").fill(0, 3);  // the guard begins anew
     const [was, q_was, v_was, before] = ["path", "q_was", "v_was", "samples"].map((name) => old.view(name));
     for (let j = 1; j <= horizon; j++) for (let a = 0; a < n; a++) {
       const step = N > 1 ? was[N * n + a] - was[(N - 1) * n + a] : this.scene.period * v_was[a];
