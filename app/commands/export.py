@@ -64,7 +64,7 @@ def export(
     from lessons.own.files import is_file
     from lessons.scenes.catalog import as_torque_scene
     from lessons.scenes.run_spec import RunSpec, tip_with_tool
-    from lessons.session.observed import objects_of
+    from lessons.session.distances import objects_of
     from lessons.session.torque import TorqueSession
     from robots.mechanics.model import saved
 
