@@ -46,7 +46,7 @@ from himpc.rotation import exp3, quaternion
 from lessons.events import MoveTarget
 from lessons.scenes.catalog import torque_scene
 from lessons.scenes.hold import hold
-from lessons.scenes.torque_scene import TorqueScene
+from lessons.scenes.scene import TorqueScene
 from lessons.session.session import LOST_SPEED
 from lessons.session.torque import TorqueSession
 from lessons.settings.assignments import with_assignments

@@ -27,7 +27,7 @@ import tyro
 from benchmarks.avoidance import jumps
 from lessons.scenes.names import SCENES
 from lessons.scenes.run_spec import RunSpec
-from lessons.scenes.torque_scene import TorqueScene
+from lessons.scenes.scene import TorqueScene
 from lessons.session.torque import TorqueSession
 
 HORIZONS, VELOCITY, TORQUE = (1, 5, 10, 20, 30), (1.0, 0.3, 0.2, 0.1), (1.0, 0.5)

@@ -23,7 +23,7 @@ from himpc.tasks import KINDS, Damping, Joints, Posture, Task
 from lessons.events import MoveTarget
 from lessons.scenes.catalog import prepared, torque_scene
 from lessons.scenes.names import SCENES
-from lessons.scenes.torque_scene import TorqueScene
+from lessons.scenes.scene import TorqueScene
 from lessons.session.torque import TorqueSession
 from lessons.settings.assignments import assignment
 from robots import CATALOG, Robot

@@ -10,8 +10,7 @@ from app.link.exercise import parts_of
 from app.panels.lesson.cards import GROUPS
 from browsing.browser_actions import BETWEEN, key, row, unfold
 from lessons.course import COURSE
-from lessons.teaching.challenge import Challenge
-from lessons.teaching.lesson import Lesson, Step
+from lessons.teaching.lesson import Challenge, Lesson, Step
 from lessons.teaching.prediction import Choice, Prediction, Sketch
 
 RUN = 120_000  # time limit of a scripted run on a busy machine, ms

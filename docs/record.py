@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 
 from app.worker.lecturer import thinned
 from lessons.course import COURSE, load_lesson
-from lessons.recording.recording import Recording
-from lessons.recording.run import run
+from lessons.recording.run import Recording, run
 from lessons.teaching.lesson import Lesson, Step
 
 ROOT = Path(__file__).parents[1]

@@ -8,8 +8,7 @@ if TYPE_CHECKING:
     from lessons.experiments.jobs import Job, perform_all
     from lessons.experiments.tune import chosen, tune
     from lessons.recording.arrays import arrays
-    from lessons.recording.recording import Recording
-    from lessons.recording.run import run
+    from lessons.recording.run import Recording, run
     from lessons.recording.summary import summary
     from lessons.runs.named import scene_named, with_tasks
     from lessons.scenes.catalog import load_scene, prepared, torque_scene

@@ -109,17 +109,8 @@ CATALOG: dict[str, CatalogEntry] = {
             title="Clearpath Ridgeback with a UR10, nine joints (HTMPC paper, section V)",
             tip="tool",
             home_deg=(0.0, 0.0, 0.0, 90.0, -45.0, 90.0, -45.0, 90.0, 75.06),  # project design notes
-            a_max=(
-                2.5,
-                2.5,
-                1.0,
-                2.16,
-                2.16,
-                3.15,
-                3.2,
-                3.2,
-                3.2,
-            ),  # project design notes; base m/s², m/s², rad/s²
+            # project design notes; base m/s², m/s², rad/s²
+            a_max=(2.5, 2.5, 1.0, 2.16, 2.16, 3.15, 3.2, 3.2, 3.2),
             M_bar=(130.0, 130.0, 7.9, 0.228, 0.66, 0.152, 0.0078, 0.0037, 0.0003),  # suggest_M_bar
             hollow=(("forearm", "wrist_2"),),
         ),

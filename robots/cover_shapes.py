@@ -10,14 +10,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from robots.collision import BALL, BOX, CAPSULE, FLOOR, Ball, Box, Floor, Surroundings, base_joint
-from robots.geometry.cover import Capsule, Cover
+from robots.collision import CAPSULE, Floor, Surroundings, WorldShape, base_joint, shape_arrays
+from robots.geometry import Capsule, Cover
 from robots.per_robot import per_robot
 from robots.robot import Robot
-from robots.world import Post
 
 Array = NDArray[np.float64]
-WorldShape = Ball | Box | Post | Floor
 
 _POSTURES = 24
 _STILL = 1e-3
@@ -48,8 +46,7 @@ def cover_surroundings(robot: Robot, cover: Cover, shapes: Sequence[WorldShape])
     for i, k in combinations(range(S), 2):
         pair = min(joint[i], joint[k]), max(joint[i], joint[k])
         meets[B + k, i] = pair[0] != pair[1] and pair not in left_out
-    tables = [_table(shape) for shape in shapes]
-    turn, middle = placements(shapes)
+    at = shape_arrays(shapes)
     return Surroundings(
         links=tuple(each.link for each in capsules),
         joint=joint,
@@ -57,12 +54,12 @@ def cover_surroundings(robot: Robot, cover: Cover, shapes: Sequence[WorldShape])
         span=span,
         radius=radius,
         names=(*(shape.name for shape in shapes), *(each.link for each in capsules)),
-        kind=np.array([*(kind for kind, *_ in tables), *[CAPSULE] * S], np.intp),
+        kind=np.array([*at.kind, *[CAPSULE] * S], np.intp),
         carrier=np.array([*[0] * B, *joint], np.intp),
-        turn=np.concatenate([turn, np.tile(np.eye(3), (S, 1, 1))]),
-        middle=np.concatenate([middle, start]),
-        half=np.array([*(half for *_, half, _ in tables), *span]).reshape(-1, 3),
-        thickness=np.array([*(thickness for *_, thickness in tables), *radius]),
+        turn=np.concatenate([at.turn, np.tile(np.eye(3), (S, 1, 1))]),
+        middle=np.concatenate([at.middle, start]),
+        half=np.concatenate([at.half, span]),
+        thickness=np.concatenate([at.thickness, radius]),
         meets=meets,
     )
 
@@ -70,25 +67,8 @@ def cover_surroundings(robot: Robot, cover: Cover, shapes: Sequence[WorldShape])
 def placements(shapes: Sequence[WorldShape]) -> tuple[Array, Array]:
     """Returns the rows of `Surroundings.turn` and `middle` for objects of the world, (B, 3, 3) and (B, 3)
     m."""
-    tables = [_table(shape) for shape in shapes]
-    turns = [pin.rpy.rpyToMatrix(0.0, 0.0, yaw) for _, yaw, *_ in tables]
-    middles = [middle for _, _, middle, *_ in tables]
-    return np.array(turns).reshape(-1, 3, 3), np.array(middles).reshape(-1, 3)
-
-
-def _table(shape: WorldShape) -> tuple[int, float, Array, Array, float]:
-    """Returns kind, yaw, middle, half and thickness, see `Surroundings`. For a post, they describe the
-    capsule that contains the post."""
-    none = np.zeros(3)
-    match shape:
-        case Floor(_, height):
-            return FLOOR, 0.0, np.array([0.0, 0.0, height]), none, 0.0
-        case Ball(_, centre, radius):
-            return BALL, 0.0, np.array(centre, float), np.full(3, radius), 0.0
-        case Box(_, centre, size, yaw):
-            return BOX, yaw, np.array(centre, float), 0.5 * np.array(size, float), 0.0
-        case Post(_, foot, height, radius):
-            return CAPSULE, 0.0, np.array(foot, float), np.array([0.0, 0.0, height]), radius
+    at = shape_arrays(shapes)
+    return at.turn, at.middle
 
 
 @per_robot

@@ -49,11 +49,13 @@ def joints_at_zero(model: pin.Model) -> list[pin.SE3]:
     return [(moved if k and nv == 0 else still).copy() for k, (still, moved, nv) in enumerate(placements)]
 
 
-def every_joint(model: pin.Model, q: Array) -> Array:
-    """Returns the motion of every joint, (J − 1,), from q = 0 at the coordinates q (n,); or, for velocities,
-    their velocities."""
+def coupling(model: pin.Model) -> Array:
+    """Returns G, (J − 1, n): G q is the motion of every joint from q = 0 at the coordinates q (n,), and G v
+    are their velocities."""
     column, factor = motions(model)
-    return factor[1:] * q[column[1:]]
+    G = np.zeros((model.njoints - 1, model.nv))
+    G[np.arange(len(G)), column[1:]] = factor[1:]
+    return G
 
 
 def followed(model: pin.Model, follower: str, leader: str, factor: float, offset: float) -> pin.Model:

@@ -49,14 +49,7 @@ class NominalSettings:
 
     def as_plant(self) -> PlantSettings:
         """Returns plant settings with the same values."""
-        return PlantSettings(
-            payload_kg=self.payload_kg,
-            damping=self.damping,
-            armature=self.armature,
-            mass_scale=self.mass_scale,
-            inertia_scale=self.inertia_scale,
-            gravity=self.gravity,
-        )
+        return PlantSettings(**vars(self))
 
 
 class NominalModel:

@@ -9,20 +9,24 @@ joint that is pushed past its limit continues to move.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from robots.errors import InputError
-from robots.joints import motions
+from robots.joints import coupling
 from robots.mechanics.contacts import Contact, Touch, contacts, touch_of
 from robots.mechanics.model import compiled
 from robots.robot import Robot
-from robots.runge_kutta import rk4
 from robots.settings import PlantSettings
 from robots.signals import Encoders, Motors, PlantState, as_vector
 from robots.truth import encoder_resolution
 from robots.world import World, check_world
+
+Array = NDArray[np.float64]
+
 
 _ZERO = (0.0, 0.0, 0.0)
 _BROKEN = 1e6  # rad/s or m/s
@@ -50,7 +54,7 @@ class Plant:
         # MuJoCo's joints of the robot come first; some of them may follow others: G (joints, n), or None.
         self._joints = robot.model.njoints - 1
         self._own = np.array(robot.joints) - 1 if self._joints > robot.n else slice(0, robot.n)
-        self._G = _coupling(robot) if self._joints > robot.n else None
+        self._G = coupling(robot.model) if self._joints > robot.n else None
         check_world(world)
         self.timestep = timestep
         self.world = world
@@ -312,9 +316,16 @@ class Plant:
         return self._model.site(f"frame{self.robot.frame_id(frame)}").id
 
 
-def _coupling(robot: Robot) -> np.ndarray:
-    """Returns G, (joints, n): q of every joint is G times the coordinates q (n,)."""
-    column, factor = motions(robot.model)
-    G = np.zeros((len(column) - 1, robot.n))
-    G[np.arange(len(G)), column[1:]] = factor[1:]
-    return G
+def rk4(q: Array, v: Array, h: float, acceleration: Callable[[Array, Array], Array]) -> tuple[Array, Array]:
+    """Returns (q, q̇) after a step of h (s) from q (n,) and v (n,). `acceleration` computes q̈ (n,) from q
+    and q̇.
+
+    Stages and weights are those of MuJoCo's RK4, for joints with one degree of freedom.
+    """
+    slopes = [np.array((v, acceleration(q, v)))]
+    for share in (0.5, 0.5, 1.0):
+        q_stage, v_stage = (q, v) + share * h * slopes[-1]
+        slopes.append(np.array((v_stage, acceleration(q_stage, v_stage))))
+    first, second, third, fourth = slopes
+    q_end, v_end = (q, v) + (h / 6.0) * (first + 2.0 * second + 2.0 * third + fourth)
+    return q_end, v_end

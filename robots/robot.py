@@ -11,9 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from robots.errors import InputError, unknown_name
-from robots.geometry.collision_model import CollisionModel
-from robots.geometry.cover import Cover
-from robots.geometry.shape import Shape
+from robots.geometry import CollisionModel, Cover, Shape
 from robots.joints import own_joints
 from robots.report import ImportReport
 

@@ -7,40 +7,14 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import Annotated
 
-from robots.collision import Ball, Box, Floor, Point
+from robots.collision import Ball, Box, Floor, Post, WorldShape
 from robots.errors import InputError
 from robots.ranges import Range, check_fields
-
-__all__ = [
-    "Ball",
-    "Box",
-    "Floor",
-    "Post",
-    "Thing",
-    "World",
-    "check_world",
-    "table",
-]
 
 MOST = 50
 """Largest number of objects of a world. Each object increases the computing time of every step of the
 plant."""
 _TABLE_TOP = 0.04  # m, thickness
-
-
-@dataclass(frozen=True)
-class Post:
-    """An upright cylinder: the middle of its lower end, its height and its radius, m."""
-
-    name: str
-    foot: Point
-    height: float
-    radius: float
-
-    def __post_init__(self) -> None:
-        sizes = (self.height, self.radius)
-        if not all(map(math.isfinite, (*self.foot, *sizes))) or min(sizes) <= 0.0:
-            raise InputError(f"post '{self.name}' needs finite coordinates and sizes above 0")
 
 
 @dataclass(frozen=True)
@@ -53,7 +27,7 @@ class Thing:
         friction: coefficient of sliding friction between the object and the robot.
     """
 
-    shape: Ball | Box | Post | Floor
+    shape: WorldShape
     mass_kg: Annotated[float | None, Range(1e-3, 1e3)] = None
     friction: Annotated[float, Range(0.0, 10.0)] = 0.5
 

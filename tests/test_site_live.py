@@ -34,7 +34,7 @@ from lessons.events import MoveLevel, MoveTarget, Push, Set
 from lessons.replay.state import State, decode, encode
 from lessons.scenes.catalog import as_torque_scene, load_scene
 from lessons.scenes.run_spec import RunSpec
-from lessons.scenes.torque_scene import TorqueScene
+from lessons.scenes.scene import TorqueScene
 from lessons.session.torque import TorqueSession
 from lessons.teaching.lesson import Lesson, Step
 

@@ -243,7 +243,6 @@ ROBOTS = {
     "lazy": (),
     "report": (),
     "signals": (),
-    "runge_kutta": (),
     "inertia": (),
     "catalog": (),
     "ranges": ("errors",),
@@ -257,22 +256,18 @@ ROBOTS = {
     "robot": ("geometry", "urdf", "joints", "report", "errors"),
     "per_robot": ("robot",),
     "reach": ("robot",),
-    "stretch": ("robot",),
     "truth": ("robot", "joints", "settings"),
     "nominal": ("truth", "robot", "inertia", "settings", "ranges"),
-    "spheres": ("robot",),
-    "collision": ("spheres", "robot", "errors"),
+    "collision": ("robot", "errors"),
     "world": ("collision", "ranges", "errors"),
-    "cover_shapes": ("world", "collision", "per_robot", "robot", "geometry"),
+    "cover_shapes": ("collision", "per_robot", "robot", "geometry"),
     "shapes": ("joints", "truth", "per_robot", "robot", "geometry", "meshes"),
     "mechanics": (
         *("joints", "world", "collision", "truth", "robot", "geometry", "inertia", "settings", "errors"),
     ),
     "floor": ("mechanics", "world", "collision", "robot"),
     "covering": ("mechanics", "shapes", "per_robot", "robot", "geometry"),
-    "plant": (
-        *("joints", "mechanics", "world", "truth", "robot", "settings", "signals", "runge_kutta", "errors"),
-    ),
+    "plant": (*("joints", "mechanics", "world", "truth", "robot", "settings", "signals", "errors"),),
     "servo": ("plant", "robot", "settings", "ranges", "signals"),
     "loading": (
         *(

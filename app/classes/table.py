@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 from app.classes.gathering import Gathering, Held
 from app.classes.member import Member
-from lessons.exercises.cells import cell
+from lessons.exercises.folder import cell
 from lessons.teaching.prediction import Choice
 
 LETTERS = "ABCDEFG"

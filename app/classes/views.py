@@ -11,7 +11,7 @@ from app.html.markdown import rendered_line
 from app.html.text import esc, figure
 from app.link.exercise import LessonPlace, parts_of
 from lessons.course import COURSE
-from lessons.teaching.challenge import Challenge
+from lessons.teaching.lesson import Challenge
 from lessons.teaching.poll import histogram
 from lessons.teaching.prediction import Choice, Sketch, Value
 from robots import InputError

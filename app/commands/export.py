@@ -14,7 +14,7 @@ from robots import InputError
 
 if TYPE_CHECKING:
     from himpc.export.folder import Recorded
-    from lessons.scenes.torque_scene import TorqueScene
+    from lessons.scenes.scene import TorqueScene
 
 
 def export(
@@ -64,9 +64,9 @@ def export(
     from lessons.own.files import is_file
     from lessons.scenes.catalog import as_torque_scene
     from lessons.scenes.run_spec import RunSpec, tip_with_tool
-    from lessons.session.observed import objects_of
+    from lessons.session.distances import objects_of
     from lessons.session.torque import TorqueSession
-    from robots.mechanics.saving import saved
+    from robots.mechanics.model import saved
 
     wanted = target_named(target)
     check_prefix(prefix)

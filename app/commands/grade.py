@@ -107,8 +107,8 @@ def _formatted(
 ) -> int:
     """Returns the grade of one file in the format of another system. Every submission gets a grade, also an
     invalid one."""
-    from lessons.exercises.formats import formatted
     from lessons.exercises.grade import grade_only
+    from lessons.exercises.result import formatted
 
     target = json or "results.json"
     if target != "-":

@@ -58,10 +58,9 @@ def run(
         json: write the result as JSON to this file, or to standard output for "-".
         npz: write one row per control tick to this file, with exactly this name.
     """
-    from lessons.recording.arrays import arrays
+    from lessons.recording.arrays import arrays, as_npz
     from lessons.recording.run import run
     from lessons.recording.summary import summary
-    from lessons.recording.table import as_npz
     from lessons.scenes.run_spec import tip_with_tool
 
     spec = _given(scene, urdf, tip_with_tool(tip, tool), hold, state)

@@ -89,7 +89,7 @@ def serve(
     from app.web.passes import given_token
     from app.web.server import FIRST, PageServer
     from app.web.serving import serve as serve_page
-    from lessons.own.folder import Folder
+    from lessons.own.files import Folder
     from lessons.replay.progress import read_key
     from lessons.scenes.run_spec import tip_with_tool
 

@@ -123,7 +123,7 @@ class SceneChoice:
         Raises:
             InputError: the file cannot be used; the message names the line.
         """
-        from lessons.own.judge import judged
+        from lessons.own.load import judged
         from lessons.settings.assignments import assignment
 
         if is_lesson(path):

@@ -13,8 +13,7 @@ from robots import InputError
 
 if TYPE_CHECKING:
     from lessons.scenes.run_spec import RunSpec
-    from lessons.teaching.challenge import Challenge, Result
-    from lessons.teaching.lesson import Lesson, Step
+    from lessons.teaching.lesson import Challenge, Lesson, Result, Step
     from lessons.teaching.measure import Signal
     from lessons.teaching.prediction import PredictionResult
 

@@ -40,7 +40,7 @@ from app.panels.widgets.snapshot import SessionSnapshot
 from app.view.coordinates import in_order
 from app.view.ghost import GhostView
 from app.view.robot import RobotView
-from lessons.own.folder import Folder
+from lessons.own.files import Folder
 from lessons.settings.settings import SceneSettings
 from lessons.settings.torque import TorqueSettings
 from lessons.settings.velocity import VelocitySettings

@@ -27,7 +27,7 @@ from app.page.comfort import Comfort
 from app.page.lesson_file import LessonFile
 from app.panels.widgets.command import add_command
 from lessons.course import COURSE, heading
-from lessons.own.folder import Folder
+from lessons.own.files import Folder
 
 if TYPE_CHECKING:
     from app.page.layout import Stage

@@ -37,7 +37,7 @@ from himpc.htmpc import base_joints
 from lessons.events import Appear, Set
 from lessons.settings.velocity import VelocitySettings
 from robots.collision import Ball, Box
-from robots.stretch import horizontal_reach
+from robots.reach import horizontal_reach
 
 _AHEAD, _RADIUS = 0.7, 0.2
 """Distance in front of the hand at which a new obstacle appears, and its radius, m."""

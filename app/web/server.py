@@ -25,7 +25,7 @@ from app.web.malloc_tuning import few_arenas, large_arrays_apart
 from app.web.passes import VARIABLE, Passes, new_key, new_token, shared
 from app.web.sessions import GRACE, Sessions
 from app.web.visit import FIRST_TEXT, Visit
-from lessons.own.folder import Folder
+from lessons.own.files import Folder
 from lessons.scenes.run_spec import RunSpec
 from robots import InputError
 

@@ -30,7 +30,7 @@ from app.web.guard import GuardedConnection
 from app.web.inlet import Inlet
 from app.web.limits import UPLOADS, Uploads
 from app.web.sessions import Sessions, tokens_of
-from lessons.own.folder import Folder
+from lessons.own.files import Folder
 from lessons.replay.progress import LearnerProgress, load_progress
 
 THREADS = 4

@@ -21,9 +21,7 @@ from lessons.scenes.scene import Scene
 from lessons.session.session import Session
 from lessons.session.start import begin
 from lessons.settings.settings import SceneSettings, settings_after
-from lessons.teaching.challenge import Challenge
-from lessons.teaching.control import within
-from lessons.teaching.lesson import Step
+from lessons.teaching.lesson import Challenge, Step, within
 from lessons.teaching.measure import Measure, Signal
 from lessons.teaching.prediction import Choice, PredictionResult, Sketch, Value
 from robots import InputError

@@ -18,9 +18,9 @@ from himpc.export.image import Image, image_of
 from himpc.tasks import FramePosition, Task
 from himpc.tasks.axes import OnAxes
 from lessons.events import Event, Push, as_data
-from lessons.scenes.torque_scene import TorqueScene
+from lessons.scenes.scene import TorqueScene
 from lessons.session.controllers import controller_of
-from lessons.session.observed import objects_of
+from lessons.session.distances import objects_of
 from lessons.session.torque import TorqueSession
 from lessons.settings.torque import TorqueSettings
 from robots import InputError, Robot

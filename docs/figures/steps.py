@@ -11,11 +11,9 @@ from docs.figures.pack import Pack
 from docs.figures.scene import refuse, scene_data
 from lessons.course import load_lesson
 from lessons.scenes.run_spec import RunSpec
-from lessons.scenes.scene import Scene
-from lessons.scenes.torque_scene import TorqueScene
+from lessons.scenes.scene import Scene, TorqueScene
 from lessons.settings.assignments import differences
-from lessons.teaching.claim import Claim
-from lessons.teaching.lesson import Lesson, Step
+from lessons.teaching.lesson import Claim, Lesson, Step
 from lessons.teaching.measure import UNITS, Measure, Signal
 from lessons.teaching.prediction import Choice, Prediction, Value
 from robots import InputError

@@ -6,7 +6,7 @@ import numpy as np
 
 from docs.further.kit import Further, Line, Question, measured
 from himpc.qp import solve_qp
-from lessons.settings.obstacle_missions import PerceptionOptions
+from lessons.settings.missions import PerceptionOptions
 
 DEPTH = -0.1 * measured("told-wrong", "The robot overlaps the crate by at least 30 cm.")
 IN_TIME = 0.1 * measured("told-wrong", "The robot overlaps the crate by at least 30 cm.", there=True)

@@ -16,8 +16,7 @@ from docs.pages.curves import figure
 from docs.record import FOLDER
 from lessons.course import COURSE, load_lesson
 from lessons.exercises import exercises_of
-from lessons.teaching.claim import Claim
-from lessons.teaching.lesson import Lesson, Step
+from lessons.teaching.lesson import Claim, Lesson, Step
 from lessons.teaching.prediction import Choice
 
 MEASURED = "docs/site/measured.json"

@@ -22,7 +22,7 @@ from examples.franka.simulated import Model, SimulatedArm, hurry, watch
 from himpc.export.image import Image, image_of
 from himpc.export.native import NativeController, build
 from lessons import load_scene, prepared
-from lessons.session.observed import objects_of
+from lessons.session.distances import objects_of
 from lessons.session.torque import TorqueSession
 from robots import InputError, Plant
 from robots.errors import unknown_name

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from itertools import accumulate
 from time import perf_counter_ns
 
@@ -11,20 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.htmpc.active_set import ActiveSetSolver
-from himpc.htmpc.avoidance import Avoidance, clearance
-from himpc.htmpc.clearance import CollisionModel
+from himpc.htmpc.clearance import Avoidance, CollisionModel, clearance
 from himpc.htmpc.continuing import braking, shifted
 from himpc.htmpc.cost import Effort
-from himpc.htmpc.evidence import evidence
+from himpc.htmpc.kernel.kinds import COLLISION, LEXICOGRAPHIC
 from himpc.htmpc.kinematics import Knots, desired_values
-from himpc.htmpc.plan import LevelEvidence, VelocityPlan
+from himpc.htmpc.plan import ActiveMotionRows, LevelEvidence, VelocityPlan
 from himpc.htmpc.prediction import Motion, Start, positions, underway, velocities
-from himpc.htmpc.problem import Problem, SharedStep
-from himpc.htmpc.rows import ConstraintTable, held, limit_rows
+from himpc.htmpc.problem import Iterate, Problem, SharedStep
+from himpc.htmpc.rows import ConstraintRows, ConstraintTable, held, limit_rows
 from himpc.htmpc.safety import commandable, permitted, plausible
 from himpc.htmpc.settings import HTMPCSettings, bounds, efforts
 from himpc.htmpc.sqp import Solved, solve_level
-from himpc.htmpc.tracking import Guard, check_dimensions, tracking
+from himpc.htmpc.tracking import Guard, Tracking, check_dimensions, tracking
 from himpc.kinematics.configuration import Configuration, joint_indices
 from himpc.references import Preview
 from himpc.stack import Stack
@@ -213,3 +212,54 @@ class HTMPC:
             clearance=min(ahead, clearance(here)),
             step_us=(perf_counter_ns() - started) / 1e3,
         )
+
+
+_ROUNDING = 1e-6
+"""A multiplier whose magnitude is smaller than this is a rounding error."""
+
+
+def evidence(
+    level: Tracking,
+    solved: Solved,
+    final: Iterate,
+    guards: Sequence[str],
+    named: Callable[[int], str] | None = None,
+) -> LevelEvidence:
+    """Builds the evidence of a level from the result of `solve_level`.
+
+    Args:
+        final: the inputs after all levels.
+        guards: the names of the rows of (12) or (11), in their order.
+        named: returns the names of a pair, see `CollisionModel.named`.
+    """
+    best = solved.at.errors(level)
+    return LevelEvidence(
+        name=level.name,
+        status=solved.status,
+        fallback=solved.fallback,
+        kkt_residual=solved.kkt_residual,
+        best=best,
+        final=final.errors(level),
+        cost=level.cost(best),
+        steps=solved.steps,
+        iterations=len(solved.steps),
+        unsolved=solved.unsolved,
+        time_us=solved.time_us,
+        active=_active_rows(solved.rows, solved.multipliers, guards, named),
+    )
+
+
+def _active_rows(
+    rows: ConstraintRows, multipliers: Array, guards: Sequence[str], named: Callable[[int], str] | None
+) -> ActiveMotionRows:
+    """Returns the active rows. The bounds of the slacks, whose multipliers are the last ones, are left
+    out."""
+    multipliers = multipliers[: len(rows.kind)]
+    some = np.flatnonzero(np.abs(multipliers) > _ROUNDING)
+    kind, part = rows.kind[some], rows.part[some]
+    of_guards = dict(zip(np.flatnonzero(rows.kind == LEXICOGRAPHIC).tolist(), guards, strict=True))
+    names = tuple(
+        named(pair) if is_pair and named else of_guards.get(row, "")
+        for row, is_pair, pair in zip(some.tolist(), (kind == COLLISION).tolist(), part.tolist(), strict=True)
+    )
+    return ActiveMotionRows(kind, rows.knot[some], part, multipliers[some], names)

@@ -10,8 +10,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from himpc.htmpc.active_set import ActiveSetSolver
-from himpc.htmpc.avoidance import PENALTY, Avoidance
-from himpc.htmpc.clearance import Clearances
+from himpc.htmpc.clearance import PENALTY, Avoidance, Clearances
 from himpc.htmpc.continuing import braking
 from himpc.htmpc.cost import Effort, barrier, barrier_value, gauss_newton
 from himpc.htmpc.kernel.kinds import LEXICOGRAPHIC

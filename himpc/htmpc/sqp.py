@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from himpc.htmpc.active_set import CONTRADICTION
-from himpc.htmpc.avoidance import PENALTY
+from himpc.htmpc.clearance import PENALTY
 from himpc.htmpc.problem import Iterate, Problem
 from himpc.htmpc.rows import ConstraintRows
 from himpc.qp import QPSolution, solve_qp

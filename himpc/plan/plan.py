@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sized
+from collections.abc import Callable, Iterable, Sequence, Sized
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple, Protocol
@@ -55,6 +55,24 @@ class SolvedLevel(Protocol):
     def time_us(self) -> float: ...
     @property
     def active(self) -> Sized: ...
+
+
+class TickPlan(Protocol):
+    """What plans share at torque level (`Plan`) and at velocity level (`himpc.htmpc.VelocityPlan`)."""
+
+    @property
+    def levels(self) -> Sequence[SolvedLevel]: ...
+    @property
+    def q(self) -> Array: ...
+    @property
+    def step_us(self) -> float: ...
+    @property
+    def unsolved(self) -> int: ...
+    @property
+    def leak(self) -> float | None: ...
+    @property
+    def notice(self) -> str | None: ...
+    def binding(self, joint_names: tuple[str, ...]) -> list[Binding]: ...
 
 
 class Evidence(NamedTuple):

@@ -7,7 +7,7 @@ from typing import NoReturn
 
 from lessons.course import load_lesson
 from lessons.own.files import Source, is_lesson, read
-from lessons.runs.check import check_duration
+from lessons.runs.named import check_duration
 from lessons.scenes.run_spec import RunSpec
 from lessons.teaching.lesson import Lesson
 from lessons.teaching.reader import assignments, read_lesson

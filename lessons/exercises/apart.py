@@ -15,10 +15,9 @@ import numpy as np
 
 from himpc.controllers.answers import OwnFault
 from himpc.controllers.view import View
-from lessons.exercises.copies import STARTING, Copy, Original
+from lessons.exercises.copies import LOOK, STARTING, Copy, Original, ProcessDeadline
 from lessons.exercises.inside import wire
 from lessons.exercises.inside.now import numbers_of, shape_of
-from lessons.exercises.watch import LOOK, ProcessDeadline
 from lessons.own.files import Source
 from lessons.session.controllers import LONGEST_TICK
 from robots import InputError

@@ -12,9 +12,7 @@ from lessons.exercises.mistakes import Law, Mistake
 from lessons.scenes.run_spec import RunSpec
 from lessons.settings.schema import settings_of
 from lessons.settings.torque import TorqueSettings
-from lessons.teaching.claim import Relation, condition, holds
-from lessons.teaching.control import Script
-from lessons.teaching.lesson import Card
+from lessons.teaching.lesson import Card, Relation, Script, condition, holds
 from lessons.teaching.measure import Measure
 
 TORQUE_UNIT = "N·m"
@@ -65,7 +63,7 @@ class Exercise:
 
     Attributes:
         name: its key in `lessons.exercises.EXERCISES`, or the name of a teacher's own exercise.
-        card: the docstring of its file.
+        card: title, question, duration and required knowledge.
         equation: the equation in LaTeX.
         plain: the equation as plain text, for a terminal.
         hints: hints for students, shown one by one.

@@ -20,11 +20,10 @@ from lessons.exercises.mistakes import Diagnosis, Law
 from lessons.exercises.own import check_order, exercise_of
 from lessons.exercises.result import CheckResult, Grade
 from lessons.own.files import SUFFIX, Source, is_file, read
-from lessons.recording.recording import Recording
-from lessons.recording.run import checked_duration, record
+from lessons.recording.run import Recording, checked_duration, record
 from lessons.scenes.catalog import as_torque_scene, prepared
 from lessons.scenes.run_spec import RunSpec
-from lessons.scenes.torque_scene import TorqueScene
+from lessons.scenes.scene import TorqueScene
 from lessons.session.torque import TorqueSession
 from lessons.settings.torque import TorqueSettings
 from robots import InputError, Robot

@@ -1,9 +1,11 @@
 """The control laws of the exercises, with an argument for each known mistake. The grader recognises mistakes
-by these laws.
+by these laws. The arguments are factors on terms, or switch terms off.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,6 +13,8 @@ from numpy.typing import NDArray
 
 from himpc.controllers.view import LevelView, View
 from himpc.qp import solve_qp
+from lessons.exercises.mistakes import Law
+from lessons.exercises.starts.distance_row import cascade
 from lessons.exercises.starts.two_levels import bounds
 
 Array = NDArray[Any]
@@ -29,6 +33,35 @@ def held(now: View) -> Array:
     return now.tau_0
 
 
+def joint_pd(now: View, *, gravity: float = 1.0, M_bar: bool = True, **how: Any) -> Array:
+    """Returns the torque of PD control with gravity compensation, for a level of joints."""
+    effort = wanted(now.levels[0], **how)
+    return gravity * now.gravity + (now.M_bar * effort if M_bar else effort)
+
+
+def _frozen_gravity() -> Law:
+    """Returns `joint_pd` with the gravity torques of its first tick."""
+    first: list[Any] = []
+
+    def law(now: View) -> Any:
+        first.append(now.gravity)
+        return joint_pd(now) - now.gravity + first[0]
+
+    return law
+
+
+def time_delay(now: View, *, tau: str = "τ₀", a: float = 1.0, M_bar: bool = True, **how: Any) -> Array:
+    """Returns the torque of time-delay estimation, for a level of joints."""
+    effort = wanted(now.levels[0], **how) - a * now.q_ddot
+    before = {"τ₀": now.tau_0, "g": now.gravity, "both": now.tau_0 + now.gravity, "none": 0.0}[tau]
+    return before + (now.M_bar * effort if M_bar else effort)
+
+
+def _late(now: View) -> Array:
+    """Returns the torque of `time_delay` with a difference of velocities that is not divided by T_s."""
+    return time_delay(now, a=now.T_s)
+
+
 def osf(
     now: View,
     *,
@@ -41,8 +74,7 @@ def osf(
     levels: int = 2,
     bias: bool = True,
 ) -> Array:
-    """Returns the torque of operational-space control. The arguments are factors on terms, or switch terms
-    off."""
+    """Returns the torque of operational-space control."""
     M_inv = np.linalg.inv(now.M)
     N, tau = np.eye(now.n), np.zeros(now.n)
     for level in now.levels[::order][:levels]:
@@ -74,8 +106,7 @@ def hierarchy(
     equality: str = "(33)",
     alone: bool = False,
 ) -> Array:
-    """Returns the torque of one or two levels of the QP (35), one knot. The arguments are factors on terms,
-    or switch terms off."""
+    """Returns the torque of one or two levels of the QP (35), one knot."""
     chosen = now.levels[::order][:levels]
     first: Array | None = None
     tau = now.tau_0
@@ -128,3 +159,63 @@ def _bounds(now: View, limits: str) -> tuple[Array, Array, Array]:
         high = ((room.v_upper - now.q_dot) - T * now.q_ddot) * scale
         lower, upper = np.r_[lower[:n], low], np.r_[upper[:n], high]
     return rows, lower, upper
+
+
+def _distance_rows(
+    now: View,
+    *,
+    D: float = 1.0,
+    gradient: float = 1.0,
+    M_bar: bool = True,
+    T_s: bool = True,
+    d_safe: float = 1.0,
+    v_stop: str = "viable",
+    speed: float = 1.0,
+    q_ddot: float = 1.0,
+    at_once: bool = False,
+    pairs: str = "all",
+) -> tuple[Array, Array]:
+    """Returns the rows D and their lower bounds, with which distances are kept."""
+    near, T = now.near, now.T_s
+    slopes = gradient * near.gradient
+    free = near.d - d_safe * near.d_safe
+    room = np.maximum(free, 0.0)
+    t, a = near.reaction, near.deceleration
+    stop = {
+        "viable": a * (np.sqrt(t**2 + 2.0 * room / a) - t),
+        "no reaction": np.sqrt(2.0 * a * room),
+        "upwards": -a * (np.sqrt(t**2 + 2.0 * room / a) - t),
+        "none": 0.0 * room,
+        "linear": room / t,
+        "signed": a * (np.sqrt(np.maximum(t**2 + 2.0 * free / a, 0.0)) - t),
+    }[v_stop]
+    share = 1.0 if at_once else min(1.0, now.bounds.approach * T or 1.0)
+    lower = share * (-stop - speed * slopes @ now.q_dot) - q_ddot * T * slopes @ now.q_ddot
+    rows = D * (T if T_s else 1.0) * (slopes / now.M_bar if M_bar else slopes)
+    chosen = {
+        "all": slice(None),
+        "nearest": slice(1),
+        "touching": near.d <= near.d_safe,
+        "none": slice(0),
+    }[pairs]
+    return rows[chosen], lower[chosen]
+
+
+def distance_row(now: View, **how: Any) -> Any:
+    """Returns the torques of all levels of the QP (35), one knot, below the rows that keep distances."""
+    return cascade(now, *_distance_rows(now, **how))
+
+
+LAWS: Mapping[str, Callable[..., Law]] = {
+    "joint-pd": partial(partial, joint_pd),
+    "null-space": partial(partial, osf),
+    "time-delay": partial(partial, time_delay),
+    "one-level-qp": partial(partial, hierarchy, levels=1),
+    "two-levels": partial(partial, hierarchy),
+    "distance-row": partial(partial, distance_row),
+    "held": partial(partial, held),
+    "frozen gravity": _frozen_gravity,
+    "late": partial(partial, _late),
+}
+"""Functions that return a law without memory of earlier runs: that of an exercise with some arguments, or a
+further mistake."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, final
 
 import numpy as np
@@ -67,8 +66,3 @@ def _alike(ours: Any, theirs: Any) -> bool:
         return bool(np.abs(here - there).max() <= CLOSE * (1.0 + np.abs(here).max()))
     except (TypeError, ValueError):
         return False
-
-
-def wrong(says: str, law: Callable[..., Any], **how: Any) -> Mistake:
-    """Returns a mistake: the control law `law` with the arguments `how`."""
-    return Mistake(says, lambda: partial(law, **how))

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lessons.parallel import FailedJob, on_cores, one_by_one
-from lessons.recording.recording import Recording
-from lessons.recording.run import run
+from lessons.recording.run import Recording, run
 from lessons.recording.summary import summary
 from lessons.scenes.run_spec import RunSpec
 

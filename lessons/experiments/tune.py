@@ -8,10 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lessons.recording.recording import Recording
-from lessons.recording.run import run
+from lessons.recording.run import Recording, run
 from lessons.recording.summary import summary
-from lessons.scenes.torque_scene import TorqueScene
+from lessons.scenes.scene import TorqueScene
 from robots import InputError
 
 MAX_STEPS = 60

@@ -1,24 +1,85 @@
 """Loads a user's file within limits: a deadline, no other processes, no signals. If the file replaces
-something in a library, the original is restored.
+something in a library, the original is restored. `judged` loads a file first in a separate process, where it
+can do no harm, and `CallDeadline` ends calls of its functions that take too long.
 """
 
 from __future__ import annotations
 
 import ctypes
 import math
+import os
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from functools import cache
-from types import ModuleType
-from typing import Any
+from functools import cache, lru_cache
+from types import FrameType, ModuleType
+from typing import Any, ParamSpec, TypeVar, final
 
-from lessons.own.deadline import TooLong, within
 from lessons.own.files import Source, execute
+from lessons.own.kinds import Kind, kind_of
 from robots import InputError
+from robots.processes.isolation import Allowance, Fault, isolated, waited
+
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
+
+
+class TooLong(BaseException):
+    """Is raised to end a call. It is a BaseException, which user code does not catch by mistake."""
+
+
+def within(seconds: float, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
+    """Returns function(…). Raises TooLong if the call takes longer than `seconds`."""
+    return CallDeadline(seconds).call(function, *args, **kwargs)
+
+
+@final
+class CallDeadline:
+    """Ends calls that take too long, in the main thread of a POSIX system. Computing and sleeping count;
+    waiting for a core on a busy machine does not. The waiting time is read only after the first alarm, since
+    reading it takes as long as a short call.
+    """
+
+    def __init__(self, seconds: float) -> None:
+        self._seconds = seconds
+        self._computed = 0.0
+        self._since: tuple[float, float] | None = None
+        self._heard = False
+
+    def call(self, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
+        """Returns function(…). Raises TooLong if the call takes too long."""
+        if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "setitimer"):
+            return function(*args, **kwargs)
+        self._begin()
+        before = signal.signal(signal.SIGALRM, self._hear)
+        signal.setitimer(signal.ITIMER_REAL, self._seconds)
+        try:
+            return function(*args, **kwargs)
+        finally:
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+            signal.signal(signal.SIGALRM, before)
+
+    def _begin(self) -> None:
+        """Starts the measurement of a call's time."""
+        self._computed = time.thread_time()
+        self._since = (time.monotonic(), waited(os.getpid())) if self._heard else None
+
+    def _hear(self, _: int, __: FrameType | None) -> None:
+        """Handles the alarm: raises TooLong, or sets the alarm again."""
+        if time.thread_time() - self._computed > 0.9 * self._seconds:
+            raise TooLong
+        now, starved = time.monotonic(), waited(os.getpid())
+        if self._since is None:
+            self._since, self._heard = (now, starved), True
+        own = now - self._since[0] - (starved - self._since[1])
+        if own > 0.98 * self._seconds:
+            raise TooLong
+        signal.setitimer(signal.ITIMER_REAL, self._seconds - own)
+
 
 LONGEST = 10.0
 """Time, s, that loading a file may take, without the time that it waits for a core."""
@@ -159,3 +220,21 @@ def _put_back(handlers: dict[int, Any]) -> None:
     for number, handler in handlers.items():
         if handler is not None and get(number) is not handler:
             signal.signal(number, handler)
+
+
+LOADING = Allowance(10.0, 2_000_000_000, "loading it", "ends the program", "leave that out")
+"""Limits for loading a file before it is known to be harmless."""
+
+
+@lru_cache(maxsize=64)
+def judged(source: Source) -> Kind:
+    """Returns the kind of a file. Raises InputError, with one sentence, if it cannot be loaded within the
+    limits."""
+    try:
+        return isolated(_kind, source, within=LOADING, copied=True)
+    except Fault as fault:
+        raise InputError(f"{source.path}: {fault}") from None
+
+
+def _kind(source: Source) -> Kind:
+    return kind_of(load(source, math.inf))

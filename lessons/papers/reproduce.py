@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ from lessons.papers.item import Item, PaperCheck, Row, Section, Table
 from lessons.papers.stored import from_memory, judged, store, stored
 from lessons.papers.words import number, tally
 from lessons.plots.draw import draw
+from lessons.plots.panels import Picture
 from robots import InputError
 
 
@@ -89,33 +90,34 @@ def _troubles(item: Item, quick: bool, results: Results) -> list[str]:
     return troubles
 
 
+PAGE = "disagreements.md"
+
+
 def write(reports: Sequence[Report], folder: Path, quick: bool) -> None:
     """Writes report.md, results.json and the pictures. Raises InputError if they cannot be written."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for report in reports:
-            for picture in report.section.pictures:
-                draw(picture, folder)
-        texts = {
-            "results.json": json.dumps(as_data(reports, quick), indent=1) + "\n",
-            "report.md": _markdown(reports, quick),
-            PAGE: _page(reports),
-        }
-        write_files({folder / name: text for name, text in texts.items()})
-    except OSError as error:
-        raise _unwritable(folder, error) from None
-
-
-PAGE = "disagreements.md"
+    texts = {
+        "results.json": json.dumps(as_data(reports, quick), indent=1) + "\n",
+        "report.md": _markdown(reports, quick),
+        PAGE: _page(reports),
+    }
+    _write(texts, [picture for report in reports for picture in report.section.pictures], folder)
 
 
 def write_page(reports: Sequence[Report], folder: Path) -> None:
     """Writes only disagreements.md. Raises InputError if it cannot be written."""
+    _write({PAGE: _page(reports)}, (), folder)
+
+
+def _write(texts: Mapping[str, str], pictures: Sequence[Picture], folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        write_files({folder / PAGE: _page(reports)})
+        for picture in pictures:
+            draw(picture, folder)
+        write_files({folder / name: text for name, text in texts.items()})
     except OSError as error:
-        raise _unwritable(folder, error) from None
+        raise InputError(
+            f"--out {folder}: cannot be written ({error.strerror}); give another folder"
+        ) from None
 
 
 def keep(reports: Sequence[Report], quick: bool) -> None:
@@ -126,10 +128,6 @@ def keep(reports: Sequence[Report], quick: bool) -> None:
         raise InputError(
             f"--store: cannot be written ({error.strerror}); install himpc-lab editable"
         ) from None
-
-
-def _unwritable(folder: Path, error: OSError) -> InputError:
-    return InputError(f"--out {folder}: cannot be written ({error.strerror}); give another folder")
 
 
 def _page(reports: Sequence[Report]) -> str:

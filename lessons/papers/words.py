@@ -1,17 +1,28 @@
-"""Sentences and rows that several items share."""
+"""Sentences, rows and printed values that several items share."""
 
 from __future__ import annotations
 
 import math
+import tomllib
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from lessons.experiments.jobs import JobResult
 from lessons.papers.item import Row, Verdict
-from lessons.papers.printed import printed
 from lessons.scenes.catalog import load_scene
+
+
+def printed(table: str) -> dict[str, Any]:
+    """Returns the values that a paper prints in a table, e.g. printed("himpc_table_2")."""
+    return read(table)
+
+
+def read(table: str) -> dict[str, Any]:
+    """Returns the content of a file of values."""
+    return tomllib.loads((Path(__file__).parent / "values" / f"{table}.toml").read_text(encoding="utf-8"))
 
 
 def number(value: float | None) -> str:

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import io
 import textwrap
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
 from lessons.outputs import write_files
 from lessons.plots.panels import Bars, Panel, Picture, PlotCurve
 from lessons.plots.style import BOUND, RC, REFERENCE, colour
-from lessons.plots.ticks import label_values
 
 WIDTH = 7.2
 """Width of a page between its margins, inches."""
@@ -210,3 +211,19 @@ def _legend(figure: Figure, grid: np.ndarray) -> None:
             ncols=min(len(legend), 4),
             markerscale=2,
         )
+
+
+_FEW = 8
+
+
+def label_values(axis: Axis, values: Sequence[float], log: bool) -> None:
+    """Sets ticks at the values if there are few of them, otherwise at round numbers. The labels are plain
+    numbers, without powers of ten."""
+    if 0 < len(values) <= _FEW:
+        axis.set_major_locator(FixedLocator(list(values)))
+    elif not log and all(float(value).is_integer() for value in values):
+        axis.set_major_locator(MaxNLocator(integer=True))
+    elif log:
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.3g}"))
+    axis.set_minor_locator(NullLocator())

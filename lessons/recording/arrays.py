@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
+import io
 import json
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from himpc.constants import RETURN_RATE
+from himpc.htmpc.settings import bounds
+from himpc.limits import POSITION_MARGIN, reaction
 from himpc.telemetry import Layout
 from lessons.events import Event, as_data
-from lessons.recording.constants import constants
 from lessons.settings.settings import SceneSettings
+from lessons.settings.torque import TorqueSettings
 from lessons.settings.values import finite
+from lessons.settings.velocity import VelocitySettings
 from robots import Robot
 
 if TYPE_CHECKING:
-    from lessons.recording.recording import Recording
+    from lessons.recording.run import Recording
 
 Array = NDArray[np.float64]
+
 
 _PER_JOINT = (
     *("q", "v", "q_measured", "v_measured", "tau_0", "tau", "tau_demand"),
@@ -82,3 +88,59 @@ def named(
         metadata["events"] = [{"t": t, **as_data(event)} for t, event in events]
     data["settings"] = np.array(json.dumps(finite(metadata)))
     return data
+
+
+def constants(robot: Robot, settings: SceneSettings) -> dict[str, Any]:
+    """a_max, (n,) rad/s² (m/s²), and the constants of the bound that stops a joint before its limit: margin
+    (rad), reaction (s) and return rate (1/s); NaN if this bound is not in force. It is never in force at
+    velocity level."""
+    a_max, *bound = _OF[type(settings)](robot, settings)
+    names = ("position_margin", "position_reaction", "position_return_rate")
+    return {"a_max": np.array(a_max), **dict(zip(names, map(np.array, bound), strict=True))}
+
+
+def _torque(robot: Robot, settings: TorqueSettings) -> tuple[Any, ...]:
+    if settings.limits.position != "viability":
+        return robot.a_max, np.nan, np.nan, np.nan
+    return robot.a_max, POSITION_MARGIN, reaction(settings.limits, settings.T_s), RETURN_RATE
+
+
+def _velocity(robot: Robot, settings: VelocitySettings) -> tuple[Any, ...]:
+    return bounds(robot, settings.htmpc.limits).a, np.nan, np.nan, np.nan
+
+
+_OF: Mapping[type[SceneSettings], Callable[[Robot, Any], tuple[Any, ...]]] = {
+    TorqueSettings: _torque,
+    VelocitySettings: _velocity,
+}
+
+
+def as_npz(data: dict[str, Any]) -> bytes:
+    """Arrays as the bytes of a compressed .npz file."""
+    memory = io.BytesIO()
+    np.savez_compressed(memory, **data)
+    return memory.getvalue()
+
+
+def as_csv(layout: Layout, rows: Array) -> bytes:
+    """Returns one line per row, one column per number. The heading is the field's name; if the field has
+    several numbers, the number's name follows in brackets. SI units; orientations are quaternions x y z w. An
+    empty cell stands for a number that is not defined."""
+    heads: list[str] = []
+    for name, where in layout.fields.items():
+        width = where.stop - where.start
+        heads += [name] if width == 1 else [f"{name}[{which}]" for which in _words(layout, name, width)]
+    lines = [",".join(heads)]
+    lines += [",".join("" if cell != cell else f"{cell:.9g}" for cell in row) for row in rows.tolist()]
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _words(layout: Layout, field: str, width: int) -> tuple[str, ...]:
+    """Returns names of a field's numbers."""
+    kind, _, name = field.partition("/")
+    if not name:
+        return layout.joints
+    task = next(task for task in layout.tasks if task.name == name)
+    if width == len(task.coordinates) and not (kind in ("x", "x_d") and width == 4):
+        return task.coordinates
+    return ("x", "y", "z", "w")[:width]

@@ -2,17 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from time import perf_counter
+from typing import Any, final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from himpc.telemetry import relaid
-from lessons.recording.recording import Recording
+from himpc.telemetry import Layout, relaid
 from lessons.scenes.scene import Scene
 from lessons.session.session import Session
 from lessons.session.start import begin
 from robots import InputError
+
+Array = NDArray[np.float64]
+
+
+@final
+class Recording:
+    """The rows of one run, one per control tick, and how long the run took in wall time."""
+
+    def __init__(self, session: Session, rows: Sequence[Array], wall_s: float) -> None:
+        # Attributes that only one kind of session has are used only by code for that kind.
+        self.session: Any = session
+        self.layout: Layout = session.layout
+        self.rows = np.array(rows).reshape(len(rows), session.layout.size)
+        self.wall_s = wall_s
+
+    def __getitem__(self, field: str) -> Array:
+        """Returns a field over time, (ticks, width)."""
+        return self.rows[:, self.layout.fields[field]]
+
+    @property
+    def duration(self) -> float:
+        """Simulated seconds."""
+        return len(self.rows) * self.session.settings.T_s
 
 
 def run(

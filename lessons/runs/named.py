@@ -1,27 +1,65 @@
-"""Finds scenes and tasks by name or by the path of a file."""
+"""Finds scenes and tasks by name or by the path of a file, and checks those of a file."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import lru_cache, partial
 from types import ModuleType
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
 from himpc.kinematics.configuration import Configuration
 from himpc.stack import Level
 from himpc.tasks import Task
+from lessons.events import Event
 from lessons.own.files import Source, is_file, read, sentence
-from lessons.own.judge import judged
 from lessons.own.kinds import expected, kind_of
-from lessons.own.load import alone, load
-from lessons.runs.check import check_scene
+from lessons.own.load import alone, judged, load
 from lessons.scenes.catalog import as_torque_scene, attached, load_scene
-from lessons.scenes.scene import Scene
-from lessons.scenes.torque_scene import TorqueScene
+from lessons.scenes.scene import Scene, TorqueScene
 from robots import InputError, Robot
+from robots.errors import shortened
+
+
+def check_scene(scene: Scene) -> None:
+    """Raises InputError if a scene cannot begin or has an impossible event. Exceptions of the scene's own
+    code are passed on."""
+    from lessons.session.start import begin  # only here: to find a scene by name must load no controller
+
+    check_duration(scene.duration)
+    for entry in scene.events:
+        if not (isinstance(entry, tuple) and len(entry) == 2 and isinstance(entry[1], get_args(Event))):
+            raise InputError(
+                f"an event is {shortened(repr(entry), 80)}: give (seconds, event of lessons.events), e.g. "
+                '(1.0, Push("link_3", force=(0.0, 5.0, 0.0)))'
+            )
+    make: Any = getattr(scene, "references", None)
+    if make is not None:
+        references = make(scene.robot, scene.settings.levels)
+        names = [task.name for level in scene.settings.levels for task in level.tasks]
+        if not isinstance(references, dict) or not references.keys() <= set(names):
+            raise InputError(
+                f"its references are {shortened(repr(references), 80)}: return a dict of references by task "
+                f"name; the tasks are {', '.join(names)}"
+            )
+    session = begin(scene)
+    for _, event in scene.events:
+        session.post(event)
+    session.drain()
+    session.tick()
+    if session.notices:
+        raise InputError(session.notices[0])
+
+
+def check_duration(seconds: Any) -> None:
+    """Raises InputError unless `seconds` is a finite number above 0."""
+    number = isinstance(seconds, (int, float)) and not isinstance(seconds, bool)
+    if not (number and math.isfinite(seconds) and seconds > 0):
+        raise InputError(f"duration is {shortened(repr(seconds), 40)}: give seconds, more than 0")
+
 
 TASK_SCENE = "iiwa14-hold"
 """The scene in which a user's task runs if no scene is named."""

@@ -10,16 +10,12 @@ from himpc.catalog import CONTROLLERS, VELOCITY_CONTROLLERS
 from himpc.tasks import Task
 from lessons.own.files import is_file
 from lessons.scenes.circle import iiwa14_circle, iiwa14_circle_paper
-from lessons.scenes.furnished import iiwa14_table, panda_post
 from lessons.scenes.hold import hold as hold_scene
-from lessons.scenes.hold import hold_of
+from lessons.scenes.hold import hold_of, iiwa14_table, panda_post, ridgeback_hold
 from lessons.scenes.missions import velocity_scene
-from lessons.scenes.mobile_hold import ridgeback_hold
 from lessons.scenes.names import ALL_SCENES, VELOCITY_SCENES
-from lessons.scenes.planar import planar3_circle, planar3_conflict, planar3_singular
-from lessons.scenes.plane import planar3_plane
-from lessons.scenes.scene import Scene
-from lessons.scenes.torque_scene import TorqueScene
+from lessons.scenes.planar import planar3_circle, planar3_conflict, planar3_plane, planar3_singular
+from lessons.scenes.scene import Scene, TorqueScene
 from lessons.scenes.two_arms import baxter_conflict, baxter_hold, baxter_tray
 from lessons.settings.assignments import with_assignments
 from lessons.settings.settings import SceneSettings

@@ -14,7 +14,7 @@ from himpc.limits import Limits
 from himpc.references import Circle, Hold, Phase, Reference, Sinusoid
 from himpc.stack import Level, Stack
 from himpc.tasks import FrameOrientation, FramePosition, Joints
-from lessons.scenes.torque_scene import TorqueScene
+from lessons.scenes.scene import TorqueScene
 from lessons.settings.torque import TorqueSettings
 from robots import Plant, PlantSettings, Robot, load_robot
 

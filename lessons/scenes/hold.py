@@ -1,4 +1,5 @@
-"""The scenes with dragged targets: EE position, EE orientation, posture, in this order of priority."""
+"""The scenes with dragged targets: EE position, EE orientation, posture, in this order of priority; the same
+among objects; and a mobile manipulator, whose base is driven by forces."""
 
 from __future__ import annotations
 
@@ -11,10 +12,11 @@ from himpc.limits import Limits
 from himpc.limits.avoidance import Avoidance
 from himpc.stack import Level, freedom_left
 from himpc.tasks import FrameOrientation, FramePosition, Posture
-from lessons.scenes.torque_scene import TorqueScene
+from lessons.scenes.scene import TorqueScene
 from lessons.settings.torque import TorqueSettings
 from robots import Plant, PlantSettings, Robot, load_robot, load_urdf_text, suggest_M_bar, tracking_bandwidth
 from robots.floor import standing_floor
+from robots.world import Ball, Post, Thing, World, table
 
 TOUCHING = PlantSettings(contacts=True, joint_stops=True)
 """The plant of scenes with dragged targets: objects and the ends of the joints' ranges stop the robot."""
@@ -115,3 +117,59 @@ def _free_axes(robot: Robot) -> tuple[str, str]:
 
     position = "".join(axis for axis in "xyz" if movable(FramePosition, axis)) or "xyz"
     return position, "".join(axis for axis in "xyz" if movable(FrameOrientation, axis))
+
+
+TABLE_HEIGHT = 0.2
+"""Height of the surface of the table, m."""
+_BALL_RADIUS = 0.05
+
+
+def iiwa14_table() -> TorqueScene:
+    """The iiwa in front of a table and beside a post; a ball of 0.3 kg lies on the table."""
+    ball = Ball("ball", (0.6, 0.3, TABLE_HEIGHT + _BALL_RADIUS), _BALL_RADIUS)
+    things = (
+        table("table", (0.7, 0.0), (0.6, 0.9), TABLE_HEIGHT),
+        Thing(Post("post", (0.3, -0.25, 0.0), 0.9, 0.04)),
+        Thing(ball, mass_kg=0.3),
+    )
+    return _with("iiwa14", "table", things)
+
+
+def panda_post() -> TorqueScene:
+    """The Panda beside a post."""
+    return _with("panda", "post", (Thing(Post("post", (0.3, -0.25, 0.0), 0.9, 0.04)),))
+
+
+def _with(robot: str, what: str, things: World) -> TorqueScene:
+    scene = hold_of(robot)
+    return replace(
+        scene,
+        name=f"{robot}-{what}",
+        title=f"{scene.title}; with a {what}",
+        world=(*scene.world, *things),
+    )
+
+
+def ridgeback_hold() -> TorqueScene:
+    """`ridgeback-ur10-hold`: EE position, then the position of the base; all other motion is damped.
+
+    The base's M̄ is half its mass, and the base has lower gains than the arm. R weighs accelerations. As
+    printed, R would weigh forces of the base in N and torques of the arm in N·m.
+    """
+    robot = load_robot("ridgeback-ur10")
+    levels = (
+        Level((FramePosition(name="ee", K_p=100.0, K_v=20.0),)),
+        Level((FramePosition(name="base", frame="base", axes="xy", K_p=16.0, K_v=8.0),)),
+    )
+    return TorqueScene(
+        name="ridgeback-ur10-hold",
+        title="Ridgeback and UR10 under HIMPC: drag the targets of hand and base; the hand comes first",
+        robot=robot,
+        settings=TorqueSettings(
+            stack=levels, M_bar=tuple(robot.M_bar), R_on="acceleration", limits=DRAGGED, plant=TOUCHING
+        ),
+        references=lambda robot, stack: {},
+        q_0=robot.home,
+        v_0=np.zeros(robot.n),
+        world=standing_floor(robot),
+    )

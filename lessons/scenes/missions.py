@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,107 +12,79 @@ from himpc.stack import Level
 from himpc.tasks import FrameOrientation, FramePosition
 from lessons.events import Event, MoveTarget, Release
 from lessons.scenes.names import VELOCITY_SCENES
-from lessons.scenes.velocity_scene import VelocityScene
+from lessons.scenes.scene import VelocityScene
 from lessons.settings.missions import (
+    BESIDE_THE_WAY,
+    CLUTTER,
+    ClutteredOptions,
     DeliveryOptions,
     MissionOptions,
+    PerceptionOptions,
     SquareOptions,
     Stay,
     WaypointOptions,
 )
-from lessons.settings.obstacle_missions import (
-    BESIDE_THE_WAY,
-    CLUTTER,
-    ClutteredOptions,
-    PerceptionOptions,
-)
 from lessons.settings.velocity import STAGE_WEIGHT, VelocitySettings
-from robots import Robot, load_robot
+from robots import load_robot
 from robots.collision import Obstacle
 
 DELIVERY_SPEEDS = (0.5, 0.5, 1.0, 0.5, 1.0, 1.0, 2.0, 2.0, 2.0)
 """Speed limits of a robot that works among people, m/s and rad/s."""
 
 
+class _Mission(NamedTuple):
+    """A mission of the mobile manipulator: its options, duration (s), obstacles and events, and whether the
+    robot works among people."""
+
+    options: MissionOptions
+    duration: float
+    obstacles: tuple[Obstacle, ...] = ()
+    among_people: bool = False
+    events: tuple[tuple[float, Event], ...] = ()
+
+
+_HANDOVER = (
+    (8.0, MoveTarget("base 2", (-1.2, -0.4))),
+    (8.0, MoveTarget("ee 2", (-1.9, -0.7, 0.8))),
+    (14.0, Release("ee 1")),
+    (17.5, MoveTarget("ee 2", (-1.9, -0.4, 1.0))),
+    (24.0, Release("ee 2")),
+)
+"""The hand holds every ball until it is taken, the first ball until 14 s. Meanwhile the second person moves,
+and later also moves the hand that receives the ball."""
+_MISSIONS = {
+    "ridgeback-ur10-drag": _Mission(Stay(), 8.0),
+    "ridgeback-ur10-square": _Mission(SquareOptions(), 16.0),
+    "ridgeback-ur10-waypoints": _Mission(WaypointOptions(), 60.0),
+    "ridgeback-ur10-delivery": _Mission(DeliveryOptions(), 400.0, among_people=True),
+    "ridgeback-ur10-handover": _Mission(
+        DeliveryOptions(seats=(1, 3), rounds=1, hold_s=None), 60.0, among_people=True, events=_HANDOVER
+    ),
+    "ridgeback-ur10-cluttered": _Mission(ClutteredOptions(), 30.0, CLUTTER),
+    "ridgeback-ur10-perception": _Mission(PerceptionOptions(), 16.0, BESIDE_THE_WAY),
+}
+_ARMS = {"iiwa14-htmpc": "iiwa14", "panda-htmpc": "panda"}
+
+
 def velocity_scene(name: str) -> VelocityScene:
     """Returns a scene of VELOCITY_SCENES."""
-    return _MAKERS[name]()
-
-
-def _ridgeback(
-    name: str, options: MissionOptions, duration: float, events: tuple[tuple[float, Event], ...] = ()
-) -> VelocityScene:
-    levels = (
-        Level((FramePosition(name="ee"),), Q=STAGE_WEIGHT["proximal"]),
-        Level((FramePosition(name="base", frame="base", axes="xy"),), Q=STAGE_WEIGHT["proximal"]),
-    )
-    return _scene(name, load_robot("ridgeback-ur10"), levels, options, duration, events)
-
-
-def _scene(
-    name: str,
-    robot: Robot,
-    levels: tuple[Level, ...],
-    options: MissionOptions,
-    duration: float,
-    events: tuple[tuple[float, Event], ...] = (),
-) -> VelocityScene:
+    if name in _ARMS:
+        robot, mission = load_robot(_ARMS[name]), _Mission(Stay(), 4.0)
+        tasks = FramePosition(name="position"), FrameOrientation(name="orientation")
+    else:
+        robot, mission = load_robot("ridgeback-ur10"), _MISSIONS[name]
+        tasks = FramePosition(name="ee"), FramePosition(name="base", frame="base", axes="xy")
+    if mission.among_people:
+        robot = replace(robot, v_limit=np.array(DELIVERY_SPEEDS))
+    levels = tuple(Level((task,), Q=STAGE_WEIGHT["proximal"]) for task in tasks)
     return VelocityScene(
         name=name,
         title=VELOCITY_SCENES[name],
         robot=robot,
-        settings=VelocitySettings(HTMPCSettings(levels), options=options),
+        settings=VelocitySettings(
+            HTMPCSettings(levels, obstacles=mission.obstacles), options=mission.options
+        ),
         q_0=robot.home,
-        duration=duration,
-        events=events,
+        duration=mission.duration,
+        events=mission.events,
     )
-
-
-def _among_people(scene: VelocityScene) -> VelocityScene:
-    return replace(scene, robot=replace(scene.robot, v_limit=np.array(DELIVERY_SPEEDS)))
-
-
-def _handover() -> VelocityScene:
-    """Returns the scene in which the hand holds every ball until it is taken, the first ball until 14 s.
-    Meanwhile the second person moves, and later also moves the hand that receives the ball."""
-    events = (
-        (8.0, MoveTarget("base 2", (-1.2, -0.4))),
-        (8.0, MoveTarget("ee 2", (-1.9, -0.7, 0.8))),
-        (14.0, Release("ee 1")),
-        (17.5, MoveTarget("ee 2", (-1.9, -0.4, 1.0))),
-        (24.0, Release("ee 2")),
-    )
-    options = DeliveryOptions(seats=(1, 3), rounds=1, hold_s=None)
-    return _among_people(_ridgeback("ridgeback-ur10-handover", options, 60.0, events))
-
-
-def _among(scene: VelocityScene, obstacles: tuple[Obstacle, ...]) -> VelocityScene:
-    htmpc = replace(scene.settings.htmpc, obstacles=obstacles)
-    return replace(scene, settings=replace(scene.settings, htmpc=htmpc))
-
-
-def _arm(robot: str) -> VelocityScene:
-    levels = (
-        Level((FramePosition(name="position"),), Q=STAGE_WEIGHT["proximal"]),
-        Level((FrameOrientation(name="orientation"),), Q=STAGE_WEIGHT["proximal"]),
-    )
-    return _scene(f"{robot}-htmpc", load_robot(robot), levels, Stay(), 4.0)
-
-
-_MAKERS: dict[str, Callable[[], VelocityScene]] = {
-    "ridgeback-ur10-drag": lambda: _ridgeback("ridgeback-ur10-drag", Stay(), 8.0),
-    "ridgeback-ur10-square": lambda: _ridgeback("ridgeback-ur10-square", SquareOptions(), 16.0),
-    "ridgeback-ur10-waypoints": lambda: _ridgeback("ridgeback-ur10-waypoints", WaypointOptions(), 60.0),
-    "ridgeback-ur10-delivery": lambda: _among_people(
-        _ridgeback("ridgeback-ur10-delivery", DeliveryOptions(), 400.0)
-    ),
-    "ridgeback-ur10-handover": _handover,
-    "ridgeback-ur10-cluttered": lambda: _among(
-        _ridgeback("ridgeback-ur10-cluttered", ClutteredOptions(), 30.0), CLUTTER
-    ),
-    "ridgeback-ur10-perception": lambda: _among(
-        _ridgeback("ridgeback-ur10-perception", PerceptionOptions(), 16.0), BESIDE_THE_WAY
-    ),
-    "iiwa14-htmpc": lambda: _arm("iiwa14"),
-    "panda-htmpc": lambda: _arm("panda"),
-}

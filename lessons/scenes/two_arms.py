@@ -14,7 +14,7 @@ from himpc.stack import Level
 from himpc.tasks import FrameOrientation, FramePosition, Posture, RelativeOrientation, RelativePosition
 from lessons.events import Event, MoveTarget
 from lessons.scenes.hold import DRAGGED, TOUCHING, gains
-from lessons.scenes.torque_scene import TorqueScene
+from lessons.scenes.scene import TorqueScene
 from lessons.settings.torque import TorqueSettings
 from robots import NominalSettings, Robot, load_robot
 from robots.floor import standing_floor

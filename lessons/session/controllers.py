@@ -1,21 +1,27 @@
-"""A controller by its name, or by the path of a user's file."""
+"""A controller by its name, or at torque level by the path of a user's file."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
 
 from himpc.controllers import Controller, make_controller
 from himpc.controllers.answers import OwnFault
 from himpc.controllers.own import OwnController
-from lessons.own.deadline import CallDeadline, TooLong
+from himpc.htmpc import HTIDKC, HTMPC, HTMPC_WPT, STMPC, HTMPCSettings, Placo, VelocityPlan
+from himpc.references import Preview
 from lessons.own.files import Source, is_file, read, sentence
-from lessons.own.judge import judged
 from lessons.own.kinds import law_of, line_of
-from lessons.own.load import alone, load
+from lessons.own.load import CallDeadline, TooLong, alone, judged, load
 from lessons.settings.torque import TorqueSettings
 from robots import Robot
+
+Array = NDArray[np.float64]
+
 
 LONGEST_TICK = 0.5
 """Time, s, that one call may compute or sleep; a control period is one or a few milliseconds."""
@@ -49,3 +55,36 @@ def _guarded(source: Source, watch: CallDeadline, function: Callable[..., Any], 
         raise OwnFault(f"{location}: one call takes longer than {LONGEST_TICK:g} s") from None
     except (Exception, SystemExit) as error:
         raise OwnFault(sentence(source.path, error)) from None
+
+
+class VelocityController(Protocol):
+    """The methods of a controller that a velocity-level session uses."""
+
+    @property
+    def settings(self) -> HTMPCSettings:
+        """The settings in use."""
+        ...
+
+    def configure(self, settings: HTMPCSettings) -> None:
+        """Applies new settings at once, without a jump. Raises InputError, without any change, if they do not
+        fit."""
+        ...
+
+    def step(self, q: Array, v: Array, previews: Mapping[str, Preview]) -> VelocityPlan:
+        """Computes one control period. It raises no exception, whatever the state, and all numbers of the
+        motion are finite."""
+        ...
+
+
+_MAKERS: dict[str, Callable[[Robot, HTMPCSettings], VelocityController]] = {
+    "htmpc": HTMPC,
+    "htmpc_wpt": HTMPC_WPT,
+    "stmpc": STMPC,
+    "htidkc": HTIDKC,
+    "placo": Placo,
+}
+
+
+def make_velocity_controller(name: str, robot: Robot, settings: HTMPCSettings) -> VelocityController:
+    """Returns a controller by its name. Raises InputError for settings that do not fit the robot."""
+    return _MAKERS[name](robot, settings)

@@ -6,13 +6,13 @@ import math
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable
-from typing import Any
+from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from himpc.kinematics.configuration import Configuration
-from himpc.plan import Binding
+from himpc.plan import Binding, TickPlan
 from himpc.telemetry import Layout
 from lessons.events import Event, Reset, Set
 from lessons.scenes.scene import Scene
@@ -20,12 +20,13 @@ from lessons.settings.settings import SceneSettings
 from robots import InputError, Plant, PlantState, Robot, VelocityPlant
 
 Array = NDArray[np.float64]
+AnyPlan = TypeVar("AnyPlan", bound=TickPlan)
 
 LOST_SPEED = 20.0
 """A joint whose speed is more than this many times its limit counts as divergence."""
 
 
-class Session(ABC):
+class Session(ABC, Generic[AnyPlan]):
     """One learner's run. `tick` advances one control period, `advance` the smallest possible step; events
     wait in the mailbox until a period begins.
 
@@ -43,8 +44,7 @@ class Session(ABC):
         log: (time, event) of every event that took effect.
     """
 
-    # Each kind of session has its own kind of plan.
-    plan: Any
+    plan: AnyPlan | None
 
     def __init__(self, scene: Scene, seed: int, plant: Plant | VelocityPlant) -> None:
         self.settings = scene.settings

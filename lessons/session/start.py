@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import overload
 
-from lessons.scenes.scene import Scene
-from lessons.scenes.torque_scene import TorqueScene
-from lessons.scenes.velocity_scene import VelocityScene
+from lessons.scenes.scene import Scene, TorqueScene, VelocityScene
 from lessons.session.session import Session
 from lessons.session.torque import TorqueSession
 from lessons.session.velocity import VelocitySession

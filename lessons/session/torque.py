@@ -4,28 +4,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import final
+from typing import NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from himpc.catalog import CONTROLLERS
+from himpc.catalog import CONTROLLERS, WITH_MODEL
 from himpc.controllers import Controller
 from himpc.kinematics.configuration import Configuration
 from himpc.plan import Plan, write_plan
 from himpc.references import Outlook, Preview, Reference, Target
+from himpc.references.observed import NOTHING
 from himpc.stack import Stack, about, ranks
 from himpc.tasks import FramePosition, Task
 from himpc.telemetry import layout_of
 from lessons.events import Event, MoveTarget, Push
-from lessons.scenes.torque_scene import TorqueScene
+from lessons.scenes.scene import TorqueScene
 from lessons.session.bumpless import Handover, settled
-from lessons.session.clearance import Clearance
-from lessons.session.controller_input import ControllerInput
+from lessons.session.commands import DelayedTorque
 from lessons.session.controllers import controller_of
-from lessons.session.deadline import DelayedTorque
-from lessons.session.leak import at_once, dynamic_leak
-from lessons.session.observed import observed
+from lessons.session.distances import Clearance, objects_of
+from lessons.session.rows import at_once, dynamic_leak
 from lessons.session.session import Session
 from lessons.session.targets import carried, kept, move_target, target_at
 from lessons.settings.settings import SceneSettings
@@ -40,16 +39,21 @@ Array = NDArray[np.float64]
 TRUTH_TICKS = 20
 """Ticks between two updates of the values that need the plant's M (gauge of M̄, true leak)."""
 
-
-_WITH_MODEL = ("osf", "osf_damped", "hqp")
-"""Controllers that use a model of the dynamics instead of time-delay estimation."""
 _SWINGS = 2.0
 """√K_p, divided by the largest bandwidth of a well-damped loop, above which a notice says that the robot may
 swing."""
 
 
+class ControllerInput(NamedTuple):
+    """The measured state, (n,) each, and the references' previews: all inputs of a controller at a tick."""
+
+    q: Array
+    v: Array
+    previews: Mapping[str, Preview]
+
+
 @final
-class TorqueSession(Session):
+class TorqueSession(Session[Plan]):
     """A run whose controller gives torques: every step is a control tick.
 
     Attributes:
@@ -60,7 +64,6 @@ class TorqueSession(Session):
     scene: TorqueScene
     settings: TorqueSettings
     plant: Plant
-    plan: Plan | None
 
     def __init__(
         self,
@@ -165,7 +168,7 @@ class TorqueSession(Session):
             self._arrange(layout)
         longer = settings.T_s > self.settings.T_s
         self.settings = settings
-        if longer and settings.controller in CONTROLLERS and settings.controller not in _WITH_MODEL:
+        if longer and settings.controller in CONTROLLERS and settings.controller not in WITH_MODEL:
             self._tell_lag()
 
     def _tell_lag(self) -> None:
@@ -197,7 +200,7 @@ class TorqueSession(Session):
             plant.push(None)
             self._push_until = math.inf
         state = plant.measure(T_s)
-        around = observed(plant, settings.limits.avoidance)
+        around = objects_of(plant) if settings.limits.avoidance.on else NOTHING
         ahead = Outlook(self.references, t, T_s, settings.horizon, around)
         self.controller = settled(self.controller)
         plan = self.controller.step(state.q, state.v, ahead, tau)

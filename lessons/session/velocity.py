@@ -15,12 +15,12 @@ from himpc.references import Reference, previews
 from himpc.stack import Level, Stack
 from himpc.telemetry import velocity_layout_of
 from lessons.events import Event, InsertTask, MoveLevel, MoveTarget, Release, RemoveTask
-from lessons.scenes.velocity_scene import VelocityScene
-from lessons.session.obstacle_distances import ObstacleDistances
-from lessons.session.servo_commands import Commands, command_step
+from lessons.scenes.scene import VelocityScene
+from lessons.session.commands import Commands, command_step
+from lessons.session.controllers import VelocityController, make_velocity_controller
+from lessons.session.distances import ObstacleDistances
+from lessons.session.rows import write_bounds, write_truth, write_velocity_plan
 from lessons.session.session import Session
-from lessons.session.velocity_controllers import VelocityController, make_velocity_controller
-from lessons.session.velocity_rows import write_bounds, write_plan, write_truth
 from lessons.settings.missions import OrderOptions
 from lessons.settings.settings import SceneSettings
 from lessons.settings.velocity import VelocitySettings
@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 
 
 @final
-class VelocitySession(Session):
+class VelocitySession(Session[VelocityPlan]):
     """A run whose controller gives velocities. A control period has one or more commands to the servos;
     `advance` sends one of them.
 
@@ -44,7 +44,6 @@ class VelocitySession(Session):
     scene: VelocityScene
     settings: VelocitySettings
     plant: VelocityPlant
-    plan: VelocityPlan | None
 
     def __init__(self, scene: VelocityScene, seed: int = 0) -> None:
         """Raises InputError if the scene's settings do not fit its robot."""
@@ -169,7 +168,7 @@ class VelocitySession(Session):
         row[fields["tau_0"]] = self._commanded
         l_0 = row[fields["place"]] = self.progress.l_0
         row[fields["left"]] = len(self.progress.mission) - l_0
-        write_plan(row, self.layout, plan, settings.lexicographic_delta)
+        write_velocity_plan(row, self.layout, plan, settings.lexicographic_delta)
         at = Configuration(self.robot, self._data, q, v)
         level_index = {level.name: index for index, level in enumerate(self._stack, start=1)}
         write_truth(row, self.layout, t, at, self.roles, level_index, references)

@@ -1,4 +1,4 @@
-"""The list of all settings for users, with their allowed and present values."""
+"""The list of all settings for users, with their allowed and present values, and of those often compared."""
 
 from __future__ import annotations
 
@@ -57,3 +57,9 @@ def _line(settings: SceneSettings, setting: Setting, path: str) -> SettingLine:
     now = assignment(setting.path, setting.read(settings)).partition("=")[2]
     shown = setting.shown
     return SettingLine(path, now, str(setting.form), shown.unit, shown.help or shown.label)
+
+
+def usual_settings(settings: SceneSettings) -> list[Setting]:
+    """Returns the settings of a scene that are often compared, except the controllers, in the order of the
+    page."""
+    return [setting for setting in settings.table().values() if setting.shown.tries and not setting.shorthand]

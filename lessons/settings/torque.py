@@ -14,11 +14,9 @@ from himpc.stack import Stack
 from himpc.tasks import Task
 from lessons.events import Event, MoveLevel
 from lessons.own.files import by_name, is_file, with_fingerprint
-from lessons.settings.levels import moved, ordered
 from lessons.settings.schema import Setting, Shape, setting_of_all_levels, settings_of_levels
 from lessons.settings.settings import SceneSettings
-from lessons.settings.stack import Own, read_stack, same_tasks, stack_as_data
-from lessons.settings.stack_changes import CHANGES, add
+from lessons.settings.stack import CHANGES, Own, add, moved, ordered, read_stack, same_tasks, stack_as_data
 from lessons.settings.values import WORD, Form
 from robots import InputError, PlantSettings, Robot
 from robots.errors import shortened, unknown_name
@@ -44,7 +42,7 @@ class TorqueSettings(ControllerSettings, SceneSettings):
     Attributes:
         M_bar: diagonal of M̄ before scaling, unlike that of the controller.
         deadline_ms: a torque that is ready later than this after the beginning of its tick acts one tick
-            later; see `lessons.session.deadline`. 0: lockstep, simulated time waits while the controller
+            later; see `lessons.session.commands`. 0: lockstep, simulated time waits while the controller
             computes.
         solve_ms_per_knot: assumed computing time for each of the N knots, so that runs are the same
             everywhere. 0: the measured computing time, and then no two runs are the same.

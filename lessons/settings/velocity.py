@@ -10,10 +10,10 @@ from himpc.catalog import VELOCITY_CONTROLLERS
 from himpc.htmpc import HTMPCSettings
 from himpc.stack import Stack
 from lessons.events import Appear, Event
-from lessons.settings.levels import ordered
 from lessons.settings.missions import MissionOptions, Stay
 from lessons.settings.schema import Setting, Shape, setting_of_all_levels, settings_of_levels, written
 from lessons.settings.settings import SceneSettings
+from lessons.settings.stack import ordered
 from lessons.settings.values import NUMBER, Form
 from robots import InputError, VelocityPlantSettings
 from robots.collision import Ball, Box, Floor, Obstacle

@@ -11,11 +11,8 @@ from lessons.parallel import FailedJob, Spread, on_cores
 from lessons.recording.run import run
 from lessons.scenes.run_spec import RunSpec
 from lessons.settings.assignments import parse_assignment
-from lessons.teaching.challenge import Challenge
-from lessons.teaching.claim import Claim
-from lessons.teaching.lesson import Lesson, Step
+from lessons.teaching.lesson import Challenge, Claim, Lesson, Note, Range, Step
 from lessons.teaching.measure import Measure
-from lessons.teaching.note import Note, Range
 from lessons.teaching.prediction import Choice, Prediction
 
 

@@ -19,12 +19,8 @@ from typing import Any, get_args
 
 from lessons import events
 from lessons.settings.assignments import parse_assignment
-from lessons.teaching.challenge import Challenge, Score
-from lessons.teaching.claim import Claim
-from lessons.teaching.control import Control
-from lessons.teaching.lesson import Card, Ghost, Lesson, Step
+from lessons.teaching.lesson import Card, Challenge, Claim, Control, Ghost, Lesson, Note, Score, Step
 from lessons.teaching.measure import Measure, Signal, Statistic
-from lessons.teaching.note import Note
 from lessons.teaching.prediction import Choice, Option, Prediction, Sketch, Value
 from robots import InputError
 from robots.errors import shortened, unknown_name
@@ -97,22 +93,8 @@ _FORMS: dict[str, tuple[str, str]] = {
 """The form of a value by its key (# is a number), and an example."""
 
 _TEXT_GROUPS = {
-    "name",
-    "unit",
-    "statistic",
-    "over_ghost",
-    "relation",
-    "words",
-    "path",
-    "choices",
-    "numbers",
-    "log",
-    "statement",
-    "on",
-    "ghost",
-    "set",
-    "effect",
-    "without",
+    *("name", "unit", "statistic", "over_ghost", "relation", "words", "path", "choices", "numbers", "log"),
+    *("statement", "on", "ghost", "set", "effect", "without"),
 }
 _MARK = re.compile(r"\[\^([\w-]+)\]")
 _NOTE = re.compile(r"(\[\^[\w-]+\]): +(.*)")
@@ -364,6 +346,18 @@ def _settings(text: str) -> tuple[str, ...]:
 def read_note(path: str, line: int, text: str) -> Note:
     """Returns a note that is beside a sentence of another text than a lesson. Raises InputError."""
     return _note(_Part(path, line, 1, "text", ""), _Part(path, line, 1, "note", text, "[^]"), "")
+
+
+def read_test(path: str, text: str) -> Claim:
+    """Returns a measure with its bound, as after `is:` in a lesson. Raises InputError."""
+    item = _Part(path, 1, 1, "is", text)
+    groups = item.groups()
+    return Claim("", _measure(item), groups["relation"], groups["bound"])
+
+
+def read_event(path: str, text: str) -> events.Event:
+    """Returns an event, as after `at 0.5 s:` in a lesson. Raises InputError."""
+    return _event(_Part(path, 1, 1, "at", text))
 
 
 def _step(part: _Part, notes: tuple[Note, ...]) -> Step:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from robots.geometry import directions
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -91,7 +92,7 @@ def _farthest(points: Array, swell: Array) -> NDArray[np.intp]:
     """Returns the indices of the balls that are farthest out in one of the directions."""
     most, found = np.full(_MANY, -np.inf), np.zeros(_MANY, np.intp)
     for first in range(0, len(points), _BLOCK):
-        heights = sphere(_MANY) @ points[first : first + _BLOCK].T + swell[first : first + _BLOCK]
+        heights = directions(_MANY) @ points[first : first + _BLOCK].T + swell[first : first + _BLOCK]
         place = heights.argmax(axis=1)
         height = heights[np.arange(_MANY), place]
         found = np.where(height > most, place + first, found)
@@ -99,21 +100,12 @@ def _farthest(points: Array, swell: Array) -> NDArray[np.intp]:
     return np.unique(found)
 
 
-@lru_cache(maxsize=4)
-def sphere(count: int) -> Array:
-    """Returns unit vectors (count, 3) that are evenly spread on a spiral."""
-    k = np.arange(count) + 0.5
-    z, turn = 1.0 - 2.0 * k / count, np.pi * (1.0 + np.sqrt(5.0)) * k
-    ring = np.sqrt(1.0 - z**2)
-    return np.column_stack([ring * np.cos(turn), ring * np.sin(turn), z])
-
-
 def _volume(length: Array, radius: Array) -> Array:
     return np.pi * radius**2 * (length + 4.0 / 3.0 * radius)
 
 
 def _quick(points: Array, swell: Array, groups: Mask) -> Fit:
-    heights = sphere(_FEW) @ points.T + swell
+    heights = directions(_FEW) @ points.T + swell
     far = np.where(groups[:, None, :], heights, -np.inf).argmax(axis=2)
     fits = _on_axes(points[far], swell[far], *_principal(points, groups))
     return fits.chosen((np.arange(len(groups)), fits.volume.argmin(axis=1)))

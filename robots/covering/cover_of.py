@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from robots.geometry.cover import Cover
+from robots.geometry import Cover
 from robots.robot import Robot
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from robots.geometry.collision_model import Solid
+from robots.geometry import Solid
 from robots.robot import Robot
 from robots.shapes.collision_shapes import FARTHEST, SHAPES_PER_LINK, primitive
 from robots.shapes.read import described_shapes, mesh_surfaces

@@ -10,8 +10,7 @@ import pinocchio as pin
 
 from robots.covering.covered import patches
 from robots.covering.covering import covering
-from robots.geometry.collision_model import CollisionModel, Excluded, Solid
-from robots.geometry.cover import Capsule, Cover
+from robots.geometry import Capsule, CollisionModel, Cover, Excluded, Solid
 from robots.mechanics.exclusions import Bodies, collision_model, touching, touching_often
 from robots.per_robot import per_robot
 from robots.robot import Robot

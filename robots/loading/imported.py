@@ -14,8 +14,7 @@ from robots.collision import base_joint
 from robots.covering.covers import made_cover, own_pairs
 from robots.errors import listed
 from robots.floor import no_floor, stands
-from robots.geometry.collision_model import CollisionModel
-from robots.geometry.cover import Cover
+from robots.geometry import CollisionModel, Cover
 from robots.loading.home import find_home
 from robots.mechanics.exclusions import collision_model, lowest
 from robots.report import Finding

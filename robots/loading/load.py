@@ -14,9 +14,7 @@ import numpy as np
 
 from robots.catalog import CATALOG, CatalogEntry
 from robots.errors import InputError, shortened, unknown_name
-from robots.geometry.collision_model import CollisionModel
-from robots.geometry.cover import Cover
-from robots.geometry.files import stored
+from robots.geometry import CollisionModel, Cover, stored
 from robots.joints import joint_names
 from robots.loading.archive import MAX_PACKED, description, unpack
 from robots.loading.imported import with_cover, with_geometry

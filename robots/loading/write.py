@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from robots.catalog import CATALOG, CatalogEntry
 from robots.covering.covers import made_cover
-from robots.geometry.collision_model import CollisionModel
-from robots.geometry.files import as_json
+from robots.geometry import CollisionModel, as_json
 from robots.loading.load import load_robot
 from robots.mechanics.exclusions import collision_model
 from robots.shapes.collision_shapes import collision_solids

@@ -11,9 +11,9 @@ import mujoco
 import numpy as np
 
 from robots.collision import base_joint
-from robots.geometry.collision_model import CollisionModel, Excluded, Solid, Why
+from robots.geometry import CollisionModel, Excluded, Solid, Why
 from robots.inertia import sample_configurations
-from robots.joints import every_joint, joint_axis
+from robots.joints import coupling, joint_axis
 from robots.mechanics.model import compiled
 from robots.robot import Robot
 from robots.settings import PlantSettings
@@ -94,8 +94,8 @@ def _touches(robot: Robot, postures: np.ndarray, margin: float = 0.0) -> Iterato
     model = compiled(robot, PlantSettings(contacts=True), margin=0.5 * margin)
     data = mujoco.MjData(model)
     joints = [solid.joint for solid in robot.collision.solids]
-    for q in postures:
-        data.qpos[:] = every_joint(robot.model, q)
+    for joint_positions in postures @ coupling(robot.model).T:
+        data.qpos[:] = joint_positions
         mujoco.mj_fwdPosition(model, data)
         pairs = (sorted(joints[geom] for geom in contact.geom) for contact in data.contact)
         yield {(a, b) for a, b in pairs}
@@ -106,7 +106,7 @@ def lowest(robot: Robot) -> tuple[float | None, float | None]:
     point of all other bodies. A height is None if there is no solid."""
     model = compiled(robot, PlantSettings(contacts=True))
     data = mujoco.MjData(model)
-    data.qpos[:] = every_joint(robot.model, robot.home)
+    data.qpos[:] = coupling(robot.model) @ robot.home
     mujoco.mj_fwdPosition(model, data)
     standing = base_joint(robot)
     found: dict[bool, list[float]] = {True: [], False: []}

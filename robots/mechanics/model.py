@@ -1,4 +1,4 @@
-"""MuJoCo's model of a robot and of the objects around it."""
+"""MuJoCo's model of a robot and of the objects around it, also as a file for MuJoCo's C library."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pinocchio as pin
 
 from robots.collision import base_joint
 from robots.errors import InputError
-from robots.geometry.collision_model import Excluded, Solid
+from robots.geometry import Excluded, Solid
 from robots.joints import joint_axis, joints_at_zero, motions, own_joints
 from robots.robot import Robot
 from robots.settings import PlantSettings
@@ -221,3 +221,18 @@ def label(robot: Robot, world: World, geom: int) -> str:
     """Returns the name of the link or object to which a geometry of the model belongs."""
     solids: tuple[Solid, ...] = robot.collision.solids
     return solids[geom].link if geom < len(solids) else world[geom - len(solids)].shape.name
+
+
+def saved(robot: Robot, settings: PlantSettings, world: World, timestep: float) -> bytes:
+    """Returns the content of an MJB file, for this version of MuJoCo.
+
+    Args:
+        robot, settings, world: as for `robots.Plant`. The file contains neither delay, lag and saturation of
+            the motors nor the encoders.
+        timestep: s.
+    """
+    model = compiled(robot, settings, world)
+    model.opt.timestep = timestep
+    content = np.empty(mujoco.mj_sizeModel(model), np.uint8)
+    mujoco.mj_saveModel(model, None, content)
+    return content.tobytes()

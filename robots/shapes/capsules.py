@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 import trimesh
 
-from robots.geometry.cover import Cover
+from robots.geometry import Cover
 from robots.joints import joint_axis
 from robots.shapes.limbs import BODY, DRUM, TIP, Colour, Limb, joint_radius, limbs
 

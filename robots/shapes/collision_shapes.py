@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 import pinocchio as pin
 
-from robots.geometry.collision_model import Point, Solid, SolidKind, Source
+from robots.geometry import Point, Solid, SolidKind, Source, directions
 from robots.robot import Robot
 from robots.shapes.limbs import limbs
 from robots.shapes.read import DescribedShape, described_shapes, mesh_surfaces
@@ -144,11 +144,7 @@ def _hull(shape: DescribedShape, source: Source, clouds: list[np.ndarray]) -> So
 
 def _directions() -> np.ndarray:
     """Returns unit vectors (_SPREAD, 3): along the axes, and on a spiral over the sphere."""
-    k = np.arange(_SPREAD - 6) + 0.5
-    z, turn = 1.0 - 2.0 * k / len(k), np.pi * (1.0 + np.sqrt(5.0)) * k
-    ring = np.sqrt(1.0 - z**2)
-    spiral = np.column_stack([ring * np.cos(turn), ring * np.sin(turn), z])
-    return np.concatenate([np.eye(3), -np.eye(3), spiral])
+    return np.concatenate([np.eye(3), -np.eye(3), directions(_SPREAD - 6)])
 
 
 def _capsules(robot: Robot, bare: set[int]) -> Iterator[Solid]:

@@ -10,7 +10,7 @@ from itertools import chain
 import numpy as np
 import trimesh
 
-from robots.geometry.shape import Shape
+from robots.geometry import Shape
 from robots.meshes.surfaces import Colour, Piece, joined, limited, split_creases
 from robots.robot import Robot
 from robots.shapes.capsules import body_capsules

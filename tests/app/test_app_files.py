@@ -13,7 +13,7 @@ from app.link.choice import SceneChoice
 from app.web.server import PageServer
 from browsing.wire import Wire, eventually
 from lessons.authoring.new import text_of
-from lessons.own.folder import Folder
+from lessons.own.files import Folder
 from lessons.replay.progress import read_handed_in
 from lessons.replay.state import State, decode, encode
 from lessons.scenes.run_spec import RunSpec

@@ -35,7 +35,7 @@ from app.web.passes import QUERY
 from app.web.server import PageServer
 from app.web.visit import Visit
 from browsing.wire import camera, let_in, pack
-from lessons.own.folder import Folder
+from lessons.own.files import Folder
 from lessons.scenes.run_spec import RunSpec
 
 PROTOCOL: Any = [f"viser-v{__version__}"]

@@ -23,8 +23,7 @@ from lessons.scenes.catalog import load_scene, prepared
 from lessons.scenes.run_spec import RunSpec
 from lessons.settings.assignments import parse_assignment
 from lessons.teaching.check import measured
-from lessons.teaching.control import chosen
-from lessons.teaching.lesson import Step
+from lessons.teaching.lesson import Step, chosen
 from robots import InputError
 
 

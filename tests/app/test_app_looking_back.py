@@ -24,9 +24,8 @@ from himpc.telemetry import Layout
 from lessons.events import Push
 from lessons.plots.draw import draw
 from lessons.plots.recorded import Recorded, run_picture
-from lessons.recording.arrays import arrays, named
+from lessons.recording.arrays import arrays, as_csv, as_npz, named
 from lessons.recording.run import run as headless_run
-from lessons.recording.table import as_csv, as_npz
 from lessons.scenes.catalog import load_scene
 from lessons.scenes.run_spec import RunSpec
 from robots import Plant, PlantSettings, load_robot

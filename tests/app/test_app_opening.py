@@ -17,7 +17,7 @@ from served import served
 from app.link.process import wait_until
 from app.web.address import seen_from_outside
 from app.web.serving import greeting, opened_in_a_browser
-from lessons.own.folder import Folder
+from lessons.own.files import Folder
 
 pytestmark = pytest.mark.usefixtures("one_fork_server")
 

@@ -21,7 +21,7 @@ from app.worker.simulation import SimulationRunner
 from browsing.wire import Wire, eventually
 from lessons.authoring.new import text_of
 from lessons.events import Set
-from lessons.own.judge import judged
+from lessons.own.load import judged
 from lessons.replay.script import script
 from lessons.replay.state import decode, encode, state_of
 from lessons.scenes.run_spec import RunSpec

@@ -23,7 +23,7 @@ from app.web.classroom import Classroom
 from app.web.guard import GuardedConnection
 from app.web.server import PageServer
 from browsing.wire import Wire, camera, eventually, let_in, pack
-from lessons.own.folder import Folder
+from lessons.own.files import Folder
 from lessons.scenes.run_spec import RunSpec
 from robots import CATALOG, InputError, load_robot
 from robots.errors import shortened

@@ -35,7 +35,7 @@ from app.web.passes import HEADER, QUERY
 from app.web.server import PageServer
 from browsing.tab import Storage, opened
 from browsing.wire import Wire, camera, eventually, pack
-from lessons.own.folder import Folder
+from lessons.own.files import Folder
 from lessons.scenes.run_spec import RunSpec
 
 PAGE = Path(__file__).parents[2] / "docs" / "serving.md"

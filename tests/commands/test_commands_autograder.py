@@ -27,8 +27,7 @@ import pytest
 from app.__main__ import main
 from app.commands.autograder import PACKAGES, requirements
 from lessons.exercises import start_of
-from lessons.exercises.formats import github, gradescope
-from lessons.exercises.result import CheckResult, Grade
+from lessons.exercises.result import CheckResult, Grade, github, gradescope
 
 ROOT = Path(__file__).parents[2]
 VISIBILITY = ["hidden", "after_due_date", "after_published", "visible"]

@@ -25,7 +25,7 @@ from himpc.tick.kernel import control_period
 from lessons.events import MoveTarget
 from lessons.scenes.catalog import as_torque_scene, torque_scene
 from lessons.scenes.run_spec import RunSpec
-from lessons.session.observed import objects_of
+from lessons.session.distances import objects_of
 from lessons.session.torque import TorqueSession
 from tests.commands.exported import controller_in, exported, needed, replayed, rows_of, told
 

@@ -9,7 +9,7 @@ import pytest
 
 from app.__main__ import main
 from lessons.authoring.new import text_of
-from lessons.own import judge
+from lessons.own import load
 
 SCENE, TASK, LESSON = (text_of(kind, None, "mine.py") for kind in ("scene", "task", "lesson"))
 
@@ -187,7 +187,7 @@ def test_a_wrong_file_is_a_sentence(
     name = "mine.md" if kind == "lesson" else "mine.py"
     Path(name).write_bytes(text if isinstance(text, bytes) else text.encode())
     # None of these files harms the process that loads it; the tests below have files that do.
-    monkeypatch.setattr(judge, "isolated", lambda function, source, **_: function(source))
+    monkeypatch.setattr(load, "isolated", lambda function, source, **_: function(source))
     assert main(LINES[kind]) == 2
     said, *shown = capsys.readouterr().err.strip().split("\n")
     assert words in said
@@ -213,7 +213,7 @@ def test_a_file_that_would_take_the_program_along_is_a_sentence(
 ) -> None:
     from dataclasses import replace
 
-    monkeypatch.setattr(judge, "LOADING", replace(judge.LOADING, seconds=4.0))
+    monkeypatch.setattr(load, "LOADING", replace(load.LOADING, seconds=4.0))
     Path("mine.py").write_text(text + f"# {kind}\n")
     assert main(LINES[kind]) == 2
     assert f"mine.py: loading it {words}" in capsys.readouterr().err

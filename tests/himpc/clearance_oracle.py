@@ -14,8 +14,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from robots import Robot
-from robots.collision import Ball, Floor, Obstacle
-from robots.spheres import covering_spheres
+from robots.collision import Ball, Floor, Obstacle, covering_spheres
 
 Array = NDArray[np.float64]
 

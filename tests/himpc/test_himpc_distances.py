@@ -28,7 +28,7 @@ from himpc.tick.distances import Distances
 from robots import Robot, load_robot
 from robots.collision import Ball, Box, Floor
 from robots.covering.cover_of import cover_of
-from robots.geometry.cover import Capsule
+from robots.geometry import Capsule
 from robots.world import Post
 
 Array = NDArray[np.float64]

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from himpc.htmpc.base import base_joints
-from himpc.htmpc.geometry import frame_at, placed
+from himpc.htmpc.kinematics import frame_at, placed
 from himpc.htmpc.safety import plausible
 from himpc.kinematics.configuration import Configuration, joint_indices
 from himpc.kinematics.geometry import geometry

@@ -11,10 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from himpc.htmpc.clearance import CollisionModel
-from himpc.htmpc.geometry import frame_at, geometry, placed
+from himpc.htmpc.kinematics import frame_at, geometry, placed
 from robots import CATALOG, Robot, load_robot
-from robots.collision import Ball, Box, Floor
-from robots.spheres import covering_spheres
+from robots.collision import Ball, Box, Floor, covering_spheres
 
 Array = np.ndarray
 

@@ -12,8 +12,7 @@ from htmpc_problems import FREE, at_home, mobile_settings, mobile_stack, point, 
 from himpc import FrameOrientation, FramePosition, Level
 from himpc.htmpc import HTMPC, G, MotionLimits, base_joints, bounds
 from himpc.htmpc.active_set import ActiveSetSolver
-from himpc.htmpc.avoidance import Avoidance
-from himpc.htmpc.clearance import CollisionModel
+from himpc.htmpc.clearance import Avoidance, CollisionModel
 from himpc.htmpc.continuing import braking, shifted
 from himpc.htmpc.cost import MU, ZETA, Effort, barrier, barrier_value
 from himpc.htmpc.kernel.kinds import KINDS, LEXICOGRAPHIC

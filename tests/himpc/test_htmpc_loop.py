@@ -21,8 +21,7 @@ from himpc.htmpc import (
 )
 from himpc.references import Hold, Reference, SquareWave
 from robots import InputError, Robot, VelocityPlant, VelocityPlantSettings, load_robot
-from robots.collision import Ball, Floor
-from robots.spheres import covering_spheres
+from robots.collision import Ball, Floor, covering_spheres
 
 Array = np.ndarray
 FAR = np.array([-0.6, -0.7])  # out of reach behind the robot

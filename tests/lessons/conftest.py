@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from lessons.scenes.catalog import torque_scene
-from lessons.scenes.torque_scene import TorqueScene
+from lessons.scenes.scene import TorqueScene
 from lessons.session.torque import TorqueSession
 
 if TYPE_CHECKING:

@@ -11,8 +11,7 @@ from evidence import Told, documents
 
 from lessons.course import COURSE, load_lesson
 from lessons.parallel import FailedJob, guarded
-from lessons.recording.recording import Recording
-from lessons.recording.run import record
+from lessons.recording.run import Recording, record
 from lessons.scenes.run_spec import RunSpec
 from lessons.session.start import begin
 from lessons.teaching.check import Outcome, Piece, Verdict, judge, judge_note, needed, perform

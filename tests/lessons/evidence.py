@@ -18,8 +18,7 @@ from docs.further import further
 from lessons.course import COURSE, lesson_file, load_lesson
 from lessons.exercises import EXERCISES, load_exercise, start_of
 from lessons.scenes.run_spec import RunSpec
-from lessons.teaching.lesson import Lesson, Step
-from lessons.teaching.note import Note
+from lessons.teaching.lesson import Lesson, Note, Step
 from lessons.teaching.reader import read_lesson, read_note
 
 ROOT = Path(__file__).parents[2]

@@ -22,10 +22,9 @@ import lessons.session.velocity
 from himpc.missions import MissionTask, Progress, advanced
 from lessons.course import load_lesson
 from lessons.events import Event
-from lessons.recording.recording import Recording
-from lessons.recording.run import run
+from lessons.recording.run import Recording, run
 from lessons.scenes.catalog import load_scene, prepared
-from lessons.scenes.velocity_scene import VelocityScene
+from lessons.scenes.scene import VelocityScene
 from lessons.session.velocity import VelocitySession
 from lessons.settings.missions import REST, Architecture, WaypointOptions
 from lessons.teaching.measure import Measure, Signal

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from lessons.events import MoveTarget
-from lessons.recording.recording import Recording
-from lessons.recording.run import run
+from lessons.recording.run import Recording, run
 from lessons.recording.summary import summary
 from lessons.scenes.names import SCENES
 from lessons.scenes.run_spec import RunSpec

@@ -13,7 +13,7 @@ from lessons.recording.run import run
 from lessons.recording.summary import summary
 from lessons.scenes.catalog import torque_scene
 from lessons.scenes.names import SCENES
-from lessons.scenes.torque_scene import TorqueScene
+from lessons.scenes.scene import TorqueScene
 from lessons.session.torque import TorqueSession
 from lessons.settings.assignments import with_assignments
 

@@ -11,7 +11,7 @@ from session_rows import field, rows_of
 from himpc import Joints, Level
 from lessons.events import MoveTarget, Set
 from lessons.scenes.catalog import torque_scene
-from lessons.scenes.torque_scene import TorqueScene
+from lessons.scenes.scene import TorqueScene
 from lessons.session.torque import TorqueSession
 
 

@@ -18,16 +18,11 @@ from lessons.course import COURSE, load_lesson
 from lessons.events import MoveTarget, Push, Set
 from lessons.parallel import one_by_one
 from lessons.scenes.run_spec import RunSpec
-from lessons.scenes.scene import Scene
-from lessons.scenes.torque_scene import TorqueScene
+from lessons.scenes.scene import Scene, TorqueScene
 from lessons.settings.assignments import parse_assignment
-from lessons.teaching.challenge import Challenge, Score
 from lessons.teaching.check import Verdict, check, measured
-from lessons.teaching.claim import Claim
-from lessons.teaching.control import Control
-from lessons.teaching.lesson import Card, Ghost, Lesson, Step, card_of
+from lessons.teaching.lesson import Card, Challenge, Claim, Control, Ghost, Lesson, Note, Score, Step, card_of
 from lessons.teaching.measure import DERIVED, Measure, Signal
-from lessons.teaching.note import Note
 from lessons.teaching.prediction import Choice, Option, Sketch, Value
 from robots import InputError
 

@@ -12,8 +12,8 @@ from session_rows import value
 from lessons.events import MoveTarget, Reset, Set
 from lessons.recording.run import run
 from lessons.scenes.catalog import torque_scene
-from lessons.scenes.torque_scene import TorqueScene
-from lessons.session.deadline import DelayedTorque
+from lessons.scenes.scene import TorqueScene
+from lessons.session.commands import DelayedTorque
 from lessons.session.torque import TorqueSession
 from lessons.settings.assignments import with_assignments
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from himpc.htmpc import base_joints
 from lessons.scenes.catalog import load_scene, prepared
-from lessons.scenes.velocity_scene import VelocityScene
+from lessons.scenes.scene import VelocityScene
 from lessons.session.velocity import VelocitySession
 
 SETTLED = 12

@@ -27,7 +27,7 @@ from lessons.events import MoveTarget
 from lessons.recording.run import run
 from lessons.scenes.catalog import torque_scene
 from lessons.scenes.run_spec import RunSpec
-from lessons.scenes.torque_scene import TorqueScene
+from lessons.scenes.scene import TorqueScene
 from robots import Plant, convergence_gauge, load_robot
 
 Array = NDArray[np.float64]

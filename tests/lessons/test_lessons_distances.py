@@ -18,7 +18,7 @@ from himpc.limits.distance import DISTANCE
 from lessons.events import MoveTarget
 from lessons.recording.run import run
 from lessons.scenes.catalog import torque_scene
-from lessons.scenes.torque_scene import TorqueScene
+from lessons.scenes.scene import TorqueScene
 from lessons.session.torque import TorqueSession
 from lessons.settings.assignments import with_assignments
 

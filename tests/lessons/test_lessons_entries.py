@@ -11,8 +11,7 @@ from docs.settings import FILE, text
 from lessons.scenes.catalog import load_scene
 from lessons.scenes.names import ALL_SCENES
 from lessons.settings.assignments import parse_assignment
-from lessons.settings.listing import lines
-from lessons.settings.presets import usual_settings
+from lessons.settings.listing import lines, usual_settings
 from lessons.settings.settings import SceneSettings
 from lessons.settings.values import NUMBER, WHOLE
 from robots import InputError

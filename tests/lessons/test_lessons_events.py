@@ -12,7 +12,7 @@ from session_rows import value
 
 from lessons.events import Event, MoveLevel, MoveTarget, Push, Reset, Set, as_data, from_data
 from lessons.scenes.catalog import torque_scene
-from lessons.scenes.torque_scene import TorqueScene
+from lessons.scenes.scene import TorqueScene
 from lessons.session.torque import TorqueSession
 from robots import InputError, NominalSettings
 

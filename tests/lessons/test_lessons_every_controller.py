@@ -10,8 +10,7 @@ import pytest
 
 from himpc import CONTROLLERS
 from himpc.catalog import VELOCITY_CONTROLLERS
-from lessons.recording.recording import Recording
-from lessons.recording.run import run
+from lessons.recording.run import Recording, run
 from lessons.scenes.catalog import torque_scene
 from lessons.scenes.names import SCENES
 from lessons.scenes.run_spec import RunSpec

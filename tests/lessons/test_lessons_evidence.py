@@ -36,9 +36,9 @@ from himpc.controllers import null_space_control
 from himpc.limits import Limits
 from lessons.course import COURSE, load_lesson
 from lessons.events import MoveTarget, Set
-from lessons.papers.printed import printed
 from lessons.papers.stored import stored
 from lessons.papers.topics import topics
+from lessons.papers.words import printed
 from lessons.recording.run import run
 from lessons.recording.summary import summary
 from lessons.scenes.catalog import torque_scene

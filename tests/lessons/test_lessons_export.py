@@ -16,8 +16,7 @@ from lessons.events import Appear, Event, InsertTask, MoveLevel, MoveTarget, Pus
 from lessons.replay.script import script
 from lessons.scenes.catalog import prepared
 from lessons.scenes.run_spec import RunSpec
-from lessons.scenes.torque_scene import TorqueScene
-from lessons.scenes.velocity_scene import VelocityScene
+from lessons.scenes.scene import TorqueScene, VelocityScene
 from lessons.session.torque import TorqueSession
 from lessons.session.velocity import VelocitySession
 

@@ -14,7 +14,7 @@ from lessons.recording.arrays import arrays
 from lessons.recording.run import run
 from lessons.scenes.catalog import torque_scene
 from lessons.scenes.names import SCENES
-from lessons.scenes.torque_scene import TorqueScene
+from lessons.scenes.scene import TorqueScene
 from lessons.session.torque import TorqueSession
 from lessons.settings.assignments import with_assignments
 from robots import InputError

@@ -7,7 +7,7 @@ import pytest
 
 from lessons.events import Event, MoveLevel, MoveTarget, Push, Reset, Set
 from lessons.scenes.catalog import torque_scene
-from lessons.scenes.torque_scene import TorqueScene
+from lessons.scenes.scene import TorqueScene
 from lessons.session.ghost import GhostDriver, ghost_scene, swapped
 from lessons.session.torque import TorqueSession
 from robots import InputError

@@ -9,7 +9,7 @@ from session_rows import field, rows_of
 from himpc.telemetry import AT_TORQUE
 from lessons.events import Event, MoveLevel, MoveTarget, Set
 from lessons.scenes.catalog import torque_scene
-from lessons.scenes.torque_scene import TorqueScene
+from lessons.scenes.scene import TorqueScene
 from lessons.session.torque import TorqueSession
 
 

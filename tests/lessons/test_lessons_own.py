@@ -167,22 +167,22 @@ def test_own_controller_that_is_wrong_is_one_sentence(what: str, tmp_path: Path)
 def test_own_call_may_wait_for_a_core_but_not_sleep(file, monkeypatch) -> None:
     """The deadline of a call counts the time in which the process sleeps, but not the time in which it waits
     for a core."""
-    from lessons.own import deadline
+    from lessons.own import load
 
     scene = load_scene("planar3-hold")
     law = file("import time\n\ndef torque(now):\n    time.sleep(0.7)\n    return now.bias\n")
     with pytest.raises(InputError, match=r"line 4: one call takes longer than 0\.5 s"):
         run(prepared(scene, law, ()), 0.01)
-    monkeypatch.setattr(deadline, "waited", lambda pid: time.monotonic())
+    monkeypatch.setattr(load, "waited", lambda pid: time.monotonic())
     assert run(prepared(scene, law, ()), 0.003)["tau"].shape == (3, 3)
 
 
 def test_own_endless_import_ends_at_the_deadline(file, monkeypatch) -> None:
     from dataclasses import replace
 
-    from lessons.own import judge
+    from lessons.own import load
 
-    monkeypatch.setattr(judge, "LOADING", replace(judge.LOADING, seconds=3.0))
+    monkeypatch.setattr(load, "LOADING", replace(load.LOADING, seconds=3.0))
     with pytest.raises(InputError, match="loading it takes longer than 3 s"):
         run(prepared(load_scene("planar3-hold"), file("while True:\n    pass\n"), ()), 0.05)
 

@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lessons.recording.recording import Recording
-from lessons.recording.run import run
+from lessons.recording.run import Recording, run
 from lessons.recording.summary import summary
 from lessons.scenes.catalog import torque_scene
 from lessons.session.torque import TorqueSession

@@ -15,15 +15,13 @@ import pytest
 
 from lessons.experiments.jobs import Job, JobResult, Results, Work, perform_all
 from lessons.papers import ITEMS
-from lessons.papers.himpc_paper.accuracy import model_errors
-from lessons.papers.himpc_paper.effort import EffortJob
-from lessons.papers.himpc_paper.planar import rt1, rt2, rt3
-from lessons.papers.himpc_paper.table_3 import CRITERIA, verdicts
-from lessons.papers.himpc_paper.table_8 import smoothness
-from lessons.papers.himpc_paper.value import decrease
+from lessons.papers.himpc_paper.ablations import EffortJob
+from lessons.papers.himpc_paper.iiwa import smoothness
+from lessons.papers.himpc_paper.planar import CRITERIA, rt1, rt2, rt3, verdicts
+from lessons.papers.himpc_paper.theory import decrease, model_errors
 from lessons.papers.item import Item, PaperCheck, Row, Section, Table, at_most
-from lessons.papers.printed import printed
 from lessons.papers.reproduce import Report, as_data, reproduce, write
+from lessons.papers.words import printed
 from lessons.plots.panels import Bars, Panel, Picture, PlotCurve
 from lessons.scenes.run_spec import RunSpec
 from lessons.scenes.scene import Scene

@@ -13,8 +13,7 @@ from typing import Any
 
 import pytest
 
-from lessons.papers import ITEMS
-from lessons.papers import printed as printed_values
+from lessons.papers import ITEMS, words
 from lessons.papers.disagreements import page
 from lessons.papers.himpc_paper.iiwa import rt4
 from lessons.papers.item import Item, PaperCheck, Row, Section, between
@@ -148,7 +147,7 @@ def with_values(patch: pytest.MonkeyPatch, name: str, data: Any, seen: list[str]
             seen.append(table)
         return data if table == name else tomllib.loads((VALUES / f"{table}.toml").read_text("utf-8"))
 
-    patch.setattr(printed_values, "read", read)
+    patch.setattr(words, "read", read)
 
 
 @pytest.mark.parametrize("name", sorted({name for name, _ in PRINTED}))

@@ -17,7 +17,7 @@ from lessons.recording.summary import summary
 from lessons.scenes.catalog import load_scene
 from lessons.scenes.run_spec import RunSpec
 from lessons.session.velocity import VelocitySession
-from lessons.settings.obstacle_missions import CRATE
+from lessons.settings.missions import CRATE
 from robots import InputError
 from robots.collision import Box
 

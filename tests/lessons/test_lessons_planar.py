@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from himpc.kinematics.configuration import Configuration
-from lessons.recording.recording import Recording
-from lessons.recording.run import run
+from lessons.recording.run import Recording, run
 from lessons.recording.summary import summary
 from lessons.scenes.catalog import torque_scene
 from lessons.scenes.planar import OMEGA, SingularOptions

@@ -14,7 +14,7 @@ from session_rows import field, rows_of
 
 from lessons.events import Event, MoveLevel, MoveTarget, Push, Set
 from lessons.scenes.catalog import torque_scene
-from lessons.scenes.torque_scene import TorqueScene
+from lessons.scenes.scene import TorqueScene
 from lessons.session.torque import TorqueSession
 
 Array = NDArray[np.float64]

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from lessons.events import Event, MoveTarget, Push
-from lessons.recording.recording import Recording
-from lessons.recording.run import run
+from lessons.recording.run import Recording, run
 from lessons.recording.summary import summary
 from lessons.scenes.catalog import torque_scene
 from lessons.settings.assignments import with_assignments

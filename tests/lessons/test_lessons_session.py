@@ -13,7 +13,7 @@ from lessons.events import MoveTarget, Push, Set
 from lessons.recording.run import run
 from lessons.recording.summary import summary
 from lessons.scenes.catalog import load_scene, prepared
-from lessons.scenes.torque_scene import TorqueScene
+from lessons.scenes.scene import TorqueScene
 from lessons.session.start import begin
 from lessons.session.torque import TorqueSession
 from lessons.settings.assignments import with_assignments
@@ -65,7 +65,7 @@ def test_a_row_contains_the_figures_of_every_level(name: str, controller: str) -
     session = begin(prepared(load_scene(name), controller, ()))
     for _ in range(3):
         row = session.tick()
-        assert session.plan.levels
+        assert session.plan is not None and session.plan.levels
         for level in session.plan.levels:
             fields = "cost", "kkt", "fallback", "time_us", "active"
             code = session.layout.fallbacks.index(level.fallback)

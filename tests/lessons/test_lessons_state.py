@@ -23,9 +23,7 @@ from lessons.recording.run import run
 from lessons.replay.state import MAX_CODE, State, decode, encode, state_of
 from lessons.scenes.catalog import load_scene, prepared
 from lessons.scenes.run_spec import RunSpec
-from lessons.scenes.scene import Scene
-from lessons.scenes.torque_scene import TorqueScene
-from lessons.scenes.velocity_scene import VelocityScene
+from lessons.scenes.scene import Scene, TorqueScene, VelocityScene
 from lessons.session.torque import TorqueSession
 from lessons.session.velocity import VelocitySession
 from lessons.settings.assignments import differences

@@ -26,7 +26,7 @@ from lessons.experiments.sweep import (
     metrics,
 )
 from lessons.parallel import FailedJob, cores, on_cores, one_by_one
-from lessons.plots.heat import draw_map
+from lessons.plots.heat import SweepMap, draw_map
 from lessons.scenes.run_spec import RunSpec
 from robots import InputError
 
@@ -273,7 +273,8 @@ def test_a_map_without_a_single_value_can_be_drawn(tmp_path: Path) -> None:
     nothing = np.full((2, 2), np.nan)
     lost = np.array([[True, True], [False, True]])
     path = tmp_path / "map.png"
-    draw_map(path, "t", "m", ("a", "b"), ((1, 2), (1, 2)), (False, True), nothing, lost, ~lost)
+    swept = SweepMap("t", "m", ("a", "b"), ((1, 2), (1, 2)), (False, True), nothing, lost, ~lost)
+    draw_map(path, swept)
     assert path.read_bytes().startswith(b"\x89PNG")
 
 

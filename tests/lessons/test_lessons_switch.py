@@ -11,7 +11,7 @@ from himpc.controllers.distance_filter import DistanceFilter
 from himpc.references.outlook import observed_by
 from lessons.events import MoveTarget, Reset, Set
 from lessons.scenes.catalog import torque_scene
-from lessons.scenes.torque_scene import TorqueScene
+from lessons.scenes.scene import TorqueScene
 from lessons.session.bumpless import HANDOVER_SECONDS, Handover
 from lessons.session.torque import TorqueSession
 

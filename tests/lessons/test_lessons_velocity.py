@@ -23,7 +23,7 @@ from lessons.events import (
 from lessons.recording.run import run
 from lessons.recording.summary import summary
 from lessons.scenes.catalog import load_scene, prepared
-from lessons.scenes.velocity_scene import VelocityScene
+from lessons.scenes.scene import VelocityScene
 from lessons.session.velocity import VelocitySession
 from lessons.settings.missions import random_peaks
 from robots import InputError

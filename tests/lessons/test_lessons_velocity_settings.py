@@ -26,10 +26,9 @@ from lessons.events import (
 from lessons.papers import ITEMS
 from lessons.papers.htmpc_paper.runs import square
 from lessons.papers.htmpc_paper.squares import collinear
-from lessons.papers.printed import printed
+from lessons.papers.words import printed
 from lessons.recording.arrays import arrays
-from lessons.recording.recording import Recording
-from lessons.recording.run import run
+from lessons.recording.run import Recording, run
 from lessons.scenes.catalog import load_scene, prepared
 from lessons.session.velocity import VelocitySession
 from lessons.settings.missions import random_peaks

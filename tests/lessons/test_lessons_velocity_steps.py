@@ -13,10 +13,10 @@ from himpc.telemetry import AT_ACCELERATION, AT_VELOCITY
 from lessons.events import Event, MoveLevel, MoveTarget, Reset, Set
 from lessons.scenes.catalog import as_torque_scene, load_scene, prepared
 from lessons.scenes.run_spec import RunSpec
-from lessons.scenes.velocity_scene import VelocityScene
+from lessons.scenes.scene import VelocityScene
 from lessons.session.velocity import VelocitySession
 from robots import InputError
-from robots.stretch import horizontal_reach
+from robots.reach import horizontal_reach
 
 OUT_OF_REACH = MoveTarget("base", (-1.5, 0.0))
 EVENTS: dict[int, Event] = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from lessons.scenes.catalog import load_scene, prepared
-from lessons.scenes.velocity_scene import VelocityScene
+from lessons.scenes.scene import VelocityScene
 
 HOME = np.array([1.48962656, 0.173941])
 """Position of the hand of the mobile manipulator at the start, in the horizontal plane, m."""

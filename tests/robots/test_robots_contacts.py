@@ -15,8 +15,7 @@ from scipy.spatial import ConvexHull
 
 from robots import CATALOG, Ball, Box, Floor, InputError, Plant, PlantSettings, Robot, load_robot
 from robots.floor import standing_floor
-from robots.geometry.collision_model import CollisionModel
-from robots.geometry.files import as_json, stored
+from robots.geometry import CollisionModel, as_json, stored
 from robots.loading.importing import import_robot
 from robots.loading.write import made
 from robots.mechanics.exclusions import touching

@@ -19,8 +19,7 @@ from robots import CATALOG, Robot, load_robot, load_urdf_text
 from robots.covering.cover_of import cover_of
 from robots.covering.covered import patches
 from robots.covering.covers import as_solid, made_cover
-from robots.geometry.cover import Cover
-from robots.geometry.files import as_json, stored
+from robots.geometry import Cover, as_json, stored
 from robots.mechanics.exclusions import touching
 from robots.shapes.link_shapes import link_shapes
 

@@ -21,7 +21,7 @@ from robots import InputError, PlantSettings, Robot
 from robots.covering import covers
 from robots.covering.covered import Patch
 from robots.covering.covering import covering
-from robots.geometry.cover import Capsule
+from robots.geometry import Capsule
 from robots.loading.importing import import_robot
 from robots.meshes.surfaces import read_meshes
 from robots.processes.isolation import DEADLINE

@@ -13,7 +13,7 @@ from app.link.poses import LinkPoses
 from himpc import FramePosition, Level
 from himpc.htmpc import HTMPCSettings, Placo
 from himpc.htmpc.clearance import CollisionModel
-from himpc.htmpc.geometry import frame_at, placed
+from himpc.htmpc.kinematics import frame_at, placed
 from himpc.kinematics.configuration import Configuration
 from himpc.kinematics.geometry import geometry
 from himpc.references import Hold

@@ -23,10 +23,7 @@ from lessons.events import (
     Reset,
     Set,
 )
-from lessons.teaching.challenge import Challenge
-from lessons.teaching.claim import Claim
-from lessons.teaching.control import Script
-from lessons.teaching.lesson import Step
+from lessons.teaching.lesson import Challenge, Claim, Script, Step
 from lessons.teaching.measure import Signal
 from lessons.teaching.prediction import Choice
 

@@ -20,8 +20,7 @@ from app.panels.widgets.command import add_command, on_click
 from app.panels.widgets.controls import add_control
 from app.panels.widgets.mirror import Bindings
 from lessons.settings.settings import SceneSettings
-from lessons.teaching.challenge import Challenge
-from lessons.teaching.lesson import Step
+from lessons.teaching.lesson import Challenge, Step
 
 _AGAIN, _MINE, _RESET = "Run again", "With my knobs", "Reset"
 _BACK, _SKIP, _ALL = "◀ Back", "Skip ▶", "All lessons"

@@ -14,7 +14,7 @@ from app.link.messages import Post
 from app.panels.context import PageContext
 from app.panels.widgets.snapshot import SessionSnapshot
 from lessons.session.ghost import swapped
-from lessons.settings.presets import usual_settings
+from lessons.settings.listing import usual_settings
 from lessons.settings.settings import SceneSettings
 from lessons.teaching.lesson import Ghost
 from robots import InputError

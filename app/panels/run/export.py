@@ -14,8 +14,7 @@ from app.client.simulation import Simulation
 from app.html.text import block
 from app.panels.context import PageContext
 from lessons.plots.recorded import Recorded, run_picture
-from lessons.recording.arrays import named
-from lessons.recording.table import as_csv, as_npz
+from lessons.recording.arrays import as_csv, as_npz, named
 
 _MINUTE, _WHOLE = "the last minute", "all since the last reset"
 

@@ -15,8 +15,7 @@ from app.link.threads import on_thread
 from app.panels.context import PageContext
 from app.panels.widgets.command import on_click
 from lessons.experiments.verdict import verdict
-from lessons.own.files import is_file, is_lesson
-from lessons.own.folder import Folder
+from lessons.own.files import Folder, is_file, is_lesson
 from lessons.scenes.names import ALL_SCENES
 from lessons.scenes.run_spec import RunSpec
 from robots import CATALOG, InputError

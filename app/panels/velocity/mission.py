@@ -14,8 +14,7 @@ from app.panels.widgets.command import on_click
 from app.panels.widgets.controls import Controls
 from app.panels.widgets.snapshot import SessionSnapshot
 from lessons.events import InsertTask, MoveLevel, Release, RemoveTask
-from lessons.settings.missions import ArchitectureOptions
-from lessons.settings.obstacle_missions import PerceptionOptions
+from lessons.settings.missions import ArchitectureOptions, PerceptionOptions
 from lessons.settings.velocity import VelocitySettings
 
 _EARLIER, _LATER, _REMOVE = "▲ Earlier", "▼ Later", "Remove"

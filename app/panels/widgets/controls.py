@@ -19,7 +19,7 @@ from lessons.events import Set
 from lessons.settings.schema import Setting
 from lessons.settings.settings import SceneSettings
 from lessons.settings.values import SWITCH, WHOLE, WORD
-from lessons.teaching.control import Control, chosen
+from lessons.teaching.lesson import Control, chosen
 from robots.ranges import Shown
 
 NONE: Mapping[str, str] = MappingProxyType({})

@@ -6,7 +6,7 @@ import threading
 
 from app.link.own_code import OwnCode
 from lessons.own.files import Stamp, is_file, read, stamp
-from lessons.own.judge import judged
+from lessons.own.load import judged
 from lessons.session.torque import TorqueSession
 from robots import InputError
 

@@ -2,36 +2,15 @@
 
 from lessons.papers.himpc_paper import (
     ablations,
-    accuracy,
     adaptation,
     evidence,
-    figures_circle,
-    figures_conflict,
     figures_iiwa,
+    figures_planar,
+    iiwa,
     limits,
-    table_2,
-    table_3,
-    table_5,
-    table_6,
-    table_7,
-    table_8,
-    value,
+    planar,
+    theory,
 )
 
-ITEMS = (
-    *table_2.ITEMS,
-    *table_3.ITEMS,
-    *table_5.ITEMS,
-    *table_6.ITEMS,
-    *table_7.ITEMS,
-    *table_8.ITEMS,
-    *figures_circle.ITEMS,
-    *figures_conflict.ITEMS,
-    *figures_iiwa.ITEMS,
-    *accuracy.ITEMS,
-    *value.ITEMS,
-    *ablations.ITEMS,
-    *limits.ITEMS,
-    *evidence.ITEMS,
-    *adaptation.ITEMS,
-)
+_PARTS = (planar, iiwa, figures_planar, figures_iiwa, theory, ablations, limits, evidence, adaptation)
+ITEMS = tuple(item for part in _PARTS for item in part.ITEMS)

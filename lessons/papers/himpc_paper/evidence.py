@@ -14,8 +14,7 @@ from lessons.papers.himpc_paper.iiwa import SOURCE as SECTION_VI
 from lessons.papers.himpc_paper.planar import ENCODER, RT1, level_1, roughness, rt1, rt2, rt3
 from lessons.papers.himpc_paper.planar import SOURCE as SECTION_V
 from lessons.papers.item import Item, Row, Section
-from lessons.papers.printed import printed
-from lessons.papers.words import number, trouble, unprinted
+from lessons.papers.words import number, printed, trouble, unprinted
 from lessons.plots.style import name
 from lessons.scenes.catalog import prepared, torque_scene
 from robots import Plant, convergence_gauge

@@ -9,13 +9,18 @@ import numpy as np
 from himpc.telemetry import AT_POSITION
 from lessons.experiments.jobs import Job, Results
 from lessons.papers.curves import banded, by_controller, curve, drawn, excerpt, spans
-from lessons.papers.himpc_paper.iiwa import SOURCE, rt4
-from lessons.papers.himpc_paper.table_6 import horizon_job, horizons
-from lessons.papers.himpc_paper.table_7 import step_seconds, timed
-from lessons.papers.himpc_paper.table_8 import resolution_job, smoothness
+from lessons.papers.himpc_paper.iiwa import (
+    SOURCE,
+    horizon_job,
+    horizons,
+    resolution_job,
+    rt4,
+    smoothness,
+    step_seconds,
+    timed,
+)
 from lessons.papers.item import Item, Section, Table
-from lessons.papers.printed import printed
-from lessons.papers.words import number, trouble
+from lessons.papers.words import number, printed, trouble
 from lessons.plots.panels import Bars, Panel, Picture
 
 DEG = 180 / np.pi

@@ -22,8 +22,7 @@ from lessons.papers.htmpc_paper.runs import (
     square,
 )
 from lessons.papers.item import Item, PaperCheck, Row, Section, Table, at_most, between
-from lessons.papers.printed import printed
-from lessons.papers.words import number, unprinted
+from lessons.papers.words import number, printed, unprinted
 from lessons.plots.panels import Panel, Picture, PlotCurve
 
 BASE_GAINS = (0.3, 0.6, 0.65, 0.7, 0.75)

@@ -5,8 +5,7 @@ from __future__ import annotations
 from lessons.experiments.jobs import Job, Results
 from lessons.papers.htmpc_paper.runs import SOURCE, example, hand_mm, normalised
 from lessons.papers.item import Item, PaperCheck, Row, Section, Table, between
-from lessons.papers.printed import printed
-from lessons.papers.words import number, trouble, unprinted
+from lessons.papers.words import number, printed, trouble, unprinted
 from lessons.plots.panels import Panel, Picture, PlotCurve
 
 EQUATIONS = {"cost": "(11)", "per_coordinate": "(12)"}

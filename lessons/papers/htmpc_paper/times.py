@@ -7,8 +7,7 @@ from dataclasses import replace
 from lessons.experiments.jobs import Job, Results
 from lessons.papers.htmpc_paper.runs import METHODS, SOURCE, example
 from lessons.papers.item import Item, Row, Section
-from lessons.papers.printed import printed
-from lessons.papers.words import trouble
+from lessons.papers.words import printed, trouble
 from lessons.scenes.run_spec import RunSpec
 
 _WHY = "another machine and another solver (the paper: CasADi and Gurobi)"

@@ -25,8 +25,7 @@ from lessons.authoring.new import text_of
 from lessons.course import COURSE, load_lesson
 from lessons.events import Set
 from lessons.settings.assignments import parse_assignment
-from lessons.teaching.challenge import Challenge
-from lessons.teaching.lesson import Lesson
+from lessons.teaching.lesson import Challenge, Lesson
 
 pytestmark = pytest.mark.usefixtures("one_fork_server")
 BEFORE, AFTER = 120, 180

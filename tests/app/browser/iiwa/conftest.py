@@ -13,7 +13,7 @@ from app.link.choice import SceneChoice
 from app.web.server import PageServer
 from browsing.browser_actions import eventually, open_page, tab
 from browsing.scene_switch import reset_all, show_scene
-from lessons.own.folder import Folder
+from lessons.own.files import Folder
 from lessons.scenes.run_spec import RunSpec
 
 CHOICE = SceneChoice(RunSpec("iiwa14-hold"))

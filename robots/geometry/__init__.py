@@ -1,1 +1,0 @@
-"""The geometry of a robot as data: the solids for contacts, and the capsules for distances."""
