@@ -18,6 +18,9 @@ CONTROLLERS: dict[str, str] = {
 }
 """Torque-level controllers: name and description."""
 
+WITH_MODEL = ("osf", "osf_damped", "hqp")
+"""Torque-level controllers that use a dynamic model in place of time-delay estimation."""
+
 VELOCITY_CONTROLLERS: dict[str, str] = {
     "htmpc": "hierarchical-task MPC: velocity level, lexicographic, previews its references",
     "htmpc_wpt": "HTMPC without preview: it receives a trajectory as separate waypoints",
