@@ -12,6 +12,7 @@ from lessons.runs.check import check_scene
 from lessons.scenes.catalog import torque_scene
 from lessons.scenes.names import SCENES
 from lessons.scenes.run_spec import RunSpec
+from lessons.session.start import begin
 from lessons.session.torque import TorqueSession
 from lessons.settings.period import USUAL, longest_period, swings
 from robots import InputError
@@ -26,9 +27,9 @@ def test_a_longer_period_is_refused_wherever_it_comes_from(name: str, longest: f
     which names the longest period."""
     scene = torque_scene(name)
     assert longest_period(scene.robot, scene.settings) == pytest.approx(1e-3 * longest)
-    TorqueSession(RunSpec(name, set=(f"T_s={1e-3 * longest:g}",)).prepared())
+    begin(RunSpec(name, set=(f"T_s={1e-3 * longest:g}",)).prepared())
     with pytest.raises(InputError, match=f"Choose at most {longest:.2g} ms") as refused:
-        TorqueSession(RunSpec(name, set=("T_s=0.02",)).prepared())
+        begin(RunSpec(name, set=("T_s=0.02",)).prepared())
     session = TorqueSession(scene)
     session.post(Set("T_s", 0.02))
     session.tick()
@@ -42,7 +43,7 @@ def test_a_change_that_makes_the_period_too_long_is_refused(change: Set) -> None
     """With half of M̄ at 2 ms, panda-post pressed on its post with 1.2 kN, at twice its speed limit. More
     inertia, and a controller without a model, have the same lag."""
     settings = ("T_s=0.002",) if change.path != "controller" else ("controller=osf", "T_s=0.004")
-    session = TorqueSession(RunSpec("panda-post", set=settings).prepared())
+    session = begin(RunSpec("panda-post", set=settings).prepared())
     session.post(change)
     session.tick()
     (told,) = session.notices
@@ -70,7 +71,7 @@ def test_gains_that_are_too_large_for_the_lag_are_told() -> None:
         ((stiff, "T_s=0.0002"), Set("T_s", 0.001), True),
         ((stiff, "T_s=0.0002"), Set("M_bar_scale", 0.2), True),
     ):
-        session = TorqueSession(RunSpec("iiwa14-hold", set=first).prepared())
+        session = begin(RunSpec("iiwa14-hold", set=first).prepared())
         session.post(then)
         session.tick()
         assert len(session.log) == 1 and len(session.notices) == int(told)
@@ -91,7 +92,7 @@ def test_codes_with_a_model_or_own_controllers_keep_their_period() -> None:
         scene.settings.changed("controller", "hqp"),
     ):
         assert longest_period(scene.robot, settings) == np.inf
-        TorqueSession(RunSpec("panda-hold", controller=settings.controller, set=("T_s=0.02",)).prepared())
+        begin(RunSpec("panda-hold", controller=settings.controller, set=("T_s=0.02",)).prepared())
 
 
 @pytest.mark.parametrize(
@@ -99,7 +100,7 @@ def test_codes_with_a_model_or_own_controllers_keep_their_period() -> None:
 )
 def test_an_arm_follows_with_the_longest_period(name: str, T_s: float, worst: float) -> None:
     """2 s after a drag of 140 mm and more the hand is at most 15 mm away; with 4 ms it was 50 mm away."""
-    session = TorqueSession(RunSpec(name, set=(f"T_s={T_s}",)).prepared())
+    session = begin(RunSpec(name, set=(f"T_s={T_s}",)).prepared())
     there = session.plant.frame_pose(session.robot.tip)[1] + [-0.08, 0.08, -0.08]
     session.post(MoveTarget("position", tuple(map(float, there))))
     while session.t < 2.5:
