@@ -100,7 +100,8 @@ def test_codes_with_a_model_or_own_controllers_keep_their_period() -> None:
 )
 def test_an_arm_follows_with_the_longest_period(name: str, T_s: float, worst: float) -> None:
     """2 s after a drag of 140 mm and more the hand is at most 15 mm away; with 4 ms it was 50 mm away."""
-    session = begin(RunSpec(name, set=(f"T_s={T_s}",)).prepared())
+    scene = torque_scene(name)
+    session = TorqueSession(replace(scene, settings=scene.settings.changed("T_s", T_s)))
     there = session.plant.frame_pose(session.robot.tip)[1] + [-0.08, 0.08, -0.08]
     session.post(MoveTarget("position", tuple(map(float, there))))
     while session.t < 2.5:
