@@ -85,7 +85,7 @@ class ArchitectureOptions(MissionOptions):
         "Architecture", "hierarchical: the robot carries out two tasks at a time. single_task: one task at a "
         "time, with the whole body. decoupled: one task at a time, with the base or the arm",
     )] = "hierarchical"
-    base_tolerance: Annotated[float, Range(0.0, above=True), Shown(
+    base_tolerance: Annotated[float, Range(0.0, 1e3, above=True), Shown(
         "Base is there within", "The task of the base is completed within this distance of its goal, for "
         "every architecture; takes effect at the next start. decoupled needs 0.05 m and a base at rest", "m",
         0.02, 1.0, 0.01, tries=("0.05", "0.25", "0.5"), name="base is there within, m")] = 0.8
@@ -161,9 +161,9 @@ class SquareOptions(OrderOptions):
     """
 
     # fmt: off
-    peak: Annotated[tuple[float, ...], Shown(
+    peak: Annotated[tuple[float, ...], Range(-1e3, 1e3), Shown(
         "Peak", "Goal of the base, x and y in the world frame", "m")] = (0.4, -1.75)
-    half_period: Annotated[float, Range(0.0, above=True), Shown(
+    half_period: Annotated[float, Range(0.0, 1e5, above=True), Shown(
         "Half period", "Duration of each of the two parts", "s", 1.0, 20.0, 0.5)] = 8.0
     # fmt: on
 
@@ -219,9 +219,9 @@ class WaypointOptions(ArchitectureOptions):
     """
 
     # fmt: off
-    height: Annotated[float, Shown(
+    height: Annotated[float, Range(-1e3, 1e3), Shown(
         "Height", "Height of the first waypoint of the hand", "m", 0.3, 1.5, 0.05)] = 0.8
-    hold_s: Annotated[float, Shown(
+    hold_s: Annotated[float, Range(0.0, 1e5), Shown(
         "Hold", "Time that the hand stays at each goal; null: until it is released", "s", 0.0, 5.0, 0.25,
     )] = 1.0
     # fmt: on
@@ -264,14 +264,14 @@ class DeliveryOptions(ArchitectureOptions):
     """
 
     # fmt: off
-    hold_s: Annotated[float | None, Shown(
+    hold_s: Annotated[float | None, Range(0.0, 1e5), Shown(
         "Hold", "Time that the hand stays at each goal; null: until it is released", "s", 0.0, 5.0, 0.25,
     )] = 1.0
     seats: Annotated[tuple[float, ...], Shown(
         "Seats", "Numbers of the people's seats, 0 to 5, in the order of the visits")] = (0, 2, 5)
     rounds: Annotated[int, Range(1, MAX_VISITS), Shown(
         "Rounds", "Number of visits to each person", low=1, high=10)] = 4
-    cruise: Annotated[float, Shown(
+    cruise: Annotated[float, Range(0.0, 100.0, above=True), Shown(
         "Cruise", "Speed along the planned paths of the base", "m/s", 0.1, 1.0, 0.05)] = CRUISE
     # fmt: on
 

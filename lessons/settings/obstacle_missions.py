@@ -28,7 +28,10 @@ CLUTTER: tuple[Obstacle, ...] = (
 class ClutteredOptions(MissionOptions):
     """The base is sent past obstacles; the EE goes first to a place beside the way."""
 
-    goal: Annotated[tuple[float, ...], Shown("Goal", "Goal of the base, x and y", "m")] = (4.0, 0.0)
+    goal: Annotated[tuple[float, ...], Range(-1e3, 1e3), Shown("Goal", "Goal of the base, x and y", "m")] = (
+        4.0,
+        0.0,
+    )
 
     def mission(self, home: Home) -> Mission:
         return (
@@ -58,7 +61,7 @@ class PerceptionOptions(OrderOptions):
     """
 
     # fmt: off
-    cruise: Annotated[float, Range(0.0, above=True), Shown(
+    cruise: Annotated[float, Range(0.0, 100.0, above=True), Shown(
         "Cruise", "Speed along the planned paths of the base", "m/s", 0.1, 1.0, 0.05)] = CRUISE
     false_report: Annotated[bool, Shown(
         "Reported wrongly", "Whether a wrong position of the crate is reported to the controller for a while",
@@ -66,9 +69,9 @@ class PerceptionOptions(OrderOptions):
     report_offset: Annotated[tuple[float, ...], Range(-10.0, 10.0), Shown(
         "Reported minus true position", "Position of the crate as it is reported, minus its true position, "
         "while the report is wrong", "m", -3.0, 3.0, 0.05)] = (0.0, -1.1, 0.0)
-    report_start: Annotated[float, Range(0.0), Shown(
+    report_start: Annotated[float, Range(0.0, 1e5), Shown(
         "Wrong from", "Time from which the report is wrong", "s", 0.0, 12.0, 0.5)] = 1.0
-    report_end: Annotated[float, Range(0.0), Shown(
+    report_end: Annotated[float, Range(0.0, 1e5), Shown(
         "Right again from", "Time from which the report is right again", "s", 0.0, 12.0, 0.5,
         tries=("5", "6", "7", "8", "9"), name="report right again from, s")] = 7.0
     # fmt: on
